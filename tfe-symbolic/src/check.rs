@@ -1,0 +1,510 @@
+//! Declarations: which names stand for what, which arguments are missing, doubled or at odds.
+//!
+//! One small function a rule. Nothing here looks inside formulas; that is the business of
+//! [`lower`](crate::lower).
+
+mod solver;
+
+use std::collections::BTreeMap;
+
+use crate::ast::{Array, Expr, ExprKind, Item, Name, Spanned};
+use crate::context::{Context, FieldKind, Length};
+use crate::declared::{Form, Solver};
+use crate::diagnostic::{Bag, Kind, Role, Span, nearest};
+use crate::function::Function;
+use crate::input::{Affine, IndexSymbol};
+pub use solver::{ELEMENTS, MAX_POINTS, RULES};
+
+/// The most coordinates of literal arrays: beyond it, tables of the engine get out of hand.
+pub const MAX_COORDINATES: usize = 10_000;
+
+/// The methods that the macro gives every model; outputs become methods beside them.
+const METHODS: &[&str] = &["state", "structure"];
+
+/// Functions that are no elementary functions, with their numbers of arguments.
+pub const SPECIAL_FUNCTIONS: &[(&str, usize)] = &[
+    ("dot", 1),
+    ("sum", 2),
+    ("select", 3),
+    ("inner", 2),
+    ("cross", 2),
+    ("norm", 1),
+    ("rotate", 2),
+    ("body_rate", 1),
+];
+
+/// Whether formulas can call `name`.
+pub fn is_function(name: &str) -> bool {
+    function_names().any(|function| function == name)
+}
+
+/// The names of all functions.
+pub fn function_names() -> impl Iterator<Item = &'static str> {
+    let special = SPECIAL_FUNCTIONS.iter().map(|(name, _)| *name);
+    special.chain(Function::ALL.into_iter().map(Function::name))
+}
+
+/// What a name in a formula stands for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Symbol {
+    /// The coordinate (array) of this number.
+    Coordinate(usize),
+    /// The momentum (array) of this number.
+    Momentum(usize),
+    /// The `let` of this number.
+    Let(usize),
+    /// The field of this number.
+    Field(usize),
+    /// A const parameter.
+    ConstParameter,
+}
+
+impl Symbol {
+    /// The role that messages speak of.
+    pub fn role(&self) -> Role {
+        match self {
+            Self::Coordinate(_) => Role::Coordinate,
+            Self::Momentum(_) => Role::Momentum,
+            Self::Let(_) => Role::Let,
+            Self::Field(_) => Role::Field,
+            Self::ConstParameter => Role::ConstParameter,
+        }
+    }
+}
+
+/// A coordinate or momentum (array) as declared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slots {
+    /// The name.
+    pub name: Name,
+    /// The flat index of its first element.
+    pub first: usize,
+    /// The length of an array.
+    pub length: Option<Affine>,
+}
+
+/// The arguments of the attribute, sorted and with their names known.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    /// What the names stand for.
+    pub symbols: BTreeMap<String, Symbol>,
+    /// The coordinates.
+    pub coordinates: Vec<Slots>,
+    /// The momenta.
+    pub momenta: Vec<Slots>,
+    /// How many coordinates there are.
+    pub dof: Affine,
+    /// The `let`s, in order.
+    pub lets: Vec<(Name, Expr)>,
+    /// L or H.
+    pub energy: Option<(Form, Expr)>,
+    /// Forces: target and value.
+    pub forces: Vec<(Expr, Expr)>,
+    /// The Rayleigh function.
+    pub dissipation: Option<Expr>,
+    /// The observables.
+    pub outputs: Vec<(Name, Expr)>,
+    /// The solvers.
+    pub solvers: Vec<Solver>,
+    /// Where `tfe` is.
+    pub crate_path: Option<String>,
+    /// Whether an argument is missing because of a mistake, so that "unused" would be a rash word.
+    pub incomplete: bool,
+    /// Whether such an argument may have declared names.
+    pub names_missing: bool,
+    /// Fields of a type that formulas cannot use.
+    other_fields: Vec<String>,
+    /// Where the solvers' elements stand.
+    solver_spans: Vec<Span>,
+}
+
+/// What the parser made of an attribute.
+#[derive(Clone, Debug, Default)]
+pub struct Arguments {
+    /// The arguments that it could read; the spans are those of their first words.
+    pub items: Vec<Spanned<Item>>,
+    /// The whole text, for mistakes that are omissions.
+    pub whole: Span,
+    /// Whether it could not read some.
+    pub incomplete: bool,
+    /// Whether those may have declared names.
+    pub names_missing: bool,
+}
+
+/// Sorts the arguments of the attribute and checks the declarations among them.
+pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
+    let Arguments {
+        items,
+        whole,
+        incomplete,
+        names_missing,
+    } = arguments;
+    let mut model = Model {
+        incomplete,
+        names_missing,
+        ..Model::default()
+    };
+    model.fields(context, bag);
+    let mut seen = Seen::default();
+    let mut momenta = Vec::new();
+    for Spanned { node: item, span } in items {
+        if let Some(argument) = once(&item)
+            && seen.again(argument)
+        {
+            bag.push(span, Kind::RepeatedArgument { argument });
+            continue;
+        }
+        match item {
+            Item::Coordinates(arrays) => {
+                if arrays.is_empty() {
+                    bag.push(span, Kind::NoCoordinates);
+                }
+                model.coordinates = slots(arrays, context, bag);
+            }
+            Item::Momenta(arrays) => {
+                model.momenta = slots(arrays, context, bag);
+                momenta.push(span);
+            }
+            Item::Let { name, value } => model.lets.push((name, value)),
+            Item::Lagrangian(value) => model.set_energy(Form::Lagrangian, value, span, bag),
+            Item::Hamiltonian(value) => model.set_energy(Form::Hamiltonian, value, span, bag),
+            Item::Dissipation(value) => model.dissipation = Some(value),
+            Item::Force { target, value } => model.forces.push((target, value)),
+            Item::Constraint { .. } => {
+                bag.push(span, Kind::Constraints);
+                model.incomplete = true;
+            }
+            Item::Output {
+                name,
+                range: None,
+                value,
+            } => model.outputs.push((name, value)),
+            Item::Output {
+                range: Some(range), ..
+            } => {
+                bag.push(range.variable.span.join(range.end.span), Kind::OutputFamily);
+                model.incomplete = true;
+            }
+            Item::Solver { name, element } => model.solver(&name, &element, context, bag),
+            Item::Crate(path) => model.crate_path = Some(path.node),
+        }
+    }
+    model.register(bag);
+    model.sizes(bag);
+    model.outputs(bag);
+    if incomplete {
+        // What seems to be missing may be what could not be read.
+        return model;
+    }
+    if !seen.0.contains(&"coordinates") {
+        bag.push(whole, Kind::NoCoordinates);
+    }
+    match (&model.energy, momenta.first()) {
+        (None, _) => bag.push(whole, Kind::NoEnergy),
+        (Some((Form::Hamiltonian, energy)), None) => bag.push(energy.span, Kind::NoMomenta),
+        (Some((Form::Lagrangian, _)), Some(span)) => {
+            bag.push(*span, Kind::MomentaWithLagrangian);
+        }
+        (Some((Form::Hamiltonian, _)), Some(span)) => model.momenta_match(*span, bag),
+        (Some((Form::Lagrangian, _)), None) => {}
+    }
+    model
+}
+
+/// The arguments that may stand once.
+fn once(item: &Item) -> Option<&'static str> {
+    match item {
+        Item::Coordinates(_) => Some("coordinates"),
+        Item::Momenta(_) => Some("momenta"),
+        Item::Lagrangian(_) => Some("lagrangian"),
+        Item::Hamiltonian(_) => Some("hamiltonian"),
+        Item::Dissipation(_) => Some("dissipation"),
+        Item::Crate(_) => Some("crate"),
+        _ => None,
+    }
+}
+
+#[derive(Default)]
+struct Seen(Vec<&'static str>);
+
+impl Seen {
+    fn again(&mut self, argument: &'static str) -> bool {
+        let again = self.0.contains(&argument);
+        self.0.push(argument);
+        again
+    }
+}
+
+/// Gives each array its place in the flat vector.
+fn slots(arrays: Vec<Array>, context: &Context, bag: &mut Bag) -> Vec<Slots> {
+    let mut first = 0usize;
+    let mut slots = Vec::new();
+    for Array { name, length } in arrays {
+        let length = length.map(|length| array_length(&name, &length, context, bag));
+        let size = match &length {
+            None => 1,
+            Some(length) => length
+                .as_constant()
+                .and_then(|n| usize::try_from(n).ok())
+                .unwrap_or(0),
+        };
+        if size > MAX_COORDINATES || first + size > MAX_COORDINATES {
+            bag.push(
+                name.span,
+                Kind::TooManyCoordinates {
+                    limit: MAX_COORDINATES,
+                },
+            );
+            // Small enough for all that follows, and of unknown length, hence without follow-ups.
+            slots.push(Slots {
+                length: Some(unknown_length(&name.node)),
+                name,
+                first,
+            });
+            continue;
+        }
+        slots.push(Slots {
+            name,
+            first,
+            length,
+        });
+        first += size;
+    }
+    slots
+}
+
+/// A length that nothing compares with, after a mistake in the true one.
+fn unknown_length(name: &str) -> Affine {
+    Affine::symbol(IndexSymbol::Field(format!("length of {name}")))
+}
+
+fn array_length(name: &Name, length: &Expr, context: &Context, bag: &mut Bag) -> Affine {
+    match &length.node {
+        ExprKind::Number(text) => match text.replace('_', "").parse::<i64>() {
+            Ok(0) => {
+                bag.push(
+                    length.span,
+                    Kind::ZeroLength {
+                        name: name.node.clone(),
+                        field: false,
+                    },
+                );
+            }
+            Ok(size) => return Affine::constant(size),
+            Err(_)
+                if text
+                    .bytes()
+                    .all(|byte| byte.is_ascii_digit() || byte == b'_') =>
+            {
+                bag.push(
+                    length.span,
+                    Kind::NumberTooLarge {
+                        number: text.clone(),
+                    },
+                );
+            }
+            Err(_) => bag.push(length.span, Kind::LengthNotSimple),
+        },
+        ExprKind::Name(symbol) if context.const_parameters.contains(symbol) => {
+            return Affine::symbol(IndexSymbol::ConstParameter(symbol.clone()));
+        }
+        ExprKind::Name(symbol) => match context.field(symbol).map(|field| &field.kind) {
+            Some(FieldKind::Length) => {
+                let (name, length_name) = (name.node.clone(), symbol.clone());
+                bag.push(
+                    length.span,
+                    Kind::RunTimeLength {
+                        name,
+                        length: length_name,
+                    },
+                );
+                return Affine::symbol(IndexSymbol::Field(symbol.clone()));
+            }
+            Some(_) => bag.push(length.span, Kind::LengthNotSimple),
+            None => {
+                let lengths = context.const_parameters.iter().map(String::as_str);
+                let nearest = nearest(symbol, lengths);
+                bag.push(
+                    length.span,
+                    Kind::UnknownLength {
+                        name: symbol.clone(),
+                        nearest,
+                    },
+                );
+            }
+        },
+        _ => bag.push(length.span, Kind::LengthNotSimple),
+    }
+    unknown_length(&name.node)
+}
+
+/// Checks a new name against the words of the language.
+pub(crate) fn reserved(name: &str, field: bool) -> Option<Kind> {
+    if name.starts_with("__tfe") {
+        Some(Kind::ReservedPrefix {
+            name: name.to_owned(),
+            field,
+        })
+    } else if matches!(name, "t" | "pi" | "_") || is_function(name) {
+        Some(Kind::ReservedName {
+            name: name.to_owned(),
+            field,
+        })
+    } else {
+        None
+    }
+}
+
+impl Model {
+    fn fields(&mut self, context: &Context, bag: &mut Bag) {
+        for name in &context.const_parameters {
+            self.symbols.insert(name.clone(), Symbol::ConstParameter);
+        }
+        for (at, field) in context.fields.iter().enumerate() {
+            if !matches!(field.kind, FieldKind::Other(_))
+                && let Some(kind) = reserved(&field.name, true)
+            {
+                bag.push(Span::default(), kind);
+            }
+            if field.kind == FieldKind::Array(Length::Literal(0)) {
+                let name = field.name.clone();
+                bag.push(Span::default(), Kind::ZeroLength { name, field: true });
+            }
+            self.symbols.insert(field.name.clone(), Symbol::Field(at));
+        }
+        self.other_fields = context
+            .fields
+            .iter()
+            .filter(|field| matches!(field.kind, FieldKind::Other(_)))
+            .map(|field| field.name.clone())
+            .collect();
+    }
+
+    fn set_energy(&mut self, form: Form, value: Expr, span: Span, bag: &mut Bag) {
+        if self.energy.is_some() {
+            bag.push(span, Kind::TwoEnergies);
+        } else {
+            self.energy = Some((form, value));
+        }
+    }
+
+    /// Enters the names that the attribute declares.
+    fn register(&mut self, bag: &mut Bag) {
+        let coordinates = self.coordinates.iter().map(|slots| &slots.name);
+        let momenta = self.momenta.iter().map(|slots| &slots.name);
+        let lets = self.lets.iter().map(|(name, _)| name);
+        let names: Vec<(Name, Symbol)> = coordinates
+            .enumerate()
+            .map(|(at, name)| (name, Symbol::Coordinate(at)))
+            .chain(
+                momenta
+                    .enumerate()
+                    .map(|(at, name)| (name, Symbol::Momentum(at))),
+            )
+            .chain(lets.enumerate().map(|(at, name)| (name, Symbol::Let(at))))
+            .map(|(name, symbol)| (name.clone(), symbol))
+            .collect();
+        for (Spanned { node: name, span }, symbol) in names {
+            if let Some(kind) = reserved(&name, false) {
+                bag.push(span, kind);
+            }
+            match self.symbols.get(&name) {
+                // A field that formulas cannot use does not stand in the way.
+                Some(taken) if !self.other_fields.contains(&name) => {
+                    bag.push(
+                        span,
+                        Kind::NameClash {
+                            name,
+                            taken: taken.role(),
+                        },
+                    );
+                }
+                _ => {
+                    self.symbols.insert(name, symbol);
+                }
+            }
+        }
+    }
+
+    /// Adds up the lengths of the coordinates.
+    fn sizes(&mut self, bag: &mut Bag) {
+        let mut dof = Affine::default();
+        for slots in &self.coordinates {
+            let length = slots.length.clone().unwrap_or(Affine::constant(1));
+            let generic = matches!(
+                length.terms.first(),
+                Some((IndexSymbol::ConstParameter(_), _))
+            );
+            if generic && self.coordinates.len() > 1 {
+                let name = slots.name.node.clone();
+                bag.push(slots.name.span, Kind::FamilyNotAlone { name });
+            }
+            dof = dof.plus_scaled(&length, 1).unwrap_or(dof);
+        }
+        if let Some((IndexSymbol::ConstParameter(length), _)) = dof.terms.first() {
+            for span in &self.solver_spans {
+                bag.push(
+                    *span,
+                    Kind::SolverOfFamily {
+                        length: length.clone(),
+                    },
+                );
+            }
+        }
+        self.dof = dof;
+    }
+
+    fn momenta_match(&self, span: Span, bag: &mut Bag) {
+        let lengths = |slots: &[Slots]| -> Vec<Option<Affine>> {
+            slots.iter().map(|slots| slots.length.clone()).collect()
+        };
+        if lengths(&self.coordinates) != lengths(&self.momenta) && !self.coordinates.is_empty() {
+            let coordinates = listed(&self.coordinates);
+            let momenta = listed(&self.momenta);
+            bag.push(
+                span,
+                Kind::MomentaMismatch {
+                    coordinates,
+                    momenta,
+                },
+            );
+        }
+    }
+
+    fn outputs(&self, bag: &mut Bag) {
+        let mut names: Vec<&str> = Vec::new();
+        for (Spanned { node: name, span }, _) in &self.outputs {
+            if let Some(kind) = reserved(name, false) {
+                bag.push(*span, kind);
+            }
+            // An output may be called like the `let` that it shows; a coordinate or momentum has
+            // its column in the results already.
+            let taken = match self.symbols.get(name) {
+                Some(symbol @ (Symbol::Coordinate(_) | Symbol::Momentum(_))) => Some(symbol.role()),
+                _ if METHODS.contains(&name.as_str()) => Some(Role::Method),
+                _ => names.contains(&name.as_str()).then_some(Role::Output),
+            };
+            if let Some(taken) = taken {
+                bag.push(
+                    *span,
+                    Kind::NameClash {
+                        name: name.clone(),
+                        taken,
+                    },
+                );
+            }
+            names.push(name);
+        }
+    }
+}
+
+fn listed(slots: &[Slots]) -> String {
+    let names: Vec<String> = slots
+        .iter()
+        .map(|slots| match &slots.length {
+            Some(length) => format!("{}[{length}]", slots.name),
+            None => slots.name.node.clone(),
+        })
+        .collect();
+    names.join(", ")
+}

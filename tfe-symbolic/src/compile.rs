@@ -1,0 +1,78 @@
+//! The pipeline from text to a declared model.
+
+use crate::ast::{ExprKind, Item, Spanned};
+use crate::check::{self, Arguments};
+use crate::context::Context;
+use crate::declared::Declared;
+use crate::diagnostic::{Bag, Diagnostic, Span};
+use crate::lower::lower;
+use crate::parse::{first_word, parse_item, split_arguments};
+
+/// Reads a whole attribute: splits, parses, checks, lowers.
+///
+/// `arguments` is what stands between the parentheses of `#[dynamics(…)]`; spans are byte ranges in
+/// it.
+///
+/// # Errors
+/// All mistakes found, in the order of the text.
+pub fn declare(arguments: &str, context: &Context) -> Result<Declared, Vec<Diagnostic>> {
+    let mut bag = Bag::new();
+    let arguments = parse(arguments, &mut bag);
+    let model = check::model(arguments, context, &mut bag);
+    let declared = lower(&model, context, &mut bag);
+    match bag.finish(declared)? {
+        Some(declared) => Ok(declared),
+        // Lowering without a result has left its reason in the bag.
+        None => Err(Vec::new()),
+    }
+}
+
+fn parse(text: &str, bag: &mut Bag) -> Arguments {
+    let whole = Span::new(0, text.trim_end().len());
+    let mut arguments = Arguments {
+        whole,
+        ..Arguments::default()
+    };
+    for range in split_arguments(text) {
+        let argument = &text[range.clone()];
+        match parse_item(argument, range.start, bag) {
+            Some(item) => arguments.items.push(item),
+            None => {
+                arguments.incomplete = true;
+                match broken_let(argument, range.start) {
+                    Some(item) => arguments.items.push(item),
+                    None => {
+                        arguments.names_missing |= !NAMELESS.contains(&first_word(argument));
+                    }
+                }
+            }
+        }
+    }
+    arguments
+}
+
+/// A `let` that could not be read still declares its name.
+fn broken_let(argument: &str, offset: usize) -> Option<Spanned<Item>> {
+    let rest = argument.trim_start().strip_prefix("let")?;
+    let name = first_word(rest);
+    if name.is_empty() || !rest.starts_with(char::is_whitespace) {
+        return None;
+    }
+    let start = offset + argument.len() - rest.trim_start().len();
+    let span = Span::new(start, start + name.len());
+    let name = Spanned::new(name.to_owned(), span);
+    let value = Spanned::new(ExprKind::Error, span);
+    Some(Spanned::new(Item::Let { name, value }, span))
+}
+
+/// The arguments that formulas cannot refer to.
+const NAMELESS: [&str; 8] = [
+    "lagrangian",
+    "hamiltonian",
+    "force",
+    "dissipation",
+    "constraint",
+    "output",
+    "solver",
+    "crate",
+];

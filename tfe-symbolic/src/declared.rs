@@ -1,0 +1,169 @@
+//! The model after checking and lowering: names resolved, vectors in components, `dot()` expanded.
+
+use std::fmt;
+
+use crate::graph::{ExprId, Graph, SumRange};
+use crate::input::Affine;
+use crate::notation::Notation;
+
+/// Which energy function declares the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Form {
+    /// L(q, v, t)
+    Lagrangian,
+    /// H(q, p, t)
+    Hamiltonian,
+}
+
+impl Form {
+    /// `Lagrangian` or `Hamiltonian`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lagrangian => "Lagrangian",
+            Self::Hamiltonian => "Hamiltonian",
+        }
+    }
+
+    /// `L` or `H`.
+    pub fn letter(self) -> char {
+        match self {
+            Self::Lagrangian => 'L',
+            Self::Hamiltonian => 'H',
+        }
+    }
+}
+
+/// A coordinate or momentum, or an array of them, in the flat vector `q` or `p`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoordinateArray {
+    /// The name.
+    pub name: String,
+    /// The flat index of its first element.
+    pub first: usize,
+    /// The length of an array; `None` for a single coordinate.
+    pub length: Option<Affine>,
+}
+
+/// A generalized force on one coordinate, or on each coordinate of a range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Force {
+    /// The loops around it, outermost first; empty for one coordinate.
+    pub ranges: Vec<SumRange>,
+    /// The flat index of the coordinate.
+    pub target: Affine,
+    /// Its value.
+    pub value: ExprId,
+}
+
+/// A request for a stepper specialised to the model and one element.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Solver {
+    /// The name of the struct to emit.
+    pub name: String,
+    /// The kind of element.
+    pub family: Family,
+    /// The number of nodes, 2 to 12.
+    pub nodes: u32,
+    /// The rule of quadrature.
+    pub rule: Rule,
+}
+
+/// The kinds of element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Family {
+    /// Displacement form.
+    Primal,
+    /// Two-field form.
+    Mixed,
+    /// Continuous trial, discontinuous test functions.
+    EnergyConserving,
+    /// One-sided jump.
+    Radau,
+}
+
+/// The rules of quadrature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Rule {
+    /// The rule that the element comes with.
+    Default,
+    /// One Gauss point less than nodes.
+    Reduced,
+    /// Lobatto points at the nodes.
+    Lobatto,
+    /// So many Gauss points.
+    Gauss(u32),
+}
+
+/// A declared model, ready to be differentiated.
+#[derive(Clone, Debug)]
+pub struct Declared {
+    /// The name of the struct.
+    pub name: String,
+    /// Lagrangian or Hamiltonian.
+    pub form: Form,
+    /// The number of coordinates: a constant, or exactly one const parameter.
+    pub dof: Affine,
+    /// The coordinates, in the order of the flat vector `q`.
+    pub coordinates: Vec<CoordinateArray>,
+    /// The momenta of a Hamiltonian model, in the order of the coordinates; else empty.
+    pub momenta: Vec<CoordinateArray>,
+    /// The expressions.
+    pub graph: Graph,
+    /// L or H.
+    pub energy: ExprId,
+    /// The Rayleigh function D; Q = −∂D/∂v.
+    pub dissipation: Option<ExprId>,
+    /// The generalized forces; several on one coordinate add up.
+    pub forces: Vec<Force>,
+    /// The observables by name.
+    pub observables: Vec<(String, ExprId)>,
+    /// The specialised steppers asked for.
+    pub solvers: Vec<Solver>,
+    /// Where the emitted code finds `tfe`, if the user said so.
+    pub crate_path: Option<String>,
+    /// The fields that formulas use, in the order of the struct.
+    pub used_fields: Vec<String>,
+    /// The formulas as the user wrote them, in mathematical notation.
+    pub notation: Notation,
+}
+
+/// The model on one line per formula:
+///
+/// ```text
+/// L = ½ m l² θ̇² + m g l cos θ
+/// coordinates: θ      parameters: m, l, g
+/// ```
+impl fmt::Display for Declared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for formula in &self.notation.formulas {
+            writeln!(f, "{formula}")?;
+        }
+        write!(f, "coordinates: {}", listed(&self.coordinates))?;
+        if !self.momenta.is_empty() {
+            write!(f, "      momenta: {}", listed(&self.momenta))?;
+        }
+        if !self.used_fields.is_empty() {
+            let names: Vec<String> = self
+                .used_fields
+                .iter()
+                .map(|name| crate::notation::symbol(name))
+                .collect();
+            write!(f, "      parameters: {}", names.join(", "))?;
+        }
+        Ok(())
+    }
+}
+
+fn listed(arrays: &[CoordinateArray]) -> String {
+    let names: Vec<String> = arrays
+        .iter()
+        .map(|array| {
+            let name = crate::notation::symbol(&array.name);
+            match &array.length {
+                Some(length) => format!("{name}[{length}]"),
+                None => name,
+            }
+        })
+        .collect();
+    names.join(", ")
+}

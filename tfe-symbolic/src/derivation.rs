@@ -1,0 +1,482 @@
+//! From a declared model to the entries of its kernels: which derivative goes where, inside which loops.
+//!
+//! The energy is split into terms, each a nest of ranges around a body. A body is differentiated once by its *slots*, the distinct leaves
+//! such as `q[i]` and `q[i+1]`. A first derivative by the slot `q[a]` adds to entry a, a second one by two slots adds to (a, b) and to (b, a):
+//! this holds also where both indices happen to be equal.
+//!
+//! A function of sums, such as `sqrt(sum(i in 0..n, q[i]^2))`, couples all with all. There each inner sum S counts as a further leaf of
+//! the body, and the chain rule continues into it: ∂f/∂q = (∂f/∂S)(∂S/∂q), in one more loop.
+
+use std::collections::BTreeMap;
+
+use crate::arrange::arrange;
+use crate::constant::Constant;
+use crate::count::Counts;
+use crate::declared::{Declared, Force, Form};
+use crate::differentiate::{Forward, gradient};
+use crate::entry::{Array, Entry, Place, blocks, for_each_sink};
+use crate::factor::take_out_factors;
+use crate::graph::{ExprId, Graph, Node, SumRange};
+use crate::input::{Affine, IndexSymbol, Input, LoopVariable};
+use crate::program::{Program, Request};
+use crate::schedule::schedule;
+use crate::structure::Structure;
+
+/// What is differentiated.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Lagrangian or Hamiltonian.
+    pub form: Form,
+    /// The number of coordinates.
+    pub dof: Affine,
+    /// The expressions.
+    pub graph: Graph,
+    /// L or H.
+    pub energy: ExprId,
+    /// The Rayleigh function D(v, q) of a Lagrangian model; Q = −∂D/∂v.
+    pub dissipation: Option<ExprId>,
+    /// The generalized forces.
+    pub forces: Vec<Force>,
+    /// The observables by name.
+    pub observables: Vec<(String, ExprId)>,
+}
+
+impl From<&Declared> for Model {
+    fn from(declared: &Declared) -> Self {
+        Self {
+            form: declared.form,
+            dof: declared.dof.clone(),
+            graph: declared.graph.clone(),
+            energy: declared.energy,
+            dissipation: declared.dissipation,
+            forces: declared.forces.clone(),
+            observables: declared.observables.clone(),
+        }
+    }
+}
+
+/// All derivatives of a model.
+///
+/// ```
+/// use tfe_symbolic::compile::declare;
+/// use tfe_symbolic::context::Context;
+/// use tfe_symbolic::derivation::Derivation;
+/// use tfe_symbolic::program::Request;
+///
+/// let text = "coordinates(a), lagrangian = dot(a)^2/2 + 9.81*cos(a)";
+/// let declared = declare(text, &Context::default()).expect("no mistakes in it");
+/// let derivation = Derivation::of(&declared);
+/// let first = derivation.program(Request { first: true, ..Request::default() });
+/// assert_eq!(
+///     first.to_string(),
+///     "E_z[0] = v[0]\n\
+///      t0 = sin(q[0])\n\
+///      t1 = 9.81 * t0\n\
+///      t2 = -t1\n\
+///      E_q[0] = t2\n"
+/// );
+/// assert!(derivation.structure().separable);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Derivation {
+    graph: Graph,
+    entries: Vec<Entry>,
+    structure: Structure,
+}
+
+impl Derivation {
+    /// Differentiates a declared model.
+    pub fn of(declared: &Declared) -> Self {
+        Self::of_model(Model::from(declared))
+    }
+
+    /// Differentiates a model.
+    pub fn of_model(model: Model) -> Self {
+        let Model {
+            form,
+            dof,
+            mut graph,
+            energy,
+            dissipation,
+            forces,
+            observables,
+        } = model;
+        let mut deriver = Deriver {
+            form,
+            graph: &mut graph,
+            entries: Vec::new(),
+        };
+        deriver.energy(energy);
+        if let Some(dissipation) = dissipation {
+            deriver.dissipation(dissipation);
+        }
+        for force in &forces {
+            deriver.force(force.ranges.clone(), force.target.clone(), force.value);
+        }
+        for (number, (_, value)) in observables.iter().enumerate() {
+            deriver.push(&[], Place::scalar(Array::Observable(number)), *value);
+        }
+        let entries = deriver.entries;
+        let structure = Structure::of(&graph, form, &dof, &entries);
+        Self {
+            graph,
+            entries,
+            structure,
+        }
+    }
+
+    /// The program of a kernel.
+    pub fn program(&self, request: Request) -> Program {
+        let wanted: Vec<&Entry> = self
+            .entries
+            .iter()
+            .filter(|entry| entry.place.array.is_wanted(request))
+            .collect();
+        let mut graph = self.graph.clone();
+        let values: Vec<ExprId> = wanted.iter().map(|entry| entry.value).collect();
+        let values = graph.open_single_sums(&values);
+        let entries: Vec<Entry> = wanted
+            .into_iter()
+            .zip(values)
+            .map(|(entry, value)| Entry {
+                nest: entry.nest.clone(),
+                place: entry.place.clone(),
+                value,
+            })
+            .collect();
+        let (cleared, mut block) = blocks(&mut graph, entries);
+        let mut values = Vec::new();
+        for_each_sink(&mut block, &mut |sink| values.push(sink.value));
+        let values = take_out_factors(&mut graph, values);
+        let mut next = values.iter();
+        for_each_sink(&mut block, &mut |sink| {
+            sink.value = *next.next().unwrap_or(&sink.value);
+        });
+        let plan = arrange(&graph, &values);
+        schedule(plan, cleared, &block)
+    }
+
+    /// What is known about the model.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+
+    /// The operations of [`Derivation::program`].
+    pub fn counts(&self, request: Request) -> Counts {
+        Counts::of(&self.program(request))
+    }
+}
+
+/// Collects the entries.
+struct Deriver<'a> {
+    form: Form,
+    graph: &'a mut Graph,
+    entries: Vec<Entry>,
+}
+
+/// A term of a sum over ranges: the body inside of its loops, outermost first.
+struct Term {
+    nest: Vec<SumRange>,
+    body: ExprId,
+}
+
+/// A leaf that derivatives are taken by.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Slot {
+    Z(Affine),
+    Q(Affine),
+}
+
+/// ∂/∂slot, to be added on every turn of a nest of loops.
+struct Contribution {
+    nest: Vec<SumRange>,
+    slot: Slot,
+    value: ExprId,
+}
+
+impl Deriver<'_> {
+    fn push(&mut self, nest: &[SumRange], place: Place, value: ExprId) {
+        if !self.graph.as_constant(value).is_some_and(Constant::is_zero) {
+            self.entries.push(Entry {
+                nest: nest.to_vec(),
+                place,
+                value,
+            });
+        }
+    }
+
+    fn energy(&mut self, energy: ExprId) {
+        let energy = self.graph.open_single_sums(&[energy])[0];
+        for Term { nest, body } in self.terms(&[], energy) {
+            self.push(&nest, Place::scalar(Array::Value), body);
+            if self.graph.contains_sum(body) {
+                self.coupled_energy(&nest, body);
+            } else {
+                self.plain_energy(&nest, body);
+            }
+        }
+    }
+
+    /// Derivatives of a body without sums: each pair of slots once.
+    fn plain_energy(&mut self, nest: &[SumRange], body: ExprId) {
+        let slots = self.slots(body);
+        let leaves: Vec<ExprId> = slots.iter().map(|(_, leaf)| *leaf).collect();
+        let slopes = gradient(self.graph, body, &leaves);
+        for ((slot, _), slope) in slots.iter().zip(&slopes) {
+            self.push(nest, first_place(slot), *slope);
+        }
+        for (at, (second, leaf)) in slots.iter().enumerate() {
+            let mut along = Forward::default();
+            for ((first, _), slope) in slots.iter().zip(&slopes).take(at + 1) {
+                let one = self.graph.constant(Constant::ONE);
+                let Node::Input(by) = self.graph.node(*leaf).clone() else {
+                    continue;
+                };
+                let value = along.derivative(self.graph, *slope, &mut |_, input| {
+                    (*input == by).then_some(one)
+                });
+                self.push_second(nest, first, second, value);
+                if first != second {
+                    self.push_second(nest, second, first, value);
+                }
+            }
+        }
+    }
+
+    fn push_second(&mut self, nest: &[SumRange], first: &Slot, second: &Slot, value: ExprId) {
+        let (array, row, column) = match (first, second) {
+            (Slot::Z(row), Slot::Z(column)) => (Array::ZZ, row, column),
+            (Slot::Z(row), Slot::Q(column)) => (Array::ZQ, row, column),
+            // The other order of the pair gives this entry.
+            (Slot::Q(_), Slot::Z(_)) => return,
+            (Slot::Q(row), Slot::Q(column)) => (Array::QQ, row, column),
+        };
+        let place = Place {
+            array,
+            row: row.clone(),
+            column: column.clone(),
+        };
+        self.push(nest, place, value);
+    }
+
+    /// Derivatives of a function of sums over ranges.
+    fn coupled_energy(&mut self, nest: &[SumRange], body: ExprId) {
+        for first in self.contributions(nest, body) {
+            self.push(&first.nest, first_place(&first.slot), first.value);
+            for second in self.contributions(&first.nest, first.value) {
+                self.push_second(&second.nest, &first.slot, &second.slot, second.value);
+            }
+        }
+    }
+
+    fn dissipation(&mut self, dissipation: ExprId) {
+        let dissipation = self.graph.open_single_sums(&[dissipation])[0];
+        for Contribution { nest, slot, value } in self.contributions(&[], dissipation) {
+            if let Slot::Z(target) = slot {
+                let force = self.graph.negate(value);
+                self.force(nest, target, force);
+            }
+        }
+    }
+
+    fn force(&mut self, nest: Vec<SumRange>, target: Affine, value: ExprId) {
+        let value = self.graph.open_single_sums(&[value])[0];
+        for term in self.terms(&nest, value) {
+            self.push(
+                &term.nest,
+                Place::vector(Array::Force, target.clone()),
+                term.body,
+            );
+        }
+        for Contribution { nest, slot, value } in self.contributions(&nest, value) {
+            let (array, column) = match slot {
+                Slot::Z(column) => (Array::ForceZ, column),
+                Slot::Q(column) => (Array::ForceQ, column),
+            };
+            self.push(
+                &nest,
+                Place {
+                    array,
+                    row: target.clone(),
+                    column,
+                },
+                value,
+            );
+        }
+    }
+
+    /// The slots of a body and their leaves, not those inside of its sums.
+    fn slots(&mut self, body: ExprId) -> Vec<(Slot, ExprId)> {
+        let slot = |id: ExprId| match self.graph.node(id) {
+            Node::Input(Input::Coordinate(index)) => Some((Slot::Q(index.clone()), id)),
+            Node::Input(Input::Velocity(index)) if self.form == Form::Lagrangian => {
+                Some((Slot::Z(index.clone()), id))
+            }
+            Node::Input(Input::Momentum(index)) if self.form == Form::Hamiltonian => {
+                Some((Slot::Z(index.clone()), id))
+            }
+            _ => None,
+        };
+        let mut slots: Vec<_> = self
+            .graph
+            .reachable_outside_sums(&[body])
+            .into_iter()
+            .filter_map(slot)
+            .collect();
+        slots.sort();
+        slots
+    }
+
+    /// First derivatives of an expression inside a nest of loops, by all slots, also through its sums.
+    fn contributions(&mut self, nest: &[SumRange], expression: ExprId) -> Vec<Contribution> {
+        let mut done = Vec::new();
+        // (nest, weight, expression): the derivatives of the expression times the weight are still to come.
+        let one = self.graph.constant(Constant::ONE);
+        let mut waiting = vec![(nest.to_vec(), one, expression)];
+        while let Some((nest, weight, expression)) = waiting.pop() {
+            for Term { nest, body } in self.terms(&nest, expression) {
+                let slots = self.slots(body);
+                let sums: Vec<ExprId> = self
+                    .graph
+                    .reachable_outside_sums(&[body])
+                    .into_iter()
+                    .filter(|id| matches!(self.graph.node(*id), Node::Loop { .. }))
+                    .collect();
+                let leaves: Vec<ExprId> = slots
+                    .iter()
+                    .map(|(_, leaf)| *leaf)
+                    .chain(sums.iter().copied())
+                    .collect();
+                let slopes = gradient(self.graph, body, &leaves);
+                let (direct, through) = slopes.split_at(slots.len());
+                for ((slot, _), slope) in slots.into_iter().zip(direct) {
+                    let value = self.graph.multiply(weight, *slope);
+                    if !self.graph.as_constant(value).is_some_and(Constant::is_zero) {
+                        done.push(Contribution {
+                            nest: nest.clone(),
+                            slot,
+                            value,
+                        });
+                    }
+                }
+                for (sum, slope) in sums.into_iter().zip(through) {
+                    let weight = self.graph.multiply(weight, *slope);
+                    waiting.push((nest.clone(), weight, sum));
+                }
+            }
+        }
+        done
+    }
+
+    /// Splits an expression into terms, each a body inside its own loops; a body that is linear in no sum keeps its sums.
+    fn terms(&mut self, nest: &[SumRange], expression: ExprId) -> Vec<Term> {
+        let mut bodies: BTreeMap<Vec<SumRange>, Vec<(Constant, ExprId)>> = BTreeMap::new();
+        let mut waiting = vec![(nest.to_vec(), Constant::ONE, expression)];
+        while let Some((nest, factor, id)) = waiting.pop() {
+            if !self.graph.contains_sum(id) {
+                bodies.entry(nest).or_default().push((factor, id));
+                continue;
+            }
+            match self.graph.node(id).clone() {
+                Node::Sum { constant, terms } => {
+                    if !constant.is_zero() {
+                        let one = self.graph.constant(Constant::ONE);
+                        bodies
+                            .entry(nest.clone())
+                            .or_default()
+                            .push((factor * constant, one));
+                    }
+                    waiting.extend(
+                        terms
+                            .into_iter()
+                            .map(|(c, x)| (nest.clone(), factor * c, x)),
+                    );
+                }
+                Node::Loop { range, body } => {
+                    let (range, body) = self.inside(&nest, range, body);
+                    let mut nest = nest;
+                    nest.push(range);
+                    waiting.push((nest, factor, body));
+                }
+                Node::Product(factors) => {
+                    let mut with_sums = factors
+                        .iter()
+                        .enumerate()
+                        .filter(|(_, (x, _))| self.graph.contains_sum(*x));
+                    let only = with_sums
+                        .next()
+                        .filter(|(_, (_, n))| *n == 1 && with_sums.next().is_none());
+                    let inner = only.map(|(at, (x, _))| (at, self.graph.node(*x).clone()));
+                    match inner {
+                        Some((at, Node::Loop { range, body })) => {
+                            let (range, body) = self.inside(&nest, range, body);
+                            let mut rest = factors.clone();
+                            rest.remove(at);
+                            rest.push((body, 1));
+                            let body = self.graph.product(Constant::ONE, &rest);
+                            let mut nest = nest;
+                            nest.push(range);
+                            waiting.push((nest, factor, body));
+                        }
+                        Some((at, Node::Sum { constant, terms })) => {
+                            let mut rest = factors.clone();
+                            rest.remove(at);
+                            for (c, x) in terms {
+                                let mut factors = rest.clone();
+                                factors.push((x, 1));
+                                let product = self.graph.product(Constant::ONE, &factors);
+                                waiting.push((nest.clone(), factor * c, product));
+                            }
+                            if !constant.is_zero() {
+                                let product = self.graph.product(Constant::ONE, &rest);
+                                waiting.push((nest, factor * constant, product));
+                            }
+                        }
+                        _ => bodies.entry(nest).or_default().push((factor, id)),
+                    }
+                }
+                _ => bodies.entry(nest).or_default().push((factor, id)),
+            }
+        }
+        let mut terms = Vec::with_capacity(bodies.len());
+        for (nest, parts) in bodies {
+            terms.push(Term {
+                nest,
+                body: self.graph.linear(Constant::ZERO, &parts),
+            });
+        }
+        terms
+    }
+
+    /// A range and its body with an index that the nest does not use yet.
+    fn inside(&mut self, nest: &[SumRange], range: SumRange, body: ExprId) -> (SumRange, ExprId) {
+        if nest.iter().all(|outer| outer.variable != range.variable) {
+            return (range, body);
+        }
+        let bound =
+            self.graph
+                .reachable(&[body])
+                .into_iter()
+                .filter_map(|id| match self.graph.node(id) {
+                    Node::Loop { range, .. } => Some(range.variable.0),
+                    _ => None,
+                });
+        let used = nest
+            .iter()
+            .map(|outer| outer.variable.0)
+            .chain(bound)
+            .max()
+            .unwrap_or(0);
+        let variable = LoopVariable(used.saturating_add(1));
+        let symbol = Affine::symbol(IndexSymbol::Loop(variable));
+        let body = self.graph.substitute_loop(body, range.variable, &symbol);
+        (SumRange { variable, ..range }, body)
+    }
+}
+
+fn first_place(slot: &Slot) -> Place {
+    match slot {
+        Slot::Z(index) => Place::vector(Array::ByZ, index.clone()),
+        Slot::Q(index) => Place::vector(Array::ByQ, index.clone()),
+    }
+}

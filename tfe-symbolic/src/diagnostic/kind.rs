@@ -1,0 +1,414 @@
+//! The kinds of mistake.
+
+use std::fmt;
+
+use crate::function::Function;
+
+/// Declares [`Kind`] together with the list of its variants' names.
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $name:ident $({ $($(#[$field_doc:meta])* $field:ident: $type:ty),* $(,)? })?,)*) => {
+        /// What is wrong.
+        #[derive(Clone, Debug, PartialEq)]
+        #[non_exhaustive]
+        pub enum Kind {
+            $($(#[$doc])* $name $({ $($(#[$field_doc])* $field: $type),* })?,)*
+        }
+
+        impl Kind {
+            /// The names of all kinds, so that a test can ask for a case of each.
+            pub const NAMES: &'static [&'static str] = &[$(stringify!($name)),*];
+
+            /// The name of this kind.
+            pub fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$name { .. } => stringify!($name),)*
+                }
+            }
+        }
+    };
+}
+
+kinds! {
+    // ---- syntax ----
+    /// The text stops making sense.
+    Expected {
+        /// What could have stood there, in words.
+        wanted: String,
+        /// What stands there.
+        found: String,
+    },
+    /// `2x`, `2(x)`, `x y`
+    MissingOperator {
+        /// What stands left of the gap.
+        left: String,
+        /// What stands right of it.
+        right: String,
+    },
+    /// `**`
+    DoubleStar,
+    /// `a..=b`
+    InclusiveRange,
+    /// Too many brackets, powers or signs inside each other.
+    NestedTooDeep {
+        /// The deepest nesting that is read.
+        limit: usize,
+    },
+    /// One expression with too many operators in a row.
+    TooLong {
+        /// How many are read.
+        limit: usize,
+    },
+    /// A number beyond the largest `f64`, or an integer beyond `i64` where an integer is needed.
+    NumberTooLarge {
+        /// The number as written.
+        number: String,
+    },
+    /// `lagrange = …`
+    UnknownArgument {
+        /// The name.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    // ---- declarations ----
+    /// No `coordinates(...)`, or an empty one.
+    NoCoordinates,
+    /// An argument that can be given once is given again.
+    RepeatedArgument {
+        /// `lagrangian`, `dissipation`, …
+        argument: &'static str,
+    },
+    /// A name declared twice.
+    NameClash {
+        /// The name.
+        name: String,
+        /// What it names already.
+        taken: Role,
+    },
+    /// A name of the language.
+    ReservedName {
+        /// The name.
+        name: String,
+        /// The field that has it, if it is a field.
+        field: bool,
+    },
+    /// A name that begins like those of the generated code.
+    ReservedPrefix {
+        /// The name.
+        name: String,
+        /// The field that has it, if it is a field.
+        field: bool,
+    },
+    /// `q[0]`
+    ZeroLength {
+        /// The array.
+        name: String,
+        /// Whether it is a field.
+        field: bool,
+    },
+    /// `q[M]` where the struct has no `M`.
+    UnknownLength {
+        /// The length.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// `q[N + 1]`
+    LengthNotSimple,
+    /// A coordinate array larger than the engine's indices.
+    TooManyCoordinates {
+        /// How many are allowed.
+        limit: usize,
+    },
+    /// `q[N]` beside other coordinates, `N` a const parameter.
+    FamilyNotAlone {
+        /// The array.
+        name: String,
+    },
+    /// `q[n]` with `n` a field.
+    RunTimeLength {
+        /// The array.
+        name: String,
+        /// The field.
+        length: String,
+    },
+    /// `constraint(...)`
+    Constraints,
+    /// `output(x[i in a..b])`
+    OutputFamily,
+    /// Neither a Lagrangian nor a Hamiltonian.
+    NoEnergy,
+    /// A Lagrangian and a Hamiltonian.
+    TwoEnergies,
+    /// A Hamiltonian without momenta.
+    NoMomenta,
+    /// Momenta beside a Lagrangian.
+    MomentaWithLagrangian,
+    /// The momenta do not match the coordinates.
+    MomentaMismatch {
+        /// The coordinates as declared.
+        coordinates: String,
+        /// The momenta as declared.
+        momenta: String,
+    },
+    /// A force on something that is no coordinate.
+    ForceTarget {
+        /// What it acts on.
+        target: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// A coordinate that the energy does not know.
+    UnusedCoordinate {
+        /// The coordinate.
+        name: String,
+        /// `Lagrangian` or `Hamiltonian`.
+        energy: &'static str,
+    },
+    /// A field that no expression uses.
+    UnusedField {
+        /// The field.
+        name: String,
+    },
+    /// A coordinate whose velocity is not in the Lagrangian.
+    NoVelocity {
+        /// The coordinate.
+        name: String,
+    },
+    /// A coordinate whose momentum ∂L/∂v holds no velocity.
+    LinearVelocity {
+        /// The coordinate.
+        name: String,
+    },
+    /// A momentum that is not in the Hamiltonian.
+    NoMomentum {
+        /// The momentum.
+        name: String,
+    },
+    /// An energy without coordinates, velocities and momenta.
+    ConstantEnergy {
+        /// `Lagrangian` or `Hamiltonian`.
+        energy: &'static str,
+    },
+    /// A Rayleigh function that does not depend on velocities.
+    DissipationWithoutVelocity,
+    // ---- names ----
+    /// A name that nothing declares.
+    UnknownSymbol {
+        /// The name.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// A function that does not exist.
+    UnknownFunction {
+        /// The name.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// A number used like a function: `m(a + b)`.
+    NotAFunction {
+        /// The name.
+        name: String,
+    },
+    /// A function without its arguments.
+    FunctionAsValue {
+        /// The name.
+        name: String,
+    },
+    /// A `let` used before it is declared.
+    UsedBeforeLet {
+        /// The name.
+        name: String,
+    },
+    /// A field of a type that formulas cannot use.
+    UnsupportedField {
+        /// The field.
+        name: String,
+        /// Its type as written.
+        field_type: String,
+    },
+    /// A function with too many or too few arguments.
+    WrongArity {
+        /// The function.
+        function: String,
+        /// How many it takes.
+        expected: usize,
+        /// How many it got.
+        found: usize,
+    },
+    // ---- velocities ----
+    /// The rate of a velocity.
+    Acceleration,
+    /// A velocity in a Hamiltonian.
+    VelocityInHamiltonian {
+        /// The `let` that holds it.
+        via: Option<String>,
+    },
+    /// `dot()` outside a Hamiltonian that has sums in loops.
+    VelocityOfLoop,
+    /// `dot()` of a momentum.
+    RateOfMomentum,
+    // ---- values ----
+    /// An exponent that varies over a base that may be negative.
+    VariableExponent {
+        /// The base as written.
+        base: String,
+        /// The exponent as written.
+        exponent: String,
+    },
+    /// `x/0`
+    DivisionByZero,
+    /// `ln(-1)`
+    OutsideDomain {
+        /// The function.
+        function: Function,
+    },
+    // ---- vectors ----
+    /// A vector where a number belongs.
+    ScalarExpected {
+        /// The length of the vector.
+        length: usize,
+    },
+    /// A number where a vector belongs.
+    VectorExpected,
+    /// Two vectors of different length, or a function that wants another length.
+    WrongLength {
+        /// The length that fits.
+        expected: usize,
+        /// The length found.
+        found: usize,
+    },
+    /// A vector times a vector.
+    ProductOfVectors,
+    /// Something divided by a vector.
+    DivisionByVector,
+    /// A power of a vector or a vector as exponent.
+    PowerOfVector,
+    /// A number plus a vector.
+    ScalarPlusVector,
+    /// `[]`
+    EmptyVector,
+    /// An array whose length the macro does not know, without an index.
+    WholeArray {
+        /// The array.
+        name: String,
+    },
+    // ---- indices and sums ----
+    /// An index that is not an integer.
+    IndexNotInteger {
+        /// The index as written.
+        index: String,
+    },
+    /// An index that is not affine.
+    IndexNotAffine {
+        /// The index as written.
+        index: String,
+    },
+    /// A vector (not an array) indexed by something that varies.
+    IndexNotConstant {
+        /// The index as written.
+        index: String,
+    },
+    /// An index beyond the array.
+    IndexOutOfRange {
+        /// The array.
+        array: String,
+        /// The value that is outside.
+        value: String,
+        /// The length of the array, if it is known here.
+        length: Option<String>,
+        /// The sums that lead there, `i in 0..3`.
+        ranges: String,
+    },
+    /// `sum(i in 3..3, …)`
+    EmptyRange {
+        /// The range as written.
+        range: String,
+    },
+    /// A sum inside a nonlinear expression of an energy, too long to be written out.
+    NonlinearSum {
+        /// The longest sum that is written out.
+        limit: usize,
+    },
+    // ---- solvers ----
+    /// An element that does not exist.
+    UnknownElement {
+        /// The name.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// `Mixed::<40>`
+    NodesOutOfRange {
+        /// The nodes asked for.
+        nodes: u64,
+    },
+    /// `.quadrature(0)`
+    PointsOutOfRange {
+        /// The points asked for.
+        points: u64,
+    },
+    /// `Mixed::<4>.exact()`
+    UnknownRule {
+        /// The name.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// `.reduced()` on an element other than `Primal`.
+    RuleNotForFamily {
+        /// The rule.
+        rule: String,
+        /// The element.
+        family: String,
+    },
+    /// `solver(...)` on a model whose size is a const parameter.
+    SolverOfFamily {
+        /// The const parameter.
+        length: String,
+    },
+}
+
+/// What a name stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// A generalized coordinate.
+    Coordinate,
+    /// A momentum.
+    Momentum,
+    /// A field of the struct.
+    Field,
+    /// A const parameter of the struct.
+    ConstParameter,
+    /// A `let`.
+    Let,
+    /// The index of a sum.
+    Index,
+    /// An output.
+    Output,
+    /// A solver.
+    Solver,
+    /// The struct itself.
+    Struct,
+    /// A method that every model has.
+    Method,
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Coordinate => "a coordinate",
+            Self::Momentum => "a momentum",
+            Self::Field => "a field of the struct",
+            Self::ConstParameter => "a const parameter of the struct",
+            Self::Let => "a `let`",
+            Self::Index => "the index of a sum around it",
+            Self::Output => "an output",
+            Self::Solver => "a solver",
+            Self::Struct => "the struct",
+            Self::Method => "a method of every model",
+        })
+    }
+}

@@ -1,0 +1,154 @@
+//! The leaves of expressions: what a kernel is given, and indices affine in loop variables.
+
+use std::fmt;
+
+/// Nesting depth of a loop: 0 is the outermost. Two sums at the same depth share the number, so equal sums are equal expressions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct LoopVariable(pub u32);
+
+/// A name whose integer value is fixed for a model but not known to the macro.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum IndexSymbol {
+    /// The index of a sum.
+    Loop(LoopVariable),
+    /// A const parameter of the struct.
+    ConstParameter(String),
+    /// A `usize` field of the struct.
+    Field(String),
+}
+
+/// `constant + Σ coefficient · symbol`, sorted by symbol, without zero coefficients.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Affine {
+    /// The constant part.
+    pub constant: i64,
+    /// The other parts.
+    pub terms: Vec<(IndexSymbol, i64)>,
+}
+
+/// What a kernel is given.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Input {
+    /// The time `t`.
+    Time,
+    /// A generalized coordinate, by its index in the flat vector `q`.
+    Coordinate(Affine),
+    /// Its velocity (models declared by a Lagrangian).
+    Velocity(Affine),
+    /// Its momentum (models declared by a Hamiltonian).
+    Momentum(Affine),
+    /// A scalar field of the struct.
+    Parameter(String),
+    /// An element of an array field of the struct.
+    ParameterElement(String, Affine),
+    /// An integer as a number: a loop index, a length.
+    Integer(Affine),
+}
+
+impl Affine {
+    /// The constant `value`.
+    pub fn constant(value: i64) -> Self {
+        Self {
+            constant: value,
+            terms: Vec::new(),
+        }
+    }
+
+    /// The symbol itself.
+    pub fn symbol(symbol: IndexSymbol) -> Self {
+        Self {
+            constant: 0,
+            terms: vec![(symbol, 1)],
+        }
+    }
+
+    /// Its value where it holds no symbol.
+    pub fn as_constant(&self) -> Option<i64> {
+        self.terms.is_empty().then_some(self.constant)
+    }
+
+    /// `self + factor · other`, or `None` on overflow.
+    pub fn plus_scaled(&self, other: &Self, factor: i64) -> Option<Self> {
+        let mut sum = self.clone();
+        sum.constant = sum
+            .constant
+            .checked_add(other.constant.checked_mul(factor)?)?;
+        for (symbol, coefficient) in &other.terms {
+            let added = coefficient.checked_mul(factor)?;
+            match sum.terms.binary_search_by(|(s, _)| s.cmp(symbol)) {
+                Ok(at) => sum.terms[at].1 = sum.terms[at].1.checked_add(added)?,
+                Err(at) => sum.terms.insert(at, (symbol.clone(), added)),
+            }
+        }
+        sum.terms.retain(|(_, coefficient)| *coefficient != 0);
+        Some(sum)
+    }
+
+    /// Whether it depends on the loop variable.
+    pub fn depends_on(&self, variable: LoopVariable) -> bool {
+        self.terms
+            .iter()
+            .any(|(symbol, _)| *symbol == IndexSymbol::Loop(variable))
+    }
+}
+
+impl fmt::Display for LoopVariable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            depth @ 0..=7 => write!(
+                f,
+                "{}",
+                ["i", "j", "k", "l", "i4", "i5", "i6", "i7"][depth as usize]
+            ),
+            depth => write!(f, "i{depth}"),
+        }
+    }
+}
+
+impl fmt::Display for IndexSymbol {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Loop(variable) => variable.fmt(f),
+            Self::ConstParameter(name) | Self::Field(name) => f.write_str(name),
+        }
+    }
+}
+
+impl fmt::Display for Affine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut first = true;
+        for (symbol, coefficient) in &self.terms {
+            let sign = if *coefficient < 0 {
+                "-"
+            } else if first {
+                ""
+            } else {
+                "+"
+            };
+            match coefficient.unsigned_abs() {
+                1 => write!(f, "{sign}{symbol}")?,
+                size => write!(f, "{sign}{size}*{symbol}")?,
+            }
+            first = false;
+        }
+        match self.constant {
+            0 if !first => Ok(()),
+            value if first => write!(f, "{value}"),
+            value => write!(f, "{value:+}"),
+        }
+    }
+}
+
+impl fmt::Display for Input {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Time => f.write_str("t"),
+            Self::Coordinate(index) => write!(f, "q[{index}]"),
+            Self::Velocity(index) => write!(f, "v[{index}]"),
+            Self::Momentum(index) => write!(f, "p[{index}]"),
+            Self::Parameter(name) => f.write_str(name),
+            Self::ParameterElement(name, index) => write!(f, "{name}[{index}]"),
+            Self::Integer(value) => write!(f, "({value})"),
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Symbolic engine of `tfe`: a declaration as text in, differentiated straight-line programs out.
+//!
+//! ```text
+//! text ──parse──▶ AST ──check──▶ model ──lower──▶ declared ──derivation──▶ roots ──schedule──▶ program
+//! ```
+//!
+//! Each arrow is a function from one named type to the next; [`compile`] lists them. The crate knows
+//! neither Rust tokens nor floating-point linear algebra.
+
+mod arrange;
+pub mod ast;
+pub mod check;
+mod collect;
+pub mod compile;
+pub mod constant;
+pub mod context;
+pub mod count;
+pub mod declared;
+pub mod derivation;
+pub mod diagnostic;
+pub mod differentiate;
+mod entry;
+mod factor;
+pub mod function;
+pub mod graph;
+pub mod input;
+pub mod interpret;
+mod listing;
+pub mod lower;
+pub mod notation;
+mod pairs;
+pub mod parse;
+mod plan;
+mod print;
+pub mod program;
+mod rewrite;
+mod schedule;
+mod simplify;
+pub mod structure;

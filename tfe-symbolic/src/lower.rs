@@ -1,0 +1,299 @@
+//! Formulas to the arena: names resolved, `dot()` by the chain rule, vectors to components, short
+//! sums written out.
+//!
+//! Sums over long or generic ranges stay loops. In an energy or a dissipation a loop may stand under
+//! sums and products with other factors only, because its derivatives must be loops over local
+//! terms again; under anything else it is written out, or reported where it is too long for that.
+//! Forces and observables may use loops anywhere.
+
+mod affine;
+mod forces;
+mod names;
+mod rates;
+mod scalar;
+mod sums;
+mod usage;
+mod vector;
+
+use std::collections::HashMap;
+
+use crate::ast::{Expr, ExprKind};
+use crate::check::Model;
+use crate::context::Context;
+use crate::declared::{CoordinateArray, Declared, Form};
+use crate::diagnostic::{Bag, Kind, Span};
+use crate::graph::{ExprId, Graph};
+use crate::input::{Affine, LoopVariable};
+use crate::notation::Notation;
+
+/// The longest sum that is written out wherever it stands.
+pub const SHORT_SUM: u64 = 16;
+/// The longest sum that is written out where it must be.
+pub const LONGEST_WRITTEN_OUT: u64 = 512;
+
+/// Lowers a checked model.
+///
+/// `None` if there is no energy to speak of; the reason is in the bag.
+pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared> {
+    let mut lowerer = Lowerer::new(model, context, bag);
+    let form = model
+        .energy
+        .as_ref()
+        .map_or(Form::Lagrangian, |(form, _)| *form);
+    let energy = model
+        .energy
+        .as_ref()
+        .and_then(|(_, value)| lowerer.energy(form, value));
+    lowerer.hamiltonian = energy.filter(|_| form == Form::Hamiltonian);
+    lowerer.usual_dot = match form {
+        Form::Lagrangian => DotRule::Velocity,
+        Form::Hamiltonian => DotRule::ByHamiltonian,
+    };
+    lowerer.setting.dot = lowerer.usual_dot;
+    let (dissipation, mut forces) = match &model.dissipation {
+        Some(value) => lowerer.dissipation(form, value),
+        None => (None, Vec::new()),
+    };
+    for (target, value) in &model.forces {
+        forces.extend(lowerer.force(target, value));
+    }
+    let mut observables = Vec::new();
+    for (name, value) in &model.outputs {
+        if let Some(value) = lowerer.scalar(value) {
+            observables.push((name.node.clone(), value));
+        }
+    }
+    // Mistakes in a `let` that nothing uses are mistakes all the same.
+    for at in 0..model.lets.len() {
+        lowerer.named(at);
+    }
+    lowerer.check_usage(form, energy);
+    let used_fields = lowerer.used_fields();
+    let graph = lowerer.graph;
+    let arrays = |slots: &[crate::check::Slots]| {
+        let array = |slots: &crate::check::Slots| CoordinateArray {
+            name: slots.name.node.clone(),
+            first: slots.first,
+            length: slots.length.clone(),
+        };
+        slots.iter().map(array).collect()
+    };
+    Some(Declared {
+        name: context.struct_name.clone(),
+        form,
+        dof: model.dof.clone(),
+        coordinates: arrays(&model.coordinates),
+        momenta: arrays(&model.momenta),
+        graph,
+        energy: energy?,
+        dissipation,
+        forces,
+        observables,
+        solvers: model.solvers.clone(),
+        crate_path: model.crate_path.clone(),
+        used_fields,
+        notation: Notation::of(model),
+    })
+}
+
+/// What a formula evaluates to. `None` in the functions below stands for "reported already".
+#[derive(Clone, Debug)]
+enum Value {
+    Scalar(ExprId),
+    Vector(Vec<ExprId>),
+    Error,
+}
+
+/// What `dot()` makes of a coordinate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum DotRule {
+    /// Its velocity.
+    Velocity,
+    /// A mistake: the formula is the Hamiltonian itself.
+    Forbidden,
+    /// ∂H/∂p.
+    ByHamiltonian,
+}
+
+/// Which rules hold for the formula at hand.
+#[derive(Clone, Copy, Debug)]
+struct Setting {
+    dot: DotRule,
+    /// Loops must stay linear: it is an energy or a dissipation.
+    linear_loops: bool,
+}
+
+/// The index of a sum around the formula at hand.
+#[derive(Clone, Debug)]
+struct Index {
+    name: String,
+    variable: LoopVariable,
+    start: Affine,
+    end: Affine,
+}
+
+struct Lowerer<'a> {
+    model: &'a Model,
+    context: &'a Context,
+    bag: &'a mut Bag,
+    graph: Graph,
+    setting: Setting,
+    /// What `dot()` means in most formulas; `let`s are kept in this meaning.
+    usual_dot: DotRule,
+    /// H, once it is known.
+    hamiltonian: Option<ExprId>,
+    /// The values of `let`s outside any loop.
+    lets: Vec<Option<Value>>,
+    /// Which `let`s hold a `dot()`, themselves or by those they use.
+    rates: Vec<bool>,
+    /// How many `let`s stand before the formula at hand.
+    visible_lets: usize,
+    /// The sums around it, outermost first.
+    indices: Vec<Index>,
+    /// Loops around the `let` at hand that its formula does not see.
+    hidden_loops: u32,
+    /// The largest number of terms of the sums met since it was last cleared; `None`: generic.
+    terms: Option<u64>,
+    /// The number of terms of each loop that was made.
+    loops: HashMap<ExprId, Option<u64>>,
+    /// The smallest and largest value of indices that vary, as far as they are numbers.
+    extents: HashMap<Affine, Option<(i64, i64)>>,
+    /// Which fields formulas use.
+    fields: Vec<bool>,
+}
+
+impl<'a> Lowerer<'a> {
+    fn new(model: &'a Model, context: &'a Context, bag: &'a mut Bag) -> Self {
+        let mut lowerer = Self {
+            model,
+            context,
+            bag,
+            graph: Graph::default(),
+            setting: Setting {
+                dot: DotRule::Velocity,
+                linear_loops: false,
+            },
+            usual_dot: DotRule::Velocity,
+            hamiltonian: None,
+            lets: vec![None; model.lets.len()],
+            rates: rates::lets_with_rates(model),
+            visible_lets: model.lets.len(),
+            indices: Vec::new(),
+            hidden_loops: 0,
+            terms: Some(1),
+            loops: HashMap::new(),
+            extents: HashMap::new(),
+            fields: vec![false; context.fields.len()],
+        };
+        // A length is a use of the field.
+        for slots in model.coordinates.iter().chain(&model.momenta) {
+            for (symbol, _) in slots.length.iter().flat_map(|length| &length.terms) {
+                lowerer.use_symbol(symbol);
+            }
+        }
+        lowerer
+    }
+
+    fn energy(&mut self, form: Form, value: &Expr) -> Option<ExprId> {
+        let dot = match form {
+            Form::Lagrangian => DotRule::Velocity,
+            Form::Hamiltonian => DotRule::Forbidden,
+        };
+        self.within(
+            Setting {
+                dot,
+                linear_loops: true,
+            },
+            |lowerer| lowerer.scalar(value),
+        )
+    }
+
+    fn within<T>(&mut self, setting: Setting, work: impl FnOnce(&mut Self) -> T) -> T {
+        let before = std::mem::replace(&mut self.setting, setting);
+        let result = work(self);
+        self.setting = before;
+        result
+    }
+
+    fn report(&mut self, span: Span, kind: Kind) {
+        self.bag.push(span, kind);
+    }
+
+    /// A number; a vector is a mistake.
+    fn scalar(&mut self, expr: &Expr) -> Option<ExprId> {
+        match self.value(expr) {
+            Value::Scalar(id) => Some(id),
+            Value::Vector(components) => {
+                self.report(
+                    expr.span,
+                    Kind::ScalarExpected {
+                        length: components.len(),
+                    },
+                );
+                None
+            }
+            Value::Error => None,
+        }
+    }
+
+    /// A vector; a number is a mistake.
+    fn vector(&mut self, expr: &Expr) -> Option<Vec<ExprId>> {
+        match self.value(expr) {
+            Value::Vector(components) => Some(components),
+            Value::Scalar(_) => {
+                self.report(expr.span, Kind::VectorExpected);
+                None
+            }
+            Value::Error => None,
+        }
+    }
+
+    fn value(&mut self, expr: &Expr) -> Value {
+        match &expr.node {
+            ExprKind::Number(text) => self.number(text, expr.span),
+            ExprKind::Name(name) => self.name(name, expr.span),
+            ExprKind::Index { value, index } => self.element(value, index, expr.span),
+            ExprKind::Negate(value) => match self.value(value) {
+                Value::Scalar(id) => Value::Scalar(self.graph.negate(id)),
+                Value::Vector(components) => Value::Vector(
+                    components
+                        .into_iter()
+                        .map(|id| self.graph.negate(id))
+                        .collect(),
+                ),
+                Value::Error => Value::Error,
+            },
+            ExprKind::Binary { .. } => self.chain(expr),
+            ExprKind::Call {
+                function,
+                arguments,
+            } => self.call(function, arguments, expr),
+            ExprKind::Select {
+                comparison,
+                left,
+                right,
+                then,
+                otherwise,
+            } => self.select(*comparison, [left, right], [then, otherwise]),
+            ExprKind::Sum { range, body } => self.sum(range, body),
+            ExprKind::Vector(components) => {
+                if components.is_empty() {
+                    self.report(expr.span, Kind::EmptyVector);
+                    return Value::Error;
+                }
+                let values: Vec<_> = components.iter().map(|part| self.scalar(part)).collect();
+                values
+                    .into_iter()
+                    .collect::<Option<Vec<_>>>()
+                    .map_or(Value::Error, Value::Vector)
+            }
+            ExprKind::Error => Value::Error,
+        }
+    }
+}
+
+impl From<Option<ExprId>> for Value {
+    fn from(id: Option<ExprId>) -> Self {
+        id.map_or(Self::Error, Self::Scalar)
+    }
+}

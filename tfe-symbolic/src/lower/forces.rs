@@ -1,0 +1,228 @@
+//! Forces on coordinates, and the dissipation.
+
+use super::{DotRule, Index, Lowerer, SHORT_SUM, Setting, Value};
+use crate::ast::{Expr, ExprKind};
+use crate::check::Symbol;
+use crate::declared::{Force, Form};
+use crate::diagnostic::{Kind, nearest};
+use crate::graph::{ExprId, SumRange};
+use crate::input::{Affine, Input};
+
+impl Lowerer<'_> {
+    /// `force(target) = value`
+    pub(super) fn force(&mut self, target: &Expr, value: &Expr) -> Vec<Force> {
+        if let ExprKind::Index {
+            value: array,
+            index,
+        } = &target.node
+            && let ExprKind::Name(name) = &array.node
+            && let Some((first, length)) = self.coordinate(name)
+        {
+            let Some(length) = length else {
+                self.report(array.span, Kind::VectorExpected);
+                return Vec::new();
+            };
+            return match &index.node {
+                ExprKind::Name(index_name) if self.symbol(index_name).is_none() => {
+                    self.index_name(index_name, index.span);
+                    self.force_on_each(index_name, first, length, value)
+                }
+                _ => self.force_on_one((name, index), first, &length, value),
+            };
+        }
+        let slots = match &target.node {
+            ExprKind::Name(name) => self.coordinate(name),
+            _ => None,
+        };
+        let force = |target: i64, value: ExprId| {
+            let target = Affine::constant(target);
+            Force {
+                ranges: Vec::new(),
+                target,
+                value,
+            }
+        };
+        match slots {
+            Some((first, None)) => self
+                .scalar(value)
+                .into_iter()
+                .map(|value| force(first, value))
+                .collect(),
+            Some((first, Some(_))) => {
+                // The whole array; a generic one is reported as it would be in a formula.
+                let Value::Vector(targets) = self.value(target) else {
+                    return Vec::new();
+                };
+                let Some(values) = self.vector(value) else {
+                    return Vec::new();
+                };
+                if targets.len() != values.len() {
+                    let kind = Kind::WrongLength {
+                        expected: targets.len(),
+                        found: values.len(),
+                    };
+                    self.report(value.span, kind);
+                    return Vec::new();
+                }
+                (first..)
+                    .zip(values)
+                    .map(|(target, value)| force(target, value))
+                    .collect()
+            }
+            None => {
+                let text = target.to_string();
+                let coordinates = self.model.coordinates.iter().map(|slots| &*slots.name.node);
+                let nearest = nearest(&text, coordinates);
+                self.report(
+                    target.span,
+                    Kind::ForceTarget {
+                        target: text,
+                        nearest,
+                    },
+                );
+                self.value(value);
+                Vec::new()
+            }
+        }
+    }
+
+    /// The first flat index of a coordinate and the length of an array.
+    fn coordinate(&self, name: &str) -> Option<(i64, Option<Affine>)> {
+        match self.symbol(name)? {
+            Symbol::Coordinate(at) => {
+                let slots = &self.model.coordinates[*at];
+                Some((slots.first as i64, slots.length.clone()))
+            }
+            _ => None,
+        }
+    }
+
+    /// `force(q[2]) = value`
+    fn force_on_one(
+        &mut self,
+        (array, index): (&str, &Expr),
+        first: i64,
+        length: &Affine,
+        value: &Expr,
+    ) -> Vec<Force> {
+        let place = self.affine(index);
+        let value = self.scalar(value);
+        let Some(place) = place else {
+            return Vec::new();
+        };
+        if !self.in_bounds(array, &place, Some(length), index.span) {
+            return Vec::new();
+        }
+        let target = place.plus_scaled(&Affine::constant(first), 1);
+        let (Some(target), Some(value)) = (target, value) else {
+            return Vec::new();
+        };
+        vec![Force {
+            ranges: Vec::new(),
+            target,
+            value,
+        }]
+    }
+
+    /// `force(q[i]) = value`, `i` over the whole array
+    fn force_on_each(
+        &mut self,
+        index: &str,
+        first: i64,
+        length: Affine,
+        value: &Expr,
+    ) -> Vec<Force> {
+        let variable = self.depth();
+        let (start, end) = (Affine::default(), length);
+        let range = SumRange {
+            variable,
+            start: start.clone(),
+            end: end.clone(),
+        };
+        self.indices.push(Index {
+            name: index.to_owned(),
+            variable,
+            start,
+            end,
+        });
+        let value = self.scalar(value);
+        self.indices.pop();
+        let Some(value) = value else {
+            return Vec::new();
+        };
+        match range.end.as_constant() {
+            Some(length) if length.unsigned_abs() <= SHORT_SUM => (0..length)
+                .map(|at| {
+                    let value = self
+                        .graph
+                        .substitute_loop(value, variable, &Affine::constant(at));
+                    let target = Affine::constant(first + at);
+                    Force {
+                        ranges: Vec::new(),
+                        target,
+                        value,
+                    }
+                })
+                .collect(),
+            _ => {
+                let index = Affine::symbol(crate::input::IndexSymbol::Loop(variable));
+                let target = index
+                    .plus_scaled(&Affine::constant(first), 1)
+                    .unwrap_or(index);
+                vec![Force {
+                    ranges: vec![range],
+                    target,
+                    value,
+                }]
+            }
+        }
+    }
+
+    /// `dissipation = value`.
+    ///
+    /// In a Hamiltonian model the forces −∂D/∂v are made here, with v = ∂H/∂p put in, and there is no
+    /// dissipation left to differentiate.
+    pub(super) fn dissipation(&mut self, form: Form, value: &Expr) -> (Option<ExprId>, Vec<Force>) {
+        let setting = Setting {
+            dot: DotRule::Velocity,
+            linear_loops: true,
+        };
+        let dissipation = self.within(setting, |lowerer| lowerer.scalar(value));
+        let Some(mut dissipation) = dissipation else {
+            return (None, Vec::new());
+        };
+        let velocity = |input: &Input| matches!(input, Input::Velocity(_));
+        let inputs = self.graph.inputs_of(dissipation);
+        if !inputs.iter().any(velocity) {
+            self.report(value.span, Kind::DissipationWithoutVelocity);
+        }
+        if form == Form::Lagrangian {
+            return (Some(dissipation), Vec::new());
+        }
+        let Some(energy) = self.hamiltonian else {
+            return (None, Vec::new());
+        };
+        let flat = (self.written_out(energy), self.written_out(dissipation));
+        let (Some(energy), Some(flat)) = flat else {
+            self.report(value.span, Kind::VelocityOfLoop);
+            return (None, Vec::new());
+        };
+        dissipation = flat;
+        let mut targets: Vec<i64> = self
+            .graph
+            .inputs_of(dissipation)
+            .iter()
+            .filter_map(|input| match input {
+                Input::Velocity(at) => at.as_constant(),
+                _ => None,
+            })
+            .collect();
+        targets.sort_unstable();
+        let forces = targets.into_iter().map(|at| Force {
+            ranges: Vec::new(),
+            target: Affine::constant(at),
+            value: self.damping(dissipation, at, energy),
+        });
+        (None, forces.collect())
+    }
+}

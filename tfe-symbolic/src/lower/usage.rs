@@ -1,0 +1,166 @@
+//! What the energy leaves out: coordinates, velocities, fields.
+
+use super::Lowerer;
+use crate::context::FieldKind;
+use crate::declared::Form;
+use crate::diagnostic::{Kind, Span};
+use crate::differentiate::derivative;
+use crate::graph::ExprId;
+use crate::input::{Affine, Input};
+
+/// Which elements of a flat vector occur.
+struct Coverage(Vec<bool>);
+
+impl Coverage {
+    fn of(lowerer: &Lowerer<'_>, inputs: &[Input], pick: fn(&Input) -> Option<&Affine>) -> Self {
+        let generic = lowerer.model.dof.as_constant().is_none();
+        let size = lowerer
+            .model
+            .dof
+            .as_constant()
+            .and_then(|dof| usize::try_from(dof).ok());
+        let mut covered = vec![false; size.unwrap_or(1)];
+        for index in inputs.iter().filter_map(pick) {
+            // An index that varies covers its extent; where that is not known, everything.
+            let extent = match index.as_constant() {
+                _ if generic => None,
+                Some(at) => Some((at, at)),
+                None => lowerer.extents.get(index).copied().flatten(),
+            };
+            for (at, covered) in covered.iter_mut().enumerate() {
+                *covered |= extent.is_none_or(|(low, high)| (low..=high).contains(&(at as i64)));
+            }
+        }
+        Self(covered)
+    }
+
+    fn has(&self, at: usize) -> bool {
+        self.0.get(at).copied().unwrap_or(true)
+    }
+}
+
+impl Lowerer<'_> {
+    pub(super) fn check_usage(&mut self, form: Form, energy: Option<ExprId>) {
+        if self.model.incomplete {
+            return;
+        }
+        self.check_fields();
+        if let Some(energy) = energy
+            && !self.model.coordinates.is_empty()
+        {
+            self.check_energy(form, energy);
+        }
+    }
+
+    fn check_fields(&mut self) {
+        let context = self.context;
+        // A field that a misspelt name may have meant, or with another mistake, is not to blame.
+        let meant: Vec<String> = self
+            .bag
+            .iter()
+            .filter_map(|diagnostic| match &diagnostic.kind {
+                Kind::UnknownSymbol { nearest, .. } => nearest.clone(),
+                Kind::NameClash { name, .. }
+                | Kind::ReservedName { name, field: true }
+                | Kind::ReservedPrefix { name, field: true } => Some(name.clone()),
+                _ => None,
+            })
+            .collect();
+        for (field, used) in context.fields.iter().zip(self.fields.clone()) {
+            let exempt = used
+                || field.name.starts_with('_')
+                || matches!(field.kind, FieldKind::Other(_))
+                || meant.contains(&field.name);
+            if !exempt {
+                self.report(
+                    Span::default(),
+                    Kind::UnusedField {
+                        name: field.name.clone(),
+                    },
+                );
+            }
+        }
+    }
+
+    fn check_energy(&mut self, form: Form, energy: ExprId) {
+        let inputs = self.graph.inputs_of(energy);
+        let model = self.model;
+        let state = |input: &Input| {
+            matches!(
+                input,
+                Input::Coordinate(_) | Input::Velocity(_) | Input::Momentum(_)
+            )
+        };
+        if !inputs.iter().any(state) {
+            let span = model
+                .energy
+                .as_ref()
+                .map_or(Span::default(), |(_, value)| value.span);
+            self.report(
+                span,
+                Kind::ConstantEnergy {
+                    energy: form.name(),
+                },
+            );
+            return;
+        }
+        let coordinates = Coverage::of(self, &inputs, |input| match input {
+            Input::Coordinate(at) => Some(at),
+            _ => None,
+        });
+        let fibres = Coverage::of(self, &inputs, |input| match input {
+            Input::Velocity(at) | Input::Momentum(at) => Some(at),
+            _ => None,
+        });
+        let clashes: Vec<Span> = self.bag.iter().map(|diagnostic| diagnostic.span).collect();
+        for (number, slots) in model.coordinates.iter().enumerate() {
+            if clashes.contains(&slots.name.span) {
+                continue;
+            }
+            let length = slots.length.as_ref().and_then(Affine::as_constant);
+            for at in 0..length.map_or(1, |length| length as usize) {
+                let flat = slots.first + at;
+                let element = |name: &str| match length {
+                    Some(_) => format!("{name}[{at}]"),
+                    None => name.to_owned(),
+                };
+                let name = element(&slots.name.node);
+                let (span, kind) = match (coordinates.has(flat), fibres.has(flat), form) {
+                    (false, false, _) => (
+                        slots.name.span,
+                        Kind::UnusedCoordinate {
+                            name,
+                            energy: form.name(),
+                        },
+                    ),
+                    (true, false, Form::Lagrangian) => (slots.name.span, Kind::NoVelocity { name }),
+                    (true, false, Form::Hamiltonian) => match model.momenta.get(number) {
+                        Some(momentum) => {
+                            let name = element(&momentum.name.node);
+                            (momentum.name.span, Kind::NoMomentum { name })
+                        }
+                        None => continue,
+                    },
+                    (_, true, Form::Lagrangian) if self.linear_velocity(energy, flat) => {
+                        (slots.name.span, Kind::LinearVelocity { name })
+                    }
+                    _ => continue,
+                };
+                self.report(span, kind);
+                // One message an array will do.
+                break;
+            }
+        }
+    }
+
+    /// Whether ∂L/∂v of a coordinate holds no velocity, so that the mass matrix has a zero row.
+    fn linear_velocity(&mut self, energy: ExprId, at: usize) -> bool {
+        if self.graph.contains_sum(energy) {
+            return false;
+        }
+        let velocity = Input::Velocity(Affine::constant(at as i64));
+        let momentum = derivative(&mut self.graph, energy, &velocity);
+        let holds = |input: &Input| matches!(input, Input::Velocity(_));
+        !self.graph.inputs_of(momentum).iter().any(holds)
+    }
+}

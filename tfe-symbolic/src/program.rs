@@ -1,0 +1,165 @@
+//! Straight-line programs with loops: what is emitted as Rust, and what the interpreter runs.
+//!
+//! CONTRACT between the engine (which schedules programs) and the emitter.
+
+use crate::ast::Comparison;
+use crate::function::Function;
+use crate::input::{Affine, Input, LoopVariable};
+
+/// A value computed by a program. Each is assigned once (accumulators: declared once, then added to).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Temporary(pub u32);
+
+/// An argument of an operation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Operand {
+    /// A value computed before.
+    Temporary(Temporary),
+    /// A number.
+    Constant(f64),
+    /// What the kernel is given.
+    Input(Input),
+}
+
+/// One operation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Operation {
+    /// `a` itself
+    Copy(Operand),
+    /// `a + b`
+    Add(Operand, Operand),
+    /// `a − b`
+    Subtract(Operand, Operand),
+    /// `a b`
+    Multiply(Operand, Operand),
+    /// `a / b`
+    Divide(Operand, Operand),
+    /// `−a`
+    Negate(Operand),
+    /// `a` to an integer power that is not worth spelling out as products
+    IntegerPower(Operand, i32),
+    /// `a^b`
+    Power(Operand, Operand),
+    /// An elementary function of one or two arguments
+    Call(Function, Vec<Operand>),
+    /// `if left comparison right { then } else { otherwise }`, both sides evaluated
+    Select {
+        /// The comparison
+        comparison: Comparison,
+        /// Left of it
+        left: Operand,
+        /// Right of it
+        right: Operand,
+        /// The value where it holds
+        then: Operand,
+        /// The value elsewhere
+        otherwise: Operand,
+    },
+}
+
+/// Where a result goes. `z` is the velocity of a Lagrangian, the momentum of a Hamiltonian.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Output {
+    /// The energy function itself, L or H
+    Value,
+    /// ∂/∂z, one entry
+    ByZ(Affine),
+    /// ∂/∂q, one entry
+    ByQ(Affine),
+    /// Generalized force on one coordinate
+    Force(Affine),
+    /// ∂²/∂z∂z
+    ZZ(Affine, Affine),
+    /// ∂²/∂z∂q (row z, column q)
+    ZQ(Affine, Affine),
+    /// ∂²/∂q∂q
+    QQ(Affine, Affine),
+    /// ∂Q/∂z (row: coordinate of the force)
+    ForceZ(Affine, Affine),
+    /// ∂Q/∂q
+    ForceQ(Affine, Affine),
+    /// The observable of this number
+    Observable(usize),
+}
+
+/// One step of a program.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Statement {
+    /// `let target = operation`
+    Let {
+        /// The value assigned
+        target: Temporary,
+        /// How it is computed
+        operation: Operation,
+    },
+    /// `let (sine, cosine) = argument.sin_cos()`
+    SineCosine {
+        /// sin of the argument
+        sine: Temporary,
+        /// cos of the argument
+        cosine: Temporary,
+        /// The argument
+        argument: Operand,
+    },
+    /// `let mut target = 0`, before a loop that adds to it
+    Accumulator {
+        /// The running sum
+        target: Temporary,
+    },
+    /// `target += value`, inside the loop
+    Accumulate {
+        /// The running sum
+        target: Temporary,
+        /// What is added
+        value: Operand,
+    },
+    /// `for variable in start..end { body }`
+    Loop {
+        /// The index
+        variable: LoopVariable,
+        /// Its first value
+        start: Affine,
+        /// One past its last value
+        end: Affine,
+        /// What is repeated
+        body: Vec<Statement>,
+    },
+    /// `output = value`, or `output += value`
+    Store {
+        /// Where to
+        output: Output,
+        /// What
+        value: Operand,
+        /// Add to what is there (the program has cleared it before: see [`Statement::Clear`])
+        accumulate: bool,
+    },
+    /// Sets a whole array of results (all its entries) to zero, before loops scatter into it; the indices are ignored
+    Clear {
+        /// The array, named by any of its entries
+        output: Output,
+    },
+}
+
+/// What one kernel computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub struct Request {
+    /// L or H
+    pub value: bool,
+    /// First derivatives and forces
+    pub first: bool,
+    /// ∂²/∂z∂z (the mass matrix of a Lagrangian)
+    pub mass: bool,
+    /// All second derivatives and the derivatives of the forces
+    pub second: bool,
+    /// The observables
+    pub observables: bool,
+}
+
+/// A program ready to be interpreted, printed or emitted.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Program {
+    /// The steps, in order
+    pub statements: Vec<Statement>,
+    /// How many temporaries they use
+    pub temporaries: u32,
+}

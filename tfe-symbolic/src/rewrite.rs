@@ -1,0 +1,336 @@
+//! Whole-expression rewrites: substitution of loop variables, writing sums out, opening sums that are used once.
+
+use std::collections::HashMap;
+
+use crate::constant::Constant;
+use crate::graph::{ExprId, Graph, Node, SumRange, TooLong};
+use crate::input::{Affine, IndexSymbol, LoopVariable};
+
+/// The most terms that [`Graph::unroll`] writes out, over all sums of an expression.
+const UNROLL_LIMIT: u64 = 4096;
+
+/// Old expressions and what became of them; lookups only.
+#[derive(Default)]
+pub(crate) struct Mapping(HashMap<ExprId, ExprId>);
+
+impl Mapping {
+    /// What `old` became; itself if it was not touched.
+    pub(crate) fn of(&self, old: ExprId) -> ExprId {
+        self.0.get(&old).copied().unwrap_or(old)
+    }
+
+    pub(crate) fn set(&mut self, old: ExprId, new: ExprId) {
+        self.0.insert(old, new);
+    }
+}
+
+impl Graph {
+    /// The node with other children, through the simplifying constructors.
+    pub(crate) fn remake(&mut self, node: &Node, mapping: &Mapping) -> ExprId {
+        match node {
+            Node::Constant(_) | Node::Input(_) => self.intern(node.clone()),
+            Node::Sum { constant, terms } => {
+                let terms: Vec<_> = terms.iter().map(|(c, x)| (*c, mapping.of(*x))).collect();
+                self.linear(*constant, &terms)
+            }
+            Node::Product(factors) => {
+                let factors: Vec<_> = factors.iter().map(|(x, n)| (mapping.of(*x), *n)).collect();
+                self.product(Constant::ONE, &factors)
+            }
+            Node::Power { base, exponent } => self.power(mapping.of(*base), mapping.of(*exponent)),
+            Node::Call {
+                function,
+                arguments,
+            } => {
+                let arguments: Vec<_> = arguments.iter().map(|x| mapping.of(*x)).collect();
+                self.call(*function, &arguments)
+            }
+            Node::Select {
+                comparison,
+                left,
+                right,
+                then,
+                otherwise,
+            } => {
+                let of = |id: &ExprId| mapping.of(*id);
+                self.select(*comparison, of(left), of(right), of(then), of(otherwise))
+            }
+            Node::Loop { range, body } => self.sum(range.clone(), mapping.of(*body)),
+        }
+    }
+
+    /// The expression with `value` in place of a loop variable, in indices, numbers and inner ranges.
+    ///
+    /// An index that leaves the 64-bit integers becomes the largest one, which no array has.
+    pub fn substitute_loop(
+        &mut self,
+        id: ExprId,
+        variable: LoopVariable,
+        value: &Affine,
+    ) -> ExprId {
+        let mut mapping = Mapping::default();
+        for old in self.reachable(&[id]) {
+            let new = match self.node(old).clone() {
+                Node::Input(input) => {
+                    match input.index().filter(|index| index.depends_on(variable)) {
+                        Some(index) => {
+                            let index = substitute(index, variable, value);
+                            self.input(input.with_index(index))
+                        }
+                        None => old,
+                    }
+                }
+                Node::Loop { range, .. } if range.variable == variable => old,
+                Node::Loop { range, body } => {
+                    let start = substitute(&range.start, variable, value);
+                    let end = substitute(&range.end, variable, value);
+                    self.sum(
+                        SumRange {
+                            variable: range.variable,
+                            start,
+                            end,
+                        },
+                        mapping.of(body),
+                    )
+                }
+                node if node
+                    .children()
+                    .iter()
+                    .all(|child| mapping.of(*child) == *child) =>
+                {
+                    old
+                }
+                node => self.remake(&node, &mapping),
+            };
+            mapping.set(old, new);
+        }
+        mapping.of(id)
+    }
+
+    /// The expression with each sum over a literal range written out; other sums stay.
+    ///
+    /// # Errors
+    /// [`TooLong`] if that makes more than a few thousand terms.
+    pub fn unroll(&mut self, id: ExprId) -> Result<ExprId, TooLong> {
+        let mut current = id;
+        let mut written = 0u64;
+        // Writing out an outer sum makes the ranges of inner ones literal: one round a level of nesting.
+        loop {
+            let mut mapping = Mapping::default();
+            let mut changed = false;
+            for old in self.reachable(&[current]) {
+                let node = self.node(old).clone();
+                let new = match &node {
+                    Node::Loop { range, body } => {
+                        match (range.start.as_constant(), range.end.as_constant()) {
+                            (Some(start), Some(end)) => {
+                                changed = true;
+                                written = written.saturating_add(end.abs_diff(start));
+                                if written > UNROLL_LIMIT {
+                                    return Err(TooLong {
+                                        terms: written,
+                                        limit: UNROLL_LIMIT,
+                                    });
+                                }
+                                let body = mapping.of(*body);
+                                let term = |graph: &mut Self, i| {
+                                    (
+                                        Constant::ONE,
+                                        graph.substitute_loop(
+                                            body,
+                                            range.variable,
+                                            &Affine::constant(i),
+                                        ),
+                                    )
+                                };
+                                let terms: Vec<_> = (start..end).map(|i| term(self, i)).collect();
+                                self.linear(Constant::ZERO, &terms)
+                            }
+                            _ => self.remake(&node, &mapping),
+                        }
+                    }
+                    _ => self.remake(&node, &mapping),
+                };
+                mapping.set(old, new);
+            }
+            current = mapping.of(current);
+            if !changed {
+                return Ok(current);
+            }
+        }
+    }
+
+    /// Merges each sum that is used once into the sum that uses it, so that like terms meet.
+    ///
+    /// A sum used twice stays as it is: opening it would repeat its additions. With a factor c, the merge must not cost multiplications:
+    /// c(2x + y) opens, c(x + y) does not.
+    pub(crate) fn open_single_sums(&mut self, roots: &[ExprId]) -> Vec<ExprId> {
+        let order = self.reachable(roots);
+        let uses = self.uses(&order, roots);
+        let mut mapping = Mapping::default();
+        for old in order {
+            let node = self.node(old).clone();
+            let new = match &node {
+                Node::Sum { constant, terms } => {
+                    let mut constant = *constant;
+                    let mut opened = Vec::with_capacity(terms.len());
+                    for (outer, x) in terms {
+                        let (multiple, inner) = self.as_multiple(mapping.of(*x));
+                        let factor = *outer * multiple;
+                        match self.as_sum(inner).filter(|_| uses.of(*x) == 1) {
+                            Some((own, inner)) if opening_is_free(factor, own, inner) => {
+                                constant = constant + factor * own;
+                                opened.extend(inner.iter().map(|(c, y)| (factor * *c, *y)));
+                            }
+                            _ => opened.push((factor, inner)),
+                        }
+                    }
+                    self.linear(constant, &opened)
+                }
+                node => self.remake(node, &mapping),
+            };
+            mapping.set(old, new);
+        }
+        roots.iter().map(|root| mapping.of(*root)).collect()
+    }
+
+    /// How often each of the nodes (all that the roots are made of) is used.
+    pub(crate) fn uses(&self, nodes: &[ExprId], roots: &[ExprId]) -> Uses {
+        let mut uses = vec![0u32; nodes.last().map_or(0, |last| last.index() + 1)];
+        for child in nodes
+            .iter()
+            .flat_map(|id| self.node(*id).children())
+            .chain(roots.iter().copied())
+        {
+            uses[child.index()] += 1;
+        }
+        Uses(uses)
+    }
+}
+
+/// How often nodes are used.
+pub(crate) struct Uses(Vec<u32>);
+
+impl Uses {
+    pub(crate) fn of(&self, id: ExprId) -> u32 {
+        self.0.get(id.index()).copied().unwrap_or(0)
+    }
+}
+
+fn opening_is_free(factor: Constant, constant: Constant, terms: &[(Constant, ExprId)]) -> bool {
+    let costly = |c: &Constant| !c.abs().is_one();
+    let before = usize::from(costly(&factor)) + terms.iter().filter(|(c, _)| costly(c)).count();
+    let after = terms.iter().filter(|(c, _)| costly(&(factor * *c))).count();
+    after <= before && (constant.is_zero() || !costly(&factor) || after < before)
+}
+
+/// `affine` with `value` in place of the variable.
+pub(crate) fn substitute(affine: &Affine, variable: LoopVariable, value: &Affine) -> Affine {
+    let symbol = IndexSymbol::Loop(variable);
+    let Some((_, factor)) = affine.terms.iter().find(|(s, _)| *s == symbol) else {
+        return affine.clone();
+    };
+    let mut rest = affine.clone();
+    rest.terms.retain(|(s, _)| *s != symbol);
+    rest.plus_scaled(value, *factor)
+        .unwrap_or_else(|| Affine::constant(i64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::Input;
+
+    fn index(depth: u32) -> Affine {
+        Affine::symbol(IndexSymbol::Loop(LoopVariable(depth)))
+    }
+
+    fn q(graph: &mut Graph, index: Affine) -> ExprId {
+        graph.input(Input::Coordinate(index))
+    }
+
+    #[test]
+    fn nested_sums_with_dependent_ranges_are_written_out() {
+        // Σ_{i<3} Σ_{j=i+1}^{2} q_i q_j = q0 q1 + q0 q2 + q1 q2
+        let mut g = Graph::default();
+        let (i, j) = (index(0), index(1));
+        let (a, b) = (q(&mut g, i.clone()), q(&mut g, j));
+        let body = g.multiply(a, b);
+        let start = i.plus_scaled(&Affine::constant(1), 1).expect("small");
+        let inner = g.sum(
+            SumRange {
+                variable: LoopVariable(1),
+                start,
+                end: Affine::constant(3),
+            },
+            body,
+        );
+        let outer = SumRange {
+            variable: LoopVariable(0),
+            start: Affine::constant(0),
+            end: Affine::constant(3),
+        };
+        let sum = g.sum(outer, inner);
+        let flat = g.unroll(sum).expect("three terms");
+        assert!(!g.contains_sum(flat));
+        assert_eq!(g.inputs_of(flat).len(), 3);
+        let [a, b, c] = [0, 1, 2].map(|k| q(&mut g, Affine::constant(k)));
+        let expected = [(a, b), (a, c), (b, c)].map(|(x, y)| (Constant::ONE, g.multiply(x, y)));
+        let expected = g.linear(Constant::ZERO, &expected);
+        let [flat, expected] = g.open_single_sums(&[flat, expected])[..] else {
+            unreachable!("two roots")
+        };
+        let difference = g.subtract(flat, expected);
+        let opened = g.open_single_sums(&[difference])[0];
+        assert!(
+            g.as_constant(opened).is_some_and(Constant::is_zero),
+            "{}",
+            g.display(opened)
+        );
+    }
+
+    #[test]
+    fn long_sums_are_refused() {
+        let mut g = Graph::default();
+        let body = q(&mut g, index(0));
+        let range = SumRange {
+            variable: LoopVariable(0),
+            start: Affine::constant(0),
+            end: Affine::constant(1_000_000),
+        };
+        let sum = g.sum(range, body);
+        assert_eq!(
+            g.unroll(sum),
+            Err(TooLong {
+                terms: 1_000_000,
+                limit: UNROLL_LIMIT
+            })
+        );
+    }
+
+    #[test]
+    fn shared_sums_stay_closed() {
+        let mut g = Graph::default();
+        let [x, y, z] = [0, 1, 2].map(|k| q(&mut g, Affine::constant(k)));
+        let inner = g.add(x, y);
+        let (a, b) = (g.add(inner, z), g.multiply(inner, z));
+        assert_eq!(g.open_single_sums(&[a, b]), vec![a, b]);
+        let opened = g.open_single_sums(&[a])[0];
+        assert_eq!(g.as_sum(opened).map(|(_, terms)| terms.len()), Some(3));
+    }
+
+    #[test]
+    fn deep_sums_do_not_overflow_the_stack() {
+        let mut g = Graph::default();
+        let x = q(&mut g, Affine::constant(0));
+        let mut sum = x;
+        for _ in 0..200_000 {
+            let sine = g.call(crate::function::Function::Sin, &[sum]);
+            sum = g.add(sine, x);
+        }
+        assert_eq!(g.inputs_of(sum).len(), 1);
+        let one = g.substitute_loop(sum, LoopVariable(0), &Affine::constant(0));
+        assert_eq!(one, sum);
+        assert!(g.display(sum).to_string().len() > 200_000);
+    }
+}

@@ -1,0 +1,274 @@
+//! Derivatives of random expressions: against hyper-dual numbers, and by the laws that derivatives obey.
+
+use num_dual::{DualNum, HyperDual64};
+use proptest::prelude::*;
+use tfe_symbolic::declared::Form;
+use tfe_symbolic::derivation::{Derivation, Model};
+use tfe_symbolic::differentiate::derivative;
+use tfe_symbolic::function::Function;
+use tfe_symbolic::graph::{ExprId, Graph};
+use tfe_symbolic::input::{Affine, Input};
+use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::program::Request;
+
+const ALL: Request = Request {
+    value: true,
+    first: true,
+    mass: true,
+    second: true,
+    observables: true,
+};
+
+/// A random expression in q0, q1, v0, v1.
+#[derive(Clone, Debug)]
+enum Tree {
+    Leaf(usize),
+    Number(i64),
+    Add(Box<Tree>, Box<Tree>),
+    Subtract(Box<Tree>, Box<Tree>),
+    Multiply(Box<Tree>, Box<Tree>),
+    Divide(Box<Tree>, Box<Tree>),
+    Power(Box<Tree>, i32),
+    Call(Function, Box<Tree>),
+}
+
+impl Tree {
+    fn build(&self, graph: &mut Graph) -> ExprId {
+        let pair = |graph: &mut Graph, a: &Self, b: &Self| (a.build(graph), b.build(graph));
+        match self {
+            Self::Leaf(at) => graph.input(leaf(*at)),
+            Self::Number(value) => graph.integer(*value),
+            Self::Add(a, b) => {
+                let (a, b) = pair(graph, a, b);
+                graph.add(a, b)
+            }
+            Self::Subtract(a, b) => {
+                let (a, b) = pair(graph, a, b);
+                graph.subtract(a, b)
+            }
+            Self::Multiply(a, b) => {
+                let (a, b) = pair(graph, a, b);
+                graph.multiply(a, b)
+            }
+            Self::Divide(a, b) => {
+                // 3 + b² keeps quotients away from their poles.
+                let (a, b) = pair(graph, a, b);
+                let (three, square) = (graph.integer(3), graph.multiply(b, b));
+                let below = graph.add(three, square);
+                graph.divide(a, below)
+            }
+            Self::Power(a, n) => {
+                let (base, exponent) = (a.build(graph), graph.integer(i64::from(*n)));
+                graph.power(base, exponent)
+            }
+            Self::Call(function, a) => {
+                let a = a.build(graph);
+                let a = self.guard(graph, a, *function);
+                graph.call(*function, &[a])
+            }
+        }
+    }
+
+    /// Keeps arguments inside of the domain: 2 + a² for logarithms and roots, sin a for large growth.
+    fn guard(&self, graph: &mut Graph, a: ExprId, function: Function) -> ExprId {
+        match function {
+            Function::Ln | Function::Sqrt | Function::Acosh => {
+                let (two, square) = (graph.integer(2), graph.multiply(a, a));
+                graph.add(two, square)
+            }
+            Function::Asin | Function::Acos | Function::Atanh => {
+                let (two, sine) = (graph.integer(2), graph.call(Function::Sin, &[a]));
+                graph.divide(sine, two)
+            }
+            Function::Exp | Function::Sinh | Function::Cosh | Function::Tan => {
+                graph.call(Function::Sin, &[a])
+            }
+            _ => a,
+        }
+    }
+
+    fn dual(&self, x: &[HyperDual64; 4]) -> HyperDual64 {
+        match self {
+            Self::Leaf(at) => x[*at],
+            Self::Number(value) => HyperDual64::from_re(*value as f64),
+            Self::Add(a, b) => a.dual(x) + b.dual(x),
+            Self::Subtract(a, b) => a.dual(x) - b.dual(x),
+            Self::Multiply(a, b) => a.dual(x) * b.dual(x),
+            Self::Divide(a, b) => {
+                let b = b.dual(x);
+                a.dual(x) / (b * b + 3.0)
+            }
+            Self::Power(a, n) => a.dual(x).powi(*n),
+            Self::Call(function, a) => {
+                let a = a.dual(x);
+                match function {
+                    Function::Sin => a.sin(),
+                    Function::Cos => a.cos(),
+                    Function::Atan => a.atan(),
+                    Function::Tanh => a.tanh(),
+                    Function::Asinh => a.asinh(),
+                    Function::Tan => a.sin().tan(),
+                    Function::Exp => a.sin().exp(),
+                    Function::Sinh => a.sin().sinh(),
+                    Function::Cosh => a.sin().cosh(),
+                    Function::Ln => (a * a + 2.0).ln(),
+                    Function::Sqrt => (a * a + 2.0).sqrt(),
+                    Function::Acosh => (a * a + 2.0).acosh(),
+                    Function::Asin => (a.sin() / 2.0).asin(),
+                    Function::Acos => (a.sin() / 2.0).acos(),
+                    Function::Atanh => (a.sin() / 2.0).atanh(),
+                    function => unreachable!("{function} is not generated"),
+                }
+            }
+        }
+    }
+}
+
+fn leaf(at: usize) -> Input {
+    let index = Affine::constant((at % 2) as i64);
+    if at < 2 {
+        Input::Coordinate(index)
+    } else {
+        Input::Velocity(index)
+    }
+}
+
+fn trees() -> impl Strategy<Value = Tree> {
+    let unary = prop::sample::select(vec![
+        Function::Sin,
+        Function::Cos,
+        Function::Atan,
+        Function::Tanh,
+        Function::Asinh,
+        Function::Tan,
+        Function::Exp,
+        Function::Sinh,
+        Function::Cosh,
+        Function::Ln,
+        Function::Sqrt,
+        Function::Acosh,
+        Function::Asin,
+        Function::Acos,
+        Function::Atanh,
+    ]);
+    let leaf =
+        prop_oneof![3 => (0..4usize).prop_map(Tree::Leaf), 1 => (-3..4i64).prop_map(Tree::Number)];
+    leaf.prop_recursive(5, 40, 2, move |inner| {
+        let two = || {
+            (
+                inner.clone().prop_map(Box::new),
+                inner.clone().prop_map(Box::new),
+            )
+        };
+        prop_oneof![
+            3 => two().prop_map(|(a, b)| Tree::Add(a, b)),
+            2 => two().prop_map(|(a, b)| Tree::Subtract(a, b)),
+            4 => two().prop_map(|(a, b)| Tree::Multiply(a, b)),
+            1 => two().prop_map(|(a, b)| Tree::Divide(a, b)),
+            1 => (inner.clone().prop_map(Box::new), 2..5i32).prop_map(|(a, n)| Tree::Power(a, n)),
+            3 => (unary.clone(), inner.prop_map(Box::new)).prop_map(|(f, a)| Tree::Call(f, a)),
+        ]
+    })
+}
+
+fn model(graph: Graph, energy: ExprId) -> Model {
+    Model {
+        form: Form::Lagrangian,
+        dof: Affine::constant(2),
+        graph,
+        energy,
+        dissipation: None,
+        forces: Vec::new(),
+        observables: Vec::new(),
+    }
+}
+
+/// |a − b| relative to the larger of 1 and their size.
+fn distance(a: f64, b: f64) -> f64 {
+    (a - b).abs() / 1f64.max(a.abs()).max(b.abs())
+}
+
+/// Nested powers and differences of the random expressions lose up to seven of the sixteen digits, in every evaluation.
+const DIGITS: f64 = 1e-9;
+
+/// The values of some expressions.
+fn evaluate(mut graph: Graph, roots: &[ExprId], x: &[f64; 4]) -> Vec<f64> {
+    let energy = graph.integer(0);
+    let observables = roots.iter().map(|root| (String::new(), *root)).collect();
+    let derivation = Derivation::of_model(Model {
+        observables,
+        ..model(graph, energy)
+    });
+    let environment = Environment {
+        q: x[..2].to_vec(),
+        z: x[2..].to_vec(),
+        ..Environment::default()
+    };
+    let mut values = interpret(&derivation.program(ALL), &environment)
+        .expect("a complete environment")
+        .observables;
+    // A root that vanishes is not stored.
+    values.resize(roots.len(), 0.0);
+    values
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn derivatives_agree_with_hyper_dual_numbers(tree in trees(), x in prop::array::uniform4(-1.5..1.5f64)) {
+        let mut graph = Graph::default();
+        let energy = tree.build(&mut graph);
+        let derivation = Derivation::of_model(model(graph, energy));
+        let environment = Environment { q: x[..2].to_vec(), z: x[2..].to_vec(), ..Environment::default() };
+        let results = interpret(&derivation.program(ALL), &environment).expect("a complete environment");
+        let block = |results: &Results, i: usize, j: usize| match (i < 2, j < 2) {
+            (true, true) => results.qq[i][j],
+            (false, false) => results.zz[i - 2][j - 2],
+            (false, true) => results.zq[i - 2][j],
+            (true, false) => results.zq[j - 2][i],
+        };
+        for i in 0..4 {
+            for j in 0..4 {
+                let mut seeded = x.map(HyperDual64::from_re);
+                seeded[i].eps1 = 1.0;
+                seeded[j].eps2 = 1.0;
+                let dual = tree.dual(&seeded);
+                prop_assume!(dual.re.abs() < 1e6 && dual.eps1eps2.abs() < 1e6);
+                prop_assert!(distance(results.value, dual.re) < DIGITS);
+                let first = if i < 2 { results.q[i] } else { results.z[i - 2] };
+                prop_assert!(distance(first, dual.eps1) < DIGITS, "{} {}", first, dual.eps1);
+                let second = block(&results, i, j);
+                prop_assert!(distance(second, dual.eps1eps2) < DIGITS, "({i},{j}) {} {}", second, dual.eps1eps2);
+            }
+        }
+    }
+
+    #[test]
+    fn mixed_partial_derivatives_commute(tree in trees(), x in prop::array::uniform4(-1.5..1.5f64)) {
+        let mut graph = Graph::default();
+        let f = tree.build(&mut graph);
+        let by_first = derivative(&mut graph, f, &leaf(0));
+        let by_second = derivative(&mut graph, f, &leaf(3));
+        let (a, b) = (derivative(&mut graph, by_first, &leaf(3)), derivative(&mut graph, by_second, &leaf(0)));
+        let values = evaluate(graph, &[a, b], &x);
+        prop_assume!(values.iter().all(|value| value.abs() < 1e6));
+        prop_assert!(distance(values[0], values[1]) < DIGITS, "{values:?}");
+    }
+
+    #[test]
+    fn derivatives_are_linear_and_obey_the_product_rule(f in trees(), g in trees(), x in prop::array::uniform4(-1.5..1.5f64)) {
+        let mut graph = Graph::default();
+        let (f, g) = (f.build(&mut graph), g.build(&mut graph));
+        let (two, three) = (graph.integer(2), graph.integer(3));
+        let (twice, thrice) = (graph.multiply(two, f), graph.multiply(three, g));
+        let (sum, product) = (graph.add(twice, thrice), graph.multiply(f, g));
+        let roots = [f, g, sum, product].map(|root| (root, derivative(&mut graph, root, &leaf(1))));
+        let [(f, df), (g, dg), (_, dsum), (_, dproduct)] = roots;
+        let values = evaluate(graph, &[f, df, g, dg, dsum, dproduct], &x);
+        prop_assume!(values.iter().all(|value| value.abs() < 1e6));
+        let [f, df, g, dg, dsum, dproduct] = values[..] else { unreachable!("six roots") };
+        prop_assert!((dsum - (2.0 * df + 3.0 * dg)).abs() < DIGITS * (1.0 + df.abs() + dg.abs()));
+        prop_assert!((dproduct - (df * g + f * dg)).abs() < DIGITS * (1.0 + (df * g).abs() + (f * dg).abs()));
+    }
+}

@@ -1,0 +1,269 @@
+//! Families in loops against the same models written out, and what the loops look like.
+
+use tfe_symbolic::compile::declare;
+use tfe_symbolic::context::{Context, Field, FieldKind};
+use tfe_symbolic::derivation::{Derivation, Model};
+use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::program::Request;
+
+const ALL: Request = Request {
+    value: true,
+    first: true,
+    mass: true,
+    second: true,
+    observables: true,
+};
+
+/// A family of N coordinates, and those of the scalar parameters m, k, a, c that the text uses.
+fn context(text: &str) -> Context {
+    let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).collect();
+    let names = ["m", "k", "a", "c"]
+        .into_iter()
+        .filter(|name| words.contains(name));
+    Context {
+        struct_name: "Model".to_owned(),
+        fields: names
+            .map(|name| Field {
+                name: name.to_owned(),
+                kind: FieldKind::Scalar,
+            })
+            .collect(),
+        const_parameters: vec!["N".to_owned()],
+    }
+}
+
+fn environment(n: usize) -> Environment {
+    let parameters = [("m", 1.3), ("k", 0.7), ("a", 0.25), ("c", 0.1)];
+    Environment {
+        time: 0.4,
+        q: (0..n).map(|i| (1.7 * i as f64 + 0.3).sin()).collect(),
+        z: (0..n).map(|i| (0.9 * i as f64 - 0.2).cos()).collect(),
+        parameters: parameters
+            .map(|(name, value)| (name.to_owned(), value))
+            .into(),
+        sizes: [("N".to_owned(), n as i64)].into(),
+        ..Environment::default()
+    }
+}
+
+fn results(text: &str, n: usize, request: Request) -> Results {
+    let declared =
+        declare(text, &context(text)).unwrap_or_else(|problems| panic!("{text}\n{problems:?}"));
+    let program = Derivation::of(&declared).program(request);
+    interpret(&program, &environment(n)).unwrap_or_else(|error| panic!("{error}\n{program}"))
+}
+
+/// Sums of at most some hundred terms of size one in another order: 1e-12 leaves a factor of ten.
+#[track_caller]
+fn assert_same(a: &Results, b: &Results) {
+    let vectors = |r: &Results| {
+        [
+            vec![r.value],
+            r.z.clone(),
+            r.q.clone(),
+            r.force.clone(),
+            r.observables.clone(),
+        ]
+        .concat()
+    };
+    let blocks = |r: &Results| {
+        [&r.zz, &r.zq, &r.qq, &r.force_z, &r.force_q]
+            .map(|block| block.concat())
+            .concat()
+    };
+    for (x, y) in [(vectors(a), vectors(b)), (blocks(a), blocks(b))] {
+        assert_eq!(x.len(), y.len());
+        for (at, (x, y)) in x.iter().zip(&y).enumerate() {
+            let size = 1f64.max(x.abs()).max(y.abs());
+            assert!((x - y).abs() < 1e-12 * size, "{at}: {x} {y}");
+        }
+    }
+}
+
+fn joined(range: std::ops::Range<usize>, term: impl Fn(usize) -> String) -> String {
+    range.map(term).collect::<Vec<_>>().join(" + ")
+}
+
+/// Compares a family in loops with the same model written out for n coordinates.
+#[track_caller]
+fn check_family(n: usize, looped: &str, written: &str) {
+    let looped = format!("coordinates(q[N]), {looped}");
+    let written = format!("coordinates(q[{n}]), {written}");
+    assert_same(&results(&looped, n, ALL), &results(&written, n, ALL));
+    let first = Request {
+        first: true,
+        ..Request::default()
+    };
+    assert_same(&results(&looped, n, first), &results(&written, n, first));
+}
+
+#[test]
+fn a_chain_in_loops_equals_the_chain_written_out() {
+    let spring = |i: usize| format!("k/2*(q[{0}]-q[{i}])^2 + a/3*(q[{0}]-q[{i}])^3", i + 1);
+    check_family(
+        10,
+        "lagrangian = sum(i in 0..N, m/2*dot(q[i])^2) - sum(i in 0..N-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3) \
+         - k/2*q[0]^2 - k/2*q[N-1]^2",
+        &format!(
+            "lagrangian = {} - ({}) - k/2*q[0]^2 - k/2*q[9]^2",
+            joined(0..10, |i| format!("m/2*dot(q[{i}])^2")),
+            joined(0..9, spring)
+        ),
+    );
+}
+
+#[test]
+fn slots_that_coincide_add_up() {
+    // With one coordinate, q[0] and q[N-1] are the same.
+    check_family(
+        1,
+        "lagrangian = sum(i in 0..N, m/2*dot(q[i])^2) - k*q[0]*sin(q[N-1])*dot(q[0])",
+        "lagrangian = m/2*dot(q[0])^2 - k*q[0]*sin(q[0])*dot(q[0])",
+    );
+}
+
+#[test]
+fn nested_sums_with_dependent_ranges() {
+    let pairs = || (0..5).flat_map(|i| (i + 1..5).map(move |j| (i, j)));
+    let coupling: Vec<String> = pairs()
+        .map(|(i, j)| format!("k*cos(q[{i}]-q[{j}])*dot(q[{j}])"))
+        .collect();
+    check_family(
+        5,
+        "lagrangian = sum(i in 0..N, m/2*dot(q[i])^2 + i*q[i]^2 + sum(j in i+1..N, k*cos(q[i]-q[j])*dot(q[j])))",
+        &format!(
+            "lagrangian = {} + {}",
+            joined(0..5, |i| format!("m/2*dot(q[{i}])^2 + {i}*q[{i}]^2")),
+            coupling.join(" + ")
+        ),
+    );
+}
+
+/// The results of the model whose energy is the first output of the declared one.
+fn results_of_output(text: &str, n: usize) -> Results {
+    let declared =
+        declare(text, &context(text)).unwrap_or_else(|problems| panic!("{text}\n{problems:?}"));
+    let mut model = Model::from(&declared);
+    model.energy = model.observables.remove(0).1;
+    let program = Derivation::of_model(model).program(ALL);
+    interpret(&program, &environment(n)).unwrap_or_else(|error| panic!("{error}\n{program}"))
+}
+
+#[test]
+fn functions_of_sums_couple_all_with_all() {
+    let squares = joined(0..4, |i| format!("q[{i}]^2"));
+    let sines = joined(0..4, |i| format!("sin(q[{i}])*dot(q[{i}])"));
+    let outer = joined(0..4, |i| format!("q[{i}]*sin(q[{i}] + {squares})"));
+    let kinetic = joined(0..4, |i| format!("m/2*dot(q[{i}])^2"));
+    let looped = "coordinates(q[N]), lagrangian = sum(i in 0..N, m/2*dot(q[i])^2), \
+         output(e) = k*sqrt(1 + sum(i in 0..N, q[i]^2))*(q[1]*t - 1) - a*sum(i in 0..N, sin(q[i])*dot(q[i]))^2 \
+         + sum(i in 0..N, q[i]*sin(q[i] + sum(j in 0..N, q[j]^2)))";
+    let written = format!(
+        "coordinates(q[4]), lagrangian = {kinetic}, output(e) = k*sqrt(1 + {squares})*(q[1]*t - 1) - a*({sines})^2 + {outer}"
+    );
+    assert_same(
+        &results_of_output(looped, 4),
+        &results_of_output(&written, 4),
+    );
+}
+
+#[test]
+fn forces_dissipation_and_outputs_in_loops() {
+    let kinetic = joined(0..4, |i| format!("m/2*dot(q[{i}])^2"));
+    let forces: Vec<String> = (0..4)
+        .map(|i| {
+            format!(
+                "force(q[{i}]) = -c*dot(q[{i}])^3 + t*q[{i}]*({})",
+                joined(0..4, |j| format!("q[{j}]^2"))
+            )
+        })
+        .collect();
+    check_family(
+        4,
+        "lagrangian = sum(i in 0..N, m/2*dot(q[i])^2), \
+         dissipation = sum(i in 0..N-1, a*(dot(q[i+1])-dot(q[i]))^2*q[i]^2), \
+         force(q[i]) = -c*dot(q[i])^3 + t*q[i]*sum(j in 0..N, q[j]^2), force(q[0]) = k*q[1], \
+         output(energy) = sum(i in 0..N, m/2*dot(q[i])^2), output(both) = sqrt(sum(i in 0..N, q[i]^2)) + sum(i in 0..N, q[i])",
+        &format!(
+            "lagrangian = {kinetic}, dissipation = {}, {}, force(q[0]) = k*q[1], output(energy) = {kinetic}, output(both) = sqrt({}) + {}",
+            joined(0..3, |i| format!(
+                "a*(dot(q[{0}])-dot(q[{i}]))^2*q[{i}]^2",
+                i + 1
+            )),
+            forces.join(", "),
+            joined(0..4, |i| format!("q[{i}]^2")),
+            joined(0..4, |i| format!("q[{i}]")),
+        ),
+    );
+}
+
+#[test]
+fn a_loop_shares_its_body_and_hoists_what_does_not_vary() {
+    let text =
+        "coordinates(q[N]), lagrangian = sum(i in 0..N, m/2*dot(q[i])^2 - sqrt(k/m)*cos(q[i]))";
+    let declared = declare(text, &context(text)).expect("a model of the test");
+    let program = Derivation::of(&declared).program(Request {
+        first: true,
+        second: true,
+        value: true,
+        ..Request::default()
+    });
+    let text = program.to_string();
+    assert_eq!(text.matches("for i").count(), 1, "{text}");
+    assert_eq!(text.matches("sin_cos").count(), 1, "{text}");
+    let (before, _) = text.split_once("for i").expect("one loop");
+    assert!(before.contains("sqrt("), "{text}");
+}
+
+#[test]
+fn missing_names_and_wild_indices_are_errors() {
+    let text = "coordinates(q[N]), lagrangian = sum(i in 0..N, m/2*dot(q[i])^2 - k*q[i]^2)";
+    let declared = declare(text, &context(text)).expect("a model of the test");
+    let program = Derivation::of(&declared).program(ALL);
+    let short = Environment {
+        sizes: [("N".to_owned(), 4)].into(),
+        ..environment(3)
+    };
+    let error = interpret(&program, &short).expect_err("there is no fourth coordinate");
+    assert_eq!(error.to_string(), "index 3 of `z` is outside of 0..3");
+    let error = interpret(&program, &Environment::default()).expect_err("nothing is given");
+    assert!(error.to_string().ends_with("has no value"), "{error}");
+}
+
+#[test]
+fn a_long_chain_of_links_takes_seconds() {
+    // 16 links with absolute angles and shared positions: the size at which exponential work or memory would show.
+    let n = 16;
+    let names: Vec<String> = (0..n).map(|i| format!("a{i}")).collect();
+    let mut lets = Vec::new();
+    let mut energy = Vec::new();
+    for i in 0..n {
+        let before = |axis: char| {
+            if i == 0 {
+                String::new()
+            } else {
+                format!("{axis}{} + ", i - 1)
+            }
+        };
+        lets.push(format!(
+            "let x{i} = {}sin(a{i}), let y{i} = {}cos(a{i})",
+            before('x'),
+            before('y')
+        ));
+        energy.push(format!("m/2*(dot(x{i})^2 + dot(y{i})^2) + m*k*y{i}"));
+    }
+    let text = format!(
+        "coordinates({}), {}, lagrangian = {}",
+        names.join(", "),
+        lets.join(", "),
+        energy.join(" + ")
+    );
+    let start = std::time::Instant::now();
+    let declared =
+        declare(&text, &context(&text)).unwrap_or_else(|problems| panic!("{problems:?}"));
+    let derivation = Derivation::of(&declared);
+    let counts = derivation.counts(ALL);
+    println!("{counts}, {:?}", start.elapsed());
+    assert!(counts.weighted() < 20_000, "{counts}");
+    assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
+}

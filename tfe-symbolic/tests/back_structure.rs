@@ -1,0 +1,166 @@
+//! What is found out about models, and how programs are written.
+
+use tfe_symbolic::compile::declare;
+use tfe_symbolic::context::Context;
+use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::program::Request;
+use tfe_symbolic::structure::Pattern;
+
+#[track_caller]
+fn derivation(text: &str) -> Derivation {
+    Derivation::of(&declare(text, &Context::default()).expect("a model of the test"))
+}
+
+/// The program of the first derivatives.
+#[track_caller]
+fn first(text: &str) -> String {
+    derivation(text)
+        .program(Request {
+            first: true,
+            ..Request::default()
+        })
+        .to_string()
+}
+
+#[test]
+fn a_linear_oscillator() {
+    let derivation = derivation(
+        "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - (x - y)^2, force(x) = -0.1*dot(x) + t",
+    );
+    let structure = derivation.structure();
+    assert!(structure.linear && structure.constant_mass && structure.separable);
+    assert!(structure.forced && structure.time_dependent && !structure.symmetric_forces);
+    assert_eq!(structure.zz, Pattern::Entries(vec![(0, 0), (1, 1)]));
+    assert_eq!(
+        structure.qq,
+        Pattern::Entries(vec![(0, 0), (0, 1), (1, 0), (1, 1)])
+    );
+    assert_eq!(structure.force_z, Pattern::Entries(vec![(0, 0)]));
+}
+
+#[test]
+fn a_spherical_pendulum() {
+    let derivation = derivation(
+        "coordinates(theta, phi), lagrangian = (dot(theta)^2 + sin(theta)^2*dot(phi)^2)/2 + cos(theta)",
+    );
+    let structure = derivation.structure();
+    assert_eq!(structure.cyclic, [1]);
+    assert!(
+        structure.quadratic_in_z
+            && !structure.constant_mass
+            && !structure.linear
+            && !structure.separable
+    );
+    assert!(!structure.forced && !structure.time_dependent);
+    let page = structure.to_string();
+    assert!(page.contains("cyclic coordinates      q[1]"), "{page}");
+    assert!(
+        page.contains("pattern L_vv            (0,0) (1,1)"),
+        "{page}"
+    );
+}
+
+#[test]
+fn a_hamiltonian_that_is_not_quadratic() {
+    let derivation = derivation("coordinates(x), momenta(p), hamiltonian = sqrt(1 + p^2) + x^4");
+    let structure = derivation.structure();
+    assert!(structure.separable && !structure.quadratic_in_z && !structure.linear);
+    assert!(structure.to_string().contains("constant H_pp           no"));
+}
+
+#[test]
+fn dissipation_is_a_force() {
+    let derivation = derivation(
+        "coordinates(x), lagrangian = dot(x)^2/2 - x^2, dissipation = 0.1*dot(x)^2 + 0.2*dot(x)^2*x^2",
+    );
+    let program = derivation
+        .program(Request {
+            first: true,
+            second: true,
+            ..Request::default()
+        })
+        .to_string();
+    assert!(derivation.structure().forced);
+    assert!(
+        program.contains("Q[0] = ")
+            && program.contains("Q_z[0, 0] = ")
+            && program.contains("Q_q[0, 0] = ")
+    );
+}
+
+#[test]
+fn sine_and_cosine_come_together() {
+    let text = first("coordinates(a), lagrangian = dot(a)^2/2 + sin(a)*cos(a)*a");
+    assert_eq!(
+        (
+            text.matches("sin_cos(").count(),
+            text.matches(" sin(").count()
+        ),
+        (1, 0),
+        "{text}"
+    );
+}
+
+#[test]
+fn repeated_division_takes_one_reciprocal() {
+    let text = first("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + 1/sqrt(x^2 + y^2)");
+    assert_eq!(text.matches(" / ").count(), 1, "{text}");
+    assert_eq!(text.matches("sqrt").count(), 1, "{text}");
+}
+
+#[test]
+fn divisors_that_stand_together_share_a_reciprocal() {
+    let text = first(
+        "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + x*y/((1 + x^2)*(2 + y^2))",
+    );
+    assert_eq!(text.matches(" / ").count(), 2, "{text}");
+    let kepler = "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + 1/sqrt(x^2 + y^2)";
+    let all = Request {
+        value: true,
+        first: true,
+        second: true,
+        ..Request::default()
+    };
+    let counts = derivation(kepler).counts(all);
+    assert_eq!(counts.divisions, 1, "{counts}");
+}
+
+#[test]
+fn powers_share_their_squares() {
+    // x^8 and 8 x^7: x², x⁴ … are shared.
+    let derivation = derivation("coordinates(x), lagrangian = dot(x)^2/2 + x^8");
+    let counts = derivation.counts(Request {
+        value: true,
+        first: true,
+        ..Request::default()
+    });
+    assert!(counts.multiplications <= 2 + 6, "{counts}");
+    assert_eq!(counts.functions, 0);
+}
+
+#[test]
+fn a_third_is_a_division_by_three() {
+    let text = derivation("coordinates(x), lagrangian = dot(x)^2/2 + x^3/3 + 0.7*x")
+        .program(Request {
+            value: true,
+            ..Request::default()
+        })
+        .to_string();
+    assert!(text.contains("/ 3") && text.contains("0.7 *"), "{text}");
+}
+
+#[test]
+fn programs_do_not_change_from_run_to_run() {
+    let text = "coordinates(a, b), lagrangian = dot(a)^2 + dot(b)^2/2 + dot(a)*dot(b)*cos(a-b)*exp(a*b)/(1 + a^2) + cos(a)";
+    let all = Request {
+        value: true,
+        first: true,
+        mass: true,
+        second: true,
+        observables: true,
+    };
+    let programs: Vec<String> = (0..5)
+        .map(|_| derivation(text).program(all).to_string())
+        .collect();
+    assert!(programs.windows(2).all(|pair| pair[0] == pair[1]));
+}
