@@ -1,0 +1,124 @@
+//! The solution between the nodes: integrated rates (T-69).
+
+use alloc::boxed::Box;
+use alloc::vec;
+
+use crate::basis::{MAX_NODES, legendre, legendre_integrals};
+use crate::model::State;
+use crate::scheme::{MAX_RATES, SchemeRef};
+use crate::step::{Interval, Last};
+
+/// One element of a motion, to be evaluated anywhere inside.
+///
+/// Coordinates and momenta are polynomials of degree n − 1 that begin and end at the states of the
+/// nodes, so that the curve is continuous; between nodes their error is of the order hⁿ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DenseElement<const N: usize> {
+    times: (f64, f64),
+    start: State<N>,
+    end: State<N>,
+    /// Legendre coefficients of h dq/dt, then those of h dp/dt.
+    rates: Box<[[f64; N]]>,
+}
+
+impl<const N: usize> DenseElement<N> {
+    /// An element in which nothing happens.
+    pub(crate) fn constant(start: f64, end: f64, state: State<N>) -> Self {
+        Self {
+            times: (start, end),
+            start: state,
+            end: state,
+            rates: Box::new([]),
+        }
+    }
+
+    pub(crate) fn of(
+        scheme: &SchemeRef<'_>,
+        times: (f64, f64),
+        last: &Last<N>,
+        rates: &[[f64; N]],
+        forces: &[[f64; N]],
+        interval: &Interval<'_, N>,
+    ) -> Self {
+        let count = scheme.rates();
+        let mut coefficients = vec![[0.0; N]; 2 * count].into_boxed_slice();
+        let (q, p) = coefficients.split_at_mut(count);
+        project(scheme.rate, rates, last.h, q);
+        project(scheme.force_rate, forces, last.h, p);
+        for impulse in interval.impulses {
+            // An impulse is a rate too; its projection has the same integral.
+            let mut values = [0.0; MAX_RATES];
+            legendre(interval.place(impulse), &mut values);
+            for (m, row) in p.iter_mut().enumerate() {
+                let weight = (2 * m + 1) as f64 * values[m];
+                for a in 0..N {
+                    row[a] += weight * impulse.value[a];
+                }
+            }
+        }
+        Self {
+            times,
+            start: last.start,
+            end: last.end,
+            rates: coefficients,
+        }
+    }
+
+    /// Time at the start.
+    #[must_use]
+    pub fn start(&self) -> f64 {
+        self.times.0
+    }
+
+    /// Time at the end.
+    #[must_use]
+    pub fn end(&self) -> f64 {
+        self.times.1
+    }
+
+    /// The state at τ ∈ [0, 1]: exactly that of the nodes at both ends.
+    #[must_use]
+    pub fn at(&self, tau: f64) -> State<N> {
+        if tau == 1.0 {
+            return self.end;
+        }
+        let mut integrals = [0.0; MAX_NODES];
+        legendre_integrals(tau, &mut integrals);
+        let mut state = self.start;
+        let (q, p) = self.rates.split_at(self.rates.len() / 2);
+        for (m, (rate, force)) in q.iter().zip(p).enumerate() {
+            for a in 0..N {
+                state.q[a] += integrals[m] * rate[a];
+                state.p[a] += integrals[m] * force[a];
+            }
+        }
+        state
+    }
+
+    /// The state at a time between start and end.
+    #[must_use]
+    pub fn at_time(&self, time: f64) -> State<N> {
+        if time == self.times.1 {
+            return self.end;
+        }
+        self.at((time - self.times.0) / (self.times.1 - self.times.0))
+    }
+}
+
+fn project<const N: usize>(
+    matrix: &[f64],
+    values: &[[f64; N]],
+    h: f64,
+    coefficients: &mut [[f64; N]],
+) {
+    for (row, weights) in coefficients
+        .iter_mut()
+        .zip(matrix.chunks_exact(values.len()))
+    {
+        for (weight, value) in weights.iter().zip(values) {
+            for a in 0..N {
+                row[a] += h * weight * value[a];
+            }
+        }
+    }
+}

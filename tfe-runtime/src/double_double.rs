@@ -1,0 +1,139 @@
+//! Numbers of twice the precision, in constant functions.
+//!
+//! The tables of an element are computed once, with about 31 digits, and rounded once: a coefficient
+//! that is wrong in its last digit is wrong in every step, and the error adds up instead of
+//! averaging out. Only the algorithms of Dekker and Knuth are used (no fused multiply-add), hence
+//! compile-time and run-time evaluation give the same digits.
+
+/// An unevaluated sum high + low with |low| ≤ ulp(high)/2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct DoubleDouble {
+    pub(crate) high: f64,
+    pub(crate) low: f64,
+}
+
+impl DoubleDouble {
+    pub(crate) const ZERO: Self = Self::new(0.0);
+    pub(crate) const ONE: Self = Self::new(1.0);
+
+    pub(crate) const fn new(value: f64) -> Self {
+        Self {
+            high: value,
+            low: 0.0,
+        }
+    }
+
+    /// A small integer; exact.
+    pub(crate) const fn integer(value: usize) -> Self {
+        Self::new(value as f64)
+    }
+
+    /// a + b exactly, for |a| ≥ |b|.
+    const fn ordered_sum(a: f64, b: f64) -> Self {
+        let high = a + b;
+        Self {
+            high,
+            low: b - (high - a),
+        }
+    }
+
+    /// a + b exactly.
+    const fn sum(a: f64, b: f64) -> Self {
+        let high = a + b;
+        let part = high - a;
+        Self {
+            high,
+            low: (a - (high - part)) + (b - part),
+        }
+    }
+
+    /// a · b exactly, by splitting both into halves of 26 bits.
+    const fn product(a: f64, b: f64) -> Self {
+        const SPLIT: f64 = 134_217_729.0; // 2²⁷ + 1
+        let (at, bt) = (SPLIT * a, SPLIT * b);
+        let (ah, bh) = (at - (at - a), bt - (bt - b));
+        let (al, bl) = (a - ah, b - bh);
+        let high = a * b;
+        Self {
+            high,
+            low: ((ah * bh - high) + ah * bl + al * bh) + al * bl,
+        }
+    }
+
+    pub(crate) const fn plus(self, other: Self) -> Self {
+        let high = Self::sum(self.high, other.high);
+        let low = Self::sum(self.low, other.low);
+        let first = Self::ordered_sum(high.high, high.low + low.high);
+        Self::ordered_sum(first.high, first.low + low.low)
+    }
+
+    pub(crate) const fn negated(self) -> Self {
+        Self {
+            high: -self.high,
+            low: -self.low,
+        }
+    }
+
+    pub(crate) const fn minus(self, other: Self) -> Self {
+        self.plus(other.negated())
+    }
+
+    pub(crate) const fn times(self, other: Self) -> Self {
+        let product = Self::product(self.high, other.high);
+        Self::ordered_sum(
+            product.high,
+            product.low + (self.high * other.low + self.low * other.high),
+        )
+    }
+
+    pub(crate) const fn over(self, other: Self) -> Self {
+        // Three digits of a long division in base 2⁵³.
+        let first = self.high / other.high;
+        let rest = self.minus(other.times(Self::new(first)));
+        let second = rest.high / other.high;
+        let rest = rest.minus(other.times(Self::new(second)));
+        let third = rest.high / other.high;
+        Self::ordered_sum(first, second).plus(Self::new(third))
+    }
+
+    /// Half of it; exact.
+    pub(crate) const fn half(self) -> Self {
+        Self {
+            high: 0.5 * self.high,
+            low: 0.5 * self.low,
+        }
+    }
+
+    pub(crate) const fn magnitude(self) -> f64 {
+        self.high.abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_third_of_three_is_one_to_thirty_digits() {
+        let three = DoubleDouble::integer(3);
+        let error = DoubleDouble::ONE
+            .over(three)
+            .times(three)
+            .minus(DoubleDouble::ONE);
+        // 2⁻¹⁰⁴ is the unit of 106 significant bits less two.
+        assert!(error.magnitude() < 5e-32, "{error:?}");
+    }
+
+    #[test]
+    fn the_sum_keeps_what_one_number_would_lose() {
+        let tiny = DoubleDouble::new(1e-25);
+        let kept = DoubleDouble::ONE.plus(tiny).minus(DoubleDouble::ONE);
+        assert!((kept.high - 1e-25).abs() < 1e-31);
+    }
+
+    #[test]
+    fn works_in_constants() {
+        const SEVENTH: DoubleDouble = DoubleDouble::ONE.over(DoubleDouble::integer(7));
+        assert_eq!(SEVENTH, DoubleDouble::ONE.over(DoubleDouble::integer(7)));
+    }
+}

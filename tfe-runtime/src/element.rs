@@ -1,0 +1,411 @@
+//! The elements by name: families, number of nodes, rule of integration.
+
+use core::fmt;
+
+use crate::basis::MAX_NODES;
+use crate::quadrature::{MAX_POINTS, Quadrature};
+
+/// Which spaces an element is built on; s = nodes − 1.
+///
+/// | family | trial | test | boundary jumps |
+/// |---|---|---|---|
+/// | `Primal` | q of degree s, v = dq/dt | the same | p on both sides |
+/// | `Mixed` | (p, q) of degree s − 1 | degree s, continuous | both sides |
+/// | `EnergyConserving` | (p, q) of degree s, continuous | degree s − 1 | none |
+/// | `Radau` | (p, q) of degree s − 1 | degree s − 1 | left side |
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Family {
+    /// Displacement form.
+    Primal,
+    /// Two-field form.
+    Mixed,
+    /// The spaces of the two-field form exchanged.
+    EnergyConserving,
+    /// Two-field form with a jump on the left side only.
+    Radau,
+}
+
+/// Where the forces of an element are evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Rule {
+    /// What suits the family: `Primal` n Gauss points, `Mixed` n − 1 Gauss points,
+    /// `EnergyConserving` 2n Gauss points, `Radau` n − 1 right Radau points.
+    Default,
+    /// So many Gauss points.
+    Gauss(usize),
+    /// So many Lobatto points, the ends included.
+    Lobatto(usize),
+}
+
+/// A finite element in time: family, number of nodes, rule of integration.
+///
+/// Any combination can be written down; [`validate`](Self::validate) says whether it is an element.
+///
+/// # Example
+/// ```
+/// use tfe_runtime::{Element, Mixed};
+///
+/// let element = Element::mixed(4);
+/// assert_eq!(element, Mixed::<4>.into());
+/// assert_eq!(element.order(), 6);
+/// assert_eq!(element.quadrature(5).to_string(), "Mixed::<4>.quadrature(5)");
+/// assert!(Element::mixed(1).validate().is_err());
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Element {
+    family: Family,
+    nodes: usize,
+    rule: Rule,
+}
+
+impl Element {
+    /// The fewest nodes.
+    pub const MIN_NODES: usize = 2;
+    /// The most nodes.
+    pub const MAX_NODES: usize = MAX_NODES;
+
+    /// An element with the default rule of its family.
+    #[must_use]
+    pub const fn new(family: Family, nodes: usize) -> Self {
+        Self {
+            family,
+            nodes,
+            rule: Rule::Default,
+        }
+    }
+
+    /// Displacement form with full quadrature.
+    #[must_use]
+    pub const fn primal(nodes: usize) -> Self {
+        Self::new(Family::Primal, nodes)
+    }
+
+    /// Two-field form; its default rule makes it Gauss collocation.
+    #[must_use]
+    pub const fn mixed(nodes: usize) -> Self {
+        Self::new(Family::Mixed, nodes)
+    }
+
+    /// Continuous trial, discontinuous test: keeps the energy as far as the rule integrates it.
+    #[must_use]
+    pub const fn energy_conserving(nodes: usize) -> Self {
+        Self::new(Family::EnergyConserving, nodes)
+    }
+
+    /// One-sided jump: L-stable, dissipative.
+    #[must_use]
+    pub const fn radau(nodes: usize) -> Self {
+        Self::new(Family::Radau, nodes)
+    }
+
+    /// The same with n − 1 Gauss points.
+    #[must_use]
+    pub const fn reduced(self) -> Self {
+        self.quadrature(self.nodes.saturating_sub(1))
+    }
+
+    /// The same with n Lobatto points.
+    #[must_use]
+    pub const fn lobatto(self) -> Self {
+        self.with_rule(Rule::Lobatto(self.nodes))
+    }
+
+    /// The same with so many Gauss points.
+    #[must_use]
+    pub const fn quadrature(self, points: usize) -> Self {
+        self.with_rule(Rule::Gauss(points))
+    }
+
+    /// The same with another rule.
+    #[must_use]
+    pub const fn with_rule(self, rule: Rule) -> Self {
+        Self { rule, ..self }
+    }
+
+    /// The family.
+    #[must_use]
+    pub const fn family(&self) -> Family {
+        self.family
+    }
+
+    /// The number of nodes n.
+    #[must_use]
+    pub const fn nodes(&self) -> usize {
+        self.nodes
+    }
+
+    /// The rule as it was asked for.
+    #[must_use]
+    pub const fn rule(&self) -> Rule {
+        self.rule
+    }
+
+    /// s = n − 1.
+    #[must_use]
+    pub const fn degree(&self) -> usize {
+        self.nodes.saturating_sub(1)
+    }
+
+    /// The number of points at which the model is evaluated.
+    #[must_use]
+    pub const fn points(&self) -> usize {
+        match (self.rule, self.family) {
+            (Rule::Gauss(points) | Rule::Lobatto(points), _) => points,
+            (Rule::Default, Family::Primal) => self.nodes,
+            (Rule::Default, Family::Mixed | Family::Radau) => self.degree(),
+            (Rule::Default, Family::EnergyConserving) => self.nodes.saturating_mul(2),
+        }
+    }
+
+    /// The number of unknown rates a coordinate: one a point, or n − 1 for a primal element.
+    #[must_use]
+    pub const fn unknowns(&self) -> usize {
+        match self.family {
+            Family::Primal => self.degree(),
+            _ => self.points(),
+        }
+    }
+
+    /// Whether the element is a Runge–Kutta method with its points as stages.
+    ///
+    /// True for all but primal elements with another rule than n − 1 Gauss points.
+    #[must_use]
+    pub const fn is_collocated(&self) -> bool {
+        match (self.family, self.rule) {
+            (Family::Primal, Rule::Gauss(points)) => points == self.degree(),
+            (Family::Primal, _) => false,
+            _ => true,
+        }
+    }
+
+    /// The rule itself.
+    #[must_use]
+    pub const fn quadrature_rule(&self) -> Quadrature {
+        match (self.rule, self.family) {
+            (Rule::Lobatto(points), _) => Quadrature::lobatto(points),
+            (Rule::Default, Family::Radau) => Quadrature::radau(self.points()),
+            _ => Quadrature::gauss(self.points()),
+        }
+    }
+
+    /// The order of accuracy in the states at the nodes, for smooth models.
+    #[must_use]
+    pub const fn order(&self) -> usize {
+        let s = self.degree();
+        let spaces = match self.family {
+            Family::Radau => s.saturating_mul(2).saturating_sub(1),
+            _ => s.saturating_mul(2),
+        };
+        // Order of the rule = degree up to which it is exact, plus one.
+        let rule = match (self.rule, self.family) {
+            (Rule::Lobatto(points), _) => points.saturating_mul(2).saturating_sub(2),
+            (Rule::Default, Family::Radau) => s.saturating_mul(2).saturating_sub(1),
+            _ => self.points().saturating_mul(2),
+        };
+        if rule < spaces { rule } else { spaces }
+    }
+
+    /// Checks the number of nodes and of points.
+    ///
+    /// # Errors
+    /// [`ElementError::Nodes`] unless 2 ≤ n ≤ 12; [`ElementError::Points`] if the rule has too few
+    /// points to see all unknowns, or more than 32.
+    pub const fn validate(&self) -> Result<(), ElementError> {
+        if self.nodes < Self::MIN_NODES || self.nodes > Self::MAX_NODES {
+            return Err(ElementError::Nodes { element: *self });
+        }
+        let s = self.degree();
+        let least = match (self.rule, self.family) {
+            // A Lobatto rule of k points is exact to degree 2k − 3 only: one point more, except
+            // for `Radau`, whose test functions are of one degree less.
+            (Rule::Lobatto(_), Family::Radau) => {
+                if s < 2 {
+                    2
+                } else {
+                    s
+                }
+            }
+            (Rule::Lobatto(_), _) => s + 1,
+            _ => s,
+        };
+        let points = self.points();
+        if points < least || points > MAX_POINTS {
+            return Err(ElementError::Points {
+                element: *self,
+                least,
+            });
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Element {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let family = match self.family {
+            Family::Primal => "Primal",
+            Family::Mixed => "Mixed",
+            Family::EnergyConserving => "EnergyConserving",
+            Family::Radau => "Radau",
+        };
+        write!(f, "{family}::<{}>", self.nodes)?;
+        match self.rule {
+            Rule::Default => Ok(()),
+            Rule::Gauss(points) if points == self.degree() => f.write_str(".reduced()"),
+            Rule::Gauss(points) => write!(f, ".quadrature({points})"),
+            Rule::Lobatto(points) if points == self.nodes => f.write_str(".lobatto()"),
+            Rule::Lobatto(points) => write!(f, ".with_rule(Rule::Lobatto({points}))"),
+        }
+    }
+}
+
+/// What is wrong with an [`Element`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ElementError {
+    /// The number of nodes is not in 2..=12.
+    Nodes {
+        /// The element as asked for.
+        element: Element,
+    },
+    /// The rule has too few points for the spaces, or too many.
+    Points {
+        /// The element as asked for.
+        element: Element,
+        /// The fewest points that do.
+        least: usize,
+    },
+}
+
+impl fmt::Display for ElementError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Nodes { element } => write!(
+                f,
+                "`{element}` has {} nodes, an element has {} to {}",
+                element.nodes,
+                Element::MIN_NODES,
+                Element::MAX_NODES
+            ),
+            Self::Points { element, least } => write!(
+                f,
+                "`{element}` integrates with {} points, it needs {least} to {MAX_POINTS}",
+                element.points()
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ElementError {}
+
+/// One unit struct a family, with the number of nodes in the type.
+macro_rules! markers {
+    ($($(#[$doc:meta])* $name:ident, $constructor:ident;)*) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub struct $name<const NODES: usize>;
+
+        impl<const NODES: usize> $name<NODES> {
+            /// As a value; a number of nodes outside 2..=12 does not compile.
+            #[must_use]
+            pub const fn element(self) -> Element {
+                const {
+                    assert!(
+                        NODES >= Element::MIN_NODES && NODES <= Element::MAX_NODES,
+                        "an element has 2 to 12 nodes"
+                    );
+                }
+                Element::$constructor(NODES)
+            }
+
+            /// The same with n − 1 Gauss points.
+            #[must_use]
+            pub const fn reduced(self) -> Element {
+                self.element().reduced()
+            }
+
+            /// The same with n Lobatto points.
+            #[must_use]
+            pub const fn lobatto(self) -> Element {
+                self.element().lobatto()
+            }
+
+            /// The same with so many Gauss points.
+            #[must_use]
+            pub const fn quadrature(self, points: usize) -> Element {
+                self.element().quadrature(points)
+            }
+        }
+
+        impl<const NODES: usize> From<$name<NODES>> for Element {
+            fn from(marker: $name<NODES>) -> Self {
+                marker.element()
+            }
+        }
+    )*};
+}
+
+markers! {
+    /// Displacement form: N nodes, full quadrature.
+    Primal, primal;
+    /// Two-field form: N nodes, N − 1 Gauss points.
+    Mixed, mixed;
+    /// Continuous trial and discontinuous test functions.
+    EnergyConserving, energy_conserving;
+    /// One-sided jump: L-stable, dissipative.
+    Radau, radau;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_default_from_2_to_12_nodes_is_valid() {
+        for nodes in 2..=12 {
+            for element in [
+                Element::primal(nodes),
+                Element::mixed(nodes),
+                Element::energy_conserving(nodes),
+                Element::radau(nodes),
+            ] {
+                for element in [element, element.reduced(), element.lobatto()] {
+                    assert_eq!(element.validate(), Ok(()), "{element:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_element_is_refused() {
+        for nodes in [0, 1, 13, usize::MAX] {
+            let element = Element::mixed(nodes);
+            assert_eq!(element.validate(), Err(ElementError::Nodes { element }));
+            assert!(element.reduced().lobatto().validate().is_err());
+            let _ = (
+                element.order(),
+                element.reduced().order(),
+                element.is_collocated(),
+            );
+        }
+        for (element, least) in [
+            (Element::mixed(4).quadrature(2), 3),
+            (Element::primal(3).quadrature(33), 2),
+            (Element::primal(3).with_rule(Rule::Lobatto(2)), 3),
+            (Element::radau(2).with_rule(Rule::Lobatto(1)), 2),
+        ] {
+            assert_eq!(
+                element.validate(),
+                Err(ElementError::Points { element, least })
+            );
+        }
+    }
+
+    #[test]
+    fn orders() {
+        assert_eq!(Primal::<2>.reduced().order(), 2);
+        assert_eq!(Primal::<4>.lobatto().order(), 6);
+        assert_eq!(Mixed::<6>.element().order(), 10);
+        assert_eq!(EnergyConserving::<3>.element().order(), 4);
+        assert_eq!(Radau::<3>.element().order(), 3);
+    }
+}

@@ -1,0 +1,389 @@
+//! The pointwise Legendre transform: any model seen as a Lagrangian or as a Hamiltonian.
+//!
+//! From L(q, v, t), with v the solution of p = L_v:
+//!
+//! ```text
+//! H_p = v ,  H_q = −L_q ,  H_pp = L_vv⁻¹ ,  H_pq = −L_vv⁻¹ L_vq ,
+//! H_qq = −L_qq + L_qv L_vv⁻¹ L_vq ,  Q_p = Q_v H_pp ,  Q_q|p = Q_q|v + Q_v H_pq .
+//! ```
+//!
+//! The way back is the same formula with the letters exchanged, because the transform is its own
+//! inverse. Nothing is inverted symbolically; the mass matrix is factored where it is needed.
+
+use crate::error::LegendreError;
+use crate::lu::Block;
+use crate::model::{First, Form, Model, Second, State};
+
+/// A model at one instant, seen as a Lagrangian: `first.z` is L_v, `second.zq` is L_vq.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LagrangianView<const N: usize> {
+    /// The momentum p = L_v.
+    pub p: [f64; N],
+    /// L(q, v, t).
+    pub lagrangian: f64,
+    /// L_v, L_q and Q.
+    pub first: First<f64, N>,
+    /// L_vv, L_vq, L_qq, ∂Q/∂v and ∂Q/∂q at constant v.
+    pub second: Second<f64, N>,
+}
+
+/// A model at one instant, seen as a Hamiltonian: `first.z` is H_p, `second.zq` is H_pq.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HamiltonianView<const N: usize> {
+    /// The velocity v = H_p.
+    pub v: [f64; N],
+    /// H(q, p, t).
+    pub hamiltonian: f64,
+    /// H_p, H_q and Q.
+    pub first: First<f64, N>,
+    /// H_pp, H_pq, H_qq, ∂Q/∂p and ∂Q/∂q at constant p.
+    pub second: Second<f64, N>,
+}
+
+/// The state (q, p) that belongs to coordinates and velocities.
+///
+/// # Errors
+/// [`LegendreError`] if the model is a Hamiltonian and no momentum is found.
+pub fn state<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+) -> Result<State<N>, LegendreError>
+where
+    M: Model<N>,
+{
+    Ok(State {
+        q: *q,
+        p: momentum(model, t, q, v)?,
+    })
+}
+
+/// The momentum p = L_v.
+///
+/// # Errors
+/// [`LegendreError`] if the model is a Hamiltonian and no momentum is found.
+pub fn momentum<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+) -> Result<[f64; N], LegendreError>
+where
+    M: Model<N>,
+{
+    match M::FORM {
+        Form::Lagrangian => finite(derivative(model, t, q, v)),
+        Form::Hamiltonian => conjugate(model, t, q, v, &[0.0; N]),
+    }
+}
+
+/// The velocity v = H_p. For a Lagrangian it is searched from `guess`, such as the last one known.
+///
+/// # Errors
+/// [`LegendreError`] if the model is a Lagrangian and no velocity is found.
+pub fn velocity<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    p: &[f64; N],
+    guess: &[f64; N],
+) -> Result<[f64; N], LegendreError>
+where
+    M: Model<N>,
+{
+    match M::FORM {
+        Form::Hamiltonian => finite(derivative(model, t, q, p)),
+        Form::Lagrangian => conjugate(model, t, q, p, guess),
+    }
+}
+
+/// The energy H(q, p, t) where the velocity is known already; NaN if that is NaN and needed.
+pub fn energy_at<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    p: &[f64; N],
+    v: &[f64; N],
+) -> f64
+where
+    M: Model<N>,
+{
+    match M::FORM {
+        Form::Hamiltonian => model.energy_function(t, q, p),
+        Form::Lagrangian => dot(p, v) - model.energy_function(t, q, v),
+    }
+}
+
+/// The energy H(q, p, t); for a Lagrangian p·v − L.
+///
+/// # Errors
+/// [`LegendreError`] if the model is a Lagrangian and no velocity is found.
+pub fn energy<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    p: &[f64; N],
+) -> Result<f64, LegendreError>
+where
+    M: Model<N>,
+{
+    match M::FORM {
+        Form::Hamiltonian => Ok(model.energy_function(t, q, p)),
+        Form::Lagrangian => {
+            let v = conjugate(model, t, q, p, &[0.0; N])?;
+            Ok(energy_at(model, t, q, p, &v))
+        }
+    }
+}
+
+/// The model as a Lagrangian at (t, q, v).
+///
+/// # Errors
+/// [`LegendreError`] if the model is a Hamiltonian and no momentum is found.
+pub fn lagrangian_view<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+) -> Result<LagrangianView<N>, LegendreError>
+where
+    M: Model<N>,
+{
+    lagrangian_view_from(model, t, q, v, &[0.0; N])
+}
+
+/// The same, searching the momentum from `guess`.
+pub(crate) fn lagrangian_view_from<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+    guess: &[f64; N],
+) -> Result<LagrangianView<N>, LegendreError>
+where
+    M: Model<N>,
+{
+    let (mut first, mut second) = (First::ZERO, Second::ZERO);
+    match M::FORM {
+        Form::Lagrangian => {
+            model.second(t, q, v, &mut first, &mut second);
+            let lagrangian = model.energy_function(t, q, v);
+            Ok(LagrangianView {
+                p: first.z,
+                lagrangian,
+                first,
+                second,
+            })
+        }
+        Form::Hamiltonian => {
+            let p = conjugate(model, t, q, v, guess)?;
+            model.second(t, q, &p, &mut first, &mut second);
+            let lagrangian = dot(&p, v) - model.energy_function(t, q, &p);
+            let (first, second) = transform(&p, &first, &second)?;
+            Ok(LagrangianView {
+                p,
+                lagrangian,
+                first,
+                second,
+            })
+        }
+    }
+}
+
+/// The model as a Hamiltonian at (t, q, p).
+///
+/// # Errors
+/// [`LegendreError`] if the model is a Lagrangian and no velocity is found.
+pub fn hamiltonian_view<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    p: &[f64; N],
+) -> Result<HamiltonianView<N>, LegendreError>
+where
+    M: Model<N>,
+{
+    let (mut first, mut second) = (First::ZERO, Second::ZERO);
+    match M::FORM {
+        Form::Hamiltonian => {
+            model.second(t, q, p, &mut first, &mut second);
+            let hamiltonian = model.energy_function(t, q, p);
+            Ok(HamiltonianView {
+                v: first.z,
+                hamiltonian,
+                first,
+                second,
+            })
+        }
+        Form::Lagrangian => {
+            let v = conjugate(model, t, q, p, &[0.0; N])?;
+            model.second(t, q, &v, &mut first, &mut second);
+            let hamiltonian = dot(p, &v) - model.energy_function(t, q, &v);
+            let (first, second) = transform(&v, &first, &second)?;
+            Ok(HamiltonianView {
+                v,
+                hamiltonian,
+                first,
+                second,
+            })
+        }
+    }
+}
+
+/// The derivatives of the conjugate function, given those of the declared one at z.
+///
+/// With F*(y) = y·z − F(z): F*_y = z, F*_q = −F_q, F*_yy = F_zz⁻¹, and so on as above.
+fn transform<const N: usize>(
+    z: &[f64; N],
+    first: &First<f64, N>,
+    second: &Second<f64, N>,
+) -> Result<(First<f64, N>, Second<f64, N>), LegendreError> {
+    let zz = Block::of(&second.zz)
+        .map_err(|singular| LegendreError::Singular {
+            coordinate: singular.column,
+        })?
+        .inverse();
+    let mut conjugate_first = First { z: *z, ..*first };
+    let mut conjugate = Second { zz, ..Second::ZERO };
+    for a in 0..N {
+        conjugate_first.q[a] = -first.q[a];
+        for b in 0..N {
+            for c in 0..N {
+                conjugate.zq[a][b] -= zz[a][c] * second.zq[c][b];
+                conjugate.force_z[a][b] += second.force_z[a][c] * zz[c][b];
+            }
+        }
+    }
+    for a in 0..N {
+        for b in 0..N {
+            // F_qz F_zz⁻¹ F_zq = −F_qz F*_yq
+            let (mut qq, mut force_q) = (-second.qq[a][b], second.force_q[a][b]);
+            for c in 0..N {
+                qq -= second.zq[c][a] * conjugate.zq[c][b];
+                force_q += second.force_z[a][c] * conjugate.zq[c][b];
+            }
+            conjugate.qq[a][b] = qq;
+            conjugate.force_q[a][b] = force_q;
+        }
+    }
+    Ok((conjugate_first, conjugate))
+}
+
+/// ∂/∂z of the declared function.
+fn derivative<M, const N: usize>(model: &M, t: f64, q: &[f64; N], z: &[f64; N]) -> [f64; N]
+where
+    M: Model<N>,
+{
+    let mut first = First::ZERO;
+    model.first(t, q, z, &mut first);
+    first.z
+}
+
+/// The z with ∂/∂z = `target`: the momentum of a velocity, or the velocity of a momentum.
+pub(crate) fn conjugate<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    target: &[f64; N],
+    guess: &[f64; N],
+) -> Result<[f64; N], LegendreError>
+where
+    M: Model<N>,
+{
+    const MOST: u32 = 60;
+    let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
+    let mut z = *guess;
+    let mut last = f64::INFINITY;
+    for iteration in 0..MOST {
+        model.first_and_mass(t, q, &z, &mut first, &mut zz);
+        let mut step = [0.0; N];
+        for a in 0..N {
+            step[a] = first.z[a] - target[a];
+        }
+        let residual = largest(&step);
+        if !residual.is_finite() {
+            return Err(LegendreError::NonFinite);
+        }
+        // A regular problem leaves the rounding of ∂/∂z; it is reached once the residual is small
+        // beside its terms and no longer falls.
+        let scale = largest(&first.z).max(largest(target));
+        if residual == 0.0 || (residual >= 0.5 * last && residual <= 64.0 * f64::EPSILON * scale) {
+            return Ok(z);
+        }
+        last = residual;
+        let block = Block::of(&zz).map_err(|singular| LegendreError::Singular {
+            coordinate: singular.column,
+        })?;
+        block.solve(&mut step);
+        let start = z;
+        advance(&mut z, &start, &step, 1.0);
+        // A quadratic function is done after one step; a second one takes away the rounding of a
+        // long first one.
+        let enough = match (M::FACTS.quadratic_in_z, iteration) {
+            (true, 0) => 1e-6,
+            (true, _) => f64::INFINITY,
+            (false, _) => f64::EPSILON,
+        };
+        if largest(&step) <= enough * largest(&z) {
+            return finite(z);
+        }
+        // Damping, for functions like −m√(1 − v²) that end where Newton's step may land.
+        let mut fraction = 1.0;
+        while !M::FACTS.quadratic_in_z
+            && residual > 1e-8 * scale
+            && fraction > 1e-6
+            && !improves(distance(&derivative(model, t, q, &z), target), residual)
+        {
+            fraction *= 0.5;
+            advance(&mut z, &start, &step, fraction);
+        }
+    }
+    Err(LegendreError::Stalled {
+        iterations: MOST,
+        residual: last,
+    })
+}
+
+fn advance<const N: usize>(z: &mut [f64; N], start: &[f64; N], step: &[f64; N], fraction: f64) {
+    for a in 0..N {
+        z[a] = start[a] - fraction * step[a];
+    }
+}
+
+/// Less, and a number.
+fn improves(new: f64, old: f64) -> bool {
+    new < old
+}
+
+fn dot<const N: usize>(x: &[f64; N], y: &[f64; N]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+fn distance<const N: usize>(x: &[f64; N], y: &[f64; N]) -> f64 {
+    let mut difference = *x;
+    for a in 0..N {
+        difference[a] -= y[a];
+    }
+    largest(&difference)
+}
+
+/// The largest magnitude; NaN if one is.
+pub(crate) fn largest(values: &[f64]) -> f64 {
+    let mut largest = 0.0_f64;
+    for value in values {
+        if value.is_nan() {
+            return f64::NAN;
+        }
+        largest = largest.max(value.abs());
+    }
+    largest
+}
+
+fn finite<const N: usize>(values: [f64; N]) -> Result<[f64; N], LegendreError> {
+    if largest(&values).is_finite() {
+        Ok(values)
+    } else {
+        Err(LegendreError::NonFinite)
+    }
+}

@@ -1,0 +1,77 @@
+//! The small runtime that generated kernels link into: time elements, Newton, stepping.
+//!
+//! Every element is data. Trial degree, test degree, boundary jumps and rule become a few matrices
+//! ([`scheme`]); a [`Model`] declared by its Lagrangian is solved for velocities, one declared by its
+//! Hamiltonian for rates in phase space. [`step::Stepper`] moves a [`State`] over one element after
+//! the other; [`step::Method`] does the same on the caller's memory, without allocation.
+//!
+//! # Features
+//! `std` (default): elementary functions of the standard library instead of `libm`; `alloc`: elements
+//! chosen at run time, dense output, the nodal forms of [`weak_form`]. Without both the crate is
+//! `no_std` and does not allocate.
+#![cfg_attr(not(feature = "std"), no_std)]
+
+#[cfg(feature = "alloc")]
+extern crate alloc;
+
+pub mod basis;
+#[cfg(feature = "alloc")]
+mod dense;
+mod double_double;
+pub mod element;
+mod equations;
+pub mod error;
+pub mod legendre;
+pub mod lu;
+pub mod model;
+mod newton;
+mod phase_form;
+pub mod quadrature;
+pub mod real;
+pub mod scheme;
+pub mod statistics;
+pub mod step;
+#[cfg(feature = "alloc")]
+mod stepper;
+pub mod structure;
+mod tableau;
+pub mod transition;
+mod velocity_form;
+#[cfg(feature = "alloc")]
+pub mod weak_form;
+pub mod workspace;
+
+pub use element::{Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule};
+pub use error::{LegendreError, StepError};
+pub use model::{CoordinateName, Facts, First, Form, Model, Second, State};
+pub use newton::Solve;
+pub use real::{Lanes, Real};
+pub use statistics::Statistics;
+pub use structure::{Operations, Structure};
+
+/// What generated code refers to. Not part of the public interface.
+#[doc(hidden)]
+pub mod __private {
+    pub use crate::element::{Element, EnergyConserving, Mixed, Primal, Radau, Rule};
+    pub use crate::error::StepError;
+    pub use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
+    pub use crate::newton::{Control, Solve};
+    pub use crate::real::Real;
+    pub use crate::scheme::{Scheme, SchemeRef, Tables};
+    pub use crate::statistics::Statistics;
+    pub use crate::step::{Impulse, Interval, Memory, Method};
+    pub use crate::structure::{Operations, Structure};
+    pub use crate::workspace::{Workspace, numbers_len, pivots_len};
+
+    /// The state of coordinates and velocities; a momentum that does not exist is NaN, which the
+    /// first step refuses.
+    pub fn state<M, const N: usize>(model: &M, t: f64, q: [f64; N], v: [f64; N]) -> State<N>
+    where
+        M: Model<N>,
+    {
+        crate::legendre::state(model, t, &q, &v).unwrap_or(State {
+            q,
+            p: [f64::NAN; N],
+        })
+    }
+}

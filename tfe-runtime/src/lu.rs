@@ -1,0 +1,174 @@
+//! Dense LU factorisation with partial pivoting, on the caller's memory.
+//!
+//! Matrices are flat, row by row. Sizes are small (rates times coordinates), so the loops are plain.
+
+/// A pivot vanished, or was not a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Singular {
+    /// The column at which elimination stopped.
+    pub column: usize,
+}
+
+/// Factors a `size` × `size` matrix in place; `pivots[k]` is the row that was exchanged with row k.
+///
+/// # Errors
+/// [`Singular`] if no row has a finite, non-zero pivot.
+#[inline]
+pub fn factor(size: usize, matrix: &mut [f64], pivots: &mut [usize]) -> Result<(), Singular> {
+    for column in 0..size {
+        let mut pivot = column;
+        for row in column + 1..size {
+            if matrix[row * size + column].abs() > matrix[pivot * size + column].abs() {
+                pivot = row;
+            }
+        }
+        pivots[column] = pivot;
+        let value = matrix[pivot * size + column];
+        if value == 0.0 || !value.is_finite() {
+            return Err(Singular { column });
+        }
+        if pivot != column {
+            for j in 0..size {
+                matrix.swap(pivot * size + j, column * size + j);
+            }
+        }
+        let (upper, lower) = matrix.split_at_mut((column + 1) * size);
+        let pivot_row = &upper[column * size..];
+        for row in lower.chunks_exact_mut(size).take(size - column - 1) {
+            let factor = row[column] / pivot_row[column];
+            row[column] = factor;
+            // Zero blocks are common in tangents of several coordinates.
+            if factor != 0.0 {
+                for j in column + 1..size {
+                    row[j] -= factor * pivot_row[j];
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Solves A x = b in place with the factors of A.
+#[inline]
+pub fn solve(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64]) {
+    for k in 0..size {
+        vector.swap(k, pivots[k]);
+    }
+    for row in 1..size {
+        let mut sum = vector[row];
+        for j in 0..row {
+            sum -= factors[row * size + j] * vector[j];
+        }
+        vector[row] = sum;
+    }
+    for row in (0..size).rev() {
+        let mut sum = vector[row];
+        for j in row + 1..size {
+            sum -= factors[row * size + j] * vector[j];
+        }
+        vector[row] = sum / factors[row * size + row];
+    }
+}
+
+/// Factors an N × N block; one that is singular up to rounding counts as singular.
+#[inline]
+pub(crate) fn factor_block<const N: usize>(
+    matrix: &mut [f64],
+    pivots: &mut [usize],
+) -> Result<(), Singular> {
+    // Columns carry the units of their coordinate: a pivot is small only beside its column.
+    let mut scales = [0.0_f64; N];
+    for row in matrix.chunks_exact(N) {
+        for (scale, entry) in scales.iter_mut().zip(row) {
+            *scale = scale.max(entry.abs());
+        }
+    }
+    factor(N, matrix, pivots)?;
+    for (column, scale) in scales.iter().enumerate() {
+        let pivot = matrix[column * N + column].abs();
+        if pivot.is_nan() || pivot <= 8.0 * f64::EPSILON * scale {
+            return Err(Singular { column });
+        }
+    }
+    Ok(())
+}
+
+/// The factors of a mass matrix, or of another N × N block.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Block<const N: usize> {
+    factors: [[f64; N]; N],
+    pivots: [usize; N],
+}
+
+impl<const N: usize> Block<N> {
+    /// Factors a matrix; one that is singular up to rounding counts as singular.
+    #[inline]
+    pub(crate) fn of(matrix: &[[f64; N]; N]) -> Result<Self, Singular> {
+        let mut block = Self {
+            factors: *matrix,
+            pivots: [0; N],
+        };
+        factor_block::<N>(block.factors.as_flattened_mut(), &mut block.pivots)?;
+        Ok(block)
+    }
+
+    #[inline]
+    pub(crate) fn solve(&self, vector: &mut [f64]) {
+        solve(N, self.factors.as_flattened(), &self.pivots, vector);
+    }
+
+    /// The inverse, for matrices that enter formulas as a whole.
+    #[inline]
+    pub(crate) fn inverse(&self) -> [[f64; N]; N] {
+        let mut inverse = [[0.0; N]; N];
+        for column in 0..N {
+            let mut unit = [0.0; N];
+            unit[column] = 1.0;
+            self.solve(&mut unit);
+            for row in 0..N {
+                inverse[row][column] = unit[row];
+            }
+        }
+        inverse
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn solves_what_needs_pivoting() {
+        let matrix = [0.0, 2.0, 1.0, 1.0, -2.0, -3.0, -1.0, 1.0, 2.0];
+        let solution = [1.0, -2.0, 3.0];
+        let mut vector = [0.0; 3];
+        for i in 0..3 {
+            vector[i] = (0..3).map(|j| matrix[3 * i + j] * solution[j]).sum();
+        }
+        let (mut factors, mut pivots) = (matrix, [0; 3]);
+        factor(3, &mut factors, &mut pivots).unwrap();
+        solve(3, &factors, &pivots, &mut vector);
+        for i in 0..3 {
+            assert!((vector[i] - solution[i]).abs() < 16.0 * f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn singular_and_not_a_number_are_told() {
+        let mut pivots = [0; 2];
+        let singular = factor(2, &mut [1.0, 2.0, 2.0, 4.0], &mut pivots);
+        assert_eq!(singular, Err(Singular { column: 1 }));
+        let nan = factor(2, &mut [f64::NAN, 2.0, 2.0, 4.0], &mut pivots);
+        assert!(nan.is_err());
+    }
+
+    #[test]
+    fn a_block_sees_singularity_through_rounding() {
+        // Rank one, with entries that are not exact.
+        let third = 1.0 / 3.0;
+        let matrix = [[third, 0.1 * third], [0.7 * third, 0.07 * third + 1e-18]];
+        assert!(Block::of(&matrix).is_err());
+        // Badly scaled, but regular.
+        assert!(Block::of(&[[1e12, 1e-6], [1e12, 2e-6]]).is_ok());
+    }
+}

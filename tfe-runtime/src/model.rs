@@ -1,0 +1,213 @@
+//! What a generated model gives the runtime.
+//!
+//! A model is declared by its Lagrangian L(q, v, t) or by its Hamiltonian H(q, p, t). The generated
+//! kernels evaluate that function and its partial derivatives at one instant; everything else
+//! (Legendre transform, elements, Newton) lives in this crate. In the names below **z** stands for the velocity v of a Lagrangian and for the momentum p of a Hamiltonian.
+
+use crate::real::Real;
+
+/// First derivatives at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct First<R, const N: usize> {
+    /// L_v, or H_p.
+    pub z: [R; N],
+    /// L_q, or H_q.
+    pub q: [R; N],
+    /// Generalized force Q.
+    pub force: [R; N],
+}
+
+impl<const N: usize> First<f64, N> {
+    /// All derivatives zero.
+    pub const ZERO: Self = Self {
+        z: [0.0; N],
+        q: [0.0; N],
+        force: [0.0; N],
+    };
+}
+
+impl<R: Real, const N: usize> First<R, N> {
+    /// All derivatives zero, in any scalar.
+    #[must_use]
+    pub fn zero() -> Self {
+        let zero = [R::from_f64(0.0); N];
+        Self {
+            z: zero,
+            q: zero,
+            force: zero,
+        }
+    }
+}
+
+/// Second derivatives at one instant: `zq[a][b]` = ∂²/∂z_a ∂q_b.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Second<R, const N: usize> {
+    /// L_vv, or H_pp.
+    pub zz: [[R; N]; N],
+    /// L_vq, or H_pq.
+    pub zq: [[R; N]; N],
+    /// L_qq, or H_qq.
+    pub qq: [[R; N]; N],
+    /// ∂Q/∂z; row: the coordinate that the force acts on.
+    pub force_z: [[R; N]; N],
+    /// ∂Q/∂q.
+    pub force_q: [[R; N]; N],
+}
+
+impl<const N: usize> Second<f64, N> {
+    /// All derivatives zero.
+    pub const ZERO: Self = Self {
+        zz: [[0.0; N]; N],
+        zq: [[0.0; N]; N],
+        qq: [[0.0; N]; N],
+        force_z: [[0.0; N]; N],
+        force_q: [[0.0; N]; N],
+    };
+}
+
+impl<R: Real, const N: usize> Second<R, N> {
+    /// All derivatives zero, in any scalar.
+    #[must_use]
+    pub fn zero() -> Self {
+        let zero = [[R::from_f64(0.0); N]; N];
+        Self {
+            zz: zero,
+            zq: zero,
+            qq: zero,
+            force_z: zero,
+            force_q: zero,
+        }
+    }
+}
+
+/// The function by which a model was declared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// L(q, v, t)
+    Lagrangian,
+    /// H(q, p, t)
+    Hamiltonian,
+}
+
+/// What the macro found out about a model; the runtime takes shorter ways where it may.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Facts {
+    /// The time appears in the energy function or in a force.
+    pub time_dependent: bool,
+    /// There are generalized forces or dissipation.
+    pub forced: bool,
+    /// The second derivative by z does not depend on z: one Newton step solves the Legendre transform.
+    pub quadratic_in_z: bool,
+    /// The second derivative by z is constant (over one run).
+    pub constant_mass: bool,
+    /// All second derivatives and all derivatives of forces are constant or depend on the time alone.
+    pub linear: bool,
+    /// The mixed second derivatives ∂²/∂z∂q vanish.
+    pub separable: bool,
+}
+
+impl Facts {
+    /// Nothing is known: every way that holds in general is taken.
+    pub const UNKNOWN: Self = Self {
+        time_dependent: true,
+        forced: true,
+        quadratic_in_z: false,
+        constant_mass: false,
+        linear: false,
+        separable: false,
+    };
+}
+
+/// The kernels of one model with N coordinates.
+///
+/// Implemented by `#[dynamics]`; by hand where one wants to.
+///
+/// Every method evaluates at one instant, for one `R`: a number, or lanes of them. `first`,
+/// `first_and_mass` and `second` write only entries that can be non-zero and never read what they
+/// are given, so pass [`First::ZERO`]-like values: entries that are structurally zero stay as they
+/// were.
+pub trait Model<const N: usize> {
+    /// By which function it was declared.
+    const FORM: Form;
+    /// What is known about its structure.
+    const FACTS: Facts;
+
+    /// L(q, v, t), or H(q, p, t).
+    fn energy_function<R: Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R;
+
+    /// Its first derivatives, and the generalized force.
+    fn first<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>);
+
+    /// The first derivatives and ∂²/∂z∂z.
+    fn first_and_mass<R: Real>(
+        &self,
+        t: R,
+        q: &[R; N],
+        z: &[R; N],
+        first: &mut First<R, N>,
+        zz: &mut [[R; N]; N],
+    );
+
+    /// First and second derivatives together.
+    fn second<R: Real>(
+        &self,
+        t: R,
+        q: &[R; N],
+        z: &[R; N],
+        first: &mut First<R, N>,
+        second: &mut Second<R, N>,
+    );
+
+    /// The names of the coordinates, in order (`theta1`, `q[0]`, `q[1]`, …).
+    fn coordinate_name(index: usize) -> CoordinateName;
+
+    /// The names of the observables.
+    const OBSERVABLES: &'static [&'static str] = &[];
+
+    /// The observables, one for each name.
+    fn observables<R: Real>(&self, _t: R, _q: &[R; N], _z: &[R; N], _values: &mut [R]) {}
+}
+
+/// The name of a coordinate: `theta1`, or `q[3]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CoordinateName {
+    /// The name as declared.
+    pub name: &'static str,
+    /// The position in an array of coordinates.
+    pub index: Option<usize>,
+}
+
+impl CoordinateName {
+    /// A coordinate of its own.
+    #[must_use]
+    pub const fn single(name: &'static str) -> Self {
+        Self { name, index: None }
+    }
+
+    /// An element of an array of coordinates.
+    #[must_use]
+    pub const fn element(name: &'static str, index: usize) -> Self {
+        Self {
+            name,
+            index: Some(index),
+        }
+    }
+}
+
+impl core::fmt::Display for CoordinateName {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self.index {
+            None => f.write_str(self.name),
+            Some(index) => write!(f, "{}[{index}]", self.name),
+        }
+    }
+}
+
+/// A point of phase space: coordinates and their momenta p = ∂L/∂v.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State<const N: usize> {
+    /// Generalized coordinates.
+    pub q: [f64; N],
+    /// Generalized momenta.
+    pub p: [f64; N],
+}

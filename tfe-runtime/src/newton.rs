@@ -1,0 +1,226 @@
+//! The iterations inside an element: fixed point first, Newton where it must.
+
+use crate::equations::{Equations, Increment};
+use crate::error::StepError;
+use crate::lu;
+use crate::workspace::Scratch;
+
+/// How the equations of an element are solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Solve {
+    /// Fixed point while it contracts well, else Newton; straight Newton for linear models.
+    #[default]
+    Auto,
+    /// Fixed point only: first derivatives suffice, but a stiff model fails.
+    FixedPoint,
+    /// Newton only.
+    Newton,
+}
+
+/// What the iterations are allowed, and what is asked of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Control {
+    /// The error that may be left, relative to the state, judged by the last increments. An
+    /// iteration that has reached round-off is accepted in any case.
+    pub tolerance: f64,
+    /// The most iterations of one element.
+    pub max_iterations: u32,
+    /// Which iteration.
+    pub solve: Solve,
+}
+
+impl Default for Control {
+    fn default() -> Self {
+        Self {
+            tolerance: 0.5 * f64::EPSILON,
+            max_iterations: 100,
+            solve: Solve::Auto,
+        }
+    }
+}
+
+/// Increments below it are the rounding of the residual, if they no longer fall.
+const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
+
+/// The same where Newton's method is ill-conditioned, if they have not fallen for some time.
+const ROUGH_ROUND_OFF: f64 = 1e-10;
+
+/// Fixed-point iterations that cost as much as Newton's way.
+const PATIENCE: u32 = 24;
+
+/// Judges a sequence of increments.
+struct Monitor {
+    tolerance: f64,
+    last: f64,
+    rate: f64,
+    risen: u32,
+}
+
+enum Verdict {
+    Converged,
+    GoOn,
+}
+
+impl Monitor {
+    fn new(tolerance: f64) -> Self {
+        Self {
+            tolerance,
+            last: f64::INFINITY,
+            rate: 1.0,
+            risen: 0,
+        }
+    }
+
+    /// # Errors
+    /// [`StepError::NonFinite`].
+    fn judge(&mut self, increment: Increment) -> Result<Verdict, StepError> {
+        let size = increment.relative;
+        if !size.is_finite() {
+            return Err(StepError::NonFinite);
+        }
+        let first = self.last.is_infinite();
+        let rate = if size == 0.0 { 0.0 } else { size / self.last };
+        // What is left is the rest of a geometric series. One lucky small increment must not end
+        // the iteration, hence a memory of the rate before.
+        let cautious = rate.max(0.1 * self.rate);
+        let left = if first || cautious >= 1.0 {
+            size
+        } else {
+            size * cautious / (1.0 - cautious)
+        };
+        self.risen = if rate >= 1.0 { self.risen + 1 } else { 0 };
+        self.last = size;
+        self.rate = if first { 1.0 } else { rate };
+        if left <= self.tolerance {
+            return Ok(Verdict::Converged);
+        }
+        let stalled = (self.risen >= 1 && size <= ROUND_OFF)
+            || (self.risen >= 3
+                && (size <= ROUGH_ROUND_OFF || increment.position <= 4.0 * f64::EPSILON));
+        Ok(if stalled {
+            Verdict::Converged
+        } else {
+            Verdict::GoOn
+        })
+    }
+
+    /// Whether so many more iterations would not do, at the present rate.
+    fn is_hopeless(&self, remaining: u32) -> bool {
+        let target = self.tolerance.max(64.0 * f64::EPSILON);
+        if self.last <= target {
+            return false;
+        }
+        let mut projected = self.last;
+        for _ in 0..remaining {
+            projected *= self.rate;
+            if projected <= target {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+/// Fixed-point iteration. With `yielding` it gives up as soon as Newton's method is the better way.
+pub(crate) fn fixed_point<E>(
+    equations: &mut E,
+    control: &Control,
+    scratch: &mut Scratch<'_>,
+    yielding: bool,
+) -> Result<(), StepError>
+where
+    E: Equations,
+{
+    let mut monitor = Monitor::new(control.tolerance);
+    let most = if yielding {
+        control.max_iterations.min(PATIENCE)
+    } else {
+        control.max_iterations
+    };
+    let mut refresh = true;
+    for iteration in 0..most {
+        let Scratch { unknowns, step, .. } = scratch;
+        equations.sweep(unknowns, step, refresh)?;
+        for (unknown, step) in unknowns.iter_mut().zip(step.iter()) {
+            *unknown += step;
+        }
+        let statistics = equations.statistics();
+        statistics.iterations += 1;
+        statistics.fixed_point_iterations += 1;
+        let increment = equations.measure(unknowns, step);
+        if let Verdict::Converged = monitor.judge(increment)? {
+            return Ok(());
+        }
+        // The start is good to a few digits, so one evaluation of mass matrices mostly serves.
+        refresh = monitor.rate > 0.1;
+        if yielding && iteration >= 2 && monitor.is_hopeless(most - iteration) {
+            break;
+        }
+    }
+    Err(StepError::FixedPointStalled {
+        iterations: most,
+        residual: monitor.last,
+        tolerance: control.tolerance,
+    })
+}
+
+/// Newton's method; the matrix is kept while it serves.
+///
+/// `known` says that the scratch holds the factors already; then they are kept throughout.
+pub(crate) fn newton<E>(
+    equations: &mut E,
+    control: &Control,
+    scratch: &mut Scratch<'_>,
+    known: bool,
+    linear: bool,
+) -> Result<(), StepError>
+where
+    E: Equations,
+{
+    let mut monitor = Monitor::new(control.tolerance);
+    let mut fresh = !known;
+    for iteration in 0..control.max_iterations {
+        let Scratch {
+            unknowns,
+            step,
+            tangent,
+            pivots,
+        } = scratch;
+        if fresh {
+            equations.tangent(unknowns, step, tangent)?;
+            lu::factor(unknowns.len(), tangent, pivots).map_err(|singular| {
+                // A NaN of the model shows here first.
+                if tangent.iter().all(|entry| entry.is_finite()) {
+                    StepError::SingularTangent {
+                        unknown: singular.column,
+                    }
+                } else {
+                    StepError::NonFinite
+                }
+            })?;
+            equations.statistics().factorizations += 1;
+        } else {
+            equations.residual(unknowns, step)?;
+        }
+        lu::solve(unknowns.len(), tangent, pivots, step);
+        for (unknown, step) in unknowns.iter_mut().zip(step.iter()) {
+            *unknown -= step;
+        }
+        let statistics = equations.statistics();
+        statistics.iterations += 1;
+        statistics.newton_iterations += 1;
+        let increment = equations.measure(unknowns, step);
+        let verdict = monitor.judge(increment)?;
+        // Equations that are linear are solved once; a second solution takes away the rounding.
+        let refined = linear && iteration > 0 && increment.relative <= ROUND_OFF;
+        if refined || matches!(verdict, Verdict::Converged) {
+            return equations.finish(unknowns, step);
+        }
+        fresh = !linear && monitor.rate > 0.05;
+    }
+    Err(StepError::NewtonStalled {
+        iterations: control.max_iterations,
+        residual: monitor.last,
+        tolerance: control.tolerance,
+    })
+}

@@ -1,0 +1,348 @@
+//! The tables of an element: one set of matrices behind all families.
+//!
+//! With nodes c_l and weights b_l of the rule, every element is, in velocity form,
+//!
+//! ```text
+//! v_l = Σ_j E_lj ν_j ,     q_l = q₀ + h Σ_j C_lj ν_j ,
+//! Σ_l P_il L_v,l − p₀ − h Σ_l G_il (L_q + Q)_l = 0 ,
+//! q₁ = q₀ + h Σ_j β_j ν_j ,     p₁ = p₀ + h Σ_l b_l (L_q + Q)_l .
+//! ```
+//!
+//! **Two-field families** are Runge–Kutta methods: E and P are unit matrices, C = G is the tableau,
+//! β = b. The tableau comes from the weak form itself, for all φ of the test space
+//!
+//! ```text
+//! ∫ y φ' dτ + h Σ_l b_l f_l φ(c_l) = ŷ₁ φ(1) − ŷ₀ φ(0) ,
+//! ```
+//!
+//! where a side with a jump has ŷ = the value at the node, one without has ŷ = the trace of y.
+//! **Primal elements** have ν on the s Gauss points with the Lagrange basis ψ_j of degree s − 1:
+//! E_lj = ψ_j(c_l), C_lj = ∫₀^{c_l} ψ_j, β_j = ∫₀¹ ψ_j; testing with δq' = ψ_i, δq(1) = 0 gives
+//! P_il = b_l E_li/β_i and G_il = b_l (1 − C_li/β_i).
+//!
+//! Everything is computed in twice the working precision and rounded once; where sums over many
+//! steps feel the rounding (C, G, β, b), what it took is kept as a correction.
+
+use crate::basis::MAX_NODES;
+use crate::element::Element;
+#[cfg(feature = "alloc")]
+use crate::element::ElementError;
+use crate::tableau::Target;
+
+/// The largest number of coefficients of a rate: degree s − 1 ≤ 10.
+pub const MAX_RATES: usize = MAX_NODES - 1;
+
+/// Borrowed tables of an element, K points and U unknown rates; matrices are flat, row by row.
+#[derive(Clone, Copy, Debug)]
+pub struct SchemeRef<'a> {
+    /// Whose tables these are.
+    pub element: Element,
+    /// E = P = 1 and C = G: a Runge–Kutta method with its points as stages.
+    pub collocated: bool,
+    /// c_l: where the model is evaluated; K.
+    pub nodes: &'a [f64],
+    /// b_l; K.
+    pub weights: &'a [f64],
+    /// What rounding took from b; K.
+    pub weights_low: &'a [f64],
+    /// Where the unknown rates sit; U.
+    pub unknown_nodes: &'a [f64],
+    /// E_lj: unknown rates to velocities; K × U.
+    pub velocity: &'a [f64],
+    /// C_lj: unknown rates to coordinates; K × U.
+    pub position: &'a [f64],
+    /// What rounding took from C; K × U.
+    pub position_low: &'a [f64],
+    /// P_il: momenta to rows; U × K.
+    pub momentum: &'a [f64],
+    /// G_il: forces to rows; U × K.
+    pub force: &'a [f64],
+    /// What rounding took from G; U × K.
+    pub force_low: &'a [f64],
+    /// β_j: unknown rates to the end; U.
+    pub advance: &'a [f64],
+    /// What rounding took from β; U.
+    pub advance_low: &'a [f64],
+    /// Legendre coefficients of ω_i(τ), the weight that row i gives an impulse at τ; U × 12.
+    pub impulse: &'a [f64],
+    /// Unknown rates to the Legendre coefficients of dq/dτ / h; (n − 1) × U.
+    pub rate: &'a [f64],
+    /// Forces to the Legendre coefficients of dp/dτ / h; (n − 1) × K.
+    pub force_rate: &'a [f64],
+}
+
+impl SchemeRef<'_> {
+    /// The number K of points at which the model is evaluated.
+    #[inline]
+    #[must_use]
+    pub fn points(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// The number U of unknown rates a coordinate.
+    #[inline]
+    #[must_use]
+    pub fn unknowns(&self) -> usize {
+        self.unknown_nodes.len()
+    }
+
+    /// The number s = n − 1 of coefficients of a rate.
+    #[inline]
+    #[must_use]
+    pub fn rates(&self) -> usize {
+        self.element.degree()
+    }
+
+    /// ω_i(τ): the weight that row i gives an impulse at τ; the end has weight one.
+    #[must_use]
+    pub fn impulse_weight(&self, row: usize, tau: f64) -> f64 {
+        let mut values = [0.0; MAX_NODES];
+        crate::basis::legendre(tau, &mut values);
+        let row = &self.impulse[row * MAX_NODES..(row + 1) * MAX_NODES];
+        row.iter()
+            .zip(&values)
+            .map(|(coefficient, value)| coefficient * value)
+            .sum()
+    }
+}
+
+/// Something that holds the tables of an element.
+///
+/// Algorithms are generic over it, so that for a [`Scheme`] every length is a constant.
+pub trait Tables {
+    /// The tables.
+    fn view(&self) -> SchemeRef<'_>;
+}
+
+impl Tables for SchemeRef<'_> {
+    #[inline(always)]
+    fn view(&self) -> SchemeRef<'_> {
+        *self
+    }
+}
+
+impl<T: Tables> Tables for &T {
+    #[inline(always)]
+    fn view(&self) -> SchemeRef<'_> {
+        (*self).view()
+    }
+}
+
+/// Tables of an element with K points and U unknown rates, as a constant.
+///
+/// # Example
+/// ```
+/// use tfe_runtime::scheme::Scheme;
+/// use tfe_runtime::{Element, Mixed};
+///
+/// const ELEMENT: Element = Mixed::<3>.element();
+/// const TABLES: Scheme<{ ELEMENT.points() }, { ELEMENT.unknowns() }> = Scheme::new(ELEMENT);
+/// # use tfe_runtime::scheme::Tables;
+/// assert_eq!(TABLES.view().weights, [0.5, 0.5]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Scheme<const K: usize, const U: usize> {
+    element: Element,
+    nodes: [f64; K],
+    weights: [f64; K],
+    weights_low: [f64; K],
+    unknown_nodes: [f64; U],
+    velocity: [[f64; U]; K],
+    position: [[f64; U]; K],
+    position_low: [[f64; U]; K],
+    momentum: [[f64; K]; U],
+    force: [[f64; K]; U],
+    force_low: [[f64; K]; U],
+    advance: [f64; U],
+    advance_low: [f64; U],
+    impulse: [[f64; MAX_NODES]; U],
+    rate: [[f64; U]; MAX_RATES],
+    force_rate: [[f64; K]; MAX_RATES],
+}
+
+impl<const K: usize, const U: usize> Scheme<K, U> {
+    /// The tables of `element`.
+    ///
+    /// # Panics
+    /// If the element is not valid or K and U are not its [`points`](Element::points) and
+    /// [`unknowns`](Element::unknowns); in a constant, that is an error of compilation.
+    #[must_use]
+    pub const fn new(element: Element) -> Self {
+        assert!(element.validate().is_ok(), "not an element");
+        assert!(
+            K == element.points() && U == element.unknowns(),
+            "sizes are not the element's"
+        );
+        let mut scheme = Self {
+            element,
+            nodes: [0.0; K],
+            weights: [0.0; K],
+            weights_low: [0.0; K],
+            unknown_nodes: [0.0; U],
+            velocity: [[0.0; U]; K],
+            position: [[0.0; U]; K],
+            position_low: [[0.0; U]; K],
+            momentum: [[0.0; K]; U],
+            force: [[0.0; K]; U],
+            force_low: [[0.0; K]; U],
+            advance: [0.0; U],
+            advance_low: [0.0; U],
+            impulse: [[0.0; MAX_NODES]; U],
+            rate: [[0.0; U]; MAX_RATES],
+            force_rate: [[0.0; K]; MAX_RATES],
+        };
+        let mut target = Target {
+            nodes: &mut scheme.nodes,
+            weights: &mut scheme.weights,
+            weights_low: &mut scheme.weights_low,
+            unknown_nodes: &mut scheme.unknown_nodes,
+            velocity: scheme.velocity.as_flattened_mut(),
+            position: scheme.position.as_flattened_mut(),
+            position_low: scheme.position_low.as_flattened_mut(),
+            momentum: scheme.momentum.as_flattened_mut(),
+            force: scheme.force.as_flattened_mut(),
+            force_low: scheme.force_low.as_flattened_mut(),
+            advance: &mut scheme.advance,
+            advance_low: &mut scheme.advance_low,
+            impulse: scheme.impulse.as_flattened_mut(),
+            rate: scheme.rate.as_flattened_mut(),
+            force_rate: scheme.force_rate.as_flattened_mut(),
+        };
+        target.fill(element);
+        scheme
+    }
+}
+
+impl<const K: usize, const U: usize> Tables for Scheme<K, U> {
+    #[inline(always)]
+    fn view(&self) -> SchemeRef<'_> {
+        SchemeRef {
+            element: self.element,
+            collocated: self.element.is_collocated(),
+            nodes: &self.nodes,
+            weights: &self.weights,
+            weights_low: &self.weights_low,
+            unknown_nodes: &self.unknown_nodes,
+            velocity: self.velocity.as_flattened(),
+            position: self.position.as_flattened(),
+            position_low: self.position_low.as_flattened(),
+            momentum: self.momentum.as_flattened(),
+            force: self.force.as_flattened(),
+            force_low: self.force_low.as_flattened(),
+            advance: &self.advance,
+            advance_low: &self.advance_low,
+            impulse: self.impulse.as_flattened(),
+            rate: self.rate.as_flattened(),
+            force_rate: self.force_rate.as_flattened(),
+        }
+    }
+}
+
+/// Tables of an element chosen at run time.
+#[cfg(feature = "alloc")]
+#[derive(Clone, Debug)]
+pub struct SchemeTable {
+    element: Element,
+    numbers: alloc::vec::Vec<f64>,
+}
+
+#[cfg(feature = "alloc")]
+impl SchemeTable {
+    /// The tables of `element`.
+    ///
+    /// # Errors
+    /// [`ElementError`] if the element is not valid.
+    pub fn new(element: Element) -> Result<Self, ElementError> {
+        element.validate()?;
+        let (k, u, s) = (element.points(), element.unknowns(), element.degree());
+        let length = Self::offsets(k, u, s)[Self::PARTS];
+        let mut table = Self {
+            element,
+            numbers: alloc::vec![0.0; length],
+        };
+        let mut rest = table.numbers.as_mut_slice();
+        let mut take = |length: usize| {
+            let (part, tail) = core::mem::take(&mut rest).split_at_mut(length);
+            rest = tail;
+            part
+        };
+        let mut target = Target {
+            nodes: take(k),
+            weights: take(k),
+            weights_low: take(k),
+            unknown_nodes: take(u),
+            velocity: take(k * u),
+            position: take(k * u),
+            position_low: take(k * u),
+            momentum: take(u * k),
+            force: take(u * k),
+            force_low: take(u * k),
+            advance: take(u),
+            advance_low: take(u),
+            impulse: take(u * MAX_NODES),
+            rate: take(s * u),
+            force_rate: take(s * k),
+        };
+        target.fill(element);
+        Ok(table)
+    }
+
+    const PARTS: usize = 15;
+
+    /// Where each part begins, and where the last ends.
+    #[inline]
+    fn offsets(k: usize, u: usize, s: usize) -> [usize; Self::PARTS + 1] {
+        let ku = k * u;
+        let lengths = [
+            k,
+            k,
+            k,
+            u,
+            ku,
+            ku,
+            ku,
+            ku,
+            ku,
+            ku,
+            u,
+            u,
+            u * MAX_NODES,
+            s * u,
+            s * k,
+        ];
+        let mut offsets = [0; Self::PARTS + 1];
+        for (part, length) in lengths.iter().enumerate() {
+            offsets[part + 1] = offsets[part] + length;
+        }
+        offsets
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl Tables for SchemeTable {
+    #[inline]
+    fn view(&self) -> SchemeRef<'_> {
+        let element = self.element;
+        let at = Self::offsets(element.points(), element.unknowns(), element.degree());
+        let part = |index: usize| &self.numbers[at[index]..at[index + 1]];
+        SchemeRef {
+            element,
+            collocated: element.is_collocated(),
+            nodes: part(0),
+            weights: part(1),
+            weights_low: part(2),
+            unknown_nodes: part(3),
+            velocity: part(4),
+            position: part(5),
+            position_low: part(6),
+            momentum: part(7),
+            force: part(8),
+            force_low: part(9),
+            advance: part(10),
+            advance_low: part(11),
+            impulse: part(12),
+            rate: part(13),
+            force_rate: part(14),
+        }
+    }
+}

@@ -1,0 +1,485 @@
+//! Steps: one element after the other, on memory of the caller or on its own.
+
+use crate::basis::{MAX_NODES, legendre};
+use crate::equations::{Equations, Span, weighted};
+use crate::error::StepError;
+use crate::legendre::{largest, velocity};
+use crate::lu::Block;
+use crate::model::{First, Form, Model, State};
+use crate::newton::{fixed_point, newton};
+use crate::phase_form::PhaseForm;
+use crate::scheme::{SchemeRef, Tables};
+use crate::statistics::Statistics;
+use crate::velocity_form::VelocityForm;
+use crate::workspace::{Parts, Scratch, Workspace};
+
+#[cfg(feature = "alloc")]
+pub use crate::dense::DenseElement;
+pub use crate::newton::{Control, Solve};
+#[cfg(feature = "alloc")]
+pub use crate::stepper::Stepper;
+
+/// A generalized force of the given time integral that acts at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impulse<const N: usize> {
+    /// When it acts; a time outside the element counts as its nearer end.
+    pub time: f64,
+    /// ∫ Q dt, one entry a coordinate.
+    pub value: [f64; N],
+}
+
+/// Where an element lies in time, and the impulses that act in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Interval<'a, const N: usize> {
+    /// Time at the start.
+    pub start: f64,
+    /// Length h; negative to go back in time.
+    pub length: f64,
+    /// Impulses inside, each weighted by the test functions (T-49).
+    pub impulses: &'a [Impulse<N>],
+}
+
+impl<const N: usize> Interval<'_, N> {
+    /// Where in the element an impulse acts, τ ∈ [0, 1].
+    pub(crate) fn place(&self, impulse: &Impulse<N>) -> f64 {
+        ((impulse.time - self.start) / self.length).clamp(0.0, 1.0)
+    }
+}
+
+/// What is carried from step to step beside the [`Workspace`].
+#[derive(Clone, Debug)]
+pub struct Memory<const N: usize> {
+    pub(crate) statistics: Statistics,
+    /// Start and end of the last step; `None` before the first and after a failure.
+    pub(crate) last: Option<Last<N>>,
+    /// What the end is more than its rounded numbers.
+    low: State<N>,
+    pub(crate) mass: Option<Block<N>>,
+    /// The step for which the workspace holds the factors of a linear, autonomous model.
+    factored: Option<f64>,
+    /// The ratio of steps for which it holds the extrapolation.
+    ratio: Option<f64>,
+    /// Steps for which Newton's method stays chosen.
+    newton_steps: u32,
+    /// How many it will be after the next failure of the fixed point.
+    penalty: u32,
+}
+
+/// The last step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Last<const N: usize> {
+    pub(crate) t: f64,
+    pub(crate) h: f64,
+    pub(crate) start: State<N>,
+    pub(crate) start_low: State<N>,
+    pub(crate) end: State<N>,
+}
+
+impl<const N: usize> State<N> {
+    pub(crate) const ZERO: Self = Self {
+        q: [0.0; N],
+        p: [0.0; N],
+    };
+}
+
+impl<const N: usize> Memory<N> {
+    /// Nothing is known yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            statistics: Statistics::NONE,
+            last: None,
+            low: State::ZERO,
+            mass: None,
+            factored: None,
+            ratio: None,
+            newton_steps: 0,
+            penalty: 0,
+        }
+    }
+
+    /// What the steps so far have cost.
+    #[must_use]
+    pub const fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// Says that the workspace no longer holds the factors of a linear model.
+    pub(crate) fn forget_factors(&mut self) {
+        self.factored = None;
+    }
+}
+
+impl<const N: usize> Default for Memory<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A model with the tables of an element: everything about a step that does not change.
+///
+/// For steps without allocation: [`Memory`] and [`Workspace`] are the caller's. [`Stepper`] owns
+/// them.
+#[derive(Debug)]
+pub struct Method<'a, M, T> {
+    /// The model.
+    pub model: &'a M,
+    /// The tables of the element.
+    pub tables: &'a T,
+    /// How its equations are solved.
+    pub control: Control,
+}
+
+// Not derived: model and tables are borrowed, they need not be `Clone`.
+impl<M, T> Clone for Method<'_, M, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M, T> Copy for Method<'_, M, T> {}
+
+impl<M, T> Method<'_, M, T>
+where
+    T: Tables,
+{
+    /// Moves `state` over one element.
+    ///
+    /// # Errors
+    /// [`StepError`]; `state` is unchanged then.
+    pub fn advance<const N: usize>(
+        &self,
+        memory: &mut Memory<N>,
+        workspace: Workspace<'_>,
+        interval: Interval<'_, N>,
+        state: &mut State<N>,
+    ) -> Result<(), StepError>
+    where
+        M: Model<N>,
+    {
+        let Interval {
+            start: t,
+            length: h,
+            impulses,
+        } = interval;
+        if !(h.is_finite() && h != 0.0) {
+            return Err(StepError::InvalidStep { step: h });
+        }
+        let scheme = self.tables.view();
+        let mut parts = Parts::of(workspace, &scheme.element, M::FORM)?;
+        let warm = self.prepare(memory, &mut parts, h, state)?;
+        set_kicks(&scheme, &interval, parts.kicks);
+        let low = if warm { memory.low } else { State::ZERO };
+        let kicks: &[[f64; N]] = parts.kicks;
+        let span = Span {
+            t,
+            h,
+            start: state,
+            low: &low,
+            kicks,
+        };
+        let known = memory.factored == Some(h);
+        // A failure leaves nothing to continue from.
+        memory.last = None;
+        let mut driver = Driver {
+            control: &self.control,
+            origin: parts.origin,
+            warm,
+            known,
+            linear: M::FACTS.linear,
+            newton_steps: &mut memory.newton_steps,
+            penalty: &mut memory.penalty,
+        };
+        let scratch = Scratch {
+            unknowns: parts.unknowns,
+            step: parts.step,
+            tangent: parts.tangent,
+            pivots: parts.tangent_pivots,
+        };
+        memory.factored = None;
+        let (end, end_low) = if is_phase::<M, N>(&scheme) {
+            let mut equations = PhaseForm {
+                model: self.model,
+                scheme,
+                span,
+                momenta: parts.momenta,
+                velocities: parts.forces,
+                masses: parts.masses,
+                swept: false,
+                statistics: &mut memory.statistics,
+            };
+            let scratch = driver.solve(&mut equations, scratch, |unknowns| {
+                cold_phase(self.model, &scheme, t, state, unknowns);
+            })?;
+            let (pi, kappa) = scratch.unknowns.as_chunks().0.split_at(scheme.points());
+            end_of(&scheme, &span, kappa, pi, impulses)
+        } else {
+            let mut equations = VelocityForm {
+                model: self.model,
+                scheme,
+                span,
+                forces: parts.forces,
+                momenta: parts.momenta,
+                masses: parts.masses,
+                mass_pivots: parts.mass_pivots,
+                constant_mass: &mut memory.mass,
+                statistics: &mut memory.statistics,
+            };
+            let scratch = driver.solve(&mut equations, scratch, |unknowns| {
+                cold_velocity(self.model, t, state, unknowns);
+            })?;
+            end_of(
+                &scheme,
+                &span,
+                scratch.unknowns.as_chunks().0,
+                parts.forces,
+                impulses,
+            )
+        };
+        if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        if M::FACTS.linear && !M::FACTS.time_dependent && driver.has_factors() {
+            memory.factored = Some(h);
+        }
+        memory.last = Some(Last {
+            t,
+            h,
+            start: *state,
+            start_low: low,
+            end,
+        });
+        memory.low = end_low;
+        memory.statistics.steps += 1;
+        *state = end;
+        Ok(())
+    }
+
+    /// Sets the unknowns to where the iteration starts; true if that continues the last step.
+    fn prepare<const N: usize>(
+        &self,
+        memory: &mut Memory<N>,
+        parts: &mut Parts<'_, N>,
+        h: f64,
+        state: &State<N>,
+    ) -> Result<bool, StepError>
+    where
+        M: Model<N>,
+    {
+        if !(largest(&state.q).is_finite() && largest(&state.p).is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        let scheme = self.tables.view();
+        let Some(last) = memory.last.filter(|last| last.end == *state) else {
+            parts.momenta.fill(state.p);
+            parts.unknowns.fill(0.0);
+            return Ok(false);
+        };
+        let ratio = h / last.h;
+        // Far outside the last element its polynomial says nothing; backwards it may be reused.
+        let near = (-1.5..=3.0).contains(&ratio);
+        let fraction = if near { ratio } else { 0.0 };
+        if memory.ratio != Some(fraction) {
+            set_extrapolation(&scheme, fraction, parts.extrapolation);
+            memory.ratio = Some(fraction);
+        }
+        let unknowns = scheme.unknowns();
+        let halves = parts.unknowns.len() / (unknowns * N);
+        for half in 0..halves {
+            let range = half * unknowns * N..(half + 1) * unknowns * N;
+            let old = parts.unknowns[range.clone()].as_chunks::<N>().0;
+            let new = parts.origin[range].as_chunks_mut::<N>().0;
+            for (row, weights) in new
+                .iter_mut()
+                .zip(parts.extrapolation.chunks_exact(unknowns))
+            {
+                *row = [0.0; N];
+                for (weight, old) in weights.iter().zip(old) {
+                    for a in 0..N {
+                        row[a] += weight * old[a];
+                    }
+                }
+            }
+        }
+        parts.unknowns.copy_from_slice(parts.origin);
+        Ok(true)
+    }
+}
+
+/// Whether the equations are those of phase space.
+pub(crate) fn is_phase<M, const N: usize>(scheme: &SchemeRef<'_>) -> bool
+where
+    M: Model<N>,
+{
+    matches!(M::FORM, Form::Hamiltonian) && scheme.collocated
+}
+
+/// ω_i(τ*) J for every row.
+pub(crate) fn set_kicks<const N: usize>(
+    scheme: &SchemeRef<'_>,
+    interval: &Interval<'_, N>,
+    kicks: &mut [[f64; N]],
+) {
+    kicks.fill([0.0; N]);
+    for impulse in interval.impulses {
+        let tau = interval.place(impulse);
+        for (i, kick) in kicks.iter_mut().enumerate() {
+            let weight = scheme.impulse_weight(i, tau);
+            for a in 0..N {
+                kick[a] += weight * impulse.value[a];
+            }
+        }
+    }
+}
+
+/// Old unknown rates to new ones: the polynomial of the last element, continued (T-65).
+fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix: &mut [f64]) {
+    let (unknowns, rates) = (scheme.unknowns(), scheme.rates());
+    for (node, row) in scheme
+        .unknown_nodes
+        .iter()
+        .zip(matrix.chunks_exact_mut(unknowns))
+    {
+        let mut values = [0.0; MAX_NODES];
+        legendre(1.0 + node * ratio, &mut values);
+        row.fill(0.0);
+        for (value, rate) in values
+            .iter()
+            .take(rates)
+            .zip(scheme.rate.chunks_exact(unknowns))
+        {
+            for (entry, rate) in row.iter_mut().zip(rate) {
+                *entry += value * rate;
+            }
+        }
+    }
+}
+
+/// Constant velocity; zero where the momentum belongs to none.
+fn cold_velocity<M, const N: usize>(model: &M, t: f64, state: &State<N>, unknowns: &mut [f64])
+where
+    M: Model<N>,
+{
+    let v = velocity(model, t, &state.q, &state.p, &[0.0; N]).unwrap_or([0.0; N]);
+    unknowns.as_chunks_mut::<N>().0.fill(v);
+}
+
+/// The rates at the start.
+fn cold_phase<M, const N: usize>(
+    model: &M,
+    scheme: &SchemeRef<'_>,
+    t: f64,
+    state: &State<N>,
+    unknowns: &mut [f64],
+) where
+    M: Model<N>,
+{
+    let mut first = First::ZERO;
+    model.first(t, &state.q, &state.p, &mut first);
+    let (pi, kappa) = unknowns
+        .as_chunks_mut::<N>()
+        .0
+        .split_at_mut(scheme.points());
+    kappa.fill(first.z);
+    for a in 0..N {
+        first.force[a] -= first.q[a];
+    }
+    pi.fill(first.force);
+}
+
+/// The end of an element and what rounding took from it (T-68).
+fn end_of<const N: usize>(
+    scheme: &SchemeRef<'_>,
+    span: &Span<'_, N>,
+    rates: &[[f64; N]],
+    forces: &[[f64; N]],
+    impulses: &[Impulse<N>],
+) -> (State<N>, State<N>) {
+    let velocity = weighted(scheme.advance, scheme.advance_low, rates);
+    let force = weighted(scheme.weights, scheme.weights_low, forces);
+    let (mut end, mut low) = (State::ZERO, State::ZERO);
+    for a in 0..N {
+        let mut impulse = span.h * force[a] + span.low.p[a];
+        for one in impulses {
+            impulse += one.value[a];
+        }
+        (end.q[a], low.q[a]) = sum(span.start.q[a], span.h * velocity[a] + span.low.q[a]);
+        (end.p[a], low.p[a]) = sum(span.start.p[a], impulse);
+    }
+    (end, low)
+}
+
+/// a + b, rounded, and what rounding took.
+fn sum(a: f64, b: f64) -> (f64, f64) {
+    let high = a + b;
+    let part = high - a;
+    (high, (a - (high - part)) + (b - part))
+}
+
+/// Chooses between the iterations and between their starts.
+struct Driver<'a> {
+    control: &'a Control,
+    origin: &'a mut [f64],
+    warm: bool,
+    known: bool,
+    linear: bool,
+    newton_steps: &'a mut u32,
+    penalty: &'a mut u32,
+}
+
+impl Driver<'_> {
+    fn solve<'s, E>(
+        &mut self,
+        equations: &mut E,
+        mut scratch: Scratch<'s>,
+        cold: impl Fn(&mut [f64]),
+    ) -> Result<Scratch<'s>, StepError>
+    where
+        E: Equations,
+    {
+        if !self.warm {
+            cold(scratch.unknowns);
+            self.origin.copy_from_slice(scratch.unknowns);
+        }
+        match self.control.solve {
+            Solve::FixedPoint => {
+                fixed_point(equations, self.control, &mut scratch, false)?;
+                return Ok(scratch);
+            }
+            Solve::Auto if !self.linear && *self.newton_steps == 0 => {
+                if fixed_point(equations, self.control, &mut scratch, true).is_ok() {
+                    *self.penalty /= 2;
+                    return Ok(scratch);
+                }
+                // Stiff steps come in rows: do not pay for two iterations in each of them.
+                *self.penalty = (*self.penalty * 2).clamp(8, 1024);
+                *self.newton_steps = *self.penalty;
+                equations.statistics().fallbacks += 1;
+                scratch.unknowns.copy_from_slice(self.origin);
+            }
+            Solve::Auto | Solve::Newton => {}
+        }
+        *self.newton_steps = self.newton_steps.saturating_sub(1);
+        let first = newton(
+            equations,
+            self.control,
+            &mut scratch,
+            self.known,
+            self.linear,
+        );
+        if let Err(error) = first {
+            if !self.warm {
+                return Err(error);
+            }
+            // The continued polynomial may be a worse start than none.
+            cold(scratch.unknowns);
+            newton(equations, self.control, &mut scratch, false, self.linear)?;
+        }
+        Ok(scratch)
+    }
+
+    /// Whether the tangent holds the factors of a linear model now.
+    fn has_factors(&self) -> bool {
+        self.linear && self.control.solve != Solve::FixedPoint
+    }
+}

@@ -1,0 +1,62 @@
+//! What the macro found out about a model, to be read by people and programs.
+
+use crate::model::{Facts, Form};
+use core::fmt;
+
+/// Operations of one kernel at one instant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Operations {
+    /// Additions and subtractions.
+    pub additions: u32,
+    /// Multiplications.
+    pub multiplications: u32,
+    /// Divisions.
+    pub divisions: u32,
+    /// Evaluations of a sine, a cosine, or both at once.
+    pub sines: u32,
+    /// Evaluations of other functions, powers and square roots among them.
+    pub functions: u32,
+}
+
+/// The structure of a model: the result of `Name::structure()`. `Display` prints a page.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Structure {
+    /// The name of the struct.
+    pub name: &'static str,
+    /// Lagrangian or Hamiltonian.
+    pub form: Form,
+    /// Linear? separable? autonomous? constant mass matrix?
+    pub facts: Facts,
+    /// The coordinates that do not appear in the energy function: their momenta are conserved where no force acts on them.
+    pub cyclic: &'static [&'static str],
+    /// The energy function alone. Loops count once for each pass through their body where the length is known, once otherwise.
+    pub value: Operations,
+    /// First derivatives and forces.
+    pub first: Operations,
+    /// First and second derivatives together.
+    pub second: Operations,
+    /// All of this, and the pattern of the tangent, in words.
+    pub page: &'static str,
+}
+
+impl fmt::Display for Operations {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            additions,
+            multiplications,
+            divisions,
+            sines,
+            functions,
+        } = self;
+        write!(
+            f,
+            "{additions} +−, {multiplications} ×, {divisions} ÷, {sines} sin/cos, {functions} other"
+        )
+    }
+}
+
+impl fmt::Display for Structure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.page)
+    }
+}

@@ -1,0 +1,326 @@
+//! The element equations with velocities as unknowns: three fields, no mass matrix inverted.
+//!
+//! ```text
+//! r_i = Σ_l P_il L_v,l − p₀ − h Σ_l G_il (L_q + Q)_l − Σ ω_i(τ*) J = 0
+//! ```
+//!
+//! with v_l = Σ_j E_lj ν_j and q_l = q₀ + h Σ_j C_lj ν_j. Every element runs a Lagrangian like this;
+//! a Hamiltonian model runs it through the pointwise Legendre transform.
+
+use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
+use crate::error::{LegendreError, StepError};
+use crate::legendre::{conjugate, lagrangian_view_from};
+use crate::lu::{Block, factor_block, solve};
+use crate::model::{First, Form, Model, Second};
+use crate::scheme::SchemeRef;
+use crate::statistics::Statistics;
+
+pub(crate) struct VelocityForm<'a, M, const N: usize> {
+    pub(crate) model: &'a M,
+    pub(crate) scheme: SchemeRef<'a>,
+    pub(crate) span: Span<'a, N>,
+    pub(crate) forces: &'a mut [[f64; N]],
+    pub(crate) momenta: &'a mut [[f64; N]],
+    pub(crate) masses: &'a mut [f64],
+    pub(crate) mass_pivots: &'a mut [usize],
+    /// The one mass matrix of a model that has only one.
+    pub(crate) constant_mass: &'a mut Option<Block<N>>,
+    pub(crate) statistics: &'a mut Statistics,
+}
+
+/// The derivatives of a Lagrangian that enter the tangent; `force` is L_q + Q.
+pub(crate) struct PointDerivatives<const N: usize> {
+    pub(crate) p: [f64; N],
+    pub(crate) force: [f64; N],
+    pub(crate) second: Second<f64, N>,
+}
+
+impl<M, const N: usize> VelocityForm<'_, M, N>
+where
+    M: Model<N>,
+{
+    /// Time, coordinates and velocities at a point.
+    #[inline(always)]
+    fn place(&self, l: usize, rates: &[[f64; N]]) -> (f64, [f64; N], [f64; N]) {
+        let Span {
+            t, h, start, low, ..
+        } = self.span;
+        let row = l * rates.len()..(l + 1) * rates.len();
+        let scheme = &self.scheme;
+        let rate = weighted(
+            &scheme.position[row.clone()],
+            &scheme.position_low[row.clone()],
+            rates,
+        );
+        let q = moved(&start.q, &low.q, h, &rate);
+        let v = if scheme.collocated {
+            rates[l]
+        } else {
+            let mut v = [0.0; N];
+            for (weight, rate) in scheme.velocity[row].iter().zip(rates) {
+                for a in 0..N {
+                    v[a] += weight * rate[a];
+                }
+            }
+            v
+        };
+        (t + scheme.nodes[l] * h, q, v)
+    }
+
+    /// Fills the residual and the forces, and on demand the mass matrices of the rows.
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64], with_masses: bool) -> Result<(), StepError> {
+        let rates = x.as_chunks::<N>().0;
+        let rows = r.as_chunks_mut::<N>().0;
+        let (points, unknowns) = (self.scheme.points(), rates.len());
+        rows.fill([0.0; N]);
+        if with_masses {
+            self.masses.fill(0.0);
+        }
+        let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
+        for l in 0..points {
+            let (t, q, v) = self.place(l, rates);
+            let p = match M::FORM {
+                Form::Lagrangian => {
+                    if with_masses {
+                        self.model.first_and_mass(t, &q, &v, &mut first, &mut zz);
+                    } else {
+                        self.model.first(t, &q, &v, &mut first);
+                    }
+                    for a in 0..N {
+                        self.forces[l][a] = first.q[a] + first.force[a];
+                    }
+                    first.z
+                }
+                Form::Hamiltonian => {
+                    let p = conjugate(self.model, t, &q, &v, &self.momenta[l])?;
+                    self.model.first_and_mass(t, &q, &p, &mut first, &mut zz);
+                    if with_masses {
+                        let inverse = Block::of(&zz).map_err(singular)?.inverse();
+                        zz = inverse;
+                    }
+                    for a in 0..N {
+                        self.forces[l][a] = first.force[a] - first.q[a];
+                    }
+                    self.momenta[l] = p;
+                    p
+                }
+            };
+            if self.scheme.collocated {
+                rows[l] = p;
+                if with_masses {
+                    self.masses[l * N * N..(l + 1) * N * N].copy_from_slice(zz.as_flattened());
+                }
+                continue;
+            }
+            for (i, row) in rows.iter_mut().enumerate() {
+                let weight = self.scheme.momentum[i * points + l];
+                for a in 0..N {
+                    row[a] += weight * p[a];
+                }
+                if with_masses {
+                    let weight = weight * self.scheme.velocity[l * unknowns + i];
+                    let mass = &mut self.masses[i * N * N..(i + 1) * N * N];
+                    for (entry, part) in mass.iter_mut().zip(zz.as_flattened()) {
+                        *entry += weight * part;
+                    }
+                }
+            }
+        }
+        self.statistics.residual_evaluations += points as u64;
+        self.subtract_impulse(rows);
+        Ok(())
+    }
+
+    /// Takes p₀ and the impulse of forces and kicks from the rows.
+    #[inline(always)]
+    fn subtract_impulse(&self, rows: &mut [[f64; N]]) {
+        let Span {
+            h,
+            start,
+            low,
+            kicks,
+            ..
+        } = self.span;
+        let points = self.scheme.points();
+        for (i, row) in rows.iter_mut().enumerate() {
+            let range = i * points..(i + 1) * points;
+            let impulse = weighted(
+                &self.scheme.force[range.clone()],
+                &self.scheme.force_low[range],
+                self.forces,
+            );
+            for a in 0..N {
+                row[a] = (row[a] - start.p[a]) - (h * impulse[a] + (kicks[i][a] + low.p[a]));
+            }
+        }
+    }
+
+    /// First and second derivatives at a point.
+    pub(crate) fn derivatives(
+        &mut self,
+        l: usize,
+        rates: &[[f64; N]],
+        point: &mut PointDerivatives<N>,
+    ) -> Result<(), StepError> {
+        let (t, q, v) = self.place(l, rates);
+        match M::FORM {
+            Form::Lagrangian => {
+                let mut first = First::ZERO;
+                self.model.second(t, &q, &v, &mut first, &mut point.second);
+                point.p = first.z;
+                for a in 0..N {
+                    point.force[a] = first.q[a] + first.force[a];
+                }
+            }
+            Form::Hamiltonian => {
+                let view = lagrangian_view_from(self.model, t, &q, &v, &self.momenta[l])?;
+                self.momenta[l] = view.p;
+                point.p = view.p;
+                point.second = view.second;
+                for a in 0..N {
+                    point.force[a] = view.first.q[a] + view.first.force[a];
+                }
+            }
+        }
+        self.statistics.tangent_evaluations += 1;
+        Ok(())
+    }
+
+    /// Adds what one point gives to the tangent ∂r/∂ν.
+    pub(crate) fn add_to_tangent(&self, l: usize, second: &Second<f64, N>, tangent: &mut [f64]) {
+        let (points, unknowns) = (self.scheme.points(), self.scheme.unknowns());
+        let (h, size) = (self.span.h, unknowns * N);
+        for i in 0..unknowns {
+            let momentum = self.scheme.momentum[i * points + l];
+            let force = -h * self.scheme.force[i * points + l];
+            for j in 0..unknowns {
+                let velocity = self.scheme.velocity[l * unknowns + j];
+                let position = h * self.scheme.position[l * unknowns + j];
+                let weights = [
+                    momentum * velocity,
+                    momentum * position,
+                    force * velocity,
+                    force * position,
+                ];
+                for a in 0..N {
+                    let row = &mut tangent[(i * N + a) * size + j * N..][..N];
+                    for b in 0..N {
+                        row[b] += weights[0] * second.zz[a][b]
+                            + weights[1] * second.zq[a][b]
+                            // L_qv is the transpose of L_vq; forces need not be symmetric.
+                            + weights[2] * (second.zq[b][a] + second.force_z[a][b])
+                            + weights[3] * (second.qq[a][b] + second.force_q[a][b]);
+                    }
+                }
+            }
+        }
+    }
+
+    fn factor_masses(&mut self) -> Result<(), StepError> {
+        if M::FACTS.constant_mass {
+            let mut mass = [[0.0; N]; N];
+            mass.as_flattened_mut()
+                .copy_from_slice(&self.masses[..N * N]);
+            *self.constant_mass = Some(Block::of(&mass).map_err(singular)?);
+            return Ok(());
+        }
+        let blocks = self.masses.chunks_exact_mut(N * N);
+        for (mass, pivots) in blocks.zip(self.mass_pivots.chunks_exact_mut(N)) {
+            factor_block::<N>(mass, pivots).map_err(singular)?;
+        }
+        Ok(())
+    }
+}
+
+fn singular(error: crate::lu::Singular) -> StepError {
+    StepError::Legendre(LegendreError::Singular {
+        coordinate: error.column,
+    })
+}
+
+impl<M, const N: usize> Equations for VelocityForm<'_, M, N>
+where
+    M: Model<N>,
+{
+    fn sweep(&mut self, x: &[f64], step: &mut [f64], refresh: bool) -> Result<(), StepError> {
+        let known = M::FACTS.constant_mass && self.constant_mass.is_some();
+        let with_masses = refresh && !known;
+        self.evaluate(x, step, with_masses)?;
+        if with_masses {
+            self.factor_masses()?;
+        }
+        // Σ_l P_il E_li = 1 for every rule that is allowed: a constant mass needs no factor.
+        for (i, row) in step.as_chunks_mut::<N>().0.iter_mut().enumerate() {
+            match self.constant_mass {
+                Some(mass) => mass.solve(row),
+                None => solve(
+                    N,
+                    &self.masses[i * N * N..(i + 1) * N * N],
+                    &self.mass_pivots[i * N..(i + 1) * N],
+                    row,
+                ),
+            }
+            for a in 0..N {
+                row[a] = -row[a];
+            }
+        }
+        Ok(())
+    }
+
+    fn residual(&mut self, x: &[f64], residual: &mut [f64]) -> Result<(), StepError> {
+        self.evaluate(x, residual, false)
+    }
+
+    fn tangent(
+        &mut self,
+        x: &[f64],
+        residual: &mut [f64],
+        tangent: &mut [f64],
+    ) -> Result<(), StepError> {
+        let rates = x.as_chunks::<N>().0;
+        let rows = residual.as_chunks_mut::<N>().0;
+        let points = self.scheme.points();
+        rows.fill([0.0; N]);
+        tangent.fill(0.0);
+        let mut point = PointDerivatives {
+            p: [0.0; N],
+            force: [0.0; N],
+            second: Second::ZERO,
+        };
+        for l in 0..points {
+            self.derivatives(l, rates, &mut point)?;
+            self.add_to_tangent(l, &point.second, tangent);
+            self.forces[l] = point.force;
+            for (i, row) in rows.iter_mut().enumerate() {
+                let weight = self.scheme.momentum[i * points + l];
+                for a in 0..N {
+                    row[a] += weight * point.p[a];
+                }
+            }
+        }
+        self.subtract_impulse(rows);
+        Ok(())
+    }
+
+    fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
+        let position = relative(self.span.h, &self.span.start.q, x, step);
+        // The momentum at the end is as good as the velocities, whatever the step; what is left of
+        // an increment reaches it through forces only, hence the factor.
+        let velocity = 0.25 * relative(1.0, &[], x, step);
+        let relative = if (velocity + position).is_nan() {
+            f64::NAN
+        } else {
+            velocity.max(position)
+        };
+        Increment { relative, position }
+    }
+
+    fn finish(&mut self, x: &[f64], scratch: &mut [f64]) -> Result<(), StepError> {
+        // The end needs the forces at the final velocities, not at the last but one.
+        self.evaluate(x, scratch, false)
+    }
+
+    fn statistics(&mut self) -> &mut Statistics {
+        self.statistics
+    }
+}

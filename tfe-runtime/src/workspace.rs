@@ -1,0 +1,123 @@
+//! The memory of one element, given by the caller: no allocation while stepping.
+
+use crate::element::Element;
+use crate::error::StepError;
+use crate::model::Form;
+
+/// Scratch space of one element, [`numbers_len`] numbers and [`pivots_len`] indices.
+///
+/// It carries the unknowns of the last step, from which the next one starts; it belongs to one
+/// [`Memory`](crate::step::Memory) and is not to be changed in between.
+#[derive(Debug)]
+pub struct Workspace<'a> {
+    /// Numbers.
+    pub numbers: &'a mut [f64],
+    /// Row exchanges of factorisations.
+    pub pivots: &'a mut [usize],
+}
+
+/// How many numbers of a rate are unknown at one place: N velocities, or N forces and N velocities.
+pub(crate) const fn width(element: &Element, form: Form, coordinates: usize) -> usize {
+    match form {
+        Form::Hamiltonian if element.is_collocated() => 2 * coordinates,
+        _ => coordinates,
+    }
+}
+
+/// The numbers that a [`Workspace`] needs for a valid element and a model with so many coordinates.
+#[must_use]
+pub const fn numbers_len(element: Element, form: Form, coordinates: usize) -> usize {
+    let (k, u) = (element.points(), element.unknowns());
+    let m = u * width(&element, form, coordinates);
+    // Unknowns, their start, increments; forces and momenta at the points; impulses and mass
+    // matrices of the rows; extrapolation; tangent.
+    3 * m + 2 * k * coordinates + u * coordinates * (1 + coordinates) + u * u + m * m
+}
+
+/// The indices that a [`Workspace`] needs.
+#[must_use]
+pub const fn pivots_len(element: Element, form: Form, coordinates: usize) -> usize {
+    let u = element.unknowns();
+    u * width(&element, form, coordinates) + u * coordinates
+}
+
+/// The numbers that a transition matrix needs beside the workspace.
+#[must_use]
+pub const fn transition_len(element: Element, form: Form, coordinates: usize) -> usize {
+    let (k, u) = (element.points(), element.unknowns());
+    let m = u * width(&element, form, coordinates);
+    2 * coordinates * m + 2 * k * coordinates * coordinates
+}
+
+/// The workspace cut into its parts.
+pub(crate) struct Parts<'a, const N: usize> {
+    /// The unknown rates: U rows; in phase form U rows of forces, then U rows of velocities.
+    pub(crate) unknowns: &'a mut [f64],
+    /// Where the iteration started.
+    pub(crate) origin: &'a mut [f64],
+    /// Residual or increment.
+    pub(crate) step: &'a mut [f64],
+    /// L_q + Q at the points; in phase form velocities.
+    pub(crate) forces: &'a mut [[f64; N]],
+    /// Momenta at the points, those from which the Legendre transform starts.
+    pub(crate) momenta: &'a mut [[f64; N]],
+    /// What impulses add to the rows.
+    pub(crate) kicks: &'a mut [[f64; N]],
+    /// Factored mass matrices of the rows; in phase form H_pp at the stages.
+    pub(crate) masses: &'a mut [f64],
+    /// Old unknowns to new ones; U × U.
+    pub(crate) extrapolation: &'a mut [f64],
+    /// Matrix of Newton's method, or its factors.
+    pub(crate) tangent: &'a mut [f64],
+    pub(crate) tangent_pivots: &'a mut [usize],
+    pub(crate) mass_pivots: &'a mut [usize],
+}
+
+impl<'a, const N: usize> Parts<'a, N> {
+    pub(crate) fn of(
+        workspace: Workspace<'a>,
+        element: &Element,
+        form: Form,
+    ) -> Result<Self, StepError> {
+        let (k, u) = (element.points(), element.unknowns());
+        let m = u * width(element, form, N);
+        let needed = numbers_len(*element, form, N);
+        let indices = pivots_len(*element, form, N);
+        if workspace.numbers.len() < needed || workspace.pivots.len() < indices {
+            let given = workspace.numbers.len();
+            return Err(StepError::Workspace { needed, given });
+        }
+        let (unknowns, rest) = workspace.numbers.split_at_mut(m);
+        let (origin, rest) = rest.split_at_mut(m);
+        let (step, rest) = rest.split_at_mut(m);
+        let (forces, rest) = rest.split_at_mut(k * N);
+        let (momenta, rest) = rest.split_at_mut(k * N);
+        let (kicks, rest) = rest.split_at_mut(u * N);
+        let (masses, rest) = rest.split_at_mut(u * N * N);
+        let (extrapolation, rest) = rest.split_at_mut(u * u);
+        let (tangent, _) = rest.split_at_mut(m * m);
+        let (tangent_pivots, rest) = workspace.pivots.split_at_mut(m);
+        let (mass_pivots, _) = rest.split_at_mut(u * N);
+        Ok(Self {
+            unknowns,
+            origin,
+            step,
+            forces: forces.as_chunks_mut().0,
+            momenta: momenta.as_chunks_mut().0,
+            kicks: kicks.as_chunks_mut().0,
+            masses,
+            extrapolation,
+            tangent,
+            tangent_pivots,
+            mass_pivots,
+        })
+    }
+}
+
+/// What an iteration works on.
+pub(crate) struct Scratch<'a> {
+    pub(crate) unknowns: &'a mut [f64],
+    pub(crate) step: &'a mut [f64],
+    pub(crate) tangent: &'a mut [f64],
+    pub(crate) pivots: &'a mut [usize],
+}
