@@ -83,6 +83,13 @@ pub struct Slots {
     pub length: Option<Affine>,
 }
 
+impl Slots {
+    /// Whether a mistake in the length has been reported.
+    pub(crate) fn has_wrong_length(&self) -> bool {
+        self.length == Some(unknown_length(&self.name.node))
+    }
+}
+
 /// The arguments of the attribute, sorted and with their names known.
 #[derive(Clone, Debug, Default)]
 pub struct Model {

@@ -61,6 +61,7 @@ impl Lowerer<'_> {
             .filter_map(|diagnostic| match &diagnostic.kind {
                 Kind::UnknownSymbol { nearest, .. } => nearest.clone(),
                 Kind::NameClash { name, .. }
+                | Kind::NotAFunction { name }
                 | Kind::ReservedName { name, field: true }
                 | Kind::ReservedPrefix { name, field: true } => Some(name.clone()),
                 _ => None,
@@ -91,7 +92,19 @@ impl Lowerer<'_> {
                 Input::Coordinate(_) | Input::Velocity(_) | Input::Momentum(_)
             )
         };
+        // A coordinate with a mistake in its declaration is not missing from the energy.
+        let wrong: Vec<bool> = model
+            .coordinates
+            .iter()
+            .map(|slots| {
+                let name = slots.name.span;
+                slots.has_wrong_length() || self.bag.iter().any(|mistake| mistake.span == name)
+            })
+            .collect();
         if !inputs.iter().any(state) {
+            if wrong.contains(&true) {
+                return;
+            }
             let span = model
                 .energy
                 .as_ref()
@@ -112,9 +125,8 @@ impl Lowerer<'_> {
             Input::Velocity(at) | Input::Momentum(at) => Some(at),
             _ => None,
         });
-        let clashes: Vec<Span> = self.bag.iter().map(|diagnostic| diagnostic.span).collect();
         for (number, slots) in model.coordinates.iter().enumerate() {
-            if clashes.contains(&slots.name.span) {
+            if wrong[number] {
                 continue;
             }
             let length = slots.length.as_ref().and_then(Affine::as_constant);
