@@ -1,0 +1,262 @@
+/// # Derived model
+/// ```text
+/// L = Σ_{i = 0..N} ½ m[i] q̇[i]² − (Σ_{i = 0..N − 1} (½ k (q[i + 1] − q[i])² + a/4 (q[i + 1] − q[i])⁴))
+/// Q(q[i]) = −c q̇[i]
+/// Q(q[N − 1]) = f sin(ω t)
+/// coordinates: q[N]      parameters: m, k, a, c, f, ω
+/// operations, value: 4 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other
+/// operations, gradient: 7 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other
+/// operations, gradient and second derivatives: 14 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other
+/// declared by             Lagrangian, N coordinates
+/// depends on time         yes
+/// forces                  yes
+/// linear                  no
+/// quadratic in v          yes
+/// constant L_vv           yes
+/// separable (L_vq = 0)    yes
+/// cyclic coordinates      none
+/// pattern L_vv            (i,i)
+/// pattern L_vq            zero
+/// pattern L_qq            (i,i) (i,i+1) (i+1,i) (i+1,i+1)
+/// pattern Q_v             (i,i)
+/// pattern Q_q             zero
+/// ```
+struct Chain<const N: usize> {
+    m: [f64; N],
+    k: f64,
+    a: f64,
+    c: f64,
+    f: f64,
+    omega: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl<const N: usize> __tfe::Model<N> for Chain<N> {
+        const FORM: __tfe::Form = __tfe::Form::Lagrangian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: true,
+            forced: true,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: false,
+            separable: true,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
+            let a = R::from_f64(self.a);
+            let k = R::from_f64(self.k);
+            let mut t0 = R::from_f64(0.0);
+            let t1 = R::from_f64(0.5) * k;
+            let t2 = R::from_f64(0.25) * a;
+            for i in 0..N.saturating_sub(1) {
+                let t3 = q[i] - q[i + 1];
+                let t4 = t3 * t3;
+                let t5 = t2 * t4;
+                let t6 = t1 + t5;
+                let t7 = t4 * t6;
+                t0 += -t7;
+            }
+            for i in 0..N {
+                let t8 = z[i] * z[i];
+                let t9 = R::from_f64(0.5) * R::from_f64(self.m[i]);
+                t0 += t8 * t9;
+            }
+            t0
+        }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            first: &mut __tfe::First<R, N>,
+        ) {
+            let a = R::from_f64(self.a);
+            let c = R::from_f64(self.c);
+            let f = R::from_f64(self.f);
+            let k = R::from_f64(self.k);
+            let omega = R::from_f64(self.omega);
+            first.force.fill(R::from_f64(0.0));
+            first.q.fill(R::from_f64(0.0));
+            first.z.fill(R::from_f64(0.0));
+            let t0 = omega * t;
+            let t1 = t0.sin();
+            first.force[N.saturating_sub(1)] += f * t1;
+            for i in 0..N.saturating_sub(1) {
+                let t2 = q[i] - q[i + 1];
+                let t3 = t2 * t2;
+                let t4 = a * t3;
+                let t5 = k + t4;
+                let t6 = t2 * t5;
+                first.q[i] += -t6;
+                first.q[i + 1] += t6;
+            }
+            for i in 0..N {
+                first.z[i] += R::from_f64(self.m[i]) * z[i];
+                let t7 = z[i] * c;
+                first.force[i] += -t7;
+            }
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            first: &mut __tfe::First<R, N>,
+            zz: &mut [[R; N]; N],
+        ) {
+            let a = R::from_f64(self.a);
+            let c = R::from_f64(self.c);
+            let f = R::from_f64(self.f);
+            let k = R::from_f64(self.k);
+            let omega = R::from_f64(self.omega);
+            first.force.fill(R::from_f64(0.0));
+            first.q.fill(R::from_f64(0.0));
+            first.z.fill(R::from_f64(0.0));
+            for row in zz.iter_mut() {
+                row.fill(R::from_f64(0.0));
+            }
+            let t0 = omega * t;
+            let t1 = t0.sin();
+            first.force[N.saturating_sub(1)] += f * t1;
+            for i in 0..N.saturating_sub(1) {
+                let t2 = q[i] - q[i + 1];
+                let t3 = t2 * t2;
+                let t4 = a * t3;
+                let t5 = k + t4;
+                let t6 = t2 * t5;
+                first.q[i] += -t6;
+                first.q[i + 1] += t6;
+            }
+            for i in 0..N {
+                first.z[i] += R::from_f64(self.m[i]) * z[i];
+                let t7 = z[i] * c;
+                first.force[i] += -t7;
+                zz[i][i] += R::from_f64(self.m[i]);
+            }
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            first: &mut __tfe::First<R, N>,
+            second: &mut __tfe::Second<R, N>,
+        ) {
+            let a = R::from_f64(self.a);
+            let c = R::from_f64(self.c);
+            let f = R::from_f64(self.f);
+            let k = R::from_f64(self.k);
+            let omega = R::from_f64(self.omega);
+            first.force.fill(R::from_f64(0.0));
+            first.q.fill(R::from_f64(0.0));
+            for row in &mut second.qq {
+                row.fill(R::from_f64(0.0));
+            }
+            first.z.fill(R::from_f64(0.0));
+            for row in &mut second.zz {
+                row.fill(R::from_f64(0.0));
+            }
+            for row in &mut second.force_z {
+                row.fill(R::from_f64(0.0));
+            }
+            let t0 = omega * t;
+            let t1 = t0.sin();
+            first.force[N.saturating_sub(1)] += f * t1;
+            let t2 = R::from_f64(3.0) * a;
+            for i in 0..N.saturating_sub(1) {
+                let t3 = q[i] - q[i + 1];
+                let t4 = t3 * t3;
+                let t5 = a * t4;
+                let t6 = k + t5;
+                let t7 = t3 * t6;
+                first.q[i] += -t7;
+                first.q[i + 1] += t7;
+                let t8 = t4 * t2;
+                let t9 = k + t8;
+                let t10 = -t9;
+                second.qq[i][i] += t10;
+                second.qq[i][i + 1] += t9;
+                second.qq[i + 1][i] += t9;
+                second.qq[i + 1][i + 1] += t10;
+            }
+            let t11 = -c;
+            for i in 0..N {
+                first.z[i] += R::from_f64(self.m[i]) * z[i];
+                let t12 = z[i] * c;
+                first.force[i] += -t12;
+                second.zz[i][i] += R::from_f64(self.m[i]);
+                second.force_z[i][i] += t11;
+            }
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0.. => __tfe::CoordinateName::element("q", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["extension"];
+        fn observables<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            values: &mut [R],
+        ) {
+            values[0] = q[N.saturating_sub(1)] - q[0];
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl<const N: usize> Chain<N> {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    fn state(&self, q: [f64; N], v: [f64; N]) -> ::tfe::__private::State<N> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "Chain",
+            form: ::tfe::__private::Form::Lagrangian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: true,
+                forced: true,
+                quadratic_in_z: true,
+                constant_mass: true,
+                linear: false,
+                separable: true,
+            },
+            cyclic: &[],
+            value: ::tfe::__private::Operations {
+                additions: 4,
+                multiplications: 8,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 7,
+                multiplications: 7,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 14,
+                multiplications: 9,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            page: "L = Σ_{i = 0..N} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..N − 1} (½ k (q[i + 1] − q[i])² + a/4 (q[i + 1] − q[i])⁴))\nQ(q[i]) = −c q\u{307}[i]\nQ(q[N − 1]) = f sin(ω t)\ncoordinates: q[N]      parameters: m, k, a, c, f, ω\noperations, value: 4 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 7 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 14 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, N coordinates\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (i,i)\npattern L_vq            zero\npattern L_qq            (i,i) (i,i+1) (i+1,i) (i+1,i+1)\npattern Q_v             (i,i)\npattern Q_q             zero",
+        }
+    }
+    /// The observable `extension` at time `t`, coordinates `q` and velocities `v`.
+    fn extension(&self, t: f64, q: [f64; N], v: [f64; N]) -> f64 {
+        let mut values = [0.0; 1];
+        ::tfe::__private::Model::observables(self, t, &q, &v, &mut values);
+        values[0]
+    }
+}

@@ -1,0 +1,381 @@
+/// # Derived model
+/// ```text
+/// gap = x − r cos θ
+/// L = ½ m (ẋ² + r² θ̇²) − m g x − (½ k gap² if gap < 0 else 0)
+/// D = ½ c θ̇²
+/// coordinates: x, θ      parameters: m, r, g, k, c
+/// operations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other
+/// operations, gradient: 2 +−, 11 ×, 0 ÷, 1 sin/cos, 1 other
+/// operations, gradient and second derivatives: 3 +−, 14 ×, 0 ÷, 1 sin/cos, 1 other
+/// declared by             Lagrangian, 2 coordinates
+/// depends on time         no
+/// forces                  yes
+/// linear                  no
+/// quadratic in v          yes
+/// constant L_vv           yes
+/// separable (L_vq = 0)    yes
+/// cyclic coordinates      none
+/// pattern L_vv            (0,0) (1,1)
+/// pattern L_vq            zero
+/// pattern L_qq            (0,0) (0,1) (1,0) (1,1)
+/// pattern Q_v             (1,1)
+/// pattern Q_q             zero
+/// ```
+struct Contact {
+    m: f64,
+    r: f64,
+    g: f64,
+    k: f64,
+    c: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<2> for Contact {
+        const FORM: __tfe::Form = __tfe::Form::Lagrangian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: false,
+            forced: true,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: false,
+            separable: true,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
+            let g = R::from_f64(self.g);
+            let k = R::from_f64(self.k);
+            let m = R::from_f64(self.m);
+            let r = R::from_f64(self.r);
+            let cos_theta = q[1].cos();
+            let t0 = r * cos_theta;
+            let t1 = q[0] - t0;
+            let t2 = t1 * t1;
+            let t3 = R::from_f64(0.5) * t2;
+            let t4 = k * t3;
+            let t5 = R::select(t1.less(R::from_f64(0.0)), t4, R::from_f64(0.0));
+            let t6 = z[0] * z[0];
+            let t7 = r * z[1];
+            let t8 = t7 * t7;
+            let t9 = t6 + t8;
+            let t10 = R::from_f64(0.5) * t9;
+            let t11 = q[0] * g;
+            let t12 = t10 - t11;
+            let t13 = m * t12;
+            let t14 = t5 - t13;
+            -t14
+        }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            let c = R::from_f64(self.c);
+            let g = R::from_f64(self.g);
+            let k = R::from_f64(self.k);
+            let m = R::from_f64(self.m);
+            let r = R::from_f64(self.r);
+            first.z[0] = m * z[0];
+            let t0 = r * r;
+            let t1 = m * t0;
+            first.z[1] = z[1] * t1;
+            let t2 = m * g;
+            let (sin_theta, cos_theta) = q[1].sin_cos();
+            let t3 = r * cos_theta;
+            let t4 = q[0] - t3;
+            let t5 = R::select(
+                t4.less(R::from_f64(0.0)),
+                R::from_f64(1.0),
+                R::from_f64(0.0),
+            );
+            let t6 = t4 * k;
+            let t7 = t5 * t6;
+            let t8 = t2 + t7;
+            first.q[0] = -t8;
+            let t9 = r * sin_theta;
+            let t10 = t7 * t9;
+            first.q[1] = -t10;
+            let t11 = z[1] * c;
+            first.force[1] = -t11;
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            let c = R::from_f64(self.c);
+            let g = R::from_f64(self.g);
+            let k = R::from_f64(self.k);
+            let m = R::from_f64(self.m);
+            let r = R::from_f64(self.r);
+            first.z[0] = m * z[0];
+            let t0 = m * r;
+            let t1 = r * t0;
+            first.z[1] = z[1] * t1;
+            let t2 = m * g;
+            let (sin_theta, cos_theta) = q[1].sin_cos();
+            let t3 = r * cos_theta;
+            let t4 = q[0] - t3;
+            let t5 = R::select(
+                t4.less(R::from_f64(0.0)),
+                R::from_f64(1.0),
+                R::from_f64(0.0),
+            );
+            let t6 = t4 * k;
+            let t7 = t5 * t6;
+            let t8 = t2 + t7;
+            first.q[0] = -t8;
+            let t9 = r * sin_theta;
+            let t10 = t7 * t9;
+            first.q[1] = -t10;
+            let t11 = z[1] * c;
+            first.force[1] = -t11;
+            zz[0][0] = m;
+            zz[1][1] = t1;
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            second: &mut __tfe::Second<R, 2>,
+        ) {
+            let c = R::from_f64(self.c);
+            let g = R::from_f64(self.g);
+            let k = R::from_f64(self.k);
+            let m = R::from_f64(self.m);
+            let r = R::from_f64(self.r);
+            first.z[0] = m * z[0];
+            let t0 = m * r;
+            let t1 = r * t0;
+            first.z[1] = z[1] * t1;
+            let t2 = m * g;
+            let (sin_theta, cos_theta) = q[1].sin_cos();
+            let t3 = r * cos_theta;
+            let t4 = q[0] - t3;
+            let t5 = R::select(
+                t4.less(R::from_f64(0.0)),
+                R::from_f64(1.0),
+                R::from_f64(0.0),
+            );
+            let t6 = k * t5;
+            let t7 = t4 * t6;
+            let t8 = t2 + t7;
+            first.q[0] = -t8;
+            let t9 = r * sin_theta;
+            let t10 = t7 * t9;
+            first.q[1] = -t10;
+            let t11 = z[1] * c;
+            first.force[1] = -t11;
+            second.zz[0][0] = m;
+            second.zz[1][1] = t1;
+            second.qq[0][0] = -t6;
+            let t12 = t6 * t9;
+            let t13 = -t12;
+            second.qq[0][1] = t13;
+            second.qq[1][0] = t13;
+            let t14 = t9 * t12;
+            let t15 = t3 * t7;
+            let t16 = t14 + t15;
+            second.qq[1][1] = -t16;
+            second.force_z[1][1] = -c;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                1 => __tfe::CoordinateName::single("theta"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height", "speed"];
+        fn observables<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            values: &mut [R],
+        ) {
+            let r = R::from_f64(self.r);
+            let cos_theta = q[1].cos();
+            let t0 = r * cos_theta;
+            values[0] = q[0] - t0;
+            let t1 = z[0] * z[0];
+            let t2 = r * z[1];
+            let t3 = t2 * t2;
+            let t4 = t1 + t3;
+            values[1] = t4.sqrt();
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl Contact {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    fn state(&self, q: [f64; 2], v: [f64; 2]) -> ::tfe::__private::State<2> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "Contact",
+            form: ::tfe::__private::Form::Lagrangian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: false,
+                forced: true,
+                quadratic_in_z: true,
+                constant_mass: true,
+                linear: false,
+                separable: true,
+            },
+            cyclic: &[],
+            value: ::tfe::__private::Operations {
+                additions: 4,
+                multiplications: 10,
+                divisions: 0,
+                sines: 1,
+                functions: 1,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 2,
+                multiplications: 11,
+                divisions: 0,
+                sines: 1,
+                functions: 1,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 3,
+                multiplications: 14,
+                divisions: 0,
+                sines: 1,
+                functions: 1,
+            },
+            page: "gap = x − r cos θ\nL = ½ m (x\u{307}² + r² θ\u{307}²) − m g x − (½ k gap² if gap < 0 else 0)\nD = ½ c θ\u{307}²\ncoordinates: x, θ      parameters: m, r, g, k, c\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient: 2 +−, 11 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient and second derivatives: 3 +−, 14 ×, 0 ÷, 1 sin/cos, 1 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_v             (1,1)\npattern Q_q             zero",
+        }
+    }
+    /// The observable `height` at time `t`, coordinates `q` and velocities `v`.
+    fn height(&self, t: f64, q: [f64; 2], v: [f64; 2]) -> f64 {
+        let mut values = [0.0; 2];
+        ::tfe::__private::Model::observables(self, t, &q, &v, &mut values);
+        values[0]
+    }
+    /// The observable `speed` at time `t`, coordinates `q` and velocities `v`.
+    fn speed(&self, t: f64, q: [f64; 2], v: [f64; 2]) -> f64 {
+        let mut values = [0.0; 2];
+        ::tfe::__private::Model::observables(self, t, &q, &v, &mut values);
+        values[1]
+    }
+}
+/// Steps [`Contact`] with one element, `Primal::<3>.reduced()`: no generics, no allocation, tables and sizes constant.
+struct Fast {
+    model: Contact,
+    start: f64,
+    step: f64,
+    steps: u64,
+    memory: ::tfe::__private::Memory<2>,
+    numbers: [f64; ::tfe::__private::numbers_len(
+        Fast::ELEMENT,
+        ::tfe::__private::Form::Lagrangian,
+        2,
+    )],
+    pivots: [usize; ::tfe::__private::pivots_len(
+        Fast::ELEMENT,
+        ::tfe::__private::Form::Lagrangian,
+        2,
+    )],
+}
+#[automatically_derived]
+#[allow(dead_code)]
+impl Fast {
+    const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::primal(3)
+        .reduced();
+    const TABLES: ::tfe::__private::Scheme<
+        { Fast::ELEMENT.points() },
+        { Fast::ELEMENT.unknowns() },
+    > = ::tfe::__private::Scheme::new(Fast::ELEMENT);
+    /// The size of the stepper, all its memory included.
+    const BYTES: usize = ::core::mem::size_of::<Self>();
+    /// A stepper of length `h` that begins at time zero. It keeps a copy of the parameters.
+    fn new(model: &Contact, h: f64) -> Self {
+        Self {
+            model: Contact {
+                m: ::core::clone::Clone::clone(&model.m),
+                r: ::core::clone::Clone::clone(&model.r),
+                g: ::core::clone::Clone::clone(&model.g),
+                k: ::core::clone::Clone::clone(&model.k),
+                c: ::core::clone::Clone::clone(&model.c),
+            },
+            start: 0.0,
+            step: h,
+            steps: 0,
+            memory: ::tfe::__private::Memory::new(),
+            numbers: [0.0; ::tfe::__private::numbers_len(
+                Fast::ELEMENT,
+                ::tfe::__private::Form::Lagrangian,
+                2,
+            )],
+            pivots: [0; ::tfe::__private::pivots_len(
+                Fast::ELEMENT,
+                ::tfe::__private::Form::Lagrangian,
+                2,
+            )],
+        }
+    }
+    /// The time of the next step's start.
+    fn time(&self) -> f64 {
+        self.start + self.steps as f64 * self.step
+    }
+    /// Makes the next step start at `time`.
+    fn set_time(&mut self, time: f64) {
+        self.start = time;
+        self.steps = 0;
+    }
+    /// What the steps so far have cost.
+    fn statistics(&self) -> &::tfe::__private::Statistics {
+        self.memory.statistics()
+    }
+    /// Moves `state` over one element.
+    ///
+    /// # Errors
+    /// Says why the element could not be solved; `state` is unchanged then.
+    fn advance(
+        &mut self,
+        state: &mut ::tfe::__private::State<2>,
+    ) -> ::core::result::Result<(), ::tfe::__private::StepError> {
+        let method = ::tfe::__private::Method {
+            model: &self.model,
+            tables: &Self::TABLES,
+            control: ::core::default::Default::default(),
+        };
+        let workspace = ::tfe::__private::Workspace {
+            numbers: &mut self.numbers,
+            pivots: &mut self.pivots,
+        };
+        let start = self.start + self.steps as f64 * self.step;
+        let interval = ::tfe::__private::Interval {
+            start,
+            length: self.step,
+            impulses: &[],
+        };
+        method.advance(&mut self.memory, workspace, interval, state)?;
+        self.steps += 1;
+        ::core::result::Result::Ok(())
+    }
+}
+#[automatically_derived]
+impl ::core::fmt::Debug for Fast {
+    fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
+        f.debug_struct("Fast")
+            .field("time", &self.time())
+            .field("step", &self.step)
+            .field("statistics", self.memory.statistics())
+            .finish_non_exhaustive()
+    }
+}

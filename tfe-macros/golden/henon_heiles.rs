@@ -1,0 +1,181 @@
+/// # Derived model
+/// ```text
+/// H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)
+/// coordinates: x, y      momenta: px, py      parameters: λ
+/// operations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other
+/// operations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other
+/// operations, gradient and second derivatives: 5 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other
+/// declared by             Hamiltonian, 2 coordinates
+/// depends on time         no
+/// forces                  no
+/// linear                  no
+/// quadratic in p          yes
+/// constant H_pp           yes
+/// separable (H_pq = 0)    yes
+/// cyclic coordinates      none
+/// pattern H_pp            (0,0) (1,1)
+/// pattern H_pq            zero
+/// pattern H_qq            (0,0) (0,1) (1,0) (1,1)
+/// ```
+struct HenonHeiles {
+    lambda: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<2> for HenonHeiles {
+        const FORM: __tfe::Form = __tfe::Form::Hamiltonian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: false,
+            forced: false,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: false,
+            separable: true,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
+            let lambda = R::from_f64(self.lambda);
+            let t0 = q[1] * q[1];
+            let t1 = q[0] * q[0];
+            let t2 = z[0] * z[0];
+            let t3 = z[1] * z[1];
+            let t4 = t2 + t3;
+            let t5 = t1 + t4;
+            let t6 = t0 + t5;
+            let t7 = R::from_f64(0.5) * t6;
+            let t8 = t0 / R::from_f64(3.0);
+            let t9 = t1 - t8;
+            let t10 = q[1] * lambda;
+            let t11 = t9 * t10;
+            t7 + t11
+        }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            let lambda = R::from_f64(self.lambda);
+            first.z[0] = z[0];
+            first.z[1] = z[1];
+            let t0 = q[1] * lambda;
+            let t1 = R::from_f64(2.0) * q[0];
+            let t2 = t0 * t1;
+            first.q[0] = q[0] + t2;
+            let t3 = q[0] * q[0];
+            let t4 = lambda * t3;
+            let t5 = q[1] * t0;
+            let t6 = q[1] - t5;
+            first.q[1] = t4 + t6;
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            let lambda = R::from_f64(self.lambda);
+            first.z[0] = z[0];
+            first.z[1] = z[1];
+            let t0 = q[1] * lambda;
+            let t1 = R::from_f64(2.0) * q[0];
+            let t2 = t0 * t1;
+            first.q[0] = q[0] + t2;
+            let t3 = q[0] * q[0];
+            let t4 = lambda * t3;
+            let t5 = q[1] * t0;
+            let t6 = q[1] - t5;
+            first.q[1] = t4 + t6;
+            zz[0][0] = R::from_f64(1.0);
+            zz[1][1] = R::from_f64(1.0);
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            second: &mut __tfe::Second<R, 2>,
+        ) {
+            let lambda = R::from_f64(self.lambda);
+            first.z[0] = z[0];
+            first.z[1] = z[1];
+            let t0 = q[1] * lambda;
+            let t1 = R::from_f64(2.0) * t0;
+            let t2 = q[0] * t1;
+            first.q[0] = q[0] + t2;
+            let t3 = q[0] * lambda;
+            let t4 = q[0] * t3;
+            let t5 = q[1] * t0;
+            let t6 = q[1] - t5;
+            first.q[1] = t4 + t6;
+            second.zz[0][0] = R::from_f64(1.0);
+            second.zz[1][1] = R::from_f64(1.0);
+            second.qq[0][0] = R::from_f64(1.0) + t1;
+            let t7 = R::from_f64(2.0) * t3;
+            second.qq[0][1] = t7;
+            second.qq[1][0] = t7;
+            let t8 = t1 - R::from_f64(1.0);
+            second.qq[1][1] = -t8;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                1 => __tfe::CoordinateName::single("y"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl HenonHeiles {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    fn state(&self, q: [f64; 2], v: [f64; 2]) -> ::tfe::__private::State<2> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "HenonHeiles",
+            form: ::tfe::__private::Form::Hamiltonian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: false,
+                forced: false,
+                quadratic_in_z: true,
+                constant_mass: true,
+                linear: false,
+                separable: true,
+            },
+            cyclic: &[],
+            value: ::tfe::__private::Operations {
+                additions: 5,
+                multiplications: 7,
+                divisions: 1,
+                sines: 0,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 3,
+                multiplications: 6,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 5,
+                multiplications: 7,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            page: "H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)\ncoordinates: x, y      momenta: px, py      parameters: λ\noperations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 5 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in p          yes\nconstant H_pp           yes\nseparable (H_pq = 0)    yes\ncyclic coordinates      none\npattern H_pp            (0,0) (1,1)\npattern H_pq            zero\npattern H_qq            (0,0) (0,1) (1,0) (1,1)",
+        }
+    }
+}

@@ -1,0 +1,172 @@
+/// A mathematical pendulum.
+///
+/// # Derived model
+/// ```text
+/// L = ½ m l² θ̇² + m g l cos θ
+/// coordinates: θ      parameters: m, l, g
+/// operations, value: 1 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other
+/// operations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other
+/// operations, gradient and second derivatives: 0 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other
+/// declared by             Lagrangian, 1 coordinates
+/// depends on time         no
+/// forces                  no
+/// linear                  no
+/// quadratic in v          yes
+/// constant L_vv           yes
+/// separable (L_vq = 0)    yes
+/// cyclic coordinates      none
+/// pattern L_vv            (0,0)
+/// pattern L_vq            zero
+/// pattern L_qq            (0,0)
+/// ```
+pub struct Pendulum {
+    /// Mass.
+    pub m: f64,
+    /// Length.
+    pub l: f64,
+    /// Acceleration of gravity.
+    pub g: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<1> for Pendulum {
+        const FORM: __tfe::Form = __tfe::Form::Lagrangian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: false,
+            forced: false,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: false,
+            separable: true,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
+            let g = R::from_f64(self.g);
+            let l = R::from_f64(self.l);
+            let m = R::from_f64(self.m);
+            let t0 = l * z[0];
+            let t1 = t0 * t0;
+            let t2 = R::from_f64(0.5) * t1;
+            let cos_theta = q[0].cos();
+            let t3 = l * g;
+            let t4 = cos_theta * t3;
+            let t5 = t2 + t4;
+            m * t5
+        }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            let g = R::from_f64(self.g);
+            let l = R::from_f64(self.l);
+            let m = R::from_f64(self.m);
+            let t0 = m * l;
+            let t1 = l * z[0];
+            first.z[0] = t0 * t1;
+            let sin_theta = q[0].sin();
+            let t2 = g * sin_theta;
+            let t3 = t0 * t2;
+            first.q[0] = -t3;
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            let g = R::from_f64(self.g);
+            let l = R::from_f64(self.l);
+            let m = R::from_f64(self.m);
+            let t0 = m * l;
+            let t1 = l * t0;
+            first.z[0] = t1 * z[0];
+            let sin_theta = q[0].sin();
+            let t2 = g * sin_theta;
+            let t3 = t0 * t2;
+            first.q[0] = -t3;
+            zz[0][0] = t1;
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            second: &mut __tfe::Second<R, 1>,
+        ) {
+            let g = R::from_f64(self.g);
+            let l = R::from_f64(self.l);
+            let m = R::from_f64(self.m);
+            let t0 = m * l;
+            let t1 = l * t0;
+            first.z[0] = t1 * z[0];
+            let t2 = t0 * g;
+            let (sin_theta, cos_theta) = q[0].sin_cos();
+            let t3 = t2 * sin_theta;
+            first.q[0] = -t3;
+            second.zz[0][0] = t1;
+            let t4 = cos_theta * t2;
+            second.qq[0][0] = -t4;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("theta"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl Pendulum {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    pub fn state(&self, q: [f64; 1], v: [f64; 1]) -> ::tfe::__private::State<1> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    pub fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "Pendulum",
+            form: ::tfe::__private::Form::Lagrangian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: false,
+                forced: false,
+                quadratic_in_z: true,
+                constant_mass: true,
+                linear: false,
+                separable: true,
+            },
+            cyclic: &[],
+            value: ::tfe::__private::Operations {
+                additions: 1,
+                multiplications: 6,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 0,
+                multiplications: 5,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 0,
+                multiplications: 6,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            page: "L = ½ m l² θ\u{307}² + m g l cos θ\ncoordinates: θ      parameters: m, l, g\noperations, value: 1 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+        }
+    }
+}

@@ -1,0 +1,499 @@
+//! Programs of the engine as Rust statements.
+
+use proc_macro2::{Ident, Literal, Span, TokenStream};
+use quote::{format_ident, quote};
+use std::collections::{BTreeMap, BTreeSet};
+use tfe_symbolic::ast::Comparison;
+use tfe_symbolic::function::Function;
+use tfe_symbolic::input::{Affine, IndexSymbol, Input, LoopVariable};
+use tfe_symbolic::program::{Operand, Operation, Output, Program, Statement, Temporary};
+
+/// Writes programs of one model.
+pub(crate) struct Emitter<'a> {
+    /// The names of the coordinates by flat index, for readable temporaries.
+    coordinates: &'a [String],
+    /// Where second derivatives go: `second.`, or nothing where the mass matrix alone is an argument.
+    second: TokenStream,
+    /// How often each temporary is read.
+    reads: BTreeMap<Temporary, usize>,
+    /// The indices of all loops.
+    indices: BTreeSet<String>,
+    names: BTreeMap<Temporary, Ident>,
+    taken: BTreeSet<String>,
+    numbered: usize,
+    parameters: BTreeMap<String, Ident>,
+    value: Option<TokenStream>,
+}
+
+/// The statements of a kernel, and the expression of the energy function where it was asked for.
+pub(crate) struct Body {
+    /// `let` statements, loops and assignments.
+    pub(crate) statements: TokenStream,
+    /// The value of the energy function.
+    pub(crate) value: Option<TokenStream>,
+}
+
+impl<'a> Emitter<'a> {
+    /// An emitter for a model with these coordinates.
+    pub(crate) fn new(coordinates: &'a [String], second: TokenStream) -> Self {
+        Self {
+            coordinates,
+            second,
+            reads: BTreeMap::new(),
+            indices: BTreeSet::new(),
+            names: BTreeMap::new(),
+            taken: BTreeSet::new(),
+            numbered: 0,
+            parameters: BTreeMap::new(),
+            value: None,
+        }
+    }
+
+    /// The body of a kernel.
+    pub(crate) fn body(mut self, program: &Program) -> Body {
+        self.survey(&program.statements);
+        let statements = self.statements(&program.statements);
+        let parameters = self.parameters.iter().map(|(field, local)| {
+            let field = identifier(field);
+            quote!(let #local = R::from_f64(self.#field);)
+        });
+        Body {
+            statements: quote!(#(#parameters)* #statements),
+            value: self.value,
+        }
+    }
+
+    /// Counts reads and collects indices.
+    fn survey(&mut self, statements: &[Statement]) {
+        for statement in statements {
+            if let Statement::Loop { variable, body, .. } = statement {
+                self.indices.insert(variable.to_string());
+                self.survey(body);
+            }
+            for operand in operands(statement) {
+                if let Operand::Temporary(temporary) = operand {
+                    *self.reads.entry(*temporary).or_default() += 1;
+                }
+            }
+        }
+    }
+
+    fn statements(&mut self, statements: &[Statement]) -> TokenStream {
+        let mut tokens = TokenStream::new();
+        let mut rest = statements;
+        while let [statement, after @ ..] = rest {
+            rest = after;
+            // A result that nothing else needs is written where it belongs, without a temporary.
+            if let (Statement::Let { target, operation }, Some(next)) = (statement, after.first())
+                && self.reads.get(target) == Some(&1)
+                && written(next) == Some(&Operand::Temporary(*target))
+            {
+                let value = self.operation(operation);
+                tokens.extend(self.write(next, value));
+                rest = &after[1..];
+            } else {
+                tokens.extend(self.statement(statement));
+            }
+        }
+        tokens
+    }
+
+    fn statement(&mut self, statement: &Statement) -> TokenStream {
+        match statement {
+            Statement::Let { target, operation } => {
+                let value = self.operation(operation);
+                let name = match operation {
+                    Operation::Call(function @ (Function::Sin | Function::Cos), arguments) => {
+                        self.define_of_coordinate(*target, function.method(), arguments.first())
+                    }
+                    _ => self.define(*target),
+                };
+                quote!(let #name = #value;)
+            }
+            Statement::SineCosine {
+                sine,
+                cosine,
+                argument,
+            } => {
+                let of = self.operand(argument);
+                let sine = self.define_of_coordinate(*sine, "sin", Some(argument));
+                let cosine = self.define_of_coordinate(*cosine, "cos", Some(argument));
+                quote!(let (#sine, #cosine) = #of.sin_cos();)
+            }
+            Statement::Accumulator { target } => {
+                let name = self.define(*target);
+                quote!(let mut #name = R::from_f64(0.0);)
+            }
+            Statement::Accumulate { value, .. } | Statement::Store { value, .. } => {
+                let value = self.operand(value);
+                self.write(statement, value)
+            }
+            Statement::Loop {
+                variable,
+                start,
+                end,
+                body,
+            } => {
+                let (variable, start, end) = (loop_name(*variable), index(start), index(end));
+                let body = self.statements(body);
+                quote!(for #variable in #start..#end { #body })
+            }
+            Statement::Clear { output } => self.clear(output),
+        }
+    }
+
+    /// A store or an accumulation of `value`.
+    fn write(&mut self, statement: &Statement, value: TokenStream) -> TokenStream {
+        match statement {
+            Statement::Store {
+                output: Output::Value,
+                ..
+            } => {
+                self.value = Some(value);
+                TokenStream::new()
+            }
+            Statement::Store {
+                output,
+                accumulate: false,
+                ..
+            } => {
+                let place = self.place(output);
+                quote!(#place = #value;)
+            }
+            Statement::Store { output, .. } => {
+                let place = self.place(output);
+                quote!(#place += #value;)
+            }
+            Statement::Accumulate { target, .. } => {
+                let name = self.name(*target);
+                quote!(#name += #value;)
+            }
+            _ => TokenStream::new(),
+        }
+    }
+
+    fn place(&self, output: &Output) -> TokenStream {
+        let second = &self.second;
+        match output {
+            Output::Value => quote!(value),
+            Output::ByZ(a) => at(&quote!(first.z), &[a]),
+            Output::ByQ(a) => at(&quote!(first.q), &[a]),
+            Output::Force(a) => at(&quote!(first.force), &[a]),
+            Output::ZZ(a, b) => at(&quote!(#second zz), &[a, b]),
+            Output::ZQ(a, b) => at(&quote!(#second zq), &[a, b]),
+            Output::QQ(a, b) => at(&quote!(#second qq), &[a, b]),
+            Output::ForceZ(a, b) => at(&quote!(#second force_z), &[a, b]),
+            Output::ForceQ(a, b) => at(&quote!(#second force_q), &[a, b]),
+            Output::Observable(k) => {
+                let k = Literal::usize_unsuffixed(*k);
+                quote!(values[#k])
+            }
+        }
+    }
+
+    fn clear(&self, output: &Output) -> TokenStream {
+        let second = &self.second;
+        let vector = |array: TokenStream| quote!(#array.fill(R::from_f64(0.0)););
+        let matrix =
+            |array: TokenStream| quote!(for row in &mut #array { row.fill(R::from_f64(0.0)); });
+        match output {
+            Output::ByZ(_) => vector(quote!(first.z)),
+            Output::ByQ(_) => vector(quote!(first.q)),
+            Output::Force(_) => vector(quote!(first.force)),
+            // The mass matrix alone is passed by reference, the blocks of all second derivatives are fields.
+            Output::ZZ(..) if second.is_empty() => {
+                quote!(for row in zz.iter_mut() {
+                    row.fill(R::from_f64(0.0));
+                })
+            }
+            Output::ZZ(..) => matrix(quote!(#second zz)),
+            Output::ZQ(..) => matrix(quote!(#second zq)),
+            Output::QQ(..) => matrix(quote!(#second qq)),
+            Output::ForceZ(..) => matrix(quote!(#second force_z)),
+            Output::ForceQ(..) => matrix(quote!(#second force_q)),
+            Output::Value | Output::Observable(_) => TokenStream::new(),
+        }
+    }
+
+    fn operation(&mut self, operation: &Operation) -> TokenStream {
+        match operation {
+            Operation::Copy(a) => self.operand(a),
+            Operation::Add(a, b) => self.binary(a, &quote!(+), b),
+            Operation::Subtract(a, b) => self.binary(a, &quote!(-), b),
+            Operation::Multiply(a, b) => self.binary(a, &quote!(*), b),
+            Operation::Divide(a, b) => self.binary(a, &quote!(/), b),
+            Operation::Negate(a) => {
+                let a = self.operand(a);
+                quote!(-#a)
+            }
+            Operation::IntegerPower(a, exponent) => {
+                let (a, exponent) = (self.operand(a), Literal::i32_unsuffixed(*exponent));
+                quote!(#a.powi(#exponent))
+            }
+            Operation::Power(a, b) => {
+                let (a, b) = (self.operand(a), self.operand(b));
+                quote!(#a.powf(#b))
+            }
+            Operation::Call(function, arguments) => {
+                let method = format_ident!("{}", function.method());
+                let mut arguments = arguments.iter();
+                let receiver = arguments.next().map(|a| self.operand(a));
+                let rest: Vec<_> = arguments.map(|a| self.operand(a)).collect();
+                quote!(#receiver.#method(#(#rest),*))
+            }
+            Operation::Select {
+                comparison,
+                left,
+                right,
+                then,
+                otherwise,
+            } => {
+                let (mut left, mut right) = (self.operand(left), self.operand(right));
+                let (then, otherwise) = (self.operand(then), self.operand(otherwise));
+                if matches!(comparison, Comparison::Greater | Comparison::GreaterOrEqual) {
+                    std::mem::swap(&mut left, &mut right);
+                }
+                let method = match comparison {
+                    Comparison::Less | Comparison::Greater => quote!(less),
+                    Comparison::LessOrEqual | Comparison::GreaterOrEqual => quote!(less_or_equal),
+                };
+                quote!(R::select(#left.#method(#right), #then, #otherwise))
+            }
+        }
+    }
+
+    fn binary(&mut self, a: &Operand, operator: &TokenStream, b: &Operand) -> TokenStream {
+        let (a, b) = (self.operand(a), self.operand(b));
+        quote!(#a #operator #b)
+    }
+
+    fn operand(&mut self, operand: &Operand) -> TokenStream {
+        match operand {
+            Operand::Temporary(temporary) => {
+                let name = self.name(*temporary);
+                quote!(#name)
+            }
+            Operand::Constant(value) => {
+                let value = number(*value);
+                quote!(R::from_f64(#value))
+            }
+            Operand::Input(input) => self.input(input),
+        }
+    }
+
+    fn input(&mut self, input: &Input) -> TokenStream {
+        match input {
+            Input::Time => quote!(t),
+            Input::Coordinate(a) => at(&quote!(q), &[a]),
+            Input::Velocity(a) | Input::Momentum(a) => at(&quote!(z), &[a]),
+            Input::Parameter(name) => {
+                let local = self.local_name(name);
+                self.parameters.insert(name.clone(), local.clone());
+                quote!(#local)
+            }
+            Input::ParameterElement(name, a) => {
+                let field = identifier(name);
+                let element = at(&quote!(self.#field), &[a]);
+                quote!(R::from_f64(#element))
+            }
+            Input::Integer(a) => {
+                let value = signed(a);
+                quote!(R::from_f64((#value) as f64))
+            }
+        }
+    }
+
+    fn name(&self, temporary: Temporary) -> Ident {
+        self.names
+            .get(&temporary)
+            .cloned()
+            .unwrap_or_else(|| format_ident!("t{}", temporary.0))
+    }
+
+    /// The next of `t0`, `t1`, …
+    fn define(&mut self, temporary: Temporary) -> Ident {
+        let name = format_ident!("t{}", self.numbered);
+        self.numbered += 1;
+        self.names.insert(temporary, name.clone());
+        name
+    }
+
+    /// `sin_theta` for the sine of a coordinate.
+    fn define_of_coordinate(
+        &mut self,
+        temporary: Temporary,
+        function: &str,
+        argument: Option<&Operand>,
+    ) -> Ident {
+        let coordinate = match argument {
+            Some(Operand::Input(Input::Coordinate(a))) => a
+                .as_constant()
+                .and_then(|k| usize::try_from(k).ok())
+                .and_then(|k| self.coordinates.get(k)),
+            _ => None,
+        };
+        let name = coordinate.map(|name| format!("{function}_{}", name.replace(['[', ']'], "")));
+        match name {
+            Some(name) if self.taken.insert(name.clone()) => {
+                let name = format_ident!("{name}");
+                self.names.insert(temporary, name.clone());
+                name
+            }
+            _ => self.define(temporary),
+        }
+    }
+
+    /// The local variable of a parameter: its own name unless that could be one of the emitter's.
+    fn local_name(&self, field: &str) -> Ident {
+        let taken = ["q", "z", "first", "second", "zz", "values", "row"];
+        let temporary = field
+            .strip_prefix('t')
+            .is_some_and(|rest| rest.chars().all(|c| c.is_ascii_digit()))
+            || field.starts_with("sin_")
+            || field.starts_with("cos_");
+        // A `let` cannot have the name of a constant around it, such as `G`.
+        let constant = field.starts_with(char::is_uppercase);
+        if taken.contains(&field) || temporary || constant || self.indices.contains(field) {
+            format_ident!("{field}_")
+        } else {
+            identifier(field)
+        }
+    }
+}
+
+/// What a store or an accumulation writes.
+fn written(statement: &Statement) -> Option<&Operand> {
+    match statement {
+        Statement::Store { value, .. } | Statement::Accumulate { value, .. } => Some(value),
+        _ => None,
+    }
+}
+
+/// What a statement reads; of a loop, nothing.
+fn operands(statement: &Statement) -> Vec<&Operand> {
+    match statement {
+        Statement::Let { operation, .. } => match operation {
+            Operation::Copy(a) | Operation::Negate(a) | Operation::IntegerPower(a, _) => vec![a],
+            Operation::Add(a, b)
+            | Operation::Subtract(a, b)
+            | Operation::Multiply(a, b)
+            | Operation::Divide(a, b)
+            | Operation::Power(a, b) => vec![a, b],
+            Operation::Call(_, arguments) => arguments.iter().collect(),
+            Operation::Select {
+                left,
+                right,
+                then,
+                otherwise,
+                ..
+            } => vec![left, right, then, otherwise],
+        },
+        Statement::SineCosine { argument, .. } => vec![argument],
+        Statement::Accumulate { value, .. } | Statement::Store { value, .. } => vec![value],
+        Statement::Accumulator { .. } | Statement::Loop { .. } | Statement::Clear { .. } => {
+            Vec::new()
+        }
+    }
+}
+
+/// An identifier, raw where it must be.
+pub(crate) fn identifier(name: &str) -> Ident {
+    syn::parse_str::<Ident>(name).unwrap_or_else(|_| Ident::new_raw(name, Span::call_site()))
+}
+
+fn loop_name(variable: LoopVariable) -> Ident {
+    format_ident!("{}", variable.to_string())
+}
+
+fn at(array: &TokenStream, indices: &[&Affine]) -> TokenStream {
+    let indices = indices.iter().map(|a| index(a));
+    quote!(#array #([#indices])*)
+}
+
+/// An index as a `usize` expression that cannot overflow: what is subtracted saturates at zero.
+pub(crate) fn index(affine: &Affine) -> TokenStream {
+    let mut sum: Option<TokenStream> = None;
+    for (symbol, coefficient) in affine.terms.iter().filter(|(_, c)| *c > 0) {
+        let term = scaled(symbol, *coefficient);
+        sum = Some(sum.map_or(term.clone(), |sum| quote!(#sum + #term)));
+    }
+    if affine.constant > 0 || sum.is_none() {
+        let constant = Literal::u64_unsuffixed(affine.constant.max(0).unsigned_abs());
+        sum = Some(sum.map_or(quote!(#constant), |sum| quote!(#sum + #constant)));
+    }
+    let mut sum = sum.unwrap_or_default();
+    for (symbol, coefficient) in affine.terms.iter().filter(|(_, c)| *c < 0) {
+        let term = scaled(symbol, -coefficient);
+        sum = less(&sum, &term);
+    }
+    if affine.constant < 0 {
+        let constant = Literal::u64_unsuffixed(affine.constant.unsigned_abs());
+        sum = less(&sum, &quote!(#constant));
+    }
+    sum
+}
+
+/// `a - b`, or zero where `b` is larger.
+fn less(a: &TokenStream, b: &TokenStream) -> TokenStream {
+    let operators = ["+", "*"];
+    if a.clone()
+        .into_iter()
+        .any(|token| operators.contains(&token.to_string().as_str()))
+    {
+        quote!((#a).saturating_sub(#b))
+    } else {
+        quote!(#a.saturating_sub(#b))
+    }
+}
+
+fn scaled(symbol: &IndexSymbol, coefficient: i64) -> TokenStream {
+    let symbol = symbol_tokens(symbol);
+    if coefficient == 1 {
+        return symbol;
+    }
+    let coefficient = Literal::i64_unsuffixed(coefficient);
+    quote!(#coefficient * #symbol)
+}
+
+fn symbol_tokens(symbol: &IndexSymbol) -> TokenStream {
+    match symbol {
+        IndexSymbol::Loop(variable) => {
+            let name = loop_name(*variable);
+            quote!(#name)
+        }
+        IndexSymbol::ConstParameter(name) => {
+            let name = identifier(name);
+            quote!(#name)
+        }
+        IndexSymbol::Field(name) => {
+            let name = identifier(name);
+            quote!(self.#name)
+        }
+    }
+}
+
+fn signed(affine: &Affine) -> TokenStream {
+    let constant = Literal::i64_unsuffixed(affine.constant);
+    let terms = affine.terms.iter().map(|(symbol, coefficient)| {
+        let (symbol, coefficient) = (symbol_tokens(symbol), Literal::i64_unsuffixed(*coefficient));
+        quote!(+ #coefficient * (#symbol as i64))
+    });
+    quote!(#constant #(#terms)*)
+}
+
+/// A number as a literal; what has none (infinities) by name.
+fn number(value: f64) -> TokenStream {
+    if value.is_nan() {
+        quote!(f64::NAN)
+    } else if value == f64::INFINITY {
+        quote!(f64::INFINITY)
+    } else if value == f64::NEG_INFINITY {
+        quote!(f64::NEG_INFINITY)
+    } else if value.is_sign_negative() {
+        let size = Literal::f64_unsuffixed(-value);
+        quote!(-#size)
+    } else {
+        let literal = Literal::f64_unsuffixed(value);
+        quote!(#literal)
+    }
+}

@@ -1,0 +1,327 @@
+//! From tokens to tokens: the whole expansion, read from top to bottom.
+
+use crate::emit::{self, Emitter};
+use crate::source_map::SourceMap;
+use crate::{fallback, input, page, solver};
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+use syn::ItemStruct;
+use tfe_symbolic::compile;
+use tfe_symbolic::declared::{Declared, Form};
+use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::input::Affine;
+use tfe_symbolic::program::Request;
+
+/// Expands `#[dynamics(arguments)] item`.
+pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
+    let map = SourceMap::new(arguments);
+    let wrong = |errors: TokenStream| {
+        // Of an item that is no type, only the error can be told.
+        let stubs = syn::parse2(item.clone())
+            .map(|item| fallback::stubs(&item, &map.text))
+            .unwrap_or_default();
+        quote!(#item #stubs #errors)
+    };
+    let item_struct = match input::parse(item.clone()) {
+        Ok(item) => item,
+        Err(error) => return wrong(error.to_compile_error()),
+    };
+    if let Err(error) = input::check(&item_struct) {
+        return wrong(error.to_compile_error());
+    }
+    match compile::declare(&map.text, &input::context(&item_struct)) {
+        Ok(declared) => model(&declared, item_struct),
+        Err(diagnostics) => wrong(
+            diagnostics
+                .iter()
+                .map(|d| fallback::compile_error(d, &map, &item_struct))
+                .collect(),
+        ),
+    }
+}
+
+/// The struct with the derived model in its documentation, the kernels, the methods, and the specialised solvers.
+fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
+    let derivation = Derivation::of(declared);
+    let path = runtime_path(declared);
+    let documented = item
+        .attrs
+        .iter()
+        .any(|attribute| attribute.path().is_ident("doc"));
+    for line in page::lines(declared, &derivation, documented) {
+        item.attrs.push(syn::parse_quote!(#[doc = #line]));
+    }
+    let kernels = Kernels::new(declared, &derivation, &item, &path);
+    let implementation = kernels.implementation();
+    let methods = kernels.methods();
+    let solvers = declared
+        .solvers
+        .iter()
+        .map(|solver| solver::expand(solver, declared, &item, &path));
+    quote! {
+        #item
+        #implementation
+        #methods
+        #(#solvers)*
+    }
+}
+
+/// Where emitted code finds the runtime: `::tfe`, or what `crate = path` says.
+fn runtime_path(declared: &Declared) -> TokenStream {
+    match declared
+        .crate_path
+        .as_deref()
+        .map(syn::parse_str::<syn::Path>)
+    {
+        Some(Ok(path)) => quote!(#path),
+        _ => quote!(::tfe),
+    }
+}
+
+/// Everything that the emitted implementations have in common.
+struct Kernels<'a> {
+    declared: &'a Declared,
+    derivation: &'a Derivation,
+    item: &'a ItemStruct,
+    path: &'a TokenStream,
+    /// The number of coordinates, as a const expression.
+    dof: TokenStream,
+    /// The names of the coordinates where their number is known.
+    coordinates: Vec<String>,
+}
+
+impl<'a> Kernels<'a> {
+    fn new(
+        declared: &'a Declared,
+        derivation: &'a Derivation,
+        item: &'a ItemStruct,
+        path: &'a TokenStream,
+    ) -> Self {
+        Self {
+            declared,
+            derivation,
+            item,
+            path,
+            dof: emit::index(&declared.dof),
+            coordinates: coordinate_names(declared),
+        }
+    }
+
+    /// The body of a kernel; second derivatives go to fields of `second`, or to an argument.
+    fn body(&self, request: Request, second: TokenStream) -> emit::Body {
+        let program = self.derivation.program(request);
+        Emitter::new(&self.coordinates, second).body(&program)
+    }
+
+    /// `impl Model<N> for Name`.
+    fn implementation(&self) -> TokenStream {
+        let Self {
+            path, dof, item, ..
+        } = self;
+        let name = &item.ident;
+        let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+        let nothing = Request::default();
+        let argument = TokenStream::new;
+        let value = Request {
+            value: true,
+            ..nothing
+        };
+        let value = self.body(value, argument());
+        let (value_statements, value) = (value.statements, value.value);
+        let value = value.unwrap_or_else(|| quote!(R::from_f64(0.0)));
+        let first = Request {
+            first: true,
+            ..nothing
+        };
+        let mass = Request {
+            mass: true,
+            ..first
+        };
+        let second = Request {
+            second: true,
+            ..first
+        };
+        let first = self.body(first, argument()).statements;
+        let mass = self.body(mass, argument()).statements;
+        let second = self.body(second, quote!(second.)).statements;
+        let form = match self.declared.form {
+            Form::Lagrangian => quote!(Lagrangian),
+            Form::Hamiltonian => quote!(Hamiltonian),
+        };
+        let facts = page::facts(self.derivation, &quote!(__tfe));
+        let coordinate_name = self.coordinate_name();
+        let observables = self.observables();
+        quote! {
+            const _: () = {
+                use #path::__private as __tfe;
+
+                #[automatically_derived]
+                #[allow(unused_variables, non_snake_case)]
+                impl #impl_generics __tfe::Model<#dof> for #name #type_generics #where_clause {
+                    const FORM: __tfe::Form = __tfe::Form::#form;
+                    const FACTS: __tfe::Facts = #facts;
+
+                    fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
+                        #value_statements
+                        #value
+                    }
+
+                    fn first<R: __tfe::Real>(
+                        &self,
+                        t: R,
+                        q: &[R; #dof],
+                        z: &[R; #dof],
+                        first: &mut __tfe::First<R, #dof>,
+                    ) {
+                        #first
+                    }
+
+                    fn first_and_mass<R: __tfe::Real>(
+                        &self,
+                        t: R,
+                        q: &[R; #dof],
+                        z: &[R; #dof],
+                        first: &mut __tfe::First<R, #dof>,
+                        zz: &mut [[R; #dof]; #dof],
+                    ) {
+                        #mass
+                    }
+
+                    fn second<R: __tfe::Real>(
+                        &self,
+                        t: R,
+                        q: &[R; #dof],
+                        z: &[R; #dof],
+                        first: &mut __tfe::First<R, #dof>,
+                        second: &mut __tfe::Second<R, #dof>,
+                    ) {
+                        #second
+                    }
+
+                    #coordinate_name
+                    #observables
+                }
+            };
+        }
+    }
+
+    fn coordinate_name(&self) -> TokenStream {
+        let mut open_end = false;
+        let arms: Vec<_> = self
+            .declared
+            .coordinates
+            .iter()
+            .map(|array| {
+                let (name, first) = (&array.name, Literal::usize_unsuffixed(array.first));
+                let element = match array.first {
+                    0 => quote!(index),
+                    _ => quote!(index - #first),
+                };
+                let element = quote!(__tfe::CoordinateName::element(#name, #element));
+                match array.length.as_ref().map(Affine::as_constant) {
+                    None => quote!(#first => __tfe::CoordinateName::single(#name),),
+                    Some(Some(length)) => {
+                        let end = array.first + usize::try_from(length).unwrap_or(0);
+                        let end = Literal::usize_unsuffixed(end);
+                        quote!(#first..#end => #element,)
+                    }
+                    Some(None) => {
+                        open_end = true;
+                        quote!(#first.. => #element,)
+                    }
+                }
+            })
+            .collect();
+        let otherwise =
+            (!open_end).then(|| quote!(_ => __tfe::CoordinateName::element("", index),));
+        quote! {
+            fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+                match index {
+                    #(#arms)*
+                    #otherwise
+                }
+            }
+        }
+    }
+
+    fn observables(&self) -> TokenStream {
+        if self.declared.observables.is_empty() {
+            return TokenStream::new();
+        }
+        let dof = &self.dof;
+        let names = self.declared.observables.iter().map(|(name, _)| name);
+        let request = Request {
+            observables: true,
+            ..Request::default()
+        };
+        let body = self.body(request, TokenStream::new()).statements;
+        quote! {
+            const OBSERVABLES: &'static [&'static str] = &[#(#names),*];
+
+            fn observables<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], values: &mut [R]) {
+                #body
+            }
+        }
+    }
+
+    /// `state`, `structure`, and one method for each observable.
+    fn methods(&self) -> TokenStream {
+        let Self {
+            path, dof, item, ..
+        } = self;
+        let (name, vis) = (&item.ident, &item.vis);
+        let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+        let (second, second_doc) = match self.declared.form {
+            Form::Lagrangian => (quote!(v), "velocities"),
+            Form::Hamiltonian => (quote!(p), "momenta"),
+        };
+        let count = Literal::usize_unsuffixed(self.declared.observables.len());
+        let observables = self.declared.observables.iter().enumerate().map(|(k, (name, _))| {
+            let (method, k) = (emit::identifier(name), Literal::usize_unsuffixed(k));
+            let doc = format!(" The observable `{name}` at time `t`, coordinates `q` and {second_doc} `{second}`.");
+            quote! {
+                #[doc = #doc]
+                #vis fn #method(&self, t: f64, q: [f64; #dof], #second: [f64; #dof]) -> f64 {
+                    let mut values = [0.0; #count];
+                    #path::__private::Model::observables(self, t, &q, &#second, &mut values);
+                    values[#k]
+                }
+            }
+        });
+        let structure = page::structure(self.declared, self.derivation, path);
+        quote! {
+            #[automatically_derived]
+            #[allow(dead_code)]
+            impl #impl_generics #name #type_generics #where_clause {
+                /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+                ///
+                /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+                #vis fn state(&self, q: [f64; #dof], v: [f64; #dof]) -> #path::__private::State<#dof> {
+                    #path::__private::state(self, 0.0, q, v)
+                }
+
+                /// What was derived from the declaration: a page when printed.
+                #vis fn structure() -> #path::__private::Structure {
+                    #structure
+                }
+
+                #(#observables)*
+            }
+        }
+    }
+}
+
+/// `theta1`, `q[0]`, `q[1]`, … where the number of coordinates is known; empty otherwise.
+pub(crate) fn coordinate_names(declared: &Declared) -> Vec<String> {
+    let mut names = Vec::new();
+    for array in &declared.coordinates {
+        match &array.length {
+            None => names.push(array.name.clone()),
+            Some(length) => match length.as_constant() {
+                Some(length) => names.extend((0..length).map(|k| format!("{}[{k}]", array.name))),
+                None => return Vec::new(),
+            },
+        }
+    }
+    names
+}

@@ -1,0 +1,239 @@
+//! What is emitted when the declaration is wrong: every mistake as a `compile_error!`, and stubs that keep rustc from reporting follow-ups.
+
+use crate::emit::identifier;
+use crate::source_map::SourceMap;
+use proc_macro2::{Ident, Literal, Span, TokenStream};
+use quote::{quote, quote_spanned};
+use std::collections::BTreeSet;
+use syn::{DeriveInput, ItemStruct};
+use tfe_symbolic::ast::{Array, ExprKind, Item};
+use tfe_symbolic::diagnostic::{Bag, Diagnostic};
+use tfe_symbolic::parse;
+
+/// `compile_error!` under the tokens that the diagnostic speaks of.
+pub(crate) fn compile_error(
+    diagnostic: &Diagnostic,
+    map: &SourceMap,
+    item: &ItemStruct,
+) -> TokenStream {
+    let (first, last) = match diagnostic.field() {
+        Some(field) => field_span(field, item),
+        None => map.spans(diagnostic.span.start..diagnostic.span.end),
+    };
+    let message = match diagnostic.help() {
+        Some(help) => format!("{}\nhelp: {help}", diagnostic.message()),
+        None => diagnostic.message(),
+    };
+    // The first span on the path and the last on the group make rustc underline everything between them.
+    let path = quote_spanned!(first=> ::core::compile_error!);
+    let group = quote_spanned!(last=> { #message });
+    quote!(#path #group)
+}
+
+fn field_span(name: &str, item: &ItemStruct) -> (Span, Span) {
+    let ident = item
+        .fields
+        .iter()
+        .filter_map(|field| field.ident.as_ref())
+        .find(|ident| crate::input::plain(ident) == name);
+    let span = ident.map_or_else(|| item.ident.span(), syn::Ident::span);
+    (span, span)
+}
+
+/// Stub implementations for a type whose declaration is wrong: uses of the model type-check, so only the mistake itself is reported.
+pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
+    let guess = Guess::from(text, item);
+    let (path, dof) = (&guess.path, &guess.dof);
+    let (name, vis) = (&item.ident, &item.vis);
+    let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+    let form = if guess.hamiltonian {
+        quote!(Hamiltonian)
+    } else {
+        quote!(Lagrangian)
+    };
+    let outputs = &guess.outputs;
+    let names = outputs.iter().map(crate::input::plain);
+    let solvers = guess
+        .solvers
+        .iter()
+        .map(|solver| solver_stub(solver, item, path, dof));
+    quote! {
+        const _: () = {
+            use #path::__private as __tfe;
+
+            #[automatically_derived]
+            #[allow(clippy::all)]
+            impl #impl_generics __tfe::Model<#dof> for #name #type_generics #where_clause {
+                const FORM: __tfe::Form = __tfe::Form::#form;
+                const FACTS: __tfe::Facts = __tfe::Facts::UNKNOWN;
+                const OBSERVABLES: &'static [&'static str] = &[#(#names),*];
+
+                fn energy_function<__R: __tfe::Real>(&self, t: __R, _: &[__R; #dof], _: &[__R; #dof]) -> __R {
+                    t
+                }
+
+                fn first<__R: __tfe::Real>(
+                    &self,
+                    _: __R,
+                    _: &[__R; #dof],
+                    _: &[__R; #dof],
+                    _: &mut __tfe::First<__R, #dof>,
+                ) {
+                }
+
+                fn first_and_mass<__R: __tfe::Real>(
+                    &self,
+                    _: __R,
+                    _: &[__R; #dof],
+                    _: &[__R; #dof],
+                    _: &mut __tfe::First<__R, #dof>,
+                    _: &mut [[__R; #dof]; #dof],
+                ) {
+                }
+
+                fn second<__R: __tfe::Real>(
+                    &self,
+                    _: __R,
+                    _: &[__R; #dof],
+                    _: &[__R; #dof],
+                    _: &mut __tfe::First<__R, #dof>,
+                    _: &mut __tfe::Second<__R, #dof>,
+                ) {
+                }
+
+                fn coordinate_name(_: usize) -> __tfe::CoordinateName {
+                    __tfe::CoordinateName ::single("")
+                }
+            }
+        };
+
+        #[automatically_derived]
+        #[allow(dead_code, missing_docs, clippy::all)]
+        impl #impl_generics #name #type_generics #where_clause {
+            #vis fn state(&self, q: [f64; #dof], _: [f64; #dof]) -> #path::__private::State<#dof> {
+                #path::__private::State { q, p: q }
+            }
+
+            #vis fn structure() -> #path::__private::Structure {
+                ::core::unimplemented!()
+            }
+
+            #(#vis fn #outputs(&self, _: f64, _: [f64; #dof], _: [f64; #dof]) -> f64 {
+                0.0
+            })*
+        }
+
+        #(#solvers)*
+    }
+}
+
+/// A stepper that does nothing.
+fn solver_stub(
+    solver: &Ident,
+    item: &DeriveInput,
+    path: &TokenStream,
+    dof: &TokenStream,
+) -> TokenStream {
+    let (name, vis) = (&item.ident, &item.vis);
+    let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+    quote! {
+        #[derive(Debug)]
+        #[allow(dead_code, missing_docs)]
+        #vis struct #solver;
+
+        #[automatically_derived]
+        #[allow(dead_code, missing_docs, clippy::all)]
+        impl #solver {
+            #vis const BYTES: usize = 0;
+
+            #vis fn new #impl_generics (_: &#name #type_generics, _: f64) -> Self #where_clause {
+                Self
+            }
+
+            #vis fn time(&self) -> f64 {
+                0.0
+            }
+
+            #vis fn set_time(&mut self, _: f64) {}
+
+            #vis fn statistics(&self) -> &#path::__private::Statistics {
+                &#path::__private::Statistics::NONE
+            }
+
+            #vis fn advance(
+                &mut self,
+                _: &mut #path::__private::State<#dof>,
+            ) -> ::core::result::Result<(), #path::__private::StepError> {
+                ::core::result::Result::Ok(())
+            }
+        }
+    }
+}
+
+/// What can be told of a wrong declaration.
+struct Guess {
+    path: TokenStream,
+    dof: TokenStream,
+    hamiltonian: bool,
+    outputs: Vec<Ident>,
+    solvers: Vec<Ident>,
+}
+
+impl Guess {
+    fn from(text: &str, item: &DeriveInput) -> Self {
+        let mut guess = Self {
+            path: quote!(::tfe),
+            dof: quote!(1),
+            hamiltonian: false,
+            outputs: Vec::new(),
+            solvers: Vec::new(),
+        };
+        for range in parse::split_arguments(text) {
+            let mut bag = Bag::new();
+            let argument = parse::parse_item(&text[range.clone()], range.start, &mut bag);
+            // The mistakes have been reported; this bag is emptied, not read.
+            let _ = bag.finish(());
+            match argument.map(|argument| argument.node) {
+                Some(Item::Coordinates(arrays)) => guess.dof = count(&arrays, item),
+                Some(Item::Hamiltonian(_)) => guess.hamiltonian = true,
+                Some(Item::Output { name, .. }) => guess.outputs.push(identifier(&name.node)),
+                Some(Item::Solver { name, .. }) => guess.solvers.push(identifier(&name.node)),
+                Some(Item::Crate(path)) => {
+                    if let Ok(path) = syn::parse_str::<syn::Path>(&path.node) {
+                        guess.path = quote!(#path);
+                    }
+                }
+                _ => {}
+            }
+        }
+        // A name that clashes has been reported; rustc would repeat it.
+        let mut seen = BTreeSet::from(["state".to_owned(), "structure".to_owned()]);
+        guess.outputs.retain(|name| seen.insert(name.to_string()));
+        let mut seen = BTreeSet::from([item.ident.to_string()]);
+        guess.solvers.retain(|name| seen.insert(name.to_string()));
+        guess
+    }
+}
+
+/// The number of coordinates, as a const expression.
+fn count(arrays: &[Array], item: &DeriveInput) -> TokenStream {
+    let is_const = |name: &str| {
+        item.generics
+            .const_params()
+            .any(|parameter| crate::input::plain(&parameter.ident) == name)
+    };
+    let mut fixed = 0_usize;
+    for array in arrays {
+        match array.length.as_ref().map(|length| &length.node) {
+            None => fixed += 1,
+            Some(ExprKind::Number(number)) => fixed += number.parse::<usize>().unwrap_or(1).min(64),
+            Some(ExprKind::Name(name)) if arrays.len() == 1 && is_const(name) => {
+                let name = identifier(name);
+                return quote!(#name);
+            }
+            Some(_) => fixed += 1,
+        }
+    }
+    let fixed = Literal::usize_unsuffixed(fixed.max(1));
+    quote!(#fixed)
+}

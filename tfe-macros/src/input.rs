@@ -1,0 +1,160 @@
+//! The annotated struct: its fields are the parameters of the model.
+
+use proc_macro2::{Span, TokenStream};
+use syn::{
+    DeriveInput, Expr, ExprLit, Fields, GenericArgument, GenericParam, ItemStruct, Lit,
+    PathArguments, Type,
+};
+use tfe_symbolic::context::{Context, Field, FieldKind, Length};
+
+/// The struct under the attribute.
+///
+/// # Errors
+/// Anything but a struct.
+pub(crate) fn parse(item: TokenStream) -> syn::Result<ItemStruct> {
+    let span = name_span(item.clone());
+    syn::parse2(item).map_err(|error| {
+        syn::Error::new(
+            span.unwrap_or_else(|| error.span()),
+            "`#[dynamics]` belongs on a struct that holds the parameters",
+        )
+    })
+}
+
+/// The name of the item, where it is a type.
+fn name_span(item: TokenStream) -> Option<Span> {
+    let item: DeriveInput = syn::parse2(item).ok()?;
+    Some(item.ident.span())
+}
+
+/// Checks that the struct can hold parameters.
+///
+/// # Errors
+/// Fields without names; generic parameters other than const parameters.
+pub(crate) fn check(item: &ItemStruct) -> syn::Result<()> {
+    if let Fields::Unnamed(fields) = &item.fields {
+        return Err(syn::Error::new_spanned(
+            fields,
+            "a model's parameters need names\nhelp: write `struct Name { m: f64, g: f64 }`",
+        ));
+    }
+    for parameter in &item.generics.params {
+        match parameter {
+            GenericParam::Const(parameter) if parameter.ident == "R" => {
+                return Err(syn::Error::new_spanned(
+                    &parameter.ident,
+                    "the name `R` is taken by the scalar of the generated code\nhelp: choose another name, such as `N`",
+                ));
+            }
+            GenericParam::Const(_) => {}
+            _ => {
+                return Err(syn::Error::new_spanned(
+                    parameter,
+                    "a model can have const parameters only\nhelp: use `const N: usize` for a length; all parameters are `f64`",
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What the engine is told about the struct.
+pub(crate) fn context(item: &ItemStruct) -> Context {
+    let const_parameters: Vec<String> = item
+        .generics
+        .const_params()
+        .filter(|parameter| is_named(&parameter.ty, "usize"))
+        .map(|parameter| plain(&parameter.ident))
+        .collect();
+    let fields = item
+        .fields
+        .iter()
+        .filter_map(|field| {
+            let name = plain(field.ident.as_ref()?);
+            Some(Field {
+                name,
+                kind: field_kind(&field.ty, &const_parameters),
+            })
+        })
+        .collect();
+    Context {
+        struct_name: plain(&item.ident),
+        fields,
+        const_parameters,
+    }
+}
+
+/// An identifier without the `r#` of raw identifiers.
+pub(crate) fn plain(ident: &syn::Ident) -> String {
+    let text = ident.to_string();
+    text.strip_prefix("r#")
+        .map_or_else(|| text.clone(), str::to_owned)
+}
+
+fn field_kind(ty: &Type, const_parameters: &[String]) -> FieldKind {
+    if is_named(ty, "f64") {
+        return FieldKind::Scalar;
+    }
+    if is_named(ty, "usize") {
+        return FieldKind::Length;
+    }
+    match ty {
+        // A type substituted by a `macro_rules!` macro stands in an invisible group.
+        Type::Group(group) => field_kind(&group.elem, const_parameters),
+        Type::Paren(inner) => field_kind(&inner.elem, const_parameters),
+        Type::Array(array) if is_named(&array.elem, "f64") => {
+            match length(&array.len, const_parameters) {
+                Some(length) => FieldKind::Array(length),
+                None => other(ty),
+            }
+        }
+        Type::Path(path) => match path.path.segments.last() {
+            Some(last) if last.ident == "Vec" => match &last.arguments {
+                PathArguments::AngleBracketed(arguments) => match arguments.args.first() {
+                    Some(GenericArgument::Type(element)) if is_named(element, "f64") => {
+                        FieldKind::Vector
+                    }
+                    _ => other(ty),
+                },
+                _ => other(ty),
+            },
+            _ => other(ty),
+        },
+        _ => other(ty),
+    }
+}
+
+fn length(expression: &Expr, const_parameters: &[String]) -> Option<Length> {
+    match expression {
+        Expr::Group(group) => length(&group.expr, const_parameters),
+        Expr::Paren(inner) => length(&inner.expr, const_parameters),
+        Expr::Lit(ExprLit {
+            lit: Lit::Int(literal),
+            ..
+        }) => literal.base10_parse().ok().map(Length::Literal),
+        Expr::Path(path) => {
+            let name = plain(path.path.get_ident()?);
+            const_parameters
+                .contains(&name)
+                .then_some(Length::ConstParameter(name))
+        }
+        _ => None,
+    }
+}
+
+fn other(ty: &Type) -> FieldKind {
+    FieldKind::Other(quote::quote!(#ty).to_string())
+}
+
+fn is_named(ty: &Type, name: &str) -> bool {
+    match ty {
+        Type::Path(path) if path.qself.is_none() => path
+            .path
+            .segments
+            .last()
+            .is_some_and(|segment| segment.ident == name && segment.arguments.is_none()),
+        Type::Group(group) => is_named(&group.elem, name),
+        Type::Paren(inner) => is_named(&inner.elem, name),
+        _ => false,
+    }
+}

@@ -1,0 +1,29 @@
+//! The `#[dynamics(...)]` attribute of [`tfe`](https://docs.rs/tfe).
+//!
+//! A thin shell: tokens become text with a table of places (`source_map`), the engine `tfe-symbolic` derives the model, and
+//! `expand` writes the resulting programs as Rust. See the documentation of `tfe` for the language.
+
+mod emit;
+mod expand;
+mod fallback;
+mod input;
+mod page;
+mod solver;
+mod source_map;
+#[cfg(test)]
+mod tests;
+
+use proc_macro::TokenStream;
+
+/// Declares a mechanical model on the struct that holds its parameters.
+///
+/// The arguments are raw tokens, separated by commas: `coordinates(...)`, `lagrangian = ...` or `hamiltonian = ...`, and as many
+/// `let`, `force(...)`, `dissipation`, `output(...)` and `solver(...)` as the model needs. Everything is differentiated symbolically while
+/// the crate compiles; mistakes are reported under the token that is wrong, all of them at once.
+///
+/// The attribute keeps the struct as it is, implements the kernels that the elements of `tfe` integrate, and adds the methods
+/// `state(q, v)`, `structure()` and one for each `output`.
+#[proc_macro_attribute]
+pub fn dynamics(arguments: TokenStream, item: TokenStream) -> TokenStream {
+    expand::expand(arguments.into(), item.into()).into()
+}

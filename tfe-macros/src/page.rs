@@ -1,0 +1,190 @@
+//! What people read: the derived model in the struct's documentation, and the page of `Name::structure()`.
+
+use crate::expand::coordinate_names;
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+use std::fmt::Write as _;
+use tfe_symbolic::count::Counts;
+use tfe_symbolic::declared::{Declared, Form};
+use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::program::Request;
+
+/// Beyond so many operations the compiler's time for a kernel is felt.
+const LARGE: usize = 10_000;
+
+/// The lines that the documentation of the struct gains.
+pub(crate) fn lines(declared: &Declared, derivation: &Derivation, documented: bool) -> Vec<String> {
+    // A blank line after the user's own words.
+    let mut lines = if documented {
+        vec![String::new()]
+    } else {
+        Vec::new()
+    };
+    lines.extend([" # Derived model".to_owned(), " ```text".to_owned()]);
+    lines.extend(
+        page(declared, derivation)
+            .lines()
+            .map(|line| format!(" {line}")),
+    );
+    lines.push(" ```".to_owned());
+    lines
+}
+
+/// The three kernels whose cost is told.
+struct Kernels {
+    value: Counts,
+    first: Counts,
+    second: Counts,
+}
+
+impl Kernels {
+    fn of(derivation: &Derivation) -> Self {
+        Self {
+            value: derivation.counts(Request {
+                value: true,
+                ..Request::default()
+            }),
+            first: derivation.counts(Request {
+                first: true,
+                ..Request::default()
+            }),
+            second: derivation.counts(Request {
+                first: true,
+                second: true,
+                ..Request::default()
+            }),
+        }
+    }
+}
+
+/// Formulas, operation counts, structure.
+fn page(declared: &Declared, derivation: &Derivation) -> String {
+    let kernels = Kernels::of(derivation);
+    let mut page = format!("{declared}\n");
+    for (name, counts) in [
+        ("value", &kernels.value),
+        ("gradient", &kernels.first),
+        ("gradient and second derivatives", &kernels.second),
+    ] {
+        let _ = writeln!(page, "operations, {name}: {}", told(counts));
+    }
+    let _ = write!(page, "{}", derivation.structure());
+    let total = kernels.second.additions + kernels.second.multiplications;
+    if total > LARGE {
+        let _ = write!(
+            page,
+            "\nlarge: {total} operations; a sum over an array of coordinates stays a loop and compiles faster"
+        );
+    }
+    page
+}
+
+fn told(counts: &Counts) -> String {
+    let Operations {
+        additions,
+        multiplications,
+        divisions,
+        sines,
+        functions,
+    } = operations(counts);
+    format!(
+        "{additions} +−, {multiplications} ×, {divisions} ÷, {sines} sin/cos, {functions} other"
+    )
+}
+
+/// The kinds that are told apart.
+struct Operations {
+    additions: usize,
+    multiplications: usize,
+    divisions: usize,
+    sines: usize,
+    functions: usize,
+}
+
+fn operations(counts: &Counts) -> Operations {
+    Operations {
+        additions: counts.additions,
+        multiplications: counts.multiplications,
+        divisions: counts.divisions,
+        sines: counts.sine_cosine_pairs + counts.lone_sines,
+        functions: counts.functions + counts.selections,
+    }
+}
+
+/// `Facts { .. }` for the runtime.
+pub(crate) fn facts(derivation: &Derivation, path: &TokenStream) -> TokenStream {
+    let structure = derivation.structure();
+    let (time_dependent, forced) = (structure.time_dependent, structure.forced);
+    let (quadratic_in_z, constant_mass) = (structure.quadratic_in_z, structure.constant_mass);
+    let (linear, separable) = (structure.linear, structure.separable);
+    quote! {
+        #path::Facts {
+            time_dependent: #time_dependent,
+            forced: #forced,
+            quadratic_in_z: #quadratic_in_z,
+            constant_mass: #constant_mass,
+            linear: #linear,
+            separable: #separable,
+        }
+    }
+}
+
+/// `Structure { .. }`, the value of `Name::structure()`.
+pub(crate) fn structure(
+    declared: &Declared,
+    derivation: &Derivation,
+    path: &TokenStream,
+) -> TokenStream {
+    let private = quote!(#path::__private);
+    let kernels = Kernels::of(derivation);
+    let tokens = |counts: &Counts| {
+        let Operations {
+            additions,
+            multiplications,
+            divisions,
+            sines,
+            functions,
+        } = operations(counts);
+        let [additions, multiplications, divisions, sines, functions] =
+            [additions, multiplications, divisions, sines, functions]
+                .map(Literal::usize_unsuffixed);
+        quote! {
+            #private::Operations {
+                additions: #additions,
+                multiplications: #multiplications,
+                divisions: #divisions,
+                sines: #sines,
+                functions: #functions,
+            }
+        }
+    };
+    let (value, first, second) = (
+        tokens(&kernels.value),
+        tokens(&kernels.first),
+        tokens(&kernels.second),
+    );
+    let names = coordinate_names(declared);
+    let cyclic = derivation
+        .structure()
+        .cyclic
+        .iter()
+        .filter_map(|index| names.get(*index));
+    let form = match declared.form {
+        Form::Lagrangian => quote!(Lagrangian),
+        Form::Hamiltonian => quote!(Hamiltonian),
+    };
+    let facts = facts(derivation, &private);
+    let (name, page) = (&declared.name, page(declared, derivation));
+    quote! {
+        #private::Structure {
+            name: #name,
+            form: #private::Form::#form,
+            facts: #facts,
+            cyclic: &[#(#cyclic),*],
+            value: #value,
+            first: #first,
+            second: #second,
+            page: #page,
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Steppers for one model and one element: `solver(Name, Mixed::<4>)`.
+
+use crate::emit::{identifier, index};
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+use syn::ItemStruct;
+use tfe_symbolic::declared::{Declared, Family, Form, Rule, Solver};
+
+/// The struct `solver.name` with everything that it needs as constants: element, tables, sizes.
+pub(crate) fn expand(
+    solver: &Solver,
+    declared: &Declared,
+    item: &ItemStruct,
+    path: &TokenStream,
+) -> TokenStream {
+    let path = quote!(#path::__private);
+    let (model, vis) = (&item.ident, &item.vis);
+    let name = identifier(&solver.name);
+    let dof = index(&declared.dof);
+    let element = element(solver, &path);
+    let form = match declared.form {
+        Form::Lagrangian => quote!(Lagrangian),
+        Form::Hamiltonian => quote!(Hamiltonian),
+    };
+    let fields: Vec<_> = item
+        .fields
+        .iter()
+        .filter_map(|field| field.ident.as_ref())
+        .collect();
+    let title = format!(
+        " Steps [`{model}`] with one element, `{}`: no generics, no allocation, tables and sizes constant.",
+        described(solver)
+    );
+    let text = name.to_string();
+    quote! {
+        #[doc = #title]
+        #vis struct #name {
+            model: #model,
+            start: f64,
+            step: f64,
+            steps: u64,
+            memory: #path::Memory<#dof>,
+            numbers: [f64; #path::numbers_len(#name::ELEMENT, #path::Form::#form, #dof)],
+            pivots: [usize; #path::pivots_len(#name::ELEMENT, #path::Form::#form, #dof)],
+        }
+
+        #[automatically_derived]
+        #[allow(dead_code)]
+        impl #name {
+            const ELEMENT: #path::Element = #element;
+            const TABLES: #path::Scheme<{ #name::ELEMENT.points() }, { #name::ELEMENT.unknowns() }> =
+                #path::Scheme::new(#name::ELEMENT);
+            /// The size of the stepper, all its memory included.
+            #vis const BYTES: usize = ::core::mem::size_of::<Self>();
+
+            /// A stepper of length `h` that begins at time zero. It keeps a copy of the parameters.
+            #vis fn new(model: &#model, h: f64) -> Self {
+                Self {
+                    model: #model { #(#fields: ::core::clone::Clone::clone(&model.#fields)),* },
+                    start: 0.0,
+                    step: h,
+                    steps: 0,
+                    memory: #path::Memory::new(),
+                    numbers: [0.0; #path::numbers_len(#name::ELEMENT, #path::Form::#form, #dof)],
+                    pivots: [0; #path::pivots_len(#name::ELEMENT, #path::Form::#form, #dof)],
+                }
+            }
+
+            /// The time of the next step's start.
+            #vis fn time(&self) -> f64 {
+                self.start + self.steps as f64 * self.step
+            }
+
+            /// Makes the next step start at `time`.
+            #vis fn set_time(&mut self, time: f64) {
+                self.start = time;
+                self.steps = 0;
+            }
+
+            /// What the steps so far have cost.
+            #vis fn statistics(&self) -> &#path::Statistics {
+                self.memory.statistics()
+            }
+
+            /// Moves `state` over one element.
+            ///
+            /// # Errors
+            /// Says why the element could not be solved; `state` is unchanged then.
+            #vis fn advance(
+                &mut self,
+                state: &mut #path::State<#dof>,
+            ) -> ::core::result::Result<(), #path::StepError> {
+                let method = #path::Method {
+                    model: &self.model,
+                    tables: &Self::TABLES,
+                    control: ::core::default::Default::default(),
+                };
+                let workspace = #path::Workspace { numbers: &mut self.numbers, pivots: &mut self.pivots };
+                let start = self.start + self.steps as f64 * self.step;
+                let interval = #path::Interval { start, length: self.step, impulses: &[] };
+                method.advance(&mut self.memory, workspace, interval, state)?;
+                self.steps += 1;
+                ::core::result::Result::Ok(())
+            }
+        }
+
+        #[automatically_derived]
+        impl ::core::fmt::Debug for #name {
+            fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
+                f.debug_struct(#text)
+                    .field("time", &self.time())
+                    .field("step", &self.step)
+                    .field("statistics", self.memory.statistics())
+                    .finish_non_exhaustive()
+            }
+        }
+    }
+}
+
+fn element(solver: &Solver, path: &TokenStream) -> TokenStream {
+    let nodes = Literal::u32_unsuffixed(solver.nodes);
+    let constructor = match solver.family {
+        Family::Primal => quote!(primal),
+        Family::Mixed => quote!(mixed),
+        Family::EnergyConserving => quote!(energy_conserving),
+        Family::Radau => quote!(radau),
+    };
+    let rule = match solver.rule {
+        Rule::Default => TokenStream::new(),
+        Rule::Reduced => quote!(.reduced()),
+        Rule::Lobatto => quote!(.lobatto()),
+        Rule::Gauss(points) => {
+            let points = Literal::u32_unsuffixed(points);
+            quote!(.quadrature(#points))
+        }
+    };
+    quote!(#path::Element::#constructor(#nodes)#rule)
+}
+
+fn described(solver: &Solver) -> String {
+    let family = match solver.family {
+        Family::Primal => "Primal",
+        Family::Mixed => "Mixed",
+        Family::EnergyConserving => "EnergyConserving",
+        Family::Radau => "Radau",
+    };
+    let rule = match solver.rule {
+        Rule::Default => String::new(),
+        Rule::Reduced => ".reduced()".to_owned(),
+        Rule::Lobatto => ".lobatto()".to_owned(),
+        Rule::Gauss(points) => format!(".quadrature({points})"),
+    };
+    format!("{family}::<{}>{rule}", solver.nodes)
+}

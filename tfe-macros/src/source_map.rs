@@ -1,0 +1,173 @@
+//! Attribute tokens as text, and the way back from a place in the text to the tokens.
+//!
+//! The engine parses text. On stable Rust the only precise spans are those of whole tokens, so every token's text is appended to a
+//! string together with a table of byte ranges; a diagnostic's range is translated to the first and the last token it touches.
+
+use proc_macro2::{Delimiter, Spacing, Span, TokenStream, TokenTree};
+use std::ops::Range;
+
+/// The text of an attribute, and where each part of it came from.
+pub(crate) struct SourceMap {
+    /// The text: tokens in order, separated by blanks where Rust separates them.
+    pub(crate) text: String,
+    entries: Vec<(Range<usize>, Span)>,
+    end: Span,
+}
+
+impl SourceMap {
+    /// Walks the tokens.
+    pub(crate) fn new(tokens: TokenStream) -> Self {
+        let mut map = Self {
+            text: String::new(),
+            entries: Vec::new(),
+            end: Span::call_site(),
+        };
+        map.walk(tokens);
+        map.end = map
+            .entries
+            .last()
+            .map_or_else(Span::call_site, |(_, span)| *span);
+        map
+    }
+
+    fn walk(&mut self, tokens: TokenStream) {
+        for token in tokens {
+            match token {
+                TokenTree::Group(group) => {
+                    // An invisible group is an expression substituted by a `macro_rules!` macro: it binds like parentheses, and a
+                    // single word needs none (a length such as `$n` must stay a number).
+                    let (open, close) = match group.delimiter() {
+                        Delimiter::None if is_word(group.stream()) => {
+                            self.walk(group.stream());
+                            continue;
+                        }
+                        Delimiter::Parenthesis | Delimiter::None => ("(", ")"),
+                        Delimiter::Bracket => ("[", "]"),
+                        Delimiter::Brace => ("{", "}"),
+                    };
+                    self.push(open, group.span_open());
+                    self.walk(group.stream());
+                    self.push(close, group.span_close());
+                }
+                TokenTree::Ident(ident) => {
+                    let text = ident.to_string();
+                    self.push_separated(text.strip_prefix("r#").unwrap_or(&text), ident.span());
+                }
+                TokenTree::Literal(literal) => {
+                    self.push_separated(&literal.to_string(), literal.span());
+                }
+                TokenTree::Punct(punct) => {
+                    self.push(punct.as_char().encode_utf8(&mut [0; 4]), punct.span());
+                    if punct.spacing() == Spacing::Alone {
+                        self.text.push(' ');
+                    }
+                }
+            }
+        }
+    }
+
+    fn push(&mut self, text: &str, span: Span) {
+        let start = self.text.len();
+        self.text.push_str(text);
+        self.entries.push((start..self.text.len(), span));
+    }
+
+    /// Appends a word: a blank follows, so that two words never run together.
+    fn push_separated(&mut self, text: &str, span: Span) {
+        self.push(text, span);
+        self.text.push(' ');
+    }
+
+    /// The spans of the first and the last token that the byte range touches. A range behind the last token, or between two tokens, is
+    /// taken to the token before it.
+    pub(crate) fn spans(&self, range: Range<usize>) -> (Span, Span) {
+        let end = range.end.max(range.start + 1);
+        let mut touched = self
+            .entries
+            .iter()
+            .filter(|(at, _)| at.start < end && at.end > range.start);
+        match touched.next() {
+            Some((_, first)) => (
+                *first,
+                touched.next_back().map_or(*first, |(_, span)| *span),
+            ),
+            None => {
+                let before = self
+                    .entries
+                    .iter()
+                    .rev()
+                    .find(|(at, _)| at.end <= range.start);
+                let span = before.map_or(self.end, |(_, span)| *span);
+                (span, span)
+            }
+        }
+    }
+}
+
+/// Whether the tokens are one name or one number, possibly in further invisible groups.
+fn is_word(tokens: TokenStream) -> bool {
+    let mut tokens = tokens.into_iter();
+    match (tokens.next(), tokens.next()) {
+        (Some(TokenTree::Ident(_) | TokenTree::Literal(_)), None) => true,
+        (Some(TokenTree::Group(group)), None) => {
+            group.delimiter() == Delimiter::None && is_word(group.stream())
+        }
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(source: &str, expected: &str) {
+        let map = SourceMap::new(source.parse().expect("test source is made of Rust tokens"));
+        assert_eq!(map.text.trim_end(), expected);
+        for (range, _) in &map.entries {
+            assert!(
+                map.text.get(range.clone()).is_some(),
+                "{range:?} splits a character"
+            );
+        }
+    }
+
+    #[test]
+    fn tokens_become_text_with_blanks_between_words() {
+        check(
+            "lagrangian = m/2*dot(x)^2",
+            "lagrangian = m / 2 * dot (x )^ 2",
+        );
+        check(
+            "sum(i in 0..n-1, q[i+1])",
+            "sum (i in 0 .. n - 1 , q [i + 1 ])",
+        );
+        check("solver(Fast, Mixed::<4>)", "solver (Fast , Mixed ::< 4 > )");
+    }
+
+    #[test]
+    fn what_a_macro_substitutes_binds_like_parentheses() {
+        let substituted = |source: &str| {
+            let tokens = source.parse().expect("tokens");
+            let group = proc_macro2::Group::new(Delimiter::None, tokens);
+            SourceMap::new(TokenTree::Group(group).into()).text
+        };
+        assert_eq!(substituted("a + b"), "(a + b )");
+        assert_eq!(substituted("8").trim_end(), "8");
+        assert_eq!(substituted("n").trim_end(), "n");
+    }
+
+    #[test]
+    fn greek_and_raw_identifiers() {
+        check("θ1 + r#type", "θ1 + type");
+    }
+
+    #[test]
+    fn ranges_translate_to_tokens() {
+        let map = SourceMap::new("a + bc".parse().expect("tokens"));
+        let places: Vec<_> = map.entries.iter().map(|(range, _)| range.clone()).collect();
+        assert_eq!(places, [0..1, 2..3, 4..6]);
+        let _ = map.spans(4..6);
+        let _ = map.spans(100..100); // behind the end: the last token, not a panic
+    }
+}

@@ -1,0 +1,147 @@
+//! Golden expansions: what `#[dynamics]` writes for a few models, as readable Rust. `UPDATE_GOLDEN=1 cargo test -p tfe-macros` rewrites them.
+
+use crate::expand::expand;
+use proc_macro2::TokenStream;
+use quote::quote;
+use std::path::Path;
+
+#[track_caller]
+fn check(name: &str, arguments: TokenStream, item: TokenStream) {
+    let file: syn::File = syn::parse2(expand(arguments, item)).expect("expansions are items");
+    let actual = prettyplease::unparse(&file);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("golden")
+        .join(name)
+        .with_extension("rs");
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(&path, &actual).expect("the golden file can be written");
+    }
+    let golden = std::fs::read_to_string(&path)
+        .expect("the golden file exists: UPDATE_GOLDEN=1 writes it")
+        .replace("\r\n", "\n");
+    if let Some((line, (golden, actual))) = golden
+        .lines()
+        .zip(actual.lines())
+        .enumerate()
+        .find(|(_, (golden, actual))| golden != actual)
+    {
+        panic!(
+            "{name}.rs, line {}:\n  golden: {golden}\n  actual: {actual}",
+            line + 1
+        );
+    }
+    assert_eq!(
+        golden, actual,
+        "{name}.rs and the expansion differ in length"
+    );
+}
+
+#[test]
+fn a_lagrangian() {
+    check(
+        "pendulum",
+        quote!(
+            coordinates(theta),
+            lagrangian = m / 2 * l ^ 2 * dot(theta) ^ 2 + m * g * l * cos(theta),
+        ),
+        quote! {
+            /// A mathematical pendulum.
+            pub struct Pendulum {
+                /// Mass.
+                pub m: f64,
+                /// Length.
+                pub l: f64,
+                /// Acceleration of gravity.
+                pub g: f64,
+            }
+        },
+    );
+}
+
+#[test]
+fn a_hamiltonian() {
+    check(
+        "henon_heiles",
+        quote!(
+            coordinates(x, y),
+            momenta(px, py),
+            hamiltonian =
+                (px ^ 2 + py ^ 2) / 2 + (x ^ 2 + y ^ 2) / 2 + lambda * (x ^ 2 * y - y ^ 3 / 3),
+        ),
+        quote!(
+            struct HenonHeiles {
+                lambda: f64,
+            }
+        ),
+    );
+}
+
+#[test]
+fn loops_over_a_chain_of_any_length() {
+    check(
+        "chain",
+        quote!(
+            coordinates(q[N]),
+            lagrangian = sum(i in 0..N, m[i] / 2 * dot(q[i]) ^ 2)
+                - sum(i in 0..N - 1, k / 2 * (q[i + 1] - q[i]) ^ 2 + a / 4 * (q[i + 1] - q[i]) ^ 4),
+            force(q[i]) = -c * dot(q[i]),
+            force(q[N - 1]) = f * sin(omega * t),
+            output(extension) = q[N - 1] - q[0],
+        ),
+        quote!(
+            struct Chain<const N: usize> {
+                m: [f64; N],
+                k: f64,
+                a: f64,
+                c: f64,
+                f: f64,
+                omega: f64,
+            }
+        ),
+    );
+}
+
+#[test]
+fn contact_dissipation_outputs_and_a_solver() {
+    check(
+        "contact",
+        quote!(
+            coordinates(x, theta),
+            let gap = x - r * cos(theta),
+            lagrangian = m / 2 * (dot(x) ^ 2 + r ^ 2 * dot(theta) ^ 2) - m * g * x
+                - select(gap < 0, k / 2 * gap ^ 2, 0),
+            dissipation = c / 2 * dot(theta) ^ 2,
+            output(height) = gap,
+            output(speed) = sqrt(dot(x) ^ 2 + (r * dot(theta)) ^ 2),
+            solver(Fast, Primal::<3>.reduced()),
+        ),
+        quote!(
+            struct Contact {
+                m: f64,
+                r: f64,
+                g: f64,
+                k: f64,
+                c: f64,
+            }
+        ),
+    );
+}
+
+#[test]
+fn a_mistake_leaves_the_struct_and_stubs() {
+    check(
+        "mistake",
+        quote!(
+            coordinates(x),
+            lagrangian = m / 2 * dot(x) ^ 2 - kk / 2 * x ^ 2,
+            output(pull) = k * x,
+            solver(Fast, Mixed::<3>),
+        ),
+        quote!(
+            struct Oscillator {
+                m: f64,
+                k: f64,
+            }
+        ),
+    );
+}
