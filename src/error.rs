@@ -1,0 +1,193 @@
+//! What can go wrong in a run, where and why.
+
+use crate::motion::Motion;
+use std::error::Error;
+use std::fmt;
+use tfe_runtime::{ElementError, StepError};
+
+/// Why a run stopped.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RunErrorKind {
+    /// The element does not exist (number of nodes, quadrature).
+    Element(ElementError),
+    /// The step is zero, infinite or not a number.
+    Step {
+        /// The step asked for.
+        step: f64,
+    },
+    /// The ends of the span are not finite.
+    Span {
+        /// The start asked for.
+        start: f64,
+        /// The end asked for.
+        end: f64,
+    },
+    /// The span holds more steps than can be counted.
+    TooManySteps {
+        /// Length of the span.
+        span: f64,
+        /// The step asked for.
+        step: f64,
+    },
+    /// A start value is not finite.
+    Start {
+        /// Which coordinate.
+        coordinate: usize,
+        /// Its value.
+        q: f64,
+        /// Its momentum.
+        p: f64,
+    },
+    /// An impulse acts at a time outside the span, or is not finite.
+    Impulse {
+        /// When it was to act.
+        time: f64,
+    },
+    /// An element could not be solved.
+    Solve {
+        /// The number of the element, from 0.
+        element: usize,
+        /// Its start time.
+        time: f64,
+        /// Its length.
+        step: f64,
+        /// Why.
+        source: StepError,
+    },
+}
+
+/// A run that stopped before its end: why, and the motion up to the last good state.
+#[derive(Clone, Debug)]
+pub struct RunError<const N: usize> {
+    kind: RunErrorKind,
+    partial: Box<Motion<N>>,
+}
+
+impl<const N: usize> RunError<N> {
+    pub(crate) fn new(kind: RunErrorKind, partial: Motion<N>) -> Self {
+        Self {
+            kind,
+            partial: Box::new(partial),
+        }
+    }
+
+    /// Why the run stopped.
+    pub fn kind(&self) -> &RunErrorKind {
+        &self.kind
+    }
+
+    /// The motion up to the last good state; the start alone where the run never began.
+    pub fn partial(&self) -> &Motion<N> {
+        &self.partial
+    }
+
+    /// The motion up to the last good state, by value.
+    pub fn into_partial(self) -> Motion<N> {
+        *self.partial
+    }
+}
+
+impl fmt::Display for RunErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Element(error) => error.fmt(f),
+            Self::Step { step } => {
+                write!(f, "the step is {step}, but it must be finite and not zero")
+            }
+            Self::Span { start, end } => {
+                write!(f, "the span {start}..{end} has an end that is not finite")
+            }
+            Self::TooManySteps { span, step } => {
+                write!(f, "a span of {span} holds too many steps of {step}")
+            }
+            Self::Start { coordinate, q, p } => {
+                write!(
+                    f,
+                    "the start is not finite: coordinate {coordinate} is {q}, its momentum {p}"
+                )
+            }
+            Self::Impulse { time } => {
+                write!(
+                    f,
+                    "the impulse at t = {time} is not finite or lies outside the span"
+                )
+            }
+            Self::Solve {
+                element,
+                time,
+                step,
+                source,
+            } => {
+                write!(f, "element {element} (t = {time}, h = {step}): {source}")
+            }
+        }
+    }
+}
+
+impl Error for RunErrorKind {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Element(error) => Some(error),
+            Self::Solve { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}
+
+impl<const N: usize> fmt::Display for RunError<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.kind.fmt(f)?;
+        match self.partial.states().last() {
+            Some(node) if self.partial.states().len() > 1 => {
+                write!(f, "; the motion up to t = {} is in `partial()`", node.t)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl<const N: usize> Error for RunError<N> {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.kind.source()
+    }
+}
+
+/// Why a motion has no value at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum AtError {
+    /// The time lies outside the span of the motion.
+    Outside {
+        /// The time asked for.
+        time: f64,
+        /// First time of the motion.
+        start: f64,
+        /// Last time of the motion.
+        end: f64,
+    },
+    /// The element around the time was not recorded (`record_every` keeps only some).
+    NotRecorded {
+        /// The time asked for.
+        time: f64,
+    },
+}
+
+impl fmt::Display for AtError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Outside { time, start, end } => {
+                write!(
+                    f,
+                    "t = {time} lies outside the motion, which spans {start} to {end}"
+                )
+            }
+            Self::NotRecorded { time } => write!(
+                f,
+                "the element around t = {time} was not recorded; run without `record_every` for dense output"
+            ),
+        }
+    }
+}
+
+impl Error for AtError {}

@@ -1,0 +1,33 @@
+#![doc = include_str!("../README.md")]
+
+extern crate self as tfe;
+
+mod csv;
+pub mod error;
+pub mod motion;
+pub mod periodic_schur;
+pub mod simulation;
+pub mod stability;
+
+pub use error::{AtError, RunError, RunErrorKind};
+pub use motion::{Motion, Node, Outputs};
+pub use simulation::{Simulation, Steps};
+pub use tfe_macros::dynamics;
+/// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
+pub use tfe_runtime as runtime;
+pub use tfe_runtime::{
+    Element, EnergyConserving, Family, Mixed, Model, Primal, Radau, Rule, Solve, State, Statistics,
+    StepError, Structure,
+};
+
+/// What a program that simulates needs: `use tfe::prelude::*;`.
+pub mod prelude {
+    pub use crate::{
+        Element, EnergyConserving, Mixed, Model, Motion, Node, Primal, Radau, Simulation, Solve,
+        State, dynamics, stability,
+    };
+}
+
+/// What generated code refers to. Not part of the public interface.
+#[doc(hidden)]
+pub use tfe_runtime::__private;

@@ -1,0 +1,257 @@
+//! The result of a run: nodes, dense output, energy, observables, statistics.
+
+use crate::csv;
+use crate::error::AtError;
+use std::fmt;
+use std::io;
+use std::path::Path;
+use tfe_runtime::step::DenseElement;
+use tfe_runtime::{CoordinateName, Model, State, Statistics, legendre};
+
+/// A state with its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node<const N: usize> {
+    /// Time.
+    pub t: f64,
+    /// Generalized coordinates.
+    pub q: [f64; N],
+    /// Generalized momenta p = ∂L/∂v.
+    pub p: [f64; N],
+}
+
+impl<const N: usize> Node<N> {
+    /// The point of phase space, without the time.
+    pub fn state(&self) -> State<N> {
+        State {
+            q: self.q,
+            p: self.p,
+        }
+    }
+}
+
+/// The observables that a model declares by `output(name) = …`, one column each, one row a recorded node.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outputs {
+    names: &'static [&'static str],
+    values: Vec<f64>,
+}
+
+impl Outputs {
+    /// The names, in the order of declaration.
+    pub fn names(&self) -> &'static [&'static str] {
+        self.names
+    }
+
+    /// The values of one observable at the recorded nodes; `None` where the model declares no such name.
+    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let at = self.names.iter().position(|candidate| *candidate == name)?;
+        Some(
+            self.values
+                .iter()
+                .skip(at)
+                .step_by(self.names.len())
+                .copied()
+                .collect(),
+        )
+    }
+
+    /// All observables at one recorded node, in the order of [`names`](Self::names).
+    pub fn row(&self, node: usize) -> Option<&[f64]> {
+        self.values
+            .get(node * self.names.len()..(node + 1) * self.names.len())
+    }
+}
+
+/// A recorded motion of a model with `N` coordinates.
+///
+/// The nodes are the ends of the elements (every one, or every k-th after
+/// [`record_every`](crate::Simulation::record_every)); between nodes, [`at`](Self::at) evaluates the element's own polynomial.
+#[derive(Clone)]
+pub struct Motion<const N: usize> {
+    nodes: Vec<Node<N>>,
+    velocities: Vec<[f64; N]>,
+    energies: Vec<f64>,
+    outputs: Outputs,
+    elements: Vec<DenseElement<N>>,
+    statistics: Statistics,
+    names: Vec<CoordinateName>,
+}
+
+impl<const N: usize> Motion<N> {
+    /// The motion of a model that has only its start.
+    pub(crate) fn from_start<M: Model<N>>(model: &M, t: f64, start: &State<N>) -> Self {
+        let mut motion = Self {
+            nodes: Vec::new(),
+            velocities: Vec::new(),
+            energies: Vec::new(),
+            outputs: Outputs {
+                names: M::OBSERVABLES,
+                values: Vec::new(),
+            },
+            elements: Vec::new(),
+            statistics: Statistics::default(),
+            names: (0..N).map(M::coordinate_name).collect(),
+        };
+        motion.record(model, t, start);
+        motion
+    }
+
+    /// Appends a node, with its velocity, energy and observables. Where the Legendre transform has no solution at the node they are
+    /// recorded as NaN: the state itself is good, and its momentum may well belong to no velocity (a singular mass matrix).
+    pub(crate) fn record<M: Model<N>>(&mut self, model: &M, t: f64, state: &State<N>) {
+        let guess = self.velocities.last().copied().unwrap_or([0.0; N]);
+        let velocity =
+            legendre::velocity(model, t, &state.q, &state.p, &guess).unwrap_or([f64::NAN; N]);
+        let energy = legendre::energy_at(model, t, &state.q, &state.p, &velocity);
+        self.nodes.push(Node {
+            t,
+            q: state.q,
+            p: state.p,
+        });
+        self.velocities.push(velocity);
+        self.energies.push(energy);
+        if !M::OBSERVABLES.is_empty() {
+            let z = if matches!(M::FORM, tfe_runtime::Form::Lagrangian) {
+                &velocity
+            } else {
+                &state.p
+            };
+            let start = self.outputs.values.len();
+            self.outputs
+                .values
+                .resize(start + M::OBSERVABLES.len(), 0.0);
+            model.observables(t, &state.q, z, &mut self.outputs.values[start..]);
+        }
+    }
+
+    pub(crate) fn keep_element(&mut self, element: DenseElement<N>) {
+        self.elements.push(element);
+    }
+
+    pub(crate) fn set_statistics(&mut self, statistics: Statistics) {
+        self.statistics = statistics;
+    }
+
+    /// The last recorded node: the end of the span after a complete run.
+    pub fn last(&self) -> &Node<N> {
+        self.nodes.last().expect("a motion is made with its start")
+    }
+
+    /// The recorded nodes, in the order of time.
+    pub fn states(&self) -> &[Node<N>] {
+        &self.nodes
+    }
+
+    /// The velocities dq/dt at the recorded nodes.
+    pub fn velocities(&self) -> &[[f64; N]] {
+        &self.velocities
+    }
+
+    /// The energy H = p·v − L at the recorded nodes.
+    pub fn energies(&self) -> &[f64] {
+        &self.energies
+    }
+
+    /// The state at a time between the nodes, from the element's own polynomial.
+    ///
+    /// The polynomial starts at one node and ends at the next, so the result is continuous; between nodes its error is of order hⁿ for an
+    /// element of n nodes, while the nodes themselves are accurate to the order of the element.
+    ///
+    /// # Errors
+    /// [`AtError::Outside`] beyond the span, [`AtError::NotRecorded`] where `record_every` left the element out.
+    pub fn at(&self, time: f64) -> Result<Node<N>, AtError> {
+        let (start, end) = (self.nodes[0].t, self.last().t);
+        if !((start.min(end)..=start.max(end)).contains(&time)) {
+            return Err(AtError::Outside { time, start, end });
+        }
+        let direction = if end < start { -1.0 } else { 1.0 };
+        let node = self
+            .nodes
+            .partition_point(|node| direction * node.t < direction * time);
+        if let Some(node) = self.nodes.get(node).filter(|node| node.t == time) {
+            return Ok(*node);
+        }
+        let after = self
+            .elements
+            .partition_point(|element| direction * element.start() <= direction * time);
+        let element = after.checked_sub(1).and_then(|at| self.elements.get(at));
+        match element {
+            Some(element) if direction * element.end() >= direction * time => {
+                let state = element.at_time(time);
+                Ok(Node {
+                    t: time,
+                    q: state.q,
+                    p: state.p,
+                })
+            }
+            _ => Err(AtError::NotRecorded { time }),
+        }
+    }
+
+    /// Largest change of the energy over the recorded nodes, relative to the energy at the start (absolute where that is zero):
+    ///
+    /// ```text
+    /// max |H(t) − H(t₀)| / |H(t₀)|
+    /// ```
+    ///
+    /// Of a model that is forced, damped or depends on time it measures physics, not error.
+    pub fn energy_error(&self) -> f64 {
+        let Some(&start) = self.energies.first() else {
+            return 0.0;
+        };
+        let scale = if start == 0.0 { 1.0 } else { start.abs() };
+        let mut largest = 0.0_f64;
+        for energy in &self.energies {
+            let change = (energy - start).abs() / scale;
+            // `f64::max` would drop a NaN.
+            if !(change <= largest) {
+                largest = change;
+            }
+        }
+        largest
+    }
+
+    /// What the run cost.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// The observables at the recorded nodes.
+    pub fn outputs(&self) -> &Outputs {
+        &self.outputs
+    }
+
+    /// Writes the recorded nodes as CSV: time, coordinates, velocities, momenta, energy, observables, with a header line. Numbers are
+    /// written so that they read back exactly.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn write_csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        let mut header = vec!["t".to_owned()];
+        header.extend(self.names.iter().map(ToString::to_string));
+        header.extend(self.names.iter().map(|name| format!("{name}_dot")));
+        header.extend(self.names.iter().map(|name| format!("p_{name}")));
+        header.push("energy".to_owned());
+        header.extend(self.outputs.names.iter().map(|name| (*name).to_owned()));
+        let rows = self.nodes.iter().enumerate().map(|(k, node)| {
+            let mut row = vec![node.t];
+            row.extend(node.q.iter().chain(&self.velocities[k]).chain(&node.p));
+            row.push(self.energies[k]);
+            row.extend(self.outputs.row(k).unwrap_or_default());
+            row
+        });
+        csv::write(path.as_ref(), &header, rows)
+    }
+}
+
+impl<const N: usize> fmt::Debug for Motion<N> {
+    /// The extent of the motion, not its thousands of numbers.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Motion")
+            .field("first", &self.nodes.first())
+            .field("last", &self.nodes.last())
+            .field("nodes", &self.nodes.len())
+            .field("statistics", &self.statistics)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,320 @@
+//! Eigenvalues of a product of matrices, without forming the product.
+//!
+//! The monodromy matrix of a periodic motion is a product of many transition matrices,
+//!
+//! ```text
+//! P = A_m ··· A_2 A_1 ,
+//! ```
+//!
+//! and its eigenvalues are the Floquet multipliers. Where some grow and others decay, the product as a floating-point
+//! matrix keeps the growing ones only: a multiplier of 1e-20 beside one of 1e+20 is lost in the round-off of the
+//! larger, and a long product over- or underflows. The periodic Schur decomposition works on the factors instead. It
+//! finds orthogonal matrices Q₁, …, Q_m, with Q_{m+1} = Q₁, such that
+//!
+//! ```text
+//! T_k = Q_{k+1}ᵀ A_k Q_k
+//! ```
+//!
+//! is upper triangular for k < m and upper quasi-triangular (1 × 1 and 2 × 2 diagonal blocks) for k = m. The
+//! eigenvalues are then products of diagonal entries and are accumulated with an exponent of their own.
+//!
+//! # Accuracy
+//! What is computed is exact for factors A_k + E_k with ‖E_k‖ of the order of n ε ‖A_k‖, *each factor for itself*.
+//! Hence every eigenvalue keeps its relative accuracy, however far the others are from it, as long as no single factor
+//! is ill conditioned. The relative error grows no faster than in proportion to m. An eigenvalue of multiplicity r in
+//! one Jordan block is known to about the r-th root of that error only: no method on these data can do better.
+//!
+//! # Method
+//! 1. Each factor is scaled by a power of two, if it is close to over- or underflow; for [`multipliers`], all factors
+//!    are then balanced by one diagonal similarity of powers of two.
+//! 2. Householder reflections make A₁, …, A_{m−1} triangular and A_m a Hessenberg matrix.
+//! 3. Implicitly shifted periodic QR steps, two shifts at a time, make the subdiagonal of the last factor vanish. A
+//!    diagonal entry of a triangular factor that is zero to round-off is set to zero and split off by one or two steps
+//!    without shift.
+//! 4. The 2 × 2 blocks that remain are made triangular by complex rotations, again factor by factor.
+//!
+//! The cost is of the order of m n³, the storage m n².
+//!
+//! # Reference
+//! A. Bojanczyk, G. H. Golub, P. Van Dooren, *The periodic Schur decomposition: algorithms and applications*, Proc.
+//! SPIE 1770 (1992); D. Kressner, *Numerical Methods for General and Structured Eigenvalue Problems*, Springer 2005.
+
+mod arithmetic;
+mod chain;
+mod pair;
+mod sweep;
+#[cfg(test)]
+mod tests;
+
+use arithmetic::Scaled;
+use chain::{Chain, Wanted};
+use nalgebra::{Complex, DMatrix};
+use std::error::Error;
+use std::f64::consts::PI;
+use std::fmt;
+
+/// An eigenvalue of a product, as modulus and argument.
+///
+/// The modulus is kept as its natural logarithm, so that e^±1000 is as good as 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Multiplier {
+    /// The natural logarithm of the modulus; −∞ for the eigenvalue zero.
+    pub log_modulus: f64,
+    /// The argument in (−π, π]: exactly 0 or π for a real eigenvalue, and 0 for the eigenvalue zero.
+    pub argument: f64,
+}
+
+impl Multiplier {
+    /// The modulus: infinite or zero where it is too large or too small for an `f64`.
+    ///
+    /// The exponential function costs a relative error of |`log_modulus`| ε.
+    pub fn modulus(&self) -> f64 {
+        self.log_modulus.exp()
+    }
+
+    /// The eigenvalue as a complex number; its imaginary part is exactly zero if the eigenvalue is real.
+    ///
+    /// Parts are infinite where [`modulus`](Self::modulus) is.
+    pub fn to_complex(&self) -> Complex<f64> {
+        let modulus = self.modulus();
+        if self.argument == 0.0 {
+            Complex::new(modulus, 0.0)
+        } else if self.argument == PI {
+            Complex::new(-modulus, 0.0)
+        } else {
+            Complex::from_polar(modulus, self.argument)
+        }
+    }
+
+    fn new(value: Scaled) -> Self {
+        let z = value.mantissa;
+        let argument = if z.im == 0.0 {
+            if z.re < 0.0 { PI } else { 0.0 }
+        } else {
+            // A pair so close to the negative axis that its argument rounds to ±π is a double real eigenvalue.
+            let argument = z.im.atan2(z.re);
+            if argument <= -PI { PI } else { argument }
+        };
+        Self {
+            log_modulus: value.ln_modulus(),
+            argument,
+        }
+    }
+}
+
+/// Why the eigenvalues of a product were not found. Factors are counted from 0, in the order they are given.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PeriodicSchurError {
+    /// There is no factor, hence no size.
+    Empty,
+    /// A factor is not square.
+    NotSquare {
+        /// Which factor.
+        index: usize,
+        /// Its number of rows.
+        rows: usize,
+        /// Its number of columns.
+        columns: usize,
+    },
+    /// A factor differs in size from the first.
+    SizeMismatch {
+        /// Which factor.
+        index: usize,
+        /// Its number of rows.
+        found: usize,
+        /// The number of rows of the first factor.
+        expected: usize,
+    },
+    /// A factor holds an entry that is infinite or not a number, or, for [`PeriodicSchur`], its triangular form would.
+    NonFinite {
+        /// Which factor.
+        index: usize,
+    },
+    /// The QR iteration does not separate the eigenvalues of a diagonal block.
+    NoConvergence {
+        /// The first row of the block, from 0.
+        first: usize,
+        /// The last row of the block.
+        last: usize,
+        /// The number of QR steps taken on it.
+        iterations: u32,
+    },
+}
+
+impl fmt::Display for PeriodicSchurError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => write!(f, "the product has no factor"),
+            Self::NotSquare {
+                index,
+                rows,
+                columns,
+            } => {
+                write!(
+                    f,
+                    "factor {index} is {rows} × {columns}, but it must be square"
+                )
+            }
+            Self::SizeMismatch {
+                index,
+                found,
+                expected,
+            } => {
+                write!(
+                    f,
+                    "factor {index} is {found} × {found}, but the first is {expected} × {expected}"
+                )
+            }
+            Self::NonFinite { index } => {
+                write!(f, "factor {index} holds an entry that is not finite")
+            }
+            Self::NoConvergence {
+                first,
+                last,
+                iterations,
+            } => {
+                write!(
+                    f,
+                    "rows {first} to {last} of the product did not separate in {iterations} QR steps"
+                )
+            }
+        }
+    }
+}
+
+impl Error for PeriodicSchurError {}
+
+/// Returns the eigenvalues of the product `factors[m − 1] ··· factors[1] factors[0]`, which is never formed.
+///
+/// The first factor acts first, as the transition matrix of the first element does. The list is ordered by decreasing
+/// modulus; complex pairs are adjacent and exact conjugates, positive argument first. Among eigenvalues whose moduli
+/// agree to round-off the order is not guaranteed, and a double real eigenvalue may come as a complex pair or as two
+/// real eigenvalues, each within its conditioning. A factor that is singular to round-off gives the eigenvalue zero,
+/// `log_modulus` = −∞, as far as round-off allows to tell: a second zero may come as round-off of the largest. Factors
+/// of size 0 × 0 give the empty list.
+///
+/// # Errors
+/// [`PeriodicSchurError`] for an empty list, for sizes that do not fit, for entries that are not finite, and if the
+/// iteration does not converge: this has been seen only where entries of one factor span the whole range of an `f64`.
+///
+/// # Example
+/// A product whose explicit form loses its small eigenvalue:
+/// ```
+/// use nalgebra::DMatrix;
+/// use tfe::periodic_schur::multipliers;
+///
+/// // Each factor has the eigenvalues 2 and ½, with the eigenvectors (1, 1) and (1, 2).
+/// let factor = DMatrix::from_row_slice(2, 2, &[3.5, -1.5, 3.0, -1.0]);
+/// let multipliers = multipliers(&vec![factor; 2000])?;
+///
+/// let log = 2000.0 * 2f64.ln(); // 2²⁰⁰⁰ overflows
+/// assert!((multipliers[0].log_modulus - log).abs() < 1e-9);
+/// assert!((multipliers[1].log_modulus + log).abs() < 1e-9);
+/// # Ok::<(), tfe::periodic_schur::PeriodicSchurError>(())
+/// ```
+pub fn multipliers(factors: &[DMatrix<f64>]) -> Result<Vec<Multiplier>, PeriodicSchurError> {
+    let mut chain = Chain::new(factors, Wanted::Multipliers)?;
+    chain.reduce();
+    chain.iterate()?;
+    eigenvalues(&chain)
+}
+
+/// The periodic Schur decomposition of a product, with its orthogonal bases.
+///
+/// With the factors A₀, …, A_{m−1} as given and Q_m = Q₀,
+///
+/// ```text
+/// A_k Q_k = Q_{k+1} T_k ,        k = 0, …, m − 1 .
+/// ```
+///
+/// The first j columns of Q₀ span an invariant subspace of the product A_{m−1} ··· A₀ wherever j does not cut a 2 × 2
+/// block, and those of Q_k the subspace that it is carried to by A_{k−1} ··· A₀: the subspace along the orbit. The
+/// eigenvalues come in no particular order along the diagonal.
+///
+/// # Example
+/// ```
+/// use nalgebra::DMatrix;
+/// use tfe::periodic_schur::PeriodicSchur;
+///
+/// let factors = [[1.0, 2.0, 3.0, 4.0], [0.0, 1.0, 1.0, 1.0]].map(|a| DMatrix::from_row_slice(2, 2, &a));
+/// let schur = PeriodicSchur::new(&factors)?;
+///
+/// let (q, t) = (schur.orthogonal(), schur.triangular());
+/// assert!((&factors[0] * &q[0] - &q[1] * &t[0]).norm() < 1e-14);
+/// assert!((&factors[1] * &q[1] - &q[0] * &t[1]).norm() < 1e-14);
+/// # Ok::<(), tfe::periodic_schur::PeriodicSchurError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct PeriodicSchur {
+    orthogonal: Vec<DMatrix<f64>>,
+    triangular: Vec<DMatrix<f64>>,
+    multipliers: Vec<Multiplier>,
+}
+
+impl PeriodicSchur {
+    /// Decomposes the product `factors[m − 1] ··· factors[1] factors[0]`.
+    ///
+    /// Unlike [`multipliers`] it does not balance, which is not an orthogonal transformation: badly scaled coordinates
+    /// are better scaled beforehand.
+    ///
+    /// # Errors
+    /// As [`multipliers`]; [`PeriodicSchurError::NonFinite`] too if an entry of a triangular factor overflows.
+    pub fn new(factors: &[DMatrix<f64>]) -> Result<Self, PeriodicSchurError> {
+        let mut chain = Chain::new(factors, Wanted::SchurForm)?;
+        chain.reduce();
+        chain.iterate()?;
+        let multipliers = eigenvalues(&chain)?;
+        let (orthogonal, triangular) = chain.into_parts()?;
+        Ok(Self {
+            orthogonal,
+            triangular,
+            multipliers,
+        })
+    }
+
+    /// The orthogonal matrices Q₀, …, Q_{m−1}.
+    pub fn orthogonal(&self) -> &[DMatrix<f64>] {
+        &self.orthogonal
+    }
+
+    /// The factors T₀, …, T_{m−1}: upper triangular, and the last one quasi-triangular.
+    pub fn triangular(&self) -> &[DMatrix<f64>] {
+        &self.triangular
+    }
+
+    /// The eigenvalues of the product, ordered as by the function [`multipliers`].
+    pub fn multipliers(&self) -> &[Multiplier] {
+        &self.multipliers
+    }
+}
+
+/// The eigenvalues of a chain whose last factor is quasi-triangular, by decreasing modulus.
+fn eigenvalues(chain: &Chain) -> Result<Vec<Multiplier>, PeriodicSchurError> {
+    // A complex pair is one item, so that sorting cannot part it.
+    let mut items: Vec<(Multiplier, Option<Multiplier>)> = Vec::new();
+    let mut row = 0;
+    while row < chain.order() {
+        if chain.splits_after(row) {
+            items.push((Multiplier::new(chain.diagonal_product(row)), None));
+            row += 1;
+            continue;
+        }
+        let [first, second] = pair::eigenvalues(chain, row)?.map(Multiplier::new);
+        if first.argument == -second.argument {
+            items.push((first, Some(second)));
+        } else {
+            items.extend([(first, None), (second, None)]);
+        }
+        row += 2;
+    }
+    items.sort_by(|(a, _), (b, _)| {
+        b.log_modulus
+            .total_cmp(&a.log_modulus)
+            .then(a.argument.total_cmp(&b.argument))
+    });
+    Ok(items
+        .into_iter()
+        .flat_map(|(first, second)| std::iter::once(first).chain(second))
+        .collect())
+}

@@ -1,0 +1,323 @@
+//! The factors under transformation: scaling, balancing, reduction to Hessenberg–triangular form.
+
+use super::PeriodicSchurError;
+use super::arithmetic::{
+    Rotation, Scaled, exponent, largest, reflect_columns, reflect_rows, reflection,
+    times_power_of_two,
+};
+use nalgebra::{Complex, DMatrix};
+use std::ops::Range;
+
+/// One matrix a factor or node.
+type Matrices = Vec<DMatrix<f64>>;
+
+/// What the transformations must carry along.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Wanted {
+    /// The eigenvalues only: balanced factors, no bases, each block transformed for itself.
+    Multipliers,
+    /// The bases and the whole triangular factors.
+    SchurForm,
+}
+
+/// The factors T_k = Q_{k+1}ᵀ A_k Q_k on their way to triangular form; node k is the space between T_{k−1} and T_k.
+pub(super) struct Chain {
+    order: usize,
+    /// At least one, each order × order and finite.
+    factors: Matrices,
+    /// Factor k stands for `factors[k]` · 2^`exponents[k]`.
+    exponents: Vec<i64>,
+    /// Q_k, one a node, if wanted.
+    bases: Option<Matrices>,
+}
+
+impl Chain {
+    /// Checks and copies the factors.
+    pub(super) fn new(
+        factors: &[DMatrix<f64>],
+        wanted: Wanted,
+    ) -> Result<Self, PeriodicSchurError> {
+        let order = factors.first().ok_or(PeriodicSchurError::Empty)?.nrows();
+        for (index, factor) in factors.iter().enumerate() {
+            let (rows, columns) = factor.shape();
+            if rows != columns {
+                return Err(PeriodicSchurError::NotSquare {
+                    index,
+                    rows,
+                    columns,
+                });
+            }
+            if rows != order {
+                return Err(PeriodicSchurError::SizeMismatch {
+                    index,
+                    found: rows,
+                    expected: order,
+                });
+            }
+            if factor.iter().any(|x| !x.is_finite()) {
+                return Err(PeriodicSchurError::NonFinite { index });
+            }
+        }
+        let mut factors = factors.to_vec();
+        let exponents = factors.iter_mut().map(keep_from_overflow).collect();
+        let bases = match wanted {
+            Wanted::Multipliers => {
+                balance(&mut factors, order);
+                None
+            }
+            Wanted::SchurForm => Some(vec![DMatrix::identity(order, order); factors.len()]),
+        };
+        Ok(Self {
+            order,
+            factors,
+            exponents,
+            bases,
+        })
+    }
+
+    /// The bases and the factors.
+    pub(super) fn into_parts(mut self) -> Result<(Matrices, Matrices), PeriodicSchurError> {
+        for (index, (factor, &exponent)) in self.factors.iter_mut().zip(&self.exponents).enumerate()
+        {
+            for x in factor.iter_mut() {
+                *x = times_power_of_two(*x, exponent);
+                if !x.is_finite() {
+                    return Err(PeriodicSchurError::NonFinite { index });
+                }
+            }
+        }
+        Ok((self.bases.unwrap_or_default(), self.factors))
+    }
+
+    /// The number of rows of each factor.
+    pub(super) fn order(&self) -> usize {
+        self.order
+    }
+
+    /// The index of the last factor, the one that is Hessenberg; also the number of triangular factors.
+    pub(super) fn last(&self) -> usize {
+        self.factors.len() - 1
+    }
+
+    /// An entry of a factor.
+    pub(super) fn at(&self, factor: usize, row: usize, column: usize) -> f64 {
+        self.factors[factor][(row, column)]
+    }
+
+    /// Sets an entry of a factor.
+    pub(super) fn set(&mut self, factor: usize, row: usize, column: usize, value: f64) {
+        self.factors[factor][(row, column)] = value;
+    }
+
+    /// Whether a diagonal block ends with this row.
+    pub(super) fn splits_after(&self, row: usize) -> bool {
+        row + 1 >= self.order || self.at(self.last(), row + 1, row) == 0.0
+    }
+
+    /// The exponents taken out of the factors, together.
+    pub(super) fn exponent(&self) -> i64 {
+        self.exponents.iter().sum()
+    }
+
+    /// The product of the diagonal entries in one row.
+    pub(super) fn diagonal_product(&self, row: usize) -> Scaled {
+        let mut product = Scaled::ONE;
+        for factor in &self.factors {
+            product.multiply(Complex::new(factor[(row, row)], 0.0));
+        }
+        product.exponent += self.exponent();
+        product
+    }
+
+    /// The rows and columns that a transformation of the block `first..=last` must reach.
+    pub(super) fn reach(&self, first: usize, last: usize) -> Range<usize> {
+        if self.bases.is_some() {
+            0..self.order
+        } else {
+            first..last + 1
+        }
+    }
+
+    /// Reflects rows of a factor, from `row` on.
+    pub(super) fn reflect_rows(
+        &mut self,
+        factor: usize,
+        row: usize,
+        v: &[f64],
+        tau: f64,
+        columns: Range<usize>,
+    ) {
+        if tau != 0.0 {
+            reflect_rows(
+                self.factors[factor].as_mut_slice(),
+                self.order,
+                row,
+                v,
+                tau,
+                columns,
+            );
+        }
+    }
+
+    /// Reflects columns of a factor, from `column` on, and with them the basis they belong to.
+    pub(super) fn reflect_columns(
+        &mut self,
+        factor: usize,
+        column: usize,
+        v: &[f64],
+        tau: f64,
+        rows: Range<usize>,
+    ) {
+        if tau != 0.0 {
+            reflect_columns(
+                self.factors[factor].as_mut_slice(),
+                self.order,
+                column,
+                v,
+                tau,
+                rows,
+            );
+            if let Some(bases) = &mut self.bases {
+                reflect_columns(
+                    bases[factor].as_mut_slice(),
+                    self.order,
+                    column,
+                    v,
+                    tau,
+                    0..self.order,
+                );
+            }
+        }
+    }
+
+    /// Rotates two rows of a factor.
+    pub(super) fn rotate_rows(
+        &mut self,
+        factor: usize,
+        row: usize,
+        rotation: Rotation,
+        columns: Range<usize>,
+    ) {
+        rotation.rows(
+            self.factors[factor].as_mut_slice(),
+            self.order,
+            row,
+            columns,
+        );
+    }
+
+    /// Rotates two columns of a factor, and with them the basis they belong to.
+    pub(super) fn rotate_columns(
+        &mut self,
+        factor: usize,
+        column: usize,
+        rotation: Rotation,
+        rows: Range<usize>,
+    ) {
+        rotation.columns(
+            self.factors[factor].as_mut_slice(),
+            self.order,
+            column,
+            rows,
+        );
+        if let Some(bases) = &mut self.bases {
+            rotation.columns(
+                bases[factor].as_mut_slice(),
+                self.order,
+                column,
+                0..self.order,
+            );
+        }
+    }
+
+    /// Makes the last factor Hessenberg and the others triangular.
+    ///
+    /// Column j is cleared in all factors, in the order they act, before column j + 1: the reflection that clears it
+    /// in one factor acts on columns j and on of the next, and the one of the last factor leaves column j alone.
+    pub(super) fn reduce(&mut self) {
+        let n = self.order;
+        let last = self.last();
+        let mut v = vec![0.0; n];
+        for j in 0..n.saturating_sub(1) {
+            for k in 0..=last {
+                let from = if k == last { j + 1 } else { j };
+                let next = if k == last { 0 } else { k + 1 };
+                let v = &mut v[from..];
+                v.copy_from_slice(&self.factors[k].as_slice()[j * n + from..(j + 1) * n]);
+                let (tau, beta) = reflection(v);
+                self.reflect_rows(k, from, v, tau, j + 1..n);
+                let column = &mut self.factors[k].as_mut_slice()[j * n + from..(j + 1) * n];
+                column.fill(0.0);
+                column[0] = beta;
+                self.reflect_columns(next, from, v, tau, 0..n);
+            }
+        }
+    }
+}
+
+/// Scales a factor by 2^−e where its largest entry could over- or underflow in sums; returns e.
+///
+/// Nothing else is scaled: in a factor with entries of very different size the small ones would be lost.
+fn keep_from_overflow(factor: &mut DMatrix<f64>) -> i64 {
+    let size = largest(factor.iter());
+    let shift = match exponent(size) {
+        _ if size == 0.0 => 0,
+        e if e > 1000 => e - 1000,
+        e if e < -500 => e,
+        _ => 0,
+    };
+    if shift != 0 {
+        factor.apply(|x| *x = times_power_of_two(*x, -shift));
+    }
+    shift
+}
+
+/// Scales rows and columns of all factors by one diagonal similarity A_k → D⁻¹ A_k D of powers of two.
+///
+/// The coordinates of a mechanical system and their momenta have units that may make one a billion times the other;
+/// balancing (Parlett and Reinsch) takes the difference out of the factors and with it out of the round-off.
+fn balance(factors: &mut [DMatrix<f64>], n: usize) {
+    // The largest modulus at each place, each factor relative to its largest entry.
+    let mut most = DMatrix::<f64>::zeros(n, n);
+    for factor in factors.iter() {
+        let size = largest(factor.iter());
+        if size > 0.0 {
+            most.zip_apply(factor, |most, x| *most = most.max(x.abs() / size));
+        }
+    }
+    let mut scales = vec![0i64; n];
+    // Each pass at least halves what is left to do; a dozen reach every scale of an f64.
+    for _ in 0..24 {
+        let mut changed = false;
+        for i in 0..n {
+            let column: f64 = (0..n).filter(|&j| j != i).map(|j| most[(j, i)]).sum();
+            let row: f64 = (0..n).filter(|&j| j != i).map(|j| most[(i, j)]).sum();
+            if column == 0.0 || row == 0.0 {
+                continue;
+            }
+            let e = (exponent(row) - exponent(column)) / 2;
+            let after = times_power_of_two(column, e) + times_power_of_two(row, -e);
+            if e == 0 || after >= 0.95 * (column + row) {
+                continue;
+            }
+            for j in (0..n).filter(|&j| j != i) {
+                most[(j, i)] = times_power_of_two(most[(j, i)], e);
+                most[(i, j)] = times_power_of_two(most[(i, j)], -e);
+            }
+            scales[i] += e;
+            changed = true;
+        }
+        if !changed {
+            break;
+        }
+    }
+    if scales.iter().any(|&scale| scale != scales[0]) {
+        for factor in factors {
+            for i in 0..n {
+                for j in 0..n {
+                    factor[(i, j)] = times_power_of_two(factor[(i, j)], scales[j] - scales[i]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,387 @@
+//! Runs: a model, an element, a step, a span.
+
+mod mesh;
+
+use crate::error::{RunError, RunErrorKind};
+use crate::motion::{Motion, Node};
+use mesh::Mesh;
+use std::ops::Range;
+use tfe_runtime::step::{Control, Impulse, Stepper};
+use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
+
+/// A run to be: which model, with which element and step.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2)]
+/// struct Oscillator { m: f64, k: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let oscillator = Oscillator { m: 1.0, k: 1.0 };
+/// let motion = Simulation::new(&oscillator)
+///     .element(Mixed::<4>)
+///     .step(0.1)
+///     .run(oscillator.state([1.0], [0.0]), 0.0..10.0)?;
+/// assert!((motion.last().q[0] - 10.0_f64.cos()).abs() < 1e-8);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// Defaults: `Mixed::<4>` (order 6), a thousandth of the span as step, every node recorded, iteration to round-off.
+#[derive(Debug)]
+pub struct Simulation<'m, M, const N: usize> {
+    model: &'m M,
+    element: Element,
+    step: Option<f64>,
+    control: Control,
+    record_every: usize,
+    impulses: Vec<Impulse<N>>,
+    breaks: Vec<f64>,
+    progress: bool,
+}
+
+impl<M, const N: usize> Clone for Simulation<'_, M, N> {
+    fn clone(&self) -> Self {
+        Self {
+            impulses: self.impulses.clone(),
+            breaks: self.breaks.clone(),
+            ..*self
+        }
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
+    /// A run of `model` with the defaults.
+    pub fn new(model: &'m M) -> Self {
+        Self {
+            model,
+            element: Element::from(Mixed::<4>),
+            step: None,
+            control: Control::default(),
+            record_every: 1,
+            impulses: Vec::new(),
+            breaks: Vec::new(),
+            progress: false,
+        }
+    }
+
+    /// The element: `Mixed::<4>`, `Primal::<3>.reduced()`, `Element::mixed(n)`, …
+    #[must_use]
+    pub fn element(mut self, element: impl Into<Element>) -> Self {
+        self.element = element.into();
+        self
+    }
+
+    /// The step h, in the units of time. Where the span is no whole number of steps the last one is shorter.
+    #[must_use]
+    pub fn step(mut self, step: f64) -> Self {
+        self.step = Some(step);
+        self
+    }
+
+    /// When the iteration inside an element is done: the relative size of the last increment. The default iterates to round-off.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.control.tolerance = tolerance;
+        self
+    }
+
+    /// The most iterations an element may take before the run stops with an error.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: u32) -> Self {
+        self.control.max_iterations = iterations;
+        self
+    }
+
+    /// How the element's equations are solved; `Solve::Auto` by default.
+    #[must_use]
+    pub fn solver(mut self, solve: Solve) -> Self {
+        self.control.solve = solve;
+        self
+    }
+
+    /// Records every `k`-th node (and always the first and the last). With `k` > 1 the elements' polynomials are not kept, so a long run takes
+    /// little memory but [`Motion::at`] knows the recorded nodes only. 0 counts as 1.
+    #[must_use]
+    pub fn record_every(mut self, k: usize) -> Self {
+        self.record_every = k.max(1);
+        self
+    }
+
+    /// Adds an impulse: a generalized force of the given time integral that acts at one instant. Inside an element it is weighted by the test
+    /// functions, at a node it changes the momentum there (`docs/theory.md`, impulses). The node at that instant shows the momentum before it.
+    #[must_use]
+    pub fn impulse(mut self, time: f64, impulse: [f64; N]) -> Self {
+        self.impulses.push(Impulse {
+            time,
+            value: impulse,
+        });
+        self
+    }
+
+    /// Makes an element end at `time`: where a force jumps, an element across the jump would lose its order.
+    #[must_use]
+    pub fn break_at(mut self, time: f64) -> Self {
+        self.breaks.push(time);
+        self
+    }
+
+    /// Shows the progress of long runs on standard error, once a second.
+    #[must_use]
+    pub fn progress(mut self) -> Self {
+        self.progress = true;
+        self
+    }
+
+    /// Runs over the span, backwards where it ends before it starts. The last node is exactly at the end of the span.
+    ///
+    /// # Errors
+    /// [`RunError`] says where and why the run stopped and holds the motion so far.
+    pub fn run(&self, start: State<N>, span: Range<f64>) -> Result<Motion<N>, RunError<N>> {
+        let mut motion = Motion::from_start(self.model, span.start, &start);
+        let prepared = check_start(&start)
+            .and_then(|()| self.mesh(&span))
+            .and_then(|mesh| {
+                let stepper = Stepper::new(self.model, self.element, self.control);
+                Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
+            });
+        let (mesh, mut stepper) = match prepared {
+            Ok(prepared) => prepared,
+            Err(kind) => return Err(RunError::new(kind, motion)),
+        };
+        let mut state = start;
+        let mut bar = progress::Bar::new(self.progress, mesh.steps());
+        let mut failure = None;
+        for (element, (t, next, h)) in mesh.elements().enumerate() {
+            let last = element + 1 == mesh.steps();
+            let impulses = mesh.impulses_in(t, next, last);
+            if let Err(source) = stepper.advance(t, h, &mut state, impulses) {
+                failure = Some(RunErrorKind::Solve {
+                    element,
+                    time: t,
+                    step: h,
+                    source,
+                });
+                break;
+            }
+            if self.record_every == 1 {
+                motion.keep_element(stepper.dense(t, next));
+            }
+            if last || (element + 1) % self.record_every == 0 {
+                motion.record(self.model, next, &state);
+            }
+            bar.advance();
+        }
+        motion.set_statistics(*stepper.statistics());
+        match failure {
+            None => Ok(motion),
+            Some(kind) => {
+                if let RunErrorKind::Solve { time, .. } = &kind
+                    && motion.states().last().is_some_and(|node| node.t != *time)
+                {
+                    motion.record(self.model, *time, &state);
+                }
+                Err(RunError::new(kind, motion))
+            }
+        }
+    }
+
+    /// The states that follow `start`, one a step, without end and in constant memory. After an error the iterator is finished.
+    ///
+    /// ```
+    /// # use tfe::prelude::*;
+    /// # #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2)]
+    /// # struct Oscillator { m: f64, k: f64 }
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let oscillator = Oscillator { m: 1.0, k: 1.0 };
+    /// let simulation = Simulation::new(&oscillator).step(0.1);
+    /// for node in simulation.steps(oscillator.state([1.0], [0.0]), 0.0) {
+    ///     let node = node?;
+    ///     if node.q[0] < 0.0 {
+    ///         println!("passed zero before t = {}", node.t);
+    ///         break;
+    ///     }
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
+        let step = self.step.unwrap_or(f64::NAN);
+        let stepper = check_start(&start).and_then(|()| {
+            if !(step.is_finite() && step != 0.0) {
+                return Err(RunErrorKind::Step { step });
+            }
+            if !t0.is_finite() {
+                return Err(RunErrorKind::Span {
+                    start: t0,
+                    end: f64::INFINITY,
+                });
+            }
+            Stepper::new(self.model, self.element, self.control).map_err(RunErrorKind::Element)
+        });
+        let (stepper, failure) = match stepper {
+            Ok(stepper) => (Some(stepper), None),
+            Err(kind) => (None, Some(kind)),
+        };
+        Steps {
+            stepper,
+            failure,
+            state: start,
+            t0,
+            step,
+            element: 0,
+            impulses: self.impulses.clone(),
+        }
+    }
+
+    fn mesh(&self, span: &Range<f64>) -> Result<Mesh<N>, RunErrorKind> {
+        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        Mesh::new(span, step, &self.breaks, &self.impulses)
+    }
+}
+
+/// Refuses start values that are not finite.
+fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErrorKind> {
+    for (coordinate, (&q, &p)) in state.q.iter().zip(&state.p).enumerate() {
+        if !(q.is_finite() && p.is_finite()) {
+            return Err(RunErrorKind::Start { coordinate, q, p });
+        }
+    }
+    Ok(())
+}
+
+/// The endless sequence of states of [`Simulation::steps`].
+#[derive(Debug)]
+pub struct Steps<'m, M, const N: usize> {
+    stepper: Option<Stepper<'m, M, N>>,
+    failure: Option<RunErrorKind>,
+    state: State<N>,
+    t0: f64,
+    step: f64,
+    element: usize,
+    impulses: Vec<Impulse<N>>,
+}
+
+impl<M: Model<N>, const N: usize> Steps<'_, M, N> {
+    /// What the steps so far have cost.
+    pub fn statistics(&self) -> Statistics {
+        self.stepper
+            .as_ref()
+            .map(|stepper| *stepper.statistics())
+            .unwrap_or_default()
+    }
+}
+
+impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
+    type Item = Result<Node<N>, RunErrorKind>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if let Some(kind) = self.failure.take() {
+            self.stepper = None;
+            return Some(Err(kind));
+        }
+        let stepper = self.stepper.as_mut()?;
+        // Times are products, not sums: a million additions of 0.1 are off by 1e-6.
+        let time = |element: usize| self.t0 + element as f64 * self.step;
+        let (t, next) = (time(self.element), time(self.element + 1));
+        let impulses: Vec<_> = if self.impulses.is_empty() {
+            Vec::new()
+        } else {
+            self.impulses
+                .iter()
+                .filter(|impulse| mesh::within(impulse.time, t, next))
+                .copied()
+                .collect()
+        };
+        match stepper.advance(t, self.step, &mut self.state, &impulses) {
+            Ok(()) => {
+                self.element += 1;
+                Some(Ok(Node {
+                    t: next,
+                    q: self.state.q,
+                    p: self.state.p,
+                }))
+            }
+            Err(source) => {
+                self.stepper = None;
+                Some(Err(RunErrorKind::Solve {
+                    element: self.element,
+                    time: t,
+                    step: self.step,
+                    source,
+                }))
+            }
+        }
+    }
+}
+
+mod progress {
+    //! Progress on standard error.
+
+    use std::io::Write;
+    use std::time::{Duration, Instant};
+
+    /// A line that says how far a run is, rewritten once a second.
+    pub(super) struct Bar {
+        shown: Option<Shown>,
+        steps: usize,
+        done: usize,
+    }
+
+    struct Shown {
+        start: Instant,
+        next: Instant,
+    }
+
+    impl Bar {
+        pub(super) fn new(wanted: bool, steps: usize) -> Self {
+            let now = Instant::now();
+            let shown = wanted.then(|| Shown {
+                start: now,
+                next: now + Duration::from_secs(1),
+            });
+            Self {
+                shown,
+                steps,
+                done: 0,
+            }
+        }
+
+        pub(super) fn advance(&mut self) {
+            self.done += 1;
+            let Some(shown) = &mut self.shown else { return };
+            // Asking for the time costs more than a small step does.
+            if !self.done.is_multiple_of(256) && self.done != self.steps {
+                return;
+            }
+            let now = Instant::now();
+            if now < shown.next {
+                return;
+            }
+            shown.next = now + Duration::from_secs(1);
+            let fraction = self.done as f64 / self.steps as f64;
+            let left = (now - shown.start).as_secs_f64() * (1.0 / fraction - 1.0);
+            let (done, steps, percent) = (self.done, self.steps, 100.0 * fraction);
+            // Progress that cannot be shown is no reason to stop a run.
+            let _ = write!(
+                std::io::stderr(),
+                "\r{done} of {steps} steps ({percent:.0} %), {left:.0} s left "
+            );
+            if self.done == self.steps {
+                let _ = writeln!(std::io::stderr());
+            }
+        }
+    }
+
+    impl Drop for Bar {
+        fn drop(&mut self) {
+            if let Some(shown) = &self.shown
+                && shown.next > shown.start + Duration::from_secs(1)
+                && self.done != self.steps
+            {
+                let _ = writeln!(std::io::stderr());
+            }
+        }
+    }
+}

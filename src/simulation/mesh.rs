@@ -1,0 +1,237 @@
+//! The elements of a run: where each begins and ends.
+
+use crate::error::RunErrorKind;
+use std::ops::Range;
+use tfe_runtime::step::Impulse;
+
+/// Times between two breaks, cut into equal steps; the last one may be shorter.
+#[derive(Clone, Debug, PartialEq)]
+struct Segment {
+    start: f64,
+    end: f64,
+    /// Signed.
+    step: f64,
+    steps: usize,
+    /// Whether the last step is as long as the others.
+    whole: bool,
+}
+
+/// All elements of a span.
+#[derive(Clone, Debug)]
+pub(crate) struct Mesh<const N: usize> {
+    segments: Vec<Segment>,
+    /// In the order in which the run meets them.
+    impulses: Vec<Impulse<N>>,
+    direction: f64,
+}
+
+impl<const N: usize> Mesh<N> {
+    /// Cuts `span` into steps of size `|step|` that end at every break inside it.
+    pub(crate) fn new(
+        span: &Range<f64>,
+        step: f64,
+        breaks: &[f64],
+        impulses: &[Impulse<N>],
+    ) -> Result<Self, RunErrorKind> {
+        let Range { start, end } = *span;
+        if !(start.is_finite() && end.is_finite()) {
+            return Err(RunErrorKind::Span { start, end });
+        }
+        if !(step.is_finite() && step != 0.0) && start != end {
+            return Err(RunErrorKind::Step { step });
+        }
+        let direction = if end < start { -1.0 } else { 1.0 };
+        let forward = |a: &f64, b: &f64| (direction * a).total_cmp(&(direction * b));
+        let within = |time: f64| {
+            direction * start <= direction * time && direction * time <= direction * end
+        };
+
+        let mut cuts: Vec<f64> = breaks
+            .iter()
+            .copied()
+            .filter(|&time| within(time) && time != start && time != end)
+            .collect();
+        cuts.sort_by(forward);
+        cuts.dedup();
+        let mut impulses = impulses.to_vec();
+        for impulse in &impulses {
+            if !(within(impulse.time) && impulse.value.iter().all(|value| value.is_finite())) {
+                return Err(RunErrorKind::Impulse { time: impulse.time });
+            }
+        }
+        impulses.sort_by(|a, b| forward(&a.time, &b.time));
+
+        let mut segments = Vec::new();
+        let mut from = start;
+        for to in cuts.into_iter().chain([end]) {
+            if to != from {
+                segments.push(Segment::new(from, to, direction * step.abs())?);
+            }
+            from = to;
+        }
+        Ok(Self {
+            segments,
+            impulses,
+            direction,
+        })
+    }
+
+    /// How many elements there are.
+    pub(crate) fn steps(&self) -> usize {
+        self.segments.iter().map(|segment| segment.steps).sum()
+    }
+
+    /// Start, end and length of each element. One ends where the next one starts, to the bit; lengths are equal to the bit, which differences of times
+    /// are not, so that what was factored for one element serves the next.
+    pub(crate) fn elements(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
+        self.segments.iter().flat_map(|segment| {
+            (0..segment.steps).map(|k| (segment.node(k), segment.node(k + 1), segment.length(k)))
+        })
+    }
+
+    /// The impulses that act in the element from `t` to `next`: one at a node belongs to the element that it starts, at the end of the span to the last.
+    pub(crate) fn impulses_in(&self, t: f64, next: f64, last: bool) -> &[Impulse<N>] {
+        if self.impulses.is_empty() {
+            return &[];
+        }
+        let before = |limit: f64| {
+            self.impulses
+                .partition_point(|impulse| self.direction * impulse.time < self.direction * limit)
+        };
+        let end = if last {
+            self.impulses.len()
+        } else {
+            before(next)
+        };
+        &self.impulses[before(t)..end]
+    }
+}
+
+/// Whether `time` belongs to the element from `t` to `next`.
+pub(crate) fn within(time: f64, t: f64, next: f64) -> bool {
+    if t <= next {
+        t <= time && time < next
+    } else {
+        t >= time && time > next
+    }
+}
+
+impl Segment {
+    /// A count of steps beyond this is a mistake in units rather than a run: it would take years.
+    const MOST_STEPS: f64 = 1e15;
+
+    fn new(start: f64, end: f64, step: f64) -> Result<Self, RunErrorKind> {
+        let ratio = (end - start) / step;
+        if !(ratio <= Self::MOST_STEPS) {
+            return Err(RunErrorKind::TooManySteps {
+                span: end - start,
+                step,
+            });
+        }
+        // 10 / 0.01 is 1000 steps although the quotient may be 1000.0000000000001.
+        let nearest = ratio.round();
+        let whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0);
+        let steps = if whole { nearest } else { ratio.ceil() }.max(1.0);
+        let step = if whole { (end - start) / steps } else { step };
+        Ok(Self {
+            start,
+            end,
+            step,
+            steps: steps as usize,
+            whole,
+        })
+    }
+
+    /// The length of the k-th element.
+    fn length(&self, k: usize) -> f64 {
+        if self.whole || k + 1 < self.steps {
+            self.step
+        } else {
+            self.end - self.node(k)
+        }
+    }
+
+    /// The k-th node: a product, not a sum, and the end of the segment exactly.
+    fn node(&self, k: usize) -> f64 {
+        if k == self.steps {
+            self.end
+        } else {
+            self.start + k as f64 * self.step
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn nodes(span: Range<f64>, step: f64, breaks: &[f64]) -> Vec<f64> {
+        let mesh = Mesh::<1>::new(&span, step, breaks, &[]).expect("a good mesh");
+        let elements: Vec<_> = mesh.elements().collect();
+        assert_eq!(elements.len(), mesh.steps());
+        for pair in elements.windows(2) {
+            assert_eq!(pair[0].1.to_bits(), pair[1].0.to_bits());
+        }
+        let mut nodes: Vec<_> = elements.first().map(|e| e.0).into_iter().collect();
+        nodes.extend(elements.iter().map(|e| e.1));
+        nodes
+    }
+
+    #[test]
+    fn ends_exactly_at_the_end() {
+        assert_eq!(
+            nodes(0.0..1.0, 0.3, &[]),
+            [0.0, 0.3, 0.6, 0.8999999999999999, 1.0]
+        );
+        let many = nodes(0.0..10.0, 0.01, &[]);
+        assert_eq!((many.len(), many[1000]), (1001, 10.0));
+    }
+
+    #[test]
+    fn backward_and_empty_spans() {
+        assert_eq!(nodes(1.0..0.0, 0.5, &[]), [1.0, 0.5, 0.0]);
+        assert!(nodes(2.0..2.0, 0.5, &[]).is_empty());
+    }
+
+    #[test]
+    fn elements_end_at_breaks() {
+        assert_eq!(nodes(0.0..1.0, 0.5, &[0.75, 7.0]), [0.0, 0.5, 0.75, 1.0]);
+    }
+
+    #[test]
+    fn bad_spans_and_steps_are_errors() {
+        let check = |span: Range<f64>, step| Mesh::<1>::new(&span, step, &[], &[]).err();
+        assert!(matches!(
+            check(0.0..1.0, 0.0),
+            Some(RunErrorKind::Step { .. })
+        ));
+        assert!(matches!(
+            check(0.0..1.0, f64::NAN),
+            Some(RunErrorKind::Step { .. })
+        ));
+        assert!(matches!(
+            check(0.0..f64::INFINITY, 0.1),
+            Some(RunErrorKind::Span { .. })
+        ));
+        assert!(matches!(
+            check(0.0..1.0, 1e-300),
+            Some(RunErrorKind::TooManySteps { .. })
+        ));
+    }
+
+    #[test]
+    fn an_impulse_at_a_node_belongs_to_the_element_it_starts() {
+        let impulse = |time| Impulse { time, value: [1.0] };
+        let impulses = [impulse(1.0), impulse(0.5), impulse(0.0), impulse(0.7)];
+        let mesh = Mesh::new(&(0.0..1.0), 0.5, &[], &impulses).expect("a good mesh");
+        let times = |t, next, last| {
+            mesh.impulses_in(t, next, last)
+                .iter()
+                .map(|i| i.time)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(times(0.0, 0.5, false), [0.0]);
+        assert_eq!(times(0.5, 1.0, true), [0.5, 0.7, 1.0]);
+    }
+}

@@ -1,0 +1,164 @@
+//! Linearised behaviour of steps: transition matrices, their spectra, and the steps at which a method fails.
+
+mod chebyshev;
+mod eigenvalues;
+mod intervals;
+mod sign_functions;
+
+pub use eigenvalues::{EigenvalueError, eigenvalues};
+pub use intervals::{IntervalError, UnstableInterval, stability_changes_of, unstable_intervals_of};
+pub use tfe_runtime::transition::TransitionError;
+
+use nalgebra::{Complex, DMatrix};
+use std::ops::Range;
+use tfe_runtime::{Element, Model, State, transition};
+
+/// The transition matrix of one element: the derivative of the step map (p, q) ↦ (p, q) at `state`.
+///
+/// ```text
+/// (δp₁, δq₁) = A (δp₀, δq₀)                                       (theory.md, transition matrices; the paper's (27))
+/// ```
+///
+/// # Shapes
+/// 2N × 2N, ordered (p, q).
+/// # Errors
+/// [`TransitionError`] where the element does not exist, cannot be solved, or has a singular tangent.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2)]
+/// struct Oscillator { m: f64, k: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let oscillator = Oscillator { m: 1.0, k: 1.0 };
+/// let rest = oscillator.state([0.0], [0.0]);
+/// let stable = stability::transition_matrix(&oscillator, Primal::<2>, &rest, 0.0, 3.4)?;
+/// let unstable = stability::transition_matrix(&oscillator, Primal::<2>, &rest, 0.0, 3.5)?; // the limit is √12
+/// assert!(stability::spectral_radius(&stable) < 1.0 + 1e-12);
+/// assert!(stability::spectral_radius(&unstable) > 1.1);
+/// # Ok(())
+/// # }
+/// ```
+pub fn transition_matrix<M: Model<N>, const N: usize>(
+    model: &M,
+    element: impl Into<Element>,
+    state: &State<N>,
+    t: f64,
+    h: f64,
+) -> Result<DMatrix<f64>, TransitionError> {
+    let mut entries = vec![0.0; 4 * N * N];
+    transition::of_step(model, element.into(), state, t, h, &mut entries)?;
+    Ok(DMatrix::from_row_slice(2 * N, 2 * N, &entries))
+}
+
+/// Every interval of step size in which a motion about an equilibrium grows, however right the model: ascending, apart from each other.
+///
+/// With A(h) the transition matrix of one element of length h about the equilibrium at t = 0, the h in `steps` with
+///
+/// ```text
+/// ρ(A(h)) > 1 ,     ρ = max |λ| ;
+/// ```
+///
+/// where the model itself is stable, the method fails there. Primal elements have such intervals near half periods of every mode,
+/// the paper's "bubbles", and grow beyond a last limit; the mixed ones have none. A model that is unstable itself, like an inverted
+/// pendulum, is so for all small steps.
+///
+/// The ends are located by root finding, to a relative accuracy of about 10⁻¹². See [`unstable_intervals_of`] for the method, its tolerances and
+/// its cost: some thousand transition matrices. `steps` may begin at zero. Where a growing or a decaying mode is wanted for another
+/// parameter than the step (a speed, a stiffness), use that function with [`transition_matrix`].
+///
+/// # Not guaranteed
+/// `equilibrium` is not checked: elsewhere A is the derivative of one step from there, and says little about the next. Of a model
+/// that depends on time only the element at t = 0 is seen.
+/// # Errors
+/// [`IntervalError::Range`] for an empty range; [`IntervalError::Matrix`] where there is no transition matrix, with the reason;
+/// [`IntervalError::Unresolved`] for a model that is not smooth at the equilibrium.
+/// # Reference
+/// theory.md (T-57), the intervals of the oscillator.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2)]
+/// struct Oscillator { m: f64, k: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let oscillator = Oscillator { m: 1.0, k: 1.0 };
+/// let rest = oscillator.state([0.0], [0.0]);
+/// let gaps = stability::unstable_intervals(&oscillator, Primal::<3>, &rest, 0.0..30.0)?;
+/// for gap in &gaps {
+///     println!("{} .. {}: radius up to {} at {}", gap.start, gap.end, gap.radius, gap.worst);
+/// }
+/// assert_eq!(gaps.len(), 2); // √10 … √12, and beyond √60
+/// assert!((gaps[0].start - 10.0_f64.sqrt()).abs() < 1e-12 && (gaps[0].end - 12.0_f64.sqrt()).abs() < 1e-12);
+/// assert!((gaps[1].start - 60.0_f64.sqrt()).abs() < 1e-12 && gaps[1].end == 30.0);
+///
+/// assert!(stability::unstable_intervals(&oscillator, Mixed::<3>, &rest, 0.0..30.0)?.is_empty());
+/// # Ok(())
+/// # }
+/// ```
+pub fn unstable_intervals<M: Model<N>, const N: usize>(
+    model: &M,
+    element: impl Into<Element>,
+    equilibrium: &State<N>,
+    steps: Range<f64>,
+) -> Result<Vec<UnstableInterval>, IntervalError<TransitionError>> {
+    let element = element.into();
+    unstable_intervals_of(
+        |h| transition_matrix(model, element, equilibrium, 0.0, h),
+        steps,
+    )
+}
+
+/// The largest modulus of an eigenvalue of a square matrix, max |λ|; zero for an empty one.
+///
+/// NaN where [`eigenvalues()`] is an error: if the matrix is not square, an entry is not finite, or the iteration does not converge.
+pub fn spectral_radius(matrix: &DMatrix<f64>) -> f64 {
+    eigenvalues(matrix).map_or(f64::NAN, |values| largest_modulus(&values))
+}
+
+fn largest_modulus(eigenvalues: &[Complex<f64>]) -> f64 {
+    eigenvalues
+        .iter()
+        .map(|value| value.norm())
+        .fold(0.0, f64::max)
+}
+
+/// How far a transition matrix is from symplectic: the largest entry of |AᵀJA − J|, J = [[0, −1], [1, 0]] in the order (p, q).
+///
+/// Zero to round-off for symplectic elements and models without forces. NaN for a matrix of odd size.
+pub fn symplecticity_defect(matrix: &DMatrix<f64>) -> f64 {
+    let size = matrix.nrows();
+    if !matrix.is_square() || !size.is_multiple_of(2) {
+        return f64::NAN;
+    }
+    let n = size / 2;
+    let j = DMatrix::from_fn(size, size, |row, column| {
+        if column == row + n {
+            -1.0
+        } else if row == column + n {
+            1.0
+        } else {
+            0.0
+        }
+    });
+    (matrix.transpose() * &j * matrix - j).amax()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spectra_of_small_matrices() {
+        let rotation = DMatrix::from_row_slice(2, 2, &[0.6, -0.8, 0.8, 0.6]);
+        assert!((spectral_radius(&rotation) - 1.0).abs() <= f64::EPSILON);
+        assert!(symplecticity_defect(&rotation) <= 2.0 * f64::EPSILON);
+        let stretch = DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 0.0, -3.0]);
+        assert_eq!(spectral_radius(&stretch), 3.0);
+        assert_eq!(symplecticity_defect(&stretch), 7.0);
+        let broken = DMatrix::from_row_slice(2, 2, &[f64::NAN, 0.0, 0.0, 1.0]);
+        assert!(spectral_radius(&broken).is_nan());
+    }
+}

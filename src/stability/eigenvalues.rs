@@ -1,0 +1,394 @@
+//! Eigenvalues of a real matrix by QR sweeps that are counted.
+
+use nalgebra::linalg::Hessenberg;
+use nalgebra::{Complex, DMatrix};
+use std::error::Error;
+use std::fmt;
+
+/// Why the eigenvalues of a matrix were not found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum EigenvalueError {
+    /// The matrix is not square.
+    NotSquare {
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+    },
+    /// An entry is infinite or not a number.
+    NotFinite {
+        /// The row of the entry, from 0.
+        row: usize,
+        /// The column of the entry.
+        column: usize,
+    },
+    /// The QR iteration did not separate all eigenvalues.
+    NoConvergence,
+}
+
+impl fmt::Display for EigenvalueError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotSquare { rows, columns } => {
+                write!(f, "a matrix of {rows} × {columns} has no eigenvalues")
+            }
+            Self::NotFinite { row, column } => {
+                write!(
+                    f,
+                    "the entry in row {row}, column {column} of the matrix is not finite"
+                )
+            }
+            Self::NoConvergence => f.write_str("the eigenvalues of the matrix did not converge"),
+        }
+    }
+}
+
+impl Error for EigenvalueError {}
+
+/// The eigenvalues of a square matrix: every λ with det(A − λ) = 0, as often as its multiplicity.
+///
+/// A matrix of two rows has a closed form,
+///
+/// ```text
+/// λ = (a₁₁ + a₂₂)/2 ± √(((a₁₁ − a₂₂)/2)² + a₁₂a₂₁) ,
+/// ```
+///
+/// so that the eigenvalues of an oscillating symplectic map have modulus one to round-off. Larger ones are balanced, and reduced by
+/// double-shift QR sweeps: exact for a matrix that differs from the balanced one by some ε of its norm. The number of sweeps is limited.
+///
+/// # Not guaranteed
+/// The order, except that complex pairs are adjacent and exact conjugates, positive imaginary part first. An eigenvalue of
+/// multiplicity r in one Jordan block is known to the r-th root of round-off only, and may come as a complex pair.
+/// # Errors
+/// [`EigenvalueError`] for a matrix that is not square or not finite, and if the sweeps do not converge.
+/// # Reference
+/// [GVL, §7.5]
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// use tfe::stability;
+///
+/// // A cyclic permutation, on which QR without exceptional shifts stalls: the cube roots of one.
+/// let cycle = DMatrix::from_row_slice(3, 3, &[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+/// let roots = stability::eigenvalues(&cycle)?;
+/// assert_eq!(roots.len(), 3);
+/// assert!(roots.iter().all(|root| (root.powi(3) - 1.0).norm() < 1e-14));
+/// # Ok::<(), stability::EigenvalueError>(())
+/// ```
+pub fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, EigenvalueError> {
+    /// Products of three entries between this and its inverse neither over- nor underflow.
+    const MODERATE: f64 = 1e100;
+    let (rows, columns) = matrix.shape();
+    if rows != columns {
+        return Err(EigenvalueError::NotSquare { rows, columns });
+    }
+    if let Some(index) = matrix.iter().position(|entry| !entry.is_finite()) {
+        return Err(EigenvalueError::NotFinite {
+            row: index % rows,
+            column: index / rows,
+        });
+    }
+    let largest = matrix.amax();
+    let found = if largest == 0.0 || (1.0 / MODERATE..=MODERATE).contains(&largest) {
+        eigenvalues_of_finite(matrix)
+    } else {
+        // Balanced first: a small entry may be the other half of the large one.
+        let balanced = balanced(matrix).0;
+        let unit = balanced.amax().log2().floor().exp2();
+        eigenvalues_of_finite(&(balanced / unit))
+            .map(|values| values.into_iter().map(|value| value * unit).collect())
+    };
+    found.ok_or(EigenvalueError::NoConvergence)
+}
+
+/// The eigenvalues of a finite square matrix, if the iteration converges; in closed form for 2 × 2, so that a symplectic map has radius 1 to round-off.
+///
+/// Otherwise by QR on the balanced matrix. Not nalgebra's: its shifts cancel near the identity, where the matrices of short steps
+/// are, and the iteration stalls.
+pub(super) fn eigenvalues_of_finite(a: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+    const MOST_SWEEPS: u32 = 200;
+    /// Every so many sweeps without an eigenvalue the shifts are arbitrary.
+    const EXCEPTIONAL: u32 = 10;
+    let size = a.nrows();
+    match size {
+        0 => return Some(Vec::new()),
+        1 => return Some(vec![Complex::new(a[(0, 0)], 0.0)]),
+        2 => {
+            return Some(
+                eigenvalues_of_two([[a[(0, 0)], a[(0, 1)]], [a[(1, 0)], a[(1, 1)]]]).to_vec(),
+            );
+        }
+        _ => {}
+    }
+    let mut h = Hessenberg::new(balanced(a).0).unpack_h();
+    let norm: f64 = h.iter().map(|entry| entry.abs()).sum();
+    let mut values = Vec::with_capacity(size);
+    let mut active = size;
+    let mut sweeps = 0;
+    while active > 0 {
+        let first = (1..active)
+            .rev()
+            .find(|&row| is_negligible(&h, row, norm))
+            .unwrap_or(0);
+        match active - first {
+            1 => values.push(Complex::new(h[(first, first)], 0.0)),
+            2 => {
+                let last = first + 1;
+                values.extend(eigenvalues_of_two([
+                    [h[(first, first)], h[(first, last)]],
+                    [h[(last, first)], h[(last, last)]],
+                ]));
+            }
+            _ if sweeps < MOST_SWEEPS => {
+                sweeps += 1;
+                double_shift_sweep(
+                    &mut h,
+                    first,
+                    active - 1,
+                    sweeps.is_multiple_of(EXCEPTIONAL),
+                );
+                continue;
+            }
+            _ => return None,
+        }
+        active = first;
+        sweeps = 0;
+    }
+    values
+        .iter()
+        .all(|value| value.re.is_finite() && value.im.is_finite())
+        .then_some(values)
+}
+
+/// Whether the entry below the diagonal in this row may be called zero.
+fn is_negligible(h: &DMatrix<f64>, row: usize, norm: f64) -> bool {
+    let around = h[(row - 1, row - 1)].abs() + h[(row, row)].abs();
+    let size = if around == 0.0 { norm } else { around };
+    h[(row, row - 1)].abs() <= f64::EPSILON * size
+}
+
+/// One implicit double-shift QR sweep on the rows first..=last of a Hessenberg matrix, of at least three rows [Golub & Van Loan, §7.5].
+///
+/// Only the diagonal block is transformed: the blocks beside it do not influence the eigenvalues. An exceptional sweep uses arbitrary
+/// shifts, for matrices like permutations that the usual ones leave as they are.
+fn double_shift_sweep(h: &mut DMatrix<f64>, first: usize, last: usize, is_exceptional: bool) {
+    let (x, y, w) = if is_exceptional {
+        let size = h[(last, last - 1)].abs() + h[(last - 1, last - 2)].abs();
+        (
+            h[(last, last)] + 0.75 * size,
+            h[(last, last)] + 0.75 * size,
+            -0.4375 * size * size,
+        )
+    } else {
+        (
+            h[(last, last)],
+            h[(last - 1, last - 1)],
+            h[(last, last - 1)] * h[(last - 1, last)],
+        )
+    };
+    // The first column of (H − s₁)(H − s₂) over its factor h₂₁, s the eigenvalues of the last 2 × 2 block [[y, ·], [·, x]]; in
+    // differences of diagonal entries: with trace and determinant they would cancel near the identity, and the sweeps stall.
+    let z = h[(first, first)];
+    let (r, s) = (x - z, y - z);
+    let mut column = [
+        (r * s - w) / h[(first + 1, first)] + h[(first, first + 1)],
+        h[(first + 1, first + 1)] - z - r - s,
+        h[(first + 2, first + 1)],
+    ];
+    for k in first..last {
+        let rows = (last - k + 1).min(3);
+        if k > first {
+            column = std::array::from_fn(|i| if i < rows { h[(k + i, k - 1)] } else { 0.0 });
+        }
+        let Some((v, factor)) = reflection(&column[..rows]) else {
+            continue;
+        };
+        for j in k.saturating_sub(1).max(first)..=last {
+            let sum: f64 = (0..rows).map(|i| v[i] * h[(k + i, j)]).sum();
+            for i in 0..rows {
+                h[(k + i, j)] -= factor * sum * v[i];
+            }
+        }
+        for i in first..=(k + 3).min(last) {
+            let sum: f64 = (0..rows).map(|j| v[j] * h[(i, k + j)]).sum();
+            for j in 0..rows {
+                h[(i, k + j)] -= factor * sum * v[j];
+            }
+        }
+        if k > first {
+            for i in 1..rows {
+                h[(k + i, k - 1)] = 0.0;
+            }
+        }
+    }
+}
+
+/// v and f so that (1 − f v vᵀ) maps x to a multiple of the first unit vector; none if x is zero already.
+fn reflection(x: &[f64]) -> Option<([f64; 3], f64)> {
+    let largest = x.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
+    if largest == 0.0 || !largest.is_finite() {
+        return None;
+    }
+    let mut v: [f64; 3] = std::array::from_fn(|i| x.get(i).map_or(0.0, |entry| entry / largest));
+    let norm = v.iter().map(|entry| entry * entry).sum::<f64>().sqrt();
+    v[0] += norm.copysign(v[0]);
+    Some((v, 2.0 / v.iter().map(|entry| entry * entry).sum::<f64>()))
+}
+
+fn eigenvalues_of_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
+    let (mean, half_difference) = (f64::midpoint(a, d), 0.5 * (a - d));
+    let discriminant = half_difference * half_difference + b * c;
+    if discriminant < 0.0 {
+        let imaginary = (-discriminant).sqrt();
+        return [
+            Complex::new(mean, imaginary),
+            Complex::new(mean, -imaginary),
+        ];
+    }
+    let root = discriminant.sqrt();
+    [
+        Complex::new(mean + root, 0.0),
+        Complex::new(mean - root, 0.0),
+    ]
+}
+
+/// A similar matrix D⁻¹AD whose rows and columns are of comparable size, and the diagonal of D, powers of two.
+///
+/// Momenta and coordinates have different units, and QR is only accurate relative to the largest entry.
+pub(super) fn balanced(a: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
+    const SWEEPS: usize = 8;
+    let mut a = a.clone();
+    let mut diagonal = vec![1.0; a.nrows()];
+    for _ in 0..SWEEPS {
+        let mut settled = true;
+        for i in 0..a.nrows() {
+            let others = |entries: &mut dyn Iterator<Item = &f64>| {
+                entries
+                    .enumerate()
+                    .filter(|&(j, _)| j != i)
+                    .map(|(_, entry)| entry.abs())
+                    .sum::<f64>()
+            };
+            let (row, column) = (
+                others(&mut a.row(i).iter()),
+                others(&mut a.column(i).iter()),
+            );
+            if row == 0.0 || column == 0.0 {
+                continue;
+            }
+            let factor = (0.5 * (row / column).log2())
+                .round()
+                .clamp(-500.0, 500.0)
+                .exp2();
+            if factor != 1.0 {
+                settled = false;
+                a.column_mut(i).scale_mut(factor);
+                a.row_mut(i).unscale_mut(factor);
+                diagonal[i] *= factor;
+            }
+        }
+        if settled {
+            break;
+        }
+    }
+    (a, diagonal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(matrix: &DMatrix<f64>, expected: &[(f64, f64)], tolerance: f64) {
+        let mut found = eigenvalues(matrix).expect("converges");
+        assert_eq!(found.len(), expected.len());
+        for &(re, im) in expected {
+            let value = Complex::new(re, im);
+            let nearest = (0..found.len())
+                .min_by(|&i, &j| {
+                    (found[i] - value)
+                        .norm()
+                        .total_cmp(&(found[j] - value).norm())
+                })
+                .expect("as many as expected");
+            let error = (found.swap_remove(nearest) - value).norm();
+            assert!(error <= tolerance, "{value}: error {error:.1e}");
+        }
+    }
+
+    #[test]
+    fn plain_shifts_stall_on_a_cyclic_permutation() {
+        let cycle = DMatrix::from_fn(
+            5,
+            5,
+            |row, column| if row == (column + 1) % 5 { 1.0 } else { 0.0 },
+        );
+        let root = |k: f64| (k * std::f64::consts::TAU / 5.0).sin_cos();
+        let expected = [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| (root(k).1, root(k).0));
+        check(&cycle, &expected, 20.0 * f64::EPSILON);
+    }
+
+    #[test]
+    fn plain_shifts_cancel_near_the_identity() {
+        // Two rotations by 1e-9 and 2e-9, in planes that are mixed by an orthogonal matrix.
+        let rotations = DMatrix::from_row_slice(
+            4,
+            4,
+            &[
+                0.0, -1e-9, 0.0, 0.0, 1e-9, 0.0, 0.0, 0.0, //
+                0.0, 0.0, 0.0, -2e-9, 0.0, 0.0, 2e-9, 0.0,
+            ],
+        );
+        let mixing = DMatrix::from_fn(4, 4, |row, column| match (row / 2, column / 2) {
+            _ if row % 2 != column % 2 => 0.0,
+            (0, 1) => -0.8,
+            (1, 0) => 0.8,
+            _ => 0.6,
+        });
+        let near = DMatrix::identity(4, 4) + &mixing * rotations * mixing.transpose();
+        let expected = [(1.0, 1e-9), (1.0, -1e-9), (1.0, 2e-9), (1.0, -2e-9)];
+        check(&near, &expected, 10.0 * f64::EPSILON);
+    }
+
+    #[test]
+    fn trivial_matrices() {
+        check(&DMatrix::zeros(0, 0), &[], 0.0);
+        check(&DMatrix::from_element(1, 1, -3.0), &[(-3.0, 0.0)], 0.0);
+        check(&DMatrix::zeros(3, 3), &[(0.0, 0.0); 3], 0.0);
+        let upper = DMatrix::from_row_slice(3, 3, &[1.0, 5.0, 6.0, 0.0, 2.0, 7.0, 0.0, 0.0, 3.0]);
+        check(&upper, &[(1.0, 0.0), (2.0, 0.0), (3.0, 0.0)], 0.0);
+    }
+
+    #[test]
+    fn entries_near_the_ends_of_the_range() {
+        for unit in [1e-300, 1e-200, 1e200, 1e300] {
+            // Eigenvalues 3 and ±i.
+            let companion =
+                DMatrix::from_row_slice(3, 3, &[3.0, -1.0, 3.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+                    * unit;
+            let expected = [(3.0 * unit, 0.0), (0.0, unit), (0.0, -unit)];
+            check(&companion, &expected, 50.0 * f64::EPSILON * unit);
+            // One large and one small entry: their product is 4.
+            let skew = DMatrix::from_row_slice(2, 2, &[0.0, 4.0 * unit, 1.0 / unit, 0.0]);
+            check(&skew, &[(2.0, 0.0), (-2.0, 0.0)], 4.0 * f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn bad_matrices_are_errors() {
+        assert_eq!(
+            eigenvalues(&DMatrix::zeros(2, 3)),
+            Err(EigenvalueError::NotSquare {
+                rows: 2,
+                columns: 3
+            })
+        );
+        let mut broken = DMatrix::zeros(3, 3);
+        broken[(1, 2)] = f64::NAN;
+        assert_eq!(
+            eigenvalues(&broken),
+            Err(EigenvalueError::NotFinite { row: 1, column: 2 })
+        );
+    }
+}

@@ -1,0 +1,199 @@
+//! Every interval of a parameter in which a transition matrix has a spectral radius above one.
+//!
+//! A grid of spectral radii cannot find intervals of width 10⁻⁵, and the radius has the singularity of a square root at their ends.
+//! Smooth functions of the matrix that change sign where stability changes have neither fault: `sign_functions` lists them.
+//!
+//! They are interpolated piecewise on Chebyshev points until resolved (`pieces`); between neighbouring critical points of the
+//! interpolant a function is monotone, and a change of sign is one root, polished on the function itself. What looks like a double
+//! zero is magnified and interpolated again, down to round-off. All roots together cut the range; the spectral radius inside says
+//! which pieces are unstable (`changes`), and golden section where it is largest (`worst`).
+
+mod changes;
+mod pieces;
+mod search;
+#[cfg(test)]
+mod tests;
+mod worst;
+
+use nalgebra::DMatrix;
+use search::Search;
+use std::error::Error;
+use std::fmt;
+use std::ops::Range;
+
+/// An interval of the parameter in which the spectral radius exceeds one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnstableInterval {
+    /// Where it begins; the start of the range if it was unstable there already.
+    pub start: f64,
+    /// Where it ends; the end of the range if it is unstable there still.
+    pub end: f64,
+    /// The largest spectral radius inside; infinite at a pole of the matrix.
+    pub radius: f64,
+    /// Where the largest spectral radius is attained.
+    pub worst: f64,
+}
+
+/// Why the unstable intervals could not be found.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum IntervalError<E> {
+    /// The range is empty, reversed or not finite.
+    Range {
+        /// The start asked for.
+        start: f64,
+        /// The end asked for.
+        end: f64,
+    },
+    /// The matrix could not be computed.
+    Matrix {
+        /// The parameter.
+        at: f64,
+        /// Why.
+        source: E,
+    },
+    /// The matrix is empty, not square, or not of the size it had elsewhere.
+    Shape {
+        /// The parameter.
+        at: f64,
+        /// Rows of the matrix.
+        rows: usize,
+        /// Columns of the matrix.
+        columns: usize,
+    },
+    /// An entry of the matrix is not finite.
+    NotFinite {
+        /// The parameter.
+        at: f64,
+    },
+    /// The eigenvalues of the matrix did not converge.
+    Eigenvalues {
+        /// The parameter.
+        at: f64,
+    },
+    /// The matrix is not smooth enough in the parameter: its functions were still unresolved after very many evaluations.
+    Unresolved {
+        /// Where the last evaluation was.
+        near: f64,
+        /// How many evaluations were spent.
+        evaluations: usize,
+    },
+}
+
+impl<E: fmt::Display> fmt::Display for IntervalError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range { start, end } => {
+                write!(f, "the range {start}..{end} is empty or not finite")
+            }
+            Self::Matrix { at, source } => write!(f, "no transition matrix at {at}: {source}"),
+            Self::Shape { at, rows, columns } => {
+                write!(
+                    f,
+                    "the matrix at {at} is {rows} × {columns}: expected a square matrix of one size everywhere"
+                )
+            }
+            Self::NotFinite { at } => {
+                write!(f, "the matrix at {at} has an entry that is not finite")
+            }
+            Self::Eigenvalues { at } => {
+                write!(f, "the eigenvalues of the matrix at {at} did not converge")
+            }
+            Self::Unresolved { near, evaluations } => {
+                write!(
+                    f,
+                    "the matrix is not smooth near {near}: unresolved after {evaluations} evaluations"
+                )
+            }
+        }
+    }
+}
+
+impl<E: Error + 'static> Error for IntervalError<E> {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Matrix { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}
+
+/// Every interval of `range` in which the spectral radius of `matrix` exceeds one, ascending.
+///
+/// The matrix must be a smooth function of the parameter, as the transition matrix of an element is of its length; poles are allowed.
+/// The ends are found by root finding, in general to a relative accuracy of 10⁻¹² and as good as round-off in the matrix permits.
+/// Neighbouring intervals are reported as one. A radius that only touches one is no interval, nor is an excess ρ − 1 below 10⁻¹⁰, nor
+/// one that perturbations of the matrix by 256 ε (ε = 2.2·10⁻¹⁶, relative to the size of each entry nearby) could explain.
+///
+/// A range may begin at zero, where a transition matrix is the identity: the matrix is not evaluated there.
+///
+/// About a thousand evaluations of the matrix for one or two modes over a few bubbles; tens of thousands for many modes that cross
+/// many times. More than 200 000 are an error.
+///
+/// # Not guaranteed
+/// Modes that coincide for every parameter make ∏ (μᵢ − μⱼ)² vanish: a collision of other eigenvalues away from ±1 is then noticed
+/// only if one of some hundred samples falls into its interval.
+/// # Errors
+/// [`IntervalError`]: a range that is empty or not finite, a matrix that cannot be computed, or one that is not smooth.
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// use std::convert::Infallible;
+/// # use tfe::stability::unstable_intervals_of;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // The primal element with two nodes for the oscillator of unit frequency: stable below √12.
+/// let element = |h: f64| {
+///     let (r, d) = (h * h, 6.0 + h * h);
+///     let diagonal = (6.0 - 2.0 * r) / d;
+///     Ok::<_, Infallible>(DMatrix::from_row_slice(2, 2, &[diagonal, (r - 12.0) * h / (2.0 * d), 6.0 * h / d, diagonal]))
+/// };
+/// let intervals = unstable_intervals_of(element, 0.0..10.0)?;
+/// assert_eq!(intervals.len(), 1);
+/// assert!((intervals[0].start - 12.0_f64.sqrt()).abs() < 1e-14);
+/// assert_eq!(intervals[0].end, 10.0);
+/// # Ok(())
+/// # }
+/// ```
+pub fn unstable_intervals_of<E>(
+    matrix: impl FnMut(f64) -> Result<DMatrix<f64>, E>,
+    range: Range<f64>,
+) -> Result<Vec<UnstableInterval>, IntervalError<E>> {
+    let mut search = Search::over(matrix, &range)?;
+    let verdict = search.verdict(&range)?;
+    let mut intervals = Vec::new();
+    let mut unstable_since = verdict.unstable_at_start.then_some(range.start);
+    for change in verdict.changes.into_iter().chain([range.end]) {
+        match unstable_since.take() {
+            Some(start) => intervals.push(search.worst_in(start, change, &range)?),
+            None => unstable_since = Some(change),
+        }
+    }
+    Ok(intervals)
+}
+
+/// Every parameter in `range` at which the spectral radius of `matrix` rises above one or returns to it, ascending.
+///
+/// The limit speed of a spinning top is such a value, or the step at which an element loses its stability. Found by the method of
+/// [`unstable_intervals_of`], with the same conditions, tolerances and errors; ends of the range are not changes.
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// use std::convert::Infallible;
+/// # use tfe::stability::stability_changes_of;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // One step of symplectic Euler for the oscillator of unit frequency: stable below h = 2.
+/// let euler = |h: f64| Ok::<_, Infallible>(DMatrix::from_row_slice(2, 2, &[1.0, -h, h, 1.0 - h * h]));
+/// let changes = stability_changes_of(euler, 0.0..100.0)?;
+/// assert_eq!(changes.len(), 1);
+/// assert!((changes[0] - 2.0).abs() < 1e-14);
+/// # Ok(())
+/// # }
+/// ```
+pub fn stability_changes_of<E>(
+    matrix: impl FnMut(f64) -> Result<DMatrix<f64>, E>,
+    range: Range<f64>,
+) -> Result<Vec<f64>, IntervalError<E>> {
+    Ok(Search::over(matrix, &range)?.verdict(&range)?.changes)
+}

@@ -1,0 +1,252 @@
+//! Where stability changes: roots of the functions, and the verdict between them.
+
+use super::IntervalError;
+use super::search::{SHORTEST, SPLIT, Sample, Search};
+use crate::stability::chebyshev::bracketed_root;
+use nalgebra::DMatrix;
+use std::ops::Range;
+use std::rc::Rc;
+
+/// An excess of the spectral radius below this is not called unstable.
+const LEAST_EXCESS: f64 = 1e-10;
+/// Roots closer than this, relative to their position, are one.
+const SAME_ROOT: f64 = 1e-12;
+
+/// A place where stability may change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Candidate {
+    at: f64,
+    /// Whether it is the root of a function, and so accurate; otherwise a function only touches zero or is unresolved there.
+    is_root: bool,
+}
+
+/// What was found out about a range.
+pub(super) struct Verdict {
+    pub(super) unstable_at_start: bool,
+    pub(super) changes: Vec<f64>,
+}
+
+/// Why the polishing of a root stopped.
+enum Stop<E> {
+    /// The function grows between the ends of the bracket: it changes its sign through infinity.
+    Pole,
+    Failed(IntervalError<E>),
+}
+
+impl<F, E> Search<F>
+where
+    F: FnMut(f64) -> Result<DMatrix<f64>, E>,
+{
+    /// Classifies the pieces between all candidates, and tells where the class changes.
+    pub(super) fn verdict(&mut self, range: &Range<f64>) -> Result<Verdict, IntervalError<E>> {
+        /// Interior points of a piece whose majority decides: one may hit a tangency.
+        const INTERIOR: [f64; 3] = [0.3, 0.5, 0.75];
+        /// Samples closer than this to a candidate, relative to the piece, say nothing.
+        const MARGIN: f64 = 1e-3;
+        let candidates = self.candidates()?;
+        let (Some(first), Some(last)) = (self.samples.first(), self.samples.last()) else {
+            return Ok(Verdict {
+                unstable_at_start: false,
+                changes: Vec::new(),
+            });
+        };
+        let ends: Vec<f64> = [first.at]
+            .into_iter()
+            .chain(candidates.iter().map(|c| c.at))
+            .chain([last.at])
+            .collect();
+
+        let mut probes: Vec<(Sample, bool)> = Vec::new();
+        for piece in ends.windows(2) {
+            let (start, width) = (piece[0], piece[1] - piece[0]);
+            if width <= SAME_ROOT * piece[0].abs().max(piece[1].abs()) {
+                continue;
+            }
+            let mut interior = Vec::with_capacity(INTERIOR.len());
+            for at in INTERIOR.map(|fraction| start + fraction * width) {
+                let next = self
+                    .samples
+                    .partition_point(|sample| sample.at < at)
+                    .min(self.samples.len() - 1);
+                let scale = Rc::clone(&self.samples[next].scale);
+                if at != 0.0 {
+                    interior.push(self.sample(at, &scale)?);
+                }
+            }
+            let verdicts: Vec<bool> = interior
+                .iter()
+                .filter_map(|sample| self.is_unstable(sample, LEAST_EXCESS))
+                .collect();
+            let unstable = verdicts.iter().filter(|&&unstable| unstable).count();
+            let margin = start + MARGIN * width..piece[1] - MARGIN * width;
+            let sampled = self
+                .samples
+                .iter()
+                .filter(|sample| margin.contains(&sample.at));
+            let mut here: Vec<(Sample, bool)> = sampled
+                .filter_map(|sample| {
+                    Some((sample.clone(), self.is_unstable(sample, LEAST_EXCESS)?))
+                })
+                .collect();
+            if !verdicts.is_empty() {
+                let majority = 2 * unstable > verdicts.len();
+                here.extend(interior.into_iter().map(|sample| (sample, majority)));
+            }
+            here.sort_by(|a, b| a.0.at.total_cmp(&b.0.at));
+            probes.extend(here);
+        }
+
+        let mut changes = Vec::new();
+        for pair in probes.windows(2) {
+            let [(left, left_unstable), (right, right_unstable)] = pair else {
+                continue;
+            };
+            if left_unstable == right_unstable {
+                continue;
+            }
+            let between = candidates
+                .iter()
+                .find(|c| c.is_root && left.at < c.at && c.at < right.at);
+            changes.push(match between {
+                Some(root) => root.at,
+                None => self.bisect(left, right, *left_unstable)?,
+            });
+        }
+        let unstable_at_start = probes.first().is_some_and(|&(_, unstable)| unstable);
+        // The probes are needed once more, for the largest radius.
+        self.samples
+            .extend(probes.into_iter().map(|(sample, _)| sample));
+        self.samples.sort_by(|a, b| a.at.total_cmp(&b.at));
+        self.samples.dedup_by(|a, b| a.at == b.at);
+        changes.retain(|&at| range.start < at && at < range.end);
+        Ok(Verdict {
+            unstable_at_start,
+            changes,
+        })
+    }
+
+    /// Where the class changes between two samples, for the ends at which no function changes its sign.
+    fn bisect(
+        &mut self,
+        left: &Sample,
+        right: &Sample,
+        left_unstable: bool,
+    ) -> Result<f64, IntervalError<E>> {
+        let (mut low, mut high) = (left.at, right.at);
+        loop {
+            let middle = f64::midpoint(low, high);
+            if !(low < middle && middle < high && high - low > 2.0 * f64::EPSILON * middle.abs()) {
+                return Ok(middle);
+            }
+            let sample = self.sample(middle, &left.scale)?;
+            if self.is_unstable(&sample, 0.0).unwrap_or(false) == left_unstable {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+    }
+
+    /// All roots and touching points, ascending, no two at one place.
+    fn candidates(&mut self) -> Result<Vec<Candidate>, IntervalError<E>> {
+        let count = self
+            .samples
+            .first()
+            .map_or(0, |sample| sample.functions.len());
+        let mut candidates: Vec<Candidate> = self
+            .touches
+            .iter()
+            .map(|&at| Candidate { at, is_root: false })
+            .collect();
+        for function in 0..count {
+            for (start, end) in self.brackets(function) {
+                candidates.push(self.polish(function, start, end)?);
+            }
+        }
+        candidates.sort_by(|a, b| a.at.total_cmp(&b.at));
+        candidates.dedup_by(|later, earlier| {
+            let is_same = later.at - earlier.at <= SAME_ROOT * later.at.abs();
+            if is_same && later.is_root && !earlier.is_root {
+                *earlier = *later;
+            }
+            is_same
+        });
+        Ok(candidates)
+    }
+
+    /// Neighbouring samples between which a function changes its sign, ignoring values that are round-off.
+    fn brackets(&self, function: usize) -> Vec<((f64, f64), (f64, f64))> {
+        let is_trusted = |sample: &Sample| {
+            let value = sample.functions[function].abs();
+            value > 0.0 && value > self.noise_of(sample, function)
+        };
+        let mut brackets = Vec::new();
+        let mut last: Option<&Sample> = None;
+        for sample in &self.samples {
+            let value = sample.functions[function];
+            match last {
+                Some(before)
+                    if (before.functions[function] > 0.0) == (value > 0.0) && value != 0.0 =>
+                {
+                    last = Some(sample);
+                }
+                _ if !is_trusted(sample) => {}
+                Some(before) => {
+                    brackets.push(((before.at, before.functions[function]), (sample.at, value)));
+                    last = Some(sample);
+                }
+                None => last = Some(sample),
+            }
+        }
+        brackets
+    }
+
+    /// The root of a function in a bracket, or the pole through which it changes its sign.
+    fn polish(
+        &mut self,
+        function: usize,
+        start: (f64, f64),
+        end: (f64, f64),
+    ) -> Result<Candidate, IntervalError<E>> {
+        let value_at = |search: &mut Self, at: f64| -> Result<f64, IntervalError<E>> {
+            let matrix = search.matrix_at(at)?;
+            let (functions, _) = search
+                .measure
+                .of(&matrix)
+                .ok_or(IntervalError::Eigenvalues { at })?;
+            Ok(functions[function])
+        };
+        let most = 10.0 * start.1.abs().max(end.1.abs());
+        let root = bracketed_root(
+            |at| {
+                let value = value_at(self, at).map_err(Stop::Failed)?;
+                if value.abs() > most {
+                    Err(Stop::Pole)
+                } else {
+                    Ok(value)
+                }
+            },
+            start,
+            end,
+        );
+        match root {
+            Ok(at) => return Ok(Candidate { at, is_root: true }),
+            Err(Stop::Failed(error)) => return Err(error),
+            Err(Stop::Pole) => {}
+        }
+        // No closer than needed: at the pole itself there is no matrix.
+        let (mut low, mut high) = (start.0, end.0);
+        while high - low > SHORTEST * low.abs().max(high.abs()) {
+            let middle = low + SPLIT * (high - low);
+            if (value_at(self, middle)? > 0.0) == (start.1 > 0.0) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Ok(Candidate {
+            at: f64::midpoint(low, high),
+            is_root: false,
+        })
+    }
+}

@@ -1,0 +1,113 @@
+//! Reference tables, and comparisons that say what differs.
+
+#![allow(dead_code)] // each test target uses its part
+
+use nalgebra::DMatrix;
+use serde_json::Value;
+
+/// A table of `tests/reference`.
+pub fn reference(name: &str) -> Value {
+    let path = format!("{}/tests/reference/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// A number of a table.
+pub fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+/// A list of a table.
+pub fn list(value: &Value) -> &[Value] {
+    value
+        .as_array()
+        .unwrap_or_else(|| panic!("{value} is not a list"))
+}
+
+/// A list of numbers.
+pub fn numbers(value: &Value) -> Vec<f64> {
+    list(value).iter().map(number).collect()
+}
+
+/// A count.
+pub fn count(value: &Value) -> usize {
+    value
+        .as_u64()
+        .and_then(|n| usize::try_from(n).ok())
+        .unwrap_or_else(|| panic!("{value} is not a count"))
+}
+
+/// A word.
+pub fn word(value: &Value) -> &str {
+    value
+        .as_str()
+        .unwrap_or_else(|| panic!("{value} is not a word"))
+}
+
+/// A matrix given by its rows.
+pub fn matrix(value: &Value) -> DMatrix<f64> {
+    let rows: Vec<Vec<f64>> = list(value).iter().map(numbers).collect();
+    DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j])
+}
+
+/// Every entry within `tolerance · max(1, |expected|)`.
+#[track_caller]
+pub fn assert_matrix(actual: &DMatrix<f64>, expected: &DMatrix<f64>, tolerance: f64, what: &str) {
+    assert_eq!(actual.shape(), expected.shape(), "{what}");
+    for i in 0..expected.nrows() {
+        for j in 0..expected.ncols() {
+            let (a, e) = (actual[(i, j)], expected[(i, j)]);
+            let error = (a - e).abs() / e.abs().max(1.0);
+            assert!(
+                error <= tolerance,
+                "{what}: entry ({i}, {j}) is {a:e}, expected {e:e}, error {error:.1e}"
+            );
+        }
+    }
+}
+
+/// Every entry within `tolerance`, absolutely.
+#[track_caller]
+pub fn assert_close(actual: &[f64], expected: &[f64], tolerance: f64, what: &str) {
+    assert_eq!(actual.len(), expected.len(), "{what}");
+    for (k, (a, e)) in actual.iter().zip(expected).enumerate() {
+        assert!(
+            (a - e).abs() <= tolerance,
+            "{what}: entry {k} is {a:e}, expected {e:e}, error {:.1e}",
+            (a - e).abs()
+        );
+    }
+}
+
+/// The largest difference of two lists.
+pub fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
+}
+
+/// The slope of log(error) against log(step) by least squares, over the points above `floor`.
+///
+/// # Panics
+/// Unless three points are above the floor: fewer say nothing about an order.
+#[track_caller]
+pub fn observed_order(points: &[(f64, f64)], floor: f64, what: &str) -> f64 {
+    let usable: Vec<(f64, f64)> = points
+        .iter()
+        .filter(|(_, error)| *error > floor)
+        .map(|(h, error)| (h.ln(), error.ln()))
+        .collect();
+    assert!(
+        usable.len() >= 3,
+        "{what}: only {} points above {floor:e}: {points:?}",
+        usable.len()
+    );
+    let n = usable.len() as f64;
+    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| usable.iter().map(f).sum::<f64>() / n;
+    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    let covariance = mean(&|p| (p.0 - x) * (p.1 - y));
+    covariance / mean(&|p| (p.0 - x).powi(2))
+}

@@ -1,0 +1,291 @@
+//! The compiled kernels against the interpreter: the same declaration once through `#[dynamics]` and once through the engine, evaluated on
+//! the same numbers. Both run the same program, so that they agree to the last bit; only `powi` may round differently.
+
+use tfe::Model;
+use tfe::prelude::dynamics;
+use tfe::runtime::{First, Second};
+use tfe_symbolic::compile::declare;
+use tfe_symbolic::context::{Context, Field, FieldKind, Length};
+use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::program::Request;
+
+/// The engine's side of a model: derived at run time from the text of the declaration.
+struct Oracle {
+    derivation: Derivation,
+    environment: Environment,
+}
+
+impl Oracle {
+    /// Fields as name, type and values; sizes as name and value.
+    fn new(text: &str, fields: &[(&str, &str, &[f64])], sizes: &[(&str, i64)]) -> Self {
+        let context = Context {
+            struct_name: "Oracle".to_owned(),
+            fields: fields
+                .iter()
+                .map(|(name, kind, _)| field(name, kind))
+                .collect(),
+            const_parameters: sizes.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        };
+        let declared =
+            declare(text, &context).unwrap_or_else(|mistakes| panic!("{text}\n{mistakes:#?}"));
+        let mut environment = Environment::default();
+        for (name, kind, values) in fields {
+            if *kind == "f64" {
+                environment.parameters.insert((*name).to_owned(), values[0]);
+            } else {
+                environment
+                    .arrays
+                    .insert((*name).to_owned(), values.to_vec());
+            }
+        }
+        environment.sizes = sizes
+            .iter()
+            .map(|(name, size)| ((*name).to_owned(), *size))
+            .collect();
+        Self {
+            derivation: Derivation::of(&declared),
+            environment,
+        }
+    }
+
+    fn run(&self, request: Request) -> Results {
+        let program = self.derivation.program(request);
+        interpret(&program, &self.environment).unwrap_or_else(|error| panic!("{error}\n{program}"))
+    }
+}
+
+/// `f64`, `[f64; 3]` or `[f64; N]`.
+fn field(name: &str, kind: &str) -> Field {
+    let length = kind
+        .strip_prefix("[f64;")
+        .and_then(|rest| rest.strip_suffix(']'))
+        .map(str::trim);
+    let kind = match length {
+        None => FieldKind::Scalar,
+        Some(length) => FieldKind::Array(match length.parse() {
+            Ok(number) => Length::Literal(number),
+            Err(_) => Length::ConstParameter(length.to_owned()),
+        }),
+    };
+    Field {
+        name: name.to_owned(),
+        kind,
+    }
+}
+
+/// The values of a field.
+trait Values {
+    fn values(&self) -> &[f64];
+}
+
+impl Values for f64 {
+    fn values(&self) -> &[f64] {
+        std::slice::from_ref(self)
+    }
+}
+
+impl<const K: usize> Values for [f64; K] {
+    fn values(&self) -> &[f64] {
+        self
+    }
+}
+
+/// Compares all kernels of a model at a few points.
+fn compare<M: Model<N>, const N: usize>(model: &M, mut oracle: Oracle) {
+    // Numbers in (0.15, 0.85) that follow no pattern: multiples of the golden ratio modulo one.
+    let mut state = 0.5_f64;
+    let mut next = || {
+        state = (state + 0.618_033_988_749_894_9).fract();
+        0.15 + 0.7 * state
+    };
+    for sign in [1.0, -1.0, 1.0, -1.0, 1.0] {
+        let t = next();
+        let q: [f64; N] = std::array::from_fn(|_| sign * next());
+        let z: [f64; N] = std::array::from_fn(|k| if k % 2 == 0 { next() } else { -next() });
+        oracle.environment.time = t;
+        oracle.environment.q = q.to_vec();
+        oracle.environment.z = z.to_vec();
+
+        let value = oracle
+            .run(Request {
+                value: true,
+                ..Request::default()
+            })
+            .value;
+        same("value", model.energy_function(t, &q, &z), value);
+
+        let mut first = First::<f64, N>::ZERO;
+        model.first(t, &q, &z, &mut first);
+        let expected = oracle.run(Request {
+            first: true,
+            ..Request::default()
+        });
+        firsts(&first, &expected);
+
+        let (mut first, mut mass) = (First::<f64, N>::ZERO, [[0.0; N]; N]);
+        model.first_and_mass(t, &q, &z, &mut first, &mut mass);
+        let expected = oracle.run(Request {
+            first: true,
+            mass: true,
+            ..Request::default()
+        });
+        firsts(&first, &expected);
+        block("mass", &mass, &expected.zz);
+
+        let (mut first, mut second) = (First::<f64, N>::ZERO, Second::<f64, N>::ZERO);
+        model.second(t, &q, &z, &mut first, &mut second);
+        let expected = oracle.run(Request {
+            first: true,
+            second: true,
+            ..Request::default()
+        });
+        firsts(&first, &expected);
+        block("zz", &second.zz, &expected.zz);
+        block("zq", &second.zq, &expected.zq);
+        block("qq", &second.qq, &expected.qq);
+        block("force_z", &second.force_z, &expected.force_z);
+        block("force_q", &second.force_q, &expected.force_q);
+
+        let mut values = vec![0.0; M::OBSERVABLES.len()];
+        model.observables(t, &q, &z, &mut values);
+        let expected = oracle.run(Request {
+            observables: true,
+            ..Request::default()
+        });
+        vector("observables", &values, &expected.observables);
+    }
+}
+
+#[track_caller]
+fn firsts<const N: usize>(first: &First<f64, N>, expected: &Results) {
+    vector("z", &first.z, &expected.z);
+    vector("q", &first.q, &expected.q);
+    vector("force", &first.force, &expected.force);
+}
+
+#[track_caller]
+fn block<const N: usize>(name: &str, block: &[[f64; N]; N], expected: &[Vec<f64>]) {
+    assert_eq!(N, expected.len());
+    for (row, expected) in block.iter().zip(expected) {
+        vector(name, row, expected);
+    }
+}
+
+#[track_caller]
+fn vector(name: &str, vector: &[f64], expected: &[f64]) {
+    assert_eq!(vector.len(), expected.len(), "{name}");
+    for (compiled, interpreted) in vector.iter().zip(expected) {
+        same(name, *compiled, *interpreted);
+    }
+}
+
+/// Finite, so that a comparison says something, and equal.
+#[track_caller]
+fn same(name: &str, compiled: f64, interpreted: f64) {
+    assert!(interpreted.is_finite(), "{name}: {interpreted}");
+    assert_eq!(compiled, interpreted, "{name}");
+}
+
+/// One model, declared twice from the same tokens.
+macro_rules! agrees {
+    (
+        $test:ident: [f64; $dof:literal]
+        struct $(<const $size:ident: usize = $length:literal>)? { $($field:ident: $type:ty = $value:expr),* $(,)? }
+        $($arguments:tt)*
+    ) => {
+        #[test]
+        fn $test() {
+            #[dynamics($($arguments)*)]
+            struct Declared $(<const $size: usize>)? {
+                $($field: $type),*
+            }
+            let model: Declared $(<$length>)? = Declared { $($field: $value),* };
+            let fields: &[(&str, &str, &[f64])] = &[$((stringify!($field), stringify!($type), model.$field.values())),*];
+            let sizes: &[(&str, i64)] = &[$((stringify!($size), $length))?];
+            compare::<_, $dof>(&model, Oracle::new(stringify!($($arguments)*), fields, sizes));
+        }
+    };
+}
+
+agrees! { double_pendulum: [f64; 2]
+    struct { m1: f64 = 1.3, m2: f64 = 0.7, l1: f64 = 1.1, l2: f64 = 0.9, g: f64 = 9.81, c: f64 = 0.2 }
+    coordinates(theta1, theta2),
+    let x1 = l1*sin(theta1),
+    let y1 = -l1*cos(theta1),
+    let x2 = x1 + l2*sin(theta2),
+    let y2 = y1 - l2*cos(theta2),
+    lagrangian = m1/2*(dot(x1)^2 + dot(y1)^2) + m2/2*(dot(x2)^2 + dot(y2)^2) - g*(m1*y1 + m2*y2),
+    force(theta1) = -c*dot(theta1)*abs(dot(theta1)),
+    dissipation = c/2*(dot(theta2) - dot(theta1))^2,
+    output(tip) = x2,
+    output(tip_speed) = sqrt(dot(x2)^2 + dot(y2)^2),
+}
+
+agrees! { henon_heiles: [f64; 2]
+    struct { lambda: f64 = 0.8 }
+    coordinates(x, y),
+    momenta(px, py),
+    hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + lambda*(x^2*y - y^3/3),
+    force(x) = -lambda*px + cos(t),
+    output(angular_momentum) = x*py - y*px,
+}
+
+agrees! { trigonometric: [f64; 2]
+    struct { k: f64 = 1.7 }
+    coordinates(x, y),
+    lagrangian = dot(x)^2/2 + exp(x)*dot(y)^2/2 - k*(sin(x*y) + cos(x) + tan(x/2) + asin(x/3) + acos(y/2) + atan(x - 2*y) + atan2(y, 3 + x)),
+    output(a) = sin(2*x)*tan(y) + asin(y)*acos(x) + atan(k*x) + atan2(x, y),
+}
+
+agrees! { hyperbolic: [f64; 2]
+    struct { k: f64 = 0.4 }
+    coordinates(x, y),
+    lagrangian = cosh(x)*dot(x)^2/2 + dot(y)^2/2 - k*(sinh(x*y) + tanh(x + y) + asinh(y) + acosh(2 + x*y) + atanh(x/2)),
+    output(a) = sinh(x)*cosh(y) + tanh(dot(x)) + asinh(x) + acosh(1 + x^2) + atanh(y),
+}
+
+agrees! { powers_and_logarithms: [f64; 2]
+    struct { k: f64 = 1.5, e: f64 = 2.5 }
+    coordinates(x, y),
+    lagrangian = (1 + x^2)*dot(x)^2/2 + dot(y)^4/12 + dot(y)^2 - k*(exp(-x) + ln(2 + y) + sqrt(3 + x*y) + hypot(x, y) + (2 + x)^e)
+        - x^7/7 - (1 + y^2)^(-3) - (2 + y)^(3/2) - 1/(3 + x),
+    force(y) = -y^11 + x^(-5)*exp(t),
+    output(a) = k^(1/3) + (x^2 + 1)^(2/3) + hypot(dot(x), dot(y)) + x^23,
+}
+
+agrees! { kinks: [f64; 2]
+    struct { k: f64 = 20.0, mu: f64 = 0.3 }
+    coordinates(x, y),
+    lagrangian = dot(x)^2/2 + dot(y)^2/2 - select(x < 0.1, k/2*(x - 0.1)^2, y^2*x) - select(y >= x, y^3, x*y) - max(x, y)^2*min(x, 2*y)/2 - abs(x*y),
+    force(x) = -mu*sign(dot(x)) - select(dot(x) > 0.5, dot(x)^2, 0.5*dot(x)) + select(t <= 0.4, t, 0.4),
+    output(a) = select(x < y, sign(x), min(dot(x), dot(y))) + max(x, 0),
+}
+
+agrees! { chain_of_any_length: [f64; 5]
+    struct <const N: usize = 5> { m: [f64; N] = [1.0, 1.2, 0.8, 1.1, 0.9], k: f64 = 2.0, a: f64 = 0.3, c: f64 = 0.1, omega: f64 = 1.4 }
+    coordinates(q[N]),
+    lagrangian = sum(i in 0..N, m[i]/2*dot(q[i])^2) - sum(i in 0..N-1, k/2*(q[i+1] - q[i])^2 + a/4*(q[i+1] - q[i])^4)
+        - sum(i in 0..N, (i + 1)*cos(q[i])),
+    force(q[i]) = -c*dot(q[i])^3,
+    force(q[N-1]) = sin(omega*t),
+    output(extension) = q[N-1] - q[0],
+    output(kinetic) = sum(i in 0..N, m[i]/2*dot(q[i])^2),
+}
+
+agrees! { all_to_all: [f64; 6]
+    struct <const N: usize = 6> { k: f64 = 0.7 }
+    coordinates(q[N]),
+    momenta(p[N]),
+    hamiltonian = sum(i in 0..N, p[i]^2/2) - k/(2*N)*sum(i in 0..N, sum(j in 0..N, cos(q[i] - q[j]))),
+    output(order) = sqrt(sum(i in 0..N, cos(q[i]))^2 + sum(i in 0..N, sin(q[i]))^2)/N,
+}
+
+agrees! { rigid_body: [f64; 7]
+    struct { j: [f64; 3] = [1.0, 2.0, 3.0], m: f64 = 1.5, g: f64 = 9.81, d: [f64; 3] = [0.1, 0.2, 0.3] }
+    coordinates(r[3], e[4]),
+    let w = body_rate(e),
+    lagrangian = m/2*inner(dot(r), dot(r)) + (j[0]*w[0]^2 + j[1]*w[1]^2 + j[2]*w[2]^2)/2 + m/2*inner(dot(e), dot(e)) - m*g*(r + rotate(e, d))[2],
+    output(spin) = norm(w),
+    output(momentum) = cross(r, m*dot(r))[1],
+}

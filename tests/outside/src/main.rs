@@ -1,0 +1,164 @@
+//! What a user writes, in a crate that depends on nothing but `tfe`.
+
+use tfe::prelude::*;
+
+/// A double pendulum of two point masses; angles from the downward vertical, SI units.
+#[dynamics(
+    coordinates(theta1, theta2),
+    let x1 = l1 * sin(theta1),
+    let y1 = -l1 * cos(theta1),
+    let x2 = x1 + l2 * sin(theta2),
+    let y2 = y1 - l2 * cos(theta2),
+    lagrangian = m1/2 * (dot(x1)^2 + dot(y1)^2) + m2/2 * (dot(x2)^2 + dot(y2)^2) - g * (m1*y1 + m2*y2),
+    force(theta1) = -c * dot(theta1),
+    output(tip_x) = x2,
+)]
+#[derive(Clone, Debug)]
+struct DoublePendulum {
+    m1: f64,
+    m2: f64,
+    l1: f64,
+    l2: f64,
+    g: f64,
+    c: f64,
+}
+
+#[dynamics(coordinates(x, y), momenta(px, py),
+           hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + lambda*(x^2*y - y^3/3))]
+struct HenonHeiles {
+    lambda: f64,
+}
+
+#[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2, dissipation = c/2*dot(x)^2,
+           solver(FastOscillator, Mixed::<4>))]
+struct Oscillator {
+    m: f64,
+    k: f64,
+    c: f64,
+}
+
+/// Fixed ends, any number of masses known at compile time.
+#[dynamics(coordinates(q[N]),
+           lagrangian = sum(i in 0..N, m/2*dot(q[i])^2) - sum(i in 0..N-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3)
+                      - k/2*(q[0]^2 + q[N-1]^2))]
+struct Chain<const N: usize> {
+    m: f64,
+    k: f64,
+    a: f64,
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let pendulum = DoublePendulum {
+        m1: 1.0,
+        m2: 1.0,
+        l1: 1.0,
+        l2: 1.0,
+        g: 9.81,
+        c: 0.0,
+    };
+    let start = pendulum.state([0.5, -0.3], [0.0, 0.0]);
+    let motion = Simulation::new(&pendulum)
+        .element(Mixed::<4>)
+        .step(0.01)
+        .run(start, 0.0..10.0)?;
+    let end = motion.last();
+    let between = motion.at(3.7)?;
+    println!(
+        "t = {}: q = {:?}, p = {:?}; at 3.7: {:?}",
+        end.t, end.q, end.p, between.q
+    );
+    println!(
+        "energy error {:.1e}, {} Newton iterations",
+        motion.energy_error(),
+        motion.statistics().iterations
+    );
+    let file = std::env::temp_dir().join("tfe-outside-pendulum.csv");
+    motion.write_csv(&file)?;
+    assert!((end.q[0] + 0.1075423326224).abs() < 1e-9 && (end.q[1] - 0.3879371483853).abs() < 1e-9);
+
+    for element in [
+        Primal::<3>.into(),
+        Primal::<3>.reduced(),
+        Primal::<3>.lobatto(),
+        Primal::<3>.quadrature(5),
+        Mixed::<3>.into(),
+        Mixed::<3>.quadrature(4),
+        EnergyConserving::<3>.into(),
+        Radau::<3>.into(),
+        Element::mixed(5),
+        Element::primal(4),
+    ] {
+        let motion = Simulation::new(&pendulum)
+            .element(element)
+            .step(0.005)
+            .tolerance(1e-14)
+            .max_iterations(50)
+            .solver(Solve::Auto)
+            .record_every(10)
+            .run(start, 0.0..1.0)?;
+        println!("{element}: {:?}", motion.last().q);
+    }
+
+    let galaxy = HenonHeiles { lambda: 1.0 };
+    let motion = Simulation::new(&galaxy)
+        .element(Primal::<4>)
+        .step(0.05)
+        .run(
+            State {
+                q: [0.1, 0.0],
+                p: [0.0, 0.5],
+            },
+            0.0..100.0,
+        )?;
+    assert!((motion.last().q[0] + 0.040194237876068817).abs() < 1e-6);
+
+    let oscillator = Oscillator {
+        m: 1.0,
+        k: 4.0,
+        c: 0.1,
+    };
+    let mut state = oscillator.state([1.0], [0.0]);
+    let mut solver = FastOscillator::new(&oscillator, 0.1);
+    for _ in 0..100 {
+        solver.advance(&mut state)?;
+    }
+    let generic = Simulation::new(&oscillator)
+        .element(Mixed::<4>)
+        .step(0.1)
+        .run(oscillator.state([1.0], [0.0]), 0.0..10.0)?;
+    assert!((generic.last().q[0] - state.q[0]).abs() < 1e-13);
+    println!("emitted solver: {} bytes", FastOscillator::BYTES);
+
+    let chain = Chain::<20> {
+        m: 1.0,
+        k: 1.0,
+        a: 0.25,
+    };
+    let mut q = [0.0; 20];
+    q[3] = 0.5;
+    let motion = Simulation::new(&chain)
+        .step(0.1)
+        .run(chain.state(q, [0.0; 20]), 0.0..10.0)?;
+    println!("chain: energy error {:.1e}", motion.energy_error());
+
+    let last = Simulation::new(&pendulum)
+        .step(0.01)
+        .steps(start, 0.0)
+        .take(1000)
+        .last();
+    println!(
+        "thousandth step: {:?}",
+        last.transpose()?.map(|node| node.t)
+    );
+
+    let a = stability::transition_matrix(
+        &oscillator,
+        Primal::<3>,
+        &oscillator.state([0.0], [0.0]),
+        0.0,
+        0.5,
+    )?;
+    println!("spectral radius {}", stability::spectral_radius(&a));
+    println!("{}", DoublePendulum::structure());
+    Ok(())
+}

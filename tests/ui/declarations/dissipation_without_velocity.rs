@@ -1,0 +1,12 @@
+//! A Rayleigh function of coordinates only.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2,
+    dissipation = x^2,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

@@ -1,0 +1,11 @@
+//! Type parameters are no parameters of a model.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2,
+)]
+struct Model<T> { m: f64, k: f64, x: T }
+
+fn main() {}

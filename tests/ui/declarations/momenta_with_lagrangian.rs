@@ -1,0 +1,12 @@
+//! A Lagrangian has velocities.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    momenta(p),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

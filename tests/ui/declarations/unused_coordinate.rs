@@ -1,0 +1,11 @@
+//! A coordinate that the energy does not know.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

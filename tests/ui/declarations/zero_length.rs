@@ -1,0 +1,11 @@
+//! An array without elements.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x, q[0]),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

@@ -1,0 +1,11 @@
+//! A name like no other.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2 - stiffness*x,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

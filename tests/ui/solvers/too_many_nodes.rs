@@ -1,0 +1,12 @@
+//! Elements have 2 to 12 nodes.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2,
+    solver(Fast, Mixed::<40>),
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

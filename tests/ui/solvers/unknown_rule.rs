@@ -1,0 +1,12 @@
+//! A misspelt rule.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2,
+    solver(Fast, Primal::<4>.lobato()),
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

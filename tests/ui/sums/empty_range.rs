@@ -1,0 +1,11 @@
+//! A sum over nothing.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(q[3]),
+    lagrangian = sum(i in 0..3, m/2*dot(q[i])^2) - k*sum(i in 2..2, q[i]),
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

@@ -1,0 +1,11 @@
+//! Indices are integers.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(q[3]),
+    lagrangian = sum(i in 0..3, m/2*dot(q[i])^2) - k*q[0.5],
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

@@ -1,0 +1,11 @@
+//! A long sum inside a root.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(q[N]),
+    lagrangian = sum(i in 0..N, m/2*dot(q[i])^2) - k*sqrt(sum(i in 0..N, q[i]^2)),
+)]
+struct Model<const N: usize> { m: f64, k: f64 }
+
+fn main() {}

@@ -1,0 +1,11 @@
+//! An operator with nothing behind it.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k/2*,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

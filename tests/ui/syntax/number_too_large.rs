@@ -1,0 +1,11 @@
+//! A number beyond `f64`.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2*1e999,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

@@ -1,0 +1,11 @@
+//! A misspelt argument.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrange = m/2*dot(x)^2 - k/2*x^2,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

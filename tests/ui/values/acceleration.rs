@@ -1,0 +1,11 @@
+//! A Lagrangian has no accelerations.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(dot(x))^2 - k/2*x^2,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

@@ -1,0 +1,11 @@
+//! Division by a literal zero.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k/0*x^2,
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

@@ -1,0 +1,11 @@
+//! A vector has components.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(r[3]),
+    lagrangian = m/2*inner(dot(r), dot(r)) - k*norm([]),
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

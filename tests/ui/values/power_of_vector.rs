@@ -1,0 +1,11 @@
+//! A power of a vector is ambiguous.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(r[3]),
+    lagrangian = m/2*dot(r)^2 - k*r[0],
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

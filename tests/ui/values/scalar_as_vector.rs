@@ -1,0 +1,11 @@
+//! `norm` wants a vector.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k*norm(x),
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

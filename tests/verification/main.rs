@@ -1,0 +1,13 @@
+//! Does it do what the theory says? Orders on nonlinear scenes, invariants, equivalences.
+
+#![allow(missing_docs)] // what models and helpers mean is said where they are
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod declarations;
+mod equivalences;
+mod invariants;
+mod models;
+mod runs;
+mod trajectories;

@@ -1,0 +1,383 @@
+//! Runs: ends, dense output, files, impulses, failures.
+
+use crate::common::{assert_close, observed_order};
+use crate::models::{DoublePendulum, Pendulum};
+use tfe::prelude::*;
+use tfe::{AtError, RunErrorKind, StepError};
+
+#[test]
+fn the_end_is_the_end() {
+    let model = Pendulum { k: 1.0 };
+    let start = model.state([1.0], [0.0]);
+    for (span, step) in [
+        (0.0..1.0, 0.3),
+        (0.0..10.0, 0.01),
+        (-1.0..0.5, 0.2),
+        (2.0..1.0, 0.3),
+    ] {
+        let motion = Simulation::new(&model)
+            .step(step)
+            .run(start, span.clone())
+            .expect("a run");
+        assert_eq!(motion.states()[0].t, span.start);
+        assert_eq!(motion.last().t.to_bits(), span.end.to_bits());
+    }
+    let still = Simulation::new(&model)
+        .step(0.1)
+        .run(start, 3.0..3.0)
+        .expect("an empty span");
+    assert_eq!((still.states().len(), still.last().q), (1, start.q));
+}
+
+#[test]
+fn dense_output_is_continuous_and_accurate() {
+    let model = DoublePendulum::UNIT;
+    let start = model.state([0.5, -0.3], [0.0, 0.0]);
+    let fine = Simulation::new(&model)
+        .element(Mixed::<8>)
+        .step(0.005)
+        .run(start, 0.0..1.0)
+        .expect("the reference");
+    for element in [
+        Element::mixed(3),
+        Element::mixed(4),
+        Element::primal(3),
+        Element::primal(4).lobatto(),
+        Element::mixed(3).quadrature(4),
+        Element::energy_conserving(3),
+        Element::radau(4),
+    ] {
+        let error = |step: f64| {
+            let motion = Simulation::new(&model)
+                .element(element)
+                .step(step)
+                .run(start, 0.0..1.0)
+                .expect("a motion");
+            for node in &motion.states()[1..motion.states().len() - 1] {
+                for side in [-1e-12, 1e-12] {
+                    let near = motion.at(node.t + side).expect("inside");
+                    // |q̇| < 4 and |ṗ| < 40 over 1e-12, and roundings of sums of stages.
+                    assert_close(
+                        &near.q,
+                        &node.q,
+                        3e-11,
+                        &format!("{element}: q at {}", node.t),
+                    );
+                    assert_close(
+                        &near.p,
+                        &node.p,
+                        3e-10,
+                        &format!("{element}: p at {}", node.t),
+                    );
+                }
+            }
+            (0..=37)
+                .map(|k| f64::from(k) / 37.0)
+                .map(|t| {
+                    let (a, b) = (
+                        motion.at(t).expect("inside").q,
+                        fine.at(t).expect("inside").q,
+                    );
+                    (a[0] - b[0]).hypot(a[1] - b[1])
+                })
+                .fold(0.0, f64::max)
+        };
+        let points: Vec<_> = [0.1, 0.05, 0.025].map(|step| (step, error(step))).into();
+        let order = observed_order(&points, 1e-13, "dense output");
+        // A polynomial of degree n − 1 is right to order n between nodes (Radau and the projections one less).
+        assert!(
+            order > element.nodes() as f64 - 1.4,
+            "{element}: dense output of order {order:.2}: {points:?}"
+        );
+    }
+}
+
+#[test]
+fn outside_the_motion_and_between_recorded_nodes() {
+    let model = Pendulum { k: 1.0 };
+    let start = model.state([1.0], [0.0]);
+    let motion = Simulation::new(&model)
+        .step(0.1)
+        .run(start, 0.0..1.0)
+        .expect("a run");
+    assert!(matches!(motion.at(1.5), Err(AtError::Outside { .. })));
+    assert!(matches!(motion.at(f64::NAN), Err(AtError::Outside { .. })));
+    let sparse = Simulation::new(&model)
+        .step(0.1)
+        .record_every(4)
+        .run(start, 0.0..1.0)
+        .expect("a run");
+    let times: Vec<f64> = sparse.states().iter().map(|node| node.t).collect();
+    assert_close(&times, &[0.0, 0.4, 0.8, 1.0], 1e-15, "recorded times");
+    assert_eq!(
+        sparse.at(0.4).expect("recorded").q,
+        motion.at(0.4).expect("recorded").q
+    );
+    assert!(matches!(sparse.at(0.5), Err(AtError::NotRecorded { .. })));
+    let back = Simulation::new(&model)
+        .step(0.1)
+        .run(motion.last().state(), 1.0..0.0)
+        .expect("backward");
+    assert_close(
+        &back.at(0.55).expect("inside").q,
+        &motion.at(0.55).expect("inside").q,
+        1e-7,
+        "backward dense output",
+    );
+}
+
+#[test]
+fn csv_reads_back_exactly() {
+    let model = DoublePendulum::UNIT;
+    let motion = Simulation::new(&model)
+        .step(0.1)
+        .run(model.state([0.5, -0.3], [0.0, 0.0]), 0.0..1.0)
+        .expect("a run");
+    let path = std::env::temp_dir().join(format!("tfe-csv-{}.csv", std::process::id()));
+    motion.write_csv(&path).expect("a writable folder");
+    let text = std::fs::read_to_string(&path).expect("the file just written");
+    std::fs::remove_file(&path).expect("the file just read");
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next(),
+        Some("t,theta1,theta2,theta1_dot,theta2_dot,p_theta1,p_theta2,energy,tip_x,tip_y")
+    );
+    let rows: Vec<Vec<f64>> = lines
+        .map(|line| {
+            line.split(',')
+                .map(|cell| cell.parse().expect("a number"))
+                .collect()
+        })
+        .collect();
+    assert_eq!(rows.len(), 11);
+    for (row, node) in rows.iter().zip(motion.states()) {
+        assert_eq!(
+            (row[0], &row[1..3], &row[5..7]),
+            (node.t, &node.q[..], &node.p[..])
+        );
+        assert_eq!(row[8], model.tip_x(node.t, node.q, [row[3], row[4]]));
+    }
+    assert_eq!(
+        motion.outputs().column("tip_y").expect("declared").len(),
+        11
+    );
+    assert!(motion.outputs().column("tip_z").is_none());
+}
+
+#[test]
+fn steps_are_the_nodes_of_a_run() {
+    let model = Pendulum { k: 1.0 };
+    let start = model.state([1.0], [0.0]);
+    let simulation = Simulation::new(&model).step(0.25);
+    let motion = simulation.run(start, 0.0..25.0).expect("a run");
+    let mut steps = simulation.steps(start, 0.0);
+    for node in &motion.states()[1..] {
+        assert_eq!(steps.next().expect("endless").expect("a good step"), *node);
+    }
+    assert_eq!(steps.statistics().steps, motion.statistics().steps);
+    let mut broken = Simulation::new(&model).step(f64::NAN).steps(start, 0.0);
+    assert!(matches!(
+        broken.next(),
+        Some(Err(RunErrorKind::Step { .. }))
+    ));
+    assert!(broken.next().is_none());
+}
+
+/// A free particle and a linear force that is a sum of impulses in the limit: an impulse in the middle of an element is weighted exactly.
+#[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2)]
+struct Free {
+    m: f64,
+}
+
+#[test]
+fn impulses_change_momentum_and_are_weighted_inside_elements() {
+    let model = Free { m: 2.0 };
+    let start = model.state([1.0], [0.5]);
+    for element in [
+        Element::primal(2),
+        Element::primal(3),
+        Element::primal(4).lobatto(),
+        Element::mixed(2),
+        Element::mixed(4),
+        Element::energy_conserving(3),
+        Element::radau(3),
+    ] {
+        for time in [0.0, 0.1, 0.25, 0.3, 0.4, 1.0] {
+            let motion = Simulation::new(&model)
+                .element(element)
+                .step(0.1)
+                .impulse(time, [0.7])
+                .run(start, 0.0..1.0)
+                .expect("a run");
+            let end = motion.last();
+            assert!(
+                (end.p[0] - 1.7).abs() < 1e-14,
+                "{element}, impulse at {time}: p = {}",
+                end.p[0]
+            );
+            let exact = 1.0 + 0.5 + 0.7 / 2.0 * (1.0 - time);
+            let error = end.q[0] - exact;
+            // Test functions that contain the linear ones put the position exactly where the motion with the jump ends. The two-node mixed
+            // element and the elements that test with less see the impulse spread over the element: q off by at most J h / 2m.
+            let exact_weights =
+                matches!(element.family(), tfe::Family::Primal | tfe::Family::Mixed);
+            let allowed = if exact_weights {
+                1e-14
+            } else {
+                0.7 * 0.1 / 2.0
+            };
+            assert!(
+                error.abs() < allowed,
+                "{element}, impulse at {time}: q off by {error:e}"
+            );
+        }
+    }
+}
+
+#[test]
+fn breaks_restore_the_order_across_a_jump_of_the_force() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - x^4/4, force(x) = select(t < 1/3, 1, -2))]
+    struct Switched {}
+    let model = Switched {};
+    let start = model.state([0.2], [0.0]);
+    let run = |step: f64, element: Element| {
+        Simulation::new(&model)
+            .element(element)
+            .step(step)
+            .break_at(1.0 / 3.0)
+            .run(start, 0.0..1.0)
+            .expect("a run")
+            .last()
+            .q[0]
+    };
+    let reference = run(0.01, Element::mixed(8));
+    let points: Vec<_> = [0.2, 0.1, 0.05]
+        .map(|h| (h, (run(h, Element::mixed(3)) - reference).abs()))
+        .into();
+    let order = observed_order(&points, 1e-14, "switched force");
+    assert!(order > 3.4, "order {order:.2}: {points:?}");
+}
+
+#[test]
+fn a_run_that_fails_says_where_and_keeps_the_motion() {
+    // x falls from one, at rest, to zero at t = ∫ dx/√(4 − 4√x) = 4/3, where the root ends.
+    #[dynamics(coordinates(x), momenta(p), hamiltonian = p^2/2 + 2*sqrt(x))]
+    struct Fall {}
+    let error = Simulation::new(&Fall {})
+        .element(Mixed::<3>)
+        .step(0.01)
+        .run(State { q: [1.0], p: [0.0] }, 0.0..3.0)
+        .expect_err("there is nothing beyond zero");
+    let RunErrorKind::Solve { element, time, .. } = error.kind() else {
+        panic!("{error}")
+    };
+    let partial = error.partial();
+    assert_eq!(partial.last().t, *time);
+    assert_eq!(partial.states().len(), element + 1);
+    assert!(*time > 1.3 && *time < 1.34, "{error}");
+    assert!(
+        partial
+            .states()
+            .iter()
+            .all(|node| node.q[0].is_finite() && node.p[0].is_finite())
+    );
+    assert!(error.to_string().contains("t ="), "{error}");
+}
+
+#[test]
+fn bad_arguments_are_errors() {
+    let model = Pendulum { k: 1.0 };
+    let start = model.state([1.0], [0.0]);
+    let kind = |simulation: Simulation<'_, Pendulum, 1>, start, span| {
+        simulation
+            .run(start, span)
+            .err()
+            .map(|error| error.kind().clone())
+    };
+    let simulation = || Simulation::new(&model).step(0.1);
+    assert!(matches!(
+        kind(simulation().element(Element::mixed(1)), start, 0.0..1.0),
+        Some(RunErrorKind::Element(_))
+    ));
+    assert!(matches!(
+        kind(simulation().element(Element::mixed(13)), start, 0.0..1.0),
+        Some(RunErrorKind::Element(_))
+    ));
+    assert!(matches!(
+        kind(
+            simulation().element(Element::primal(4).quadrature(1)),
+            start,
+            0.0..1.0
+        ),
+        Some(RunErrorKind::Element(_))
+    ));
+    assert!(matches!(
+        kind(simulation().step(0.0), start, 0.0..1.0),
+        Some(RunErrorKind::Step { .. })
+    ));
+    assert!(matches!(
+        kind(simulation(), start, 0.0..f64::NAN),
+        Some(RunErrorKind::Span { .. })
+    ));
+    let never = simulation()
+        .step(0.0)
+        .run(start, 0.0..1.0)
+        .expect_err("no step");
+    assert_eq!(
+        (never.partial().states().len(), never.partial().last().q),
+        (1, start.q)
+    );
+    let nowhere = State {
+        q: [f64::NAN],
+        p: [0.0],
+    };
+    assert!(matches!(
+        kind(simulation(), nowhere, 0.0..1.0),
+        Some(RunErrorKind::Start { coordinate: 0, .. })
+    ));
+    assert!(matches!(
+        kind(simulation().impulse(2.0, [1.0]), start, 0.0..1.0),
+        Some(RunErrorKind::Impulse { .. })
+    ));
+}
+
+#[test]
+fn too_few_iterations_are_an_error_with_the_residual() {
+    let model = DoublePendulum::UNIT;
+    let start = model.state([2.0, 1.0], [1.0, 0.0]);
+    let error = Simulation::new(&model)
+        .element(Mixed::<4>)
+        .step(0.1)
+        .max_iterations(1)
+        .run(start, 0.0..1.0)
+        .expect_err("one iteration is not enough");
+    let RunErrorKind::Solve {
+        element: 0, source, ..
+    } = error.kind()
+    else {
+        panic!("{error}")
+    };
+    assert!(
+        matches!(source, StepError::NewtonStalled { .. }),
+        "{source:?}"
+    );
+}
+
+#[test]
+fn a_singular_tangent_is_an_error() {
+    // ∂²L/∂v² vanishes at v = 0.
+    #[dynamics(coordinates(x), lagrangian = dot(x)^4/4 - x^2/2)]
+    struct Degenerate {}
+    let model = Degenerate {};
+    let result = Simulation::new(&model)
+        .step(0.1)
+        .run(model.state([0.0], [0.0]), 0.0..1.0);
+    // At rest in the equilibrium the motion stays there, or the tangent is found singular; never a NaN.
+    match result {
+        Ok(motion) => assert!(motion.states().iter().all(|node| node.q[0].is_finite())),
+        Err(error) => assert!(
+            matches!(error.kind(), RunErrorKind::Solve { .. }),
+            "{error}"
+        ),
+    }
+}
