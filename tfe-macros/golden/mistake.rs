@@ -76,9 +76,9 @@ impl Fast {
     fn statistics(&self) -> &::tfe::__private::Statistics {
         &::tfe::__private::Statistics::NONE
     }
-    fn advance(
+    fn advance<const __DOF: usize>(
         &mut self,
-        _: &mut ::tfe::__private::State<1>,
+        _: &mut ::tfe::__private::State<__DOF>,
     ) -> ::core::result::Result<(), ::tfe::__private::StepError> {
         ::core::result::Result::Ok(())
     }

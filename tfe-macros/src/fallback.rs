@@ -56,7 +56,7 @@ pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
     let solvers = guess
         .solvers
         .iter()
-        .map(|solver| solver_stub(solver, item, path, dof));
+        .map(|solver| solver_stub(solver, item, path));
     quote! {
         const _: () = {
             use #path::__private as __tfe;
@@ -127,13 +127,8 @@ pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
     }
 }
 
-/// A stepper that does nothing.
-fn solver_stub(
-    solver: &Ident,
-    item: &DeriveInput,
-    path: &TokenStream,
-    dof: &TokenStream,
-) -> TokenStream {
+/// A stepper that does nothing, for any number of coordinates: that of the model may be what is wrong.
+fn solver_stub(solver: &Ident, item: &DeriveInput, path: &TokenStream) -> TokenStream {
     let (name, vis) = (&item.ident, &item.vis);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
     quote! {
@@ -160,9 +155,9 @@ fn solver_stub(
                 &#path::__private::Statistics::NONE
             }
 
-            #vis fn advance(
+            #vis fn advance<const __DOF: usize>(
                 &mut self,
-                _: &mut #path::__private::State<#dof>,
+                _: &mut #path::__private::State<__DOF>,
             ) -> ::core::result::Result<(), #path::__private::StepError> {
                 ::core::result::Result::Ok(())
             }

@@ -9,4 +9,8 @@ use tfe::prelude::*;
 )]
 struct Model<const N: usize> { m: f64, k: f64 }
 
-fn main() {}
+fn main() {
+    let model = Model::<3> { m: 1.0, k: 1.0 };
+    let mut state = model.state([1.0; 3], [0.0; 3]);
+    println!("{:?}", Fast::new(&model, 0.1).advance(&mut state));
+}
