@@ -32,7 +32,8 @@ pub struct Control {
 impl Default for Control {
     fn default() -> Self {
         Self {
-            tolerance: 0.5 * f64::EPSILON,
+            // Well below one rounding: what a fixed point leaves has the same sign in element after element and adds up, roundings do not.
+            tolerance: 0.05 * f64::EPSILON,
             max_iterations: 100,
             solve: Solve::Auto,
         }
