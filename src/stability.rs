@@ -149,11 +149,12 @@ pub fn symplecticity_defect(matrix: &DMatrix<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn spectra_of_small_matrices() {
         let rotation = DMatrix::from_row_slice(2, 2, &[0.6, -0.8, 0.8, 0.6]);
-        assert!((spectral_radius(&rotation) - 1.0).abs() <= f64::EPSILON);
+        assert_abs_diff_eq!(spectral_radius(&rotation), 1.0, epsilon = f64::EPSILON);
         assert!(symplecticity_defect(&rotation) <= 2.0 * f64::EPSILON);
         let stretch = DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 0.0, -3.0]);
         assert_eq!(spectral_radius(&stretch), 3.0);
