@@ -15,6 +15,9 @@
 extern crate alloc;
 
 pub mod basis;
+mod condense;
+#[cfg(feature = "alloc")]
+pub mod condenser;
 #[cfg(feature = "alloc")]
 mod dense;
 mod double_double;

@@ -158,6 +158,28 @@ pub trait Model<const N: usize> {
         second: &mut Second<R, N>,
     );
 
+    /// The names of the parameters by which the model can be differentiated: those of `sensitivity(…)`.
+    const SENSITIVITIES: &'static [&'static str] = &[];
+
+    /// The value of the parameter `SENSITIVITIES[index]`; NaN beyond them.
+    fn sensitivity_parameter(&self, _index: usize) -> f64 {
+        f64::NAN
+    }
+
+    /// The partial derivatives of everything that [`first`](Self::first) gives by a parameter or by the time: ∂L_z/∂a, ∂L_q/∂a, ∂Q/∂a
+    /// (or of H) at fixed (q, z).
+    ///
+    /// Called only for the parameters of [`SENSITIVITIES`](Self::SENSITIVITIES), and, where there is at least one, for [`By::Time`].
+    fn first_by<R: Real>(
+        &self,
+        _by: By,
+        _t: R,
+        _q: &[R; N],
+        _z: &[R; N],
+        _first: &mut First<R, N>,
+    ) {
+    }
+
     /// The names of the coordinates, in order (`theta1`, `q[0]`, `q[1]`, …).
     fn coordinate_name(index: usize) -> CoordinateName;
 
@@ -166,6 +188,15 @@ pub trait Model<const N: usize> {
 
     /// The observables, one for each name.
     fn observables<R: Real>(&self, _t: R, _q: &[R; N], _z: &[R; N], _values: &mut [R]) {}
+}
+
+/// By what the first derivatives of a model are differentiated once more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// The time t, at fixed (q, z).
+    Time,
+    /// The parameter with this index in [`Model::SENSITIVITIES`].
+    Parameter(usize),
 }
 
 /// The name of a coordinate: `theta1`, or `q[3]`.

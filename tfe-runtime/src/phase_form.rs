@@ -70,7 +70,7 @@ where
 
     /// Time, coordinates and momenta at a stage.
     #[inline(always)]
-    fn place(&self, k: usize, x: &[f64]) -> (f64, [f64; N], [f64; N]) {
+    pub(crate) fn place(&self, k: usize, x: &[f64]) -> (f64, [f64; N], [f64; N]) {
         let (pi, kappa) = x.as_chunks::<N>().0.split_at(self.scheme.points());
         let (t, q) = self.coordinates(k, kappa);
         (t, q, self.momentum(k, pi))

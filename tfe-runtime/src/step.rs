@@ -388,7 +388,7 @@ fn cold_phase<M, const N: usize>(
 }
 
 /// The end of an element and what rounding took from it (T-68).
-fn end_of<const N: usize>(
+pub(crate) fn end_of<const N: usize>(
     scheme: &SchemeRef<'_>,
     span: &Span<'_, N>,
     rates: &[[f64; N]],

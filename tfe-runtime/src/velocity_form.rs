@@ -41,7 +41,7 @@ where
 {
     /// Time, coordinates and velocities at a point.
     #[inline(always)]
-    fn place(&self, l: usize, rates: &[[f64; N]]) -> (f64, [f64; N], [f64; N]) {
+    pub(crate) fn place(&self, l: usize, rates: &[[f64; N]]) -> (f64, [f64; N], [f64; N]) {
         let Span {
             t, h, start, low, ..
         } = self.span;
@@ -133,7 +133,7 @@ where
 
     /// Takes p₀ and the impulse of forces and kicks from the rows.
     #[inline(always)]
-    fn subtract_impulse(&self, rows: &mut [[f64; N]]) {
+    pub(crate) fn subtract_impulse(&self, rows: &mut [[f64; N]]) {
         let Span {
             h,
             start,

@@ -1,0 +1,337 @@
+//! Elements of assembled problems: each linearised about an iterate, its interior condensed to its two nodes (T-81).
+//!
+//! Periodic orbits and boundary-value problems have the nodes y₀ … y_E of all elements and the interior rates x of each as unknowns.
+//! Newton's method needs, at the current iterate,
+//!
+//! ```text
+//! y_{e+1} − A_e y_e − C_e γ = r_e ,         γ: the period, a parameter, …
+//! ```
+//!
+//! and, once the nodes are known, the interior. No element is solved by itself: all converge together.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::condense::{System, phase_ends, velocity_ends};
+use crate::dense::DenseElement;
+use crate::element::{Element, ElementError};
+use crate::equations::Span;
+use crate::error::{LegendreError, StepError};
+use crate::legendre;
+use crate::model::{First, Model, State};
+use crate::phase_form::PhaseForm;
+use crate::scheme::{SchemeTable, Tables};
+use crate::statistics::Statistics;
+use crate::step::{Interval, Last, Memory, end_of, is_phase};
+use crate::velocity_form::VelocityForm;
+use crate::workspace::{Parts, Workspace, numbers_len, pivots_len, width};
+
+pub use crate::condense::Direction;
+
+/// One element of an assembled problem at the current iterate.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed<'a, const N: usize> {
+    /// Time at the start.
+    pub time: f64,
+    /// Length h.
+    pub length: f64,
+    /// The state of the first node.
+    pub start: &'a State<N>,
+    /// The interior rates x, [`Condenser::interior`] numbers.
+    pub interior: &'a [f64],
+}
+
+/// Where the parts of a condensed element are written.
+#[derive(Debug)]
+pub struct Condensed<'a> {
+    /// A and C and, in the last column, what the end of the Newton step is beyond A δy₀ + C δγ: 2N rows of 2N + g + 1 columns,
+    /// ordered (p, q).
+    pub ends: &'a mut [f64],
+    /// The interior as a function of the nodes: 2N + g + 1 vectors of [`Condenser::interior`] numbers, the last one its own Newton step.
+    pub response: &'a mut [f64],
+}
+
+/// Linearises elements, on memory of its own. It holds no model, so that parameters may change between two calls.
+///
+/// # Example
+/// One element, solved by Newton's method, and the derivative of its end by its start.
+/// ```
+/// # use tfe_runtime::{CoordinateName, Facts, First, Form, Mixed, Model, Real, Second, State};
+/// use tfe_runtime::condenser::{Condensed, Condenser, Placed};
+///
+/// # struct Oscillator;
+/// # impl Model<1> for Oscillator {
+/// #     const FORM: Form = Form::Lagrangian;
+/// #     const FACTS: Facts = Facts::UNKNOWN;
+/// #     fn energy_function<R: Real>(&self, _: R, q: &[R; 1], v: &[R; 1]) -> R {
+/// #         (v[0] * v[0] - q[0] * q[0]) * R::from_f64(0.5)
+/// #     }
+/// #     fn first<R: Real>(&self, _: R, q: &[R; 1], v: &[R; 1], first: &mut First<R, 1>) {
+/// #         (first.z, first.q) = (*v, [-q[0]]);
+/// #     }
+/// #     fn first_and_mass<R: Real>(
+/// #         &self, t: R, q: &[R; 1], v: &[R; 1], first: &mut First<R, 1>, zz: &mut [[R; 1]; 1],
+/// #     ) {
+/// #         self.first(t, q, v, first);
+/// #         zz[0][0] = R::from_f64(1.0);
+/// #     }
+/// #     fn second<R: Real>(
+/// #         &self, t: R, q: &[R; 1], v: &[R; 1], first: &mut First<R, 1>, second: &mut Second<R, 1>,
+/// #     ) {
+/// #         self.first_and_mass(t, q, v, first, &mut second.zz);
+/// #         second.qq[0][0] = R::from_f64(-1.0);
+/// #     }
+/// #     fn coordinate_name(_: usize) -> CoordinateName {
+/// #         CoordinateName { name: "x", index: None }
+/// #     }
+/// # }
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut condenser = Condenser::<1>::new::<Oscillator>(Mixed::<4>.into())?;
+/// let interior = vec![0.0; condenser.interior()];
+/// let (mut ends, mut response) = ([0.0; 2 * 3], vec![0.0; 3 * interior.len()]);
+/// let start = State { q: [1.0], p: [0.0] };
+/// condenser.linearise(
+///     &Oscillator,
+///     Placed { time: 0.0, length: 0.1, start: &start, interior: &interior },
+///     &[],
+///     Condensed { ends: &mut ends, response: &mut response },
+/// )?;
+/// // A linear model needs one step: the last column is the end, the others are A in the order (p, q).
+/// let [p_by_p, _, p, _, q_by_q, q] = ends;
+/// assert!((p + 0.1_f64.sin()).abs() < 1e-9 && (q - 0.1_f64.cos()).abs() < 1e-9);
+/// assert!((p_by_p - 0.1_f64.cos()).abs() < 1e-9 && (q_by_q - 0.1_f64.cos()).abs() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Condenser<const N: usize> {
+    table: SchemeTable,
+    interior: usize,
+    memory: Memory<N>,
+    numbers: Vec<f64>,
+    pivots: Vec<usize>,
+    points: Vec<[f64; N]>,
+}
+
+impl<const N: usize> Condenser<N> {
+    /// For models of one type and one element, of any length.
+    ///
+    /// # Errors
+    /// [`ElementError`] if the element is none.
+    pub fn new<M: Model<N>>(element: Element) -> Result<Self, ElementError> {
+        let table = SchemeTable::new(element)?;
+        Ok(Self {
+            table,
+            interior: element.unknowns() * width(&element, M::FORM, N),
+            memory: Memory::new(),
+            numbers: vec![0.0; numbers_len(element, M::FORM, N)],
+            pivots: vec![0; pivots_len(element, M::FORM, N)],
+            points: Vec::new(),
+        })
+    }
+
+    /// The number of interior unknowns of an element.
+    #[must_use]
+    pub fn interior(&self) -> usize {
+        self.interior
+    }
+
+    /// What the linearisations so far have cost.
+    #[must_use]
+    pub fn statistics(&self) -> &Statistics {
+        self.memory.statistics()
+    }
+
+    /// The interior of an element that follows a given curve, t ↦ (q, dq/dt).
+    ///
+    /// # Errors
+    /// [`LegendreError`] where a Hamiltonian model has no momentum for a velocity.
+    pub fn interpolate<M: Model<N>>(
+        &self,
+        model: &M,
+        time: f64,
+        length: f64,
+        mut curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
+        interior: &mut [f64],
+    ) -> Result<(), LegendreError> {
+        let scheme = self.table.view();
+        let rates = interior.as_chunks_mut::<N>().0;
+        if is_phase::<M, N>(&scheme) {
+            let (forces, velocities) = rates.split_at_mut(scheme.points());
+            for (k, node) in scheme.nodes.iter().enumerate() {
+                let t = time + node * length;
+                let (q, v) = curve(t);
+                let p = legendre::momentum(model, t, &q, &v)?;
+                let mut first = First::ZERO;
+                model.first(t, &q, &p, &mut first);
+                velocities[k] = v;
+                for a in 0..N {
+                    forces[k][a] = first.force[a] - first.q[a];
+                }
+            }
+        } else {
+            for (rate, node) in rates.iter_mut().zip(scheme.unknown_nodes) {
+                *rate = curve(time + node * length).1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Linearises an element; with g directions the slices of `condensed` have (2N + g + 1) columns.
+    ///
+    /// # Errors
+    /// [`StepError`] if the length is none, a value is not finite, memory is short, or the tangent is singular.
+    pub fn linearise<M: Model<N>>(
+        &mut self,
+        model: &M,
+        placed: Placed<'_, N>,
+        directions: &[Direction],
+        condensed: Condensed<'_>,
+    ) -> Result<(), StepError> {
+        let Placed {
+            time,
+            length,
+            start,
+            interior,
+        } = placed;
+        if !(length.is_finite() && length != 0.0) {
+            return Err(StepError::InvalidStep { step: length });
+        }
+        let m = self.interior();
+        let columns = 2 * N + directions.len() + 1;
+        let needed = columns * m.max(2 * N);
+        let given = condensed
+            .response
+            .len()
+            .min(condensed.ends.len() * m.max(2 * N) / (2 * N));
+        if interior.len() != m
+            || condensed.response.len() != columns * m
+            || condensed.ends.len() != 2 * N * columns
+        {
+            return Err(StepError::Workspace { needed, given });
+        }
+        let scheme = self.table.view();
+        let rows = scheme.points() * (2 * N + directions.len());
+        if self.points.len() < rows {
+            self.points.resize(rows, [0.0; N]);
+        }
+        let workspace = Workspace {
+            numbers: &mut self.numbers,
+            pivots: &mut self.pivots,
+        };
+        let parts = Parts::of(workspace, &scheme.element, M::FORM)?;
+        parts.kicks.fill([0.0; N]);
+        let kicks: &[[f64; N]] = parts.kicks;
+        let low = State::ZERO;
+        let span = Span {
+            t: time,
+            h: length,
+            start,
+            low: &low,
+            kicks,
+        };
+        let mut system = System {
+            tangent: parts.tangent,
+            pivots: parts.tangent_pivots,
+            residual: parts.step,
+            sides: condensed.response,
+        };
+        let ends = condensed.ends;
+        let end = if is_phase::<M, N>(&scheme) {
+            let mut equations = PhaseForm {
+                model,
+                scheme,
+                span,
+                momenta: parts.momenta,
+                velocities: parts.forces,
+                masses: parts.masses,
+                swept: false,
+                statistics: &mut self.memory.statistics,
+            };
+            system.of_phase(&mut equations, interior, directions);
+            let sides = system.with_newton_step().solve()?.sides;
+            phase_ends::<N>(&scheme, length, interior, directions, sides, ends);
+            let (forces, velocities) = interior.as_chunks().0.split_at(scheme.points());
+            end_of(&scheme, &span, velocities, forces, &[]).0
+        } else {
+            parts.momenta.fill(start.p);
+            let mut equations = VelocityForm {
+                model,
+                scheme,
+                span,
+                forces: parts.forces,
+                momenta: parts.momenta,
+                masses: parts.masses,
+                mass_pivots: parts.mass_pivots,
+                constant_mass: &mut self.memory.mass,
+                statistics: &mut self.memory.statistics,
+            };
+            system.of_velocities(&mut equations, interior, directions, &mut self.points)?;
+            let sides = system.with_newton_step().solve()?.sides;
+            velocity_ends(&equations, interior, directions, &self.points, sides, ends);
+            end_of(
+                &scheme,
+                &span,
+                interior.as_chunks().0,
+                equations.forces,
+                &[],
+            )
+            .0
+        };
+        self.memory.statistics.factorizations += 1;
+        let mut sum = 0.0;
+        for (row, value) in end.p.iter().chain(&end.q).enumerate() {
+            let row = &mut ends[row * columns..(row + 1) * columns];
+            row[columns - 1] += value;
+            sum += row.iter().map(|entry| 0.0 * entry).sum::<f64>();
+        }
+        // Infinities and what is no number give no zero.
+        if sum == 0.0 {
+            Ok(())
+        } else {
+            Err(StepError::NonFinite)
+        }
+    }
+
+    /// The polynomial of the element linearised last, from its first node `placed.start` to the given last one.
+    #[must_use]
+    pub fn dense<M: Model<N>>(&self, placed: Placed<'_, N>, end: &State<N>) -> DenseElement<N> {
+        let scheme = self.table.view();
+        let rates = placed.interior.as_chunks().0;
+        let m = self.interior;
+        let (rates, forces) = if is_phase::<M, N>(&scheme) {
+            let (forces, velocities) = rates.split_at(scheme.points());
+            (velocities, forces)
+        } else {
+            // The workspace begins with the unknowns, their start and the increments.
+            let forces = &self.numbers[3 * m..3 * m + scheme.points() * N];
+            (rates, forces.as_chunks().0)
+        };
+        let interval = Interval {
+            start: placed.time,
+            length: placed.length,
+            impulses: &[],
+        };
+        let last = Last {
+            t: placed.time,
+            h: placed.length,
+            start: *placed.start,
+            start_low: State::ZERO,
+            end: *end,
+        };
+        let times = (placed.time, placed.time + placed.length);
+        DenseElement::of(&scheme, times, &last, rates, forces, &interval)
+    }
+}
+
+impl System<'_> {
+    /// Lets the last side be the Newton step of the interior itself.
+    fn with_newton_step(self) -> Self {
+        let m = self.residual.len();
+        let last = self.sides.len() - m;
+        for (side, residual) in self.sides[last..].iter_mut().zip(&*self.residual) {
+            *side = -residual;
+        }
+        self
+    }
+}
