@@ -25,8 +25,7 @@ pub struct Direction {
     pub length: f64,
     /// The parameter, by its index in [`Model::SENSITIVITIES`], that γ is.
     pub parameter: Option<usize>,
-    /// The force along the velocities that γ adds, Q += γ · damping · v: what unfolds the families of periodic orbits of a
-    /// conservative model.
+    /// Its part of the additional force along the velocities, Q += damping · γ v.
     pub damping: f64,
 }
 
@@ -85,8 +84,9 @@ impl System<'_> {
                     }
                 }
                 for a in 0..N {
-                    let mut force =
-                        explicit.force[a] - explicit.q[a] + direction.damping * first.z[a];
+                    let mut force = explicit.force[a] - explicit.q[a]
+                        + direction.damping * first.z[a]
+                        + equations.span.damping * explicit.z[a];
                     let mut velocity = explicit.z[a];
                     for b in 0..N {
                         force += (second.force_z[a][b] - second.zq[b][a]) * moved.0[b]
@@ -230,7 +230,8 @@ where
             Form::Hamiltonian => {
                 let by = explicit(self.model, t, &q, &point.p, direction, node);
                 for a in 0..N {
-                    of_force[a] = by.force[a] - by.q[a];
+                    // The additional force is one of v, which stays.
+                    of_force[a] = by.force[a] - by.q[a] + self.span.damping * by.z[a];
                     for b in 0..N {
                         of_momentum[a] -= second.zz[a][b] * by.z[b];
                         of_force[a] -= (second.zq[b][a] + second.force_z[a][b]) * by.z[b];

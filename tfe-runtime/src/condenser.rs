@@ -39,6 +39,8 @@ pub struct Placed<'a, const N: usize> {
     pub start: &'a State<N>,
     /// The interior rates x, [`Condenser::interior`] numbers.
     pub interior: &'a [f64],
+    /// γ of an additional force γ v along the velocities: what unfolds the families of periodic orbits of a conservative model; else zero.
+    pub damping: f64,
 }
 
 /// Where the parts of a condensed element are written.
@@ -92,7 +94,7 @@ pub struct Condensed<'a> {
 /// let start = State { q: [1.0], p: [0.0] };
 /// condenser.linearise(
 ///     &Oscillator,
-///     Placed { time: 0.0, length: 0.1, start: &start, interior: &interior },
+///     Placed { time: 0.0, length: 0.1, start: &start, interior: &interior, damping: 0.0 },
 ///     &[],
 ///     Condensed { ends: &mut ends, response: &mut response },
 /// )?;
@@ -193,6 +195,7 @@ impl<const N: usize> Condenser<N> {
             length,
             start,
             interior,
+            damping,
         } = placed;
         if !(length.is_finite() && length != 0.0) {
             return Err(StepError::InvalidStep { step: length });
@@ -229,6 +232,7 @@ impl<const N: usize> Condenser<N> {
             start,
             low: &low,
             kicks,
+            damping,
         };
         let mut system = System {
             tangent: parts.tangent,
@@ -293,9 +297,14 @@ impl<const N: usize> Condenser<N> {
         }
     }
 
-    /// The polynomial of the element linearised last, from its first node `placed.start` to the given last one.
+    /// The polynomial of the element linearised last, from its first node to the one at time `next` with the state `end`.
     #[must_use]
-    pub fn dense<M: Model<N>>(&self, placed: Placed<'_, N>, end: &State<N>) -> DenseElement<N> {
+    pub fn dense<M: Model<N>>(
+        &self,
+        placed: Placed<'_, N>,
+        next: f64,
+        end: &State<N>,
+    ) -> DenseElement<N> {
         let scheme = self.table.view();
         let rates = placed.interior.as_chunks().0;
         let m = self.interior;
@@ -319,8 +328,14 @@ impl<const N: usize> Condenser<N> {
             start_low: State::ZERO,
             end: *end,
         };
-        let times = (placed.time, placed.time + placed.length);
-        DenseElement::of(&scheme, times, &last, rates, forces, &interval)
+        DenseElement::of(
+            &scheme,
+            (placed.time, next),
+            &last,
+            rates,
+            forces,
+            &interval,
+        )
     }
 }
 

@@ -51,6 +51,8 @@ pub(crate) struct Span<'a, const N: usize> {
     pub(crate) low: &'a State<N>,
     /// What impulses add to the rows.
     pub(crate) kicks: &'a [[f64; N]],
+    /// γ of an additional force γ v; zero in steps.
+    pub(crate) damping: f64,
 }
 
 /// Σ (high + low) · row.

@@ -46,7 +46,7 @@ pub mod workspace;
 
 pub use element::{Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule};
 pub use error::{LegendreError, StepError};
-pub use model::{CoordinateName, Facts, First, Form, Model, Second, State};
+pub use model::{By, CoordinateName, Facts, First, Form, Model, Second, State};
 pub use newton::Solve;
 pub use real::{Lanes, Real};
 pub use statistics::Statistics;
@@ -57,7 +57,7 @@ pub use structure::{Operations, Structure};
 pub mod __private {
     pub use crate::element::{Element, EnergyConserving, Mixed, Primal, Radau, Rule};
     pub use crate::error::StepError;
-    pub use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
+    pub use crate::model::{By, CoordinateName, Facts, First, Form, Model, Second, State};
     pub use crate::newton::{Control, Solve};
     pub use crate::real::Real;
     pub use crate::scheme::{Scheme, SchemeRef, Tables};

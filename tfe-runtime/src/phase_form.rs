@@ -112,7 +112,21 @@ where
         second: &mut Second<f64, N>,
     ) {
         let (t, q, p) = self.place(k, x);
-        self.model.second(t, &q, &p, first, second);
+        let damping = self.span.damping;
+        if damping == 0.0 {
+            self.model.second(t, &q, &p, first, second);
+        } else {
+            // Kernels write only what is not structurally zero: nothing of the last call may stay.
+            (*first, *second) = (First::ZERO, Second::ZERO);
+            self.model.second(t, &q, &p, first, second);
+            for a in 0..N {
+                first.force[a] += damping * first.z[a];
+                for b in 0..N {
+                    second.force_z[a][b] += damping * second.zz[a][b];
+                    second.force_q[a][b] += damping * second.zq[a][b];
+                }
+            }
+        }
         self.statistics.tangent_evaluations += 1;
     }
 

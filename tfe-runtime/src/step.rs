@@ -177,6 +177,7 @@ where
             start: state,
             low: &low,
             kicks,
+            damping: 0.0,
         };
         let known = memory.factored == Some(h);
         // A failure leaves nothing to continue from.

@@ -155,6 +155,7 @@ where
             start: &last.start,
             low: &last.start_low,
             kicks,
+            damping: 0.0,
         };
         // One right side, or solution, for each of the 2N directions of the start.
         let (sides, derivatives) = extra.split_at_mut(2 * N * parts.unknowns.len());

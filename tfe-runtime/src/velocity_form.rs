@@ -163,6 +163,11 @@ where
         point: &mut PointDerivatives<N>,
     ) -> Result<(), StepError> {
         let (t, q, v) = self.place(l, rates);
+        let damping = self.span.damping;
+        if damping != 0.0 {
+            // Kernels write only what is not structurally zero: nothing of the last call may stay.
+            point.second = Second::ZERO;
+        }
         match M::FORM {
             Form::Lagrangian => {
                 let mut first = First::ZERO;
@@ -180,6 +185,12 @@ where
                 for a in 0..N {
                     point.force[a] = view.first.q[a] + view.first.force[a];
                 }
+            }
+        }
+        if damping != 0.0 {
+            for a in 0..N {
+                point.force[a] += damping * v[a];
+                point.second.force_z[a][a] += damping;
             }
         }
         self.statistics.tangent_evaluations += 1;

@@ -222,7 +222,7 @@ fn elements() -> Vec<Element> {
 fn solve<M: Model<1>>(
     model: &M,
     element: Element,
-    (time, length): (f64, f64),
+    (time, length, damping): (f64, f64, f64),
     directions: &[Direction],
 ) -> ([f64; 2], Vec<[f64; 2]>) {
     let mut condenser = Condenser::new::<M>(element).expect("an element");
@@ -239,6 +239,7 @@ fn solve<M: Model<1>>(
             length,
             start: &START,
             interior: &interior,
+            damping,
         };
         let condensed = Condensed {
             ends: &mut ends,
@@ -285,9 +286,13 @@ fn check<M: Movable>(model: &M) {
             time: 0.5,
             ..Direction::default()
         },
+        Direction {
+            damping: 1.0,
+            ..Direction::default()
+        },
     ];
     for element in elements() {
-        let (end, derivatives) = solve(model, element, (TIME, LENGTH), &directions);
+        let (end, derivatives) = solve(model, element, (TIME, LENGTH, 0.0), &directions[..0]);
         let mut matrix = [0.0; 4];
         let stepped =
             transition::of_step(model, element, &START, TIME, LENGTH, &mut matrix).expect("a step");
@@ -300,7 +305,11 @@ fn check<M: Movable>(model: &M) {
                 close(derivatives[column][row], entry, 1e-13);
             }
         }
-        let at = |model: &M, time: f64, length: f64| solve(model, element, (time, length), &[]).0;
+        // From here on with the additional force 0.3 v.
+        let (_, derivatives) = solve(model, element, (TIME, LENGTH, 0.3), &directions);
+        let at = |model: &M, time: f64, length: f64, damping: f64| {
+            solve(model, element, (time, length, damping), &[]).0
+        };
         // A difference of fourth order at δ = 10⁻³: δ⁴ times a fifth derivative, and round-off over δ.
         let difference = |end: &dyn Fn(f64) -> [f64; 2], row: usize| {
             let delta = 1e-3;
@@ -309,10 +318,14 @@ fn check<M: Movable>(model: &M) {
         };
         for row in 0..2 {
             let expected = [
-                difference(&|x| at(model, TIME + x, LENGTH), row),
-                difference(&|x| at(model, TIME, LENGTH + x), row),
-                difference(&|x| at(&model.moved(0, x), TIME, LENGTH), row),
-                difference(&|x| at(&model.moved(1, x), TIME + 0.5 * x, LENGTH), row),
+                difference(&|x| at(model, TIME + x, LENGTH, 0.3), row),
+                difference(&|x| at(model, TIME, LENGTH + x, 0.3), row),
+                difference(&|x| at(&model.moved(0, x), TIME, LENGTH, 0.3), row),
+                difference(
+                    &|x| at(&model.moved(1, x), TIME + 0.5 * x, LENGTH, 0.3),
+                    row,
+                ),
+                difference(&|x| at(model, TIME, LENGTH, 0.3 + x), row),
             ];
             for (derivative, expected) in derivatives[2..].iter().zip(expected) {
                 close(derivative[row], expected, 1e-10);
@@ -344,6 +357,7 @@ fn wrong_lengths_and_broken_values_are_errors() {
                 length,
                 start: &State { q: [q], p: [0.0] },
                 interior: &vec![0.0; m],
+                damping: 0.0,
             },
             &[],
             Condensed {
