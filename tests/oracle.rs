@@ -3,16 +3,18 @@
 
 use tfe::Model;
 use tfe::prelude::dynamics;
-use tfe::runtime::{First, Second};
+use tfe::runtime::{By, First, Second};
 use tfe_symbolic::compile::declare;
 use tfe_symbolic::context::{Context, Field, FieldKind, Length};
+use tfe_symbolic::declared::Parameter;
 use tfe_symbolic::derivation::Derivation;
 use tfe_symbolic::interpret::{Environment, Results, interpret};
-use tfe_symbolic::program::Request;
+use tfe_symbolic::program::{self, Program, Request};
 
 /// The engine's side of a model: derived at run time from the text of the declaration.
 struct Oracle {
     derivation: Derivation,
+    sensitivities: Vec<Parameter>,
     environment: Environment,
 }
 
@@ -45,14 +47,69 @@ impl Oracle {
             .collect();
         Self {
             derivation: Derivation::of(&declared),
+            sensitivities: declared.sensitivities,
             environment,
         }
     }
 
     fn run(&self, request: Request) -> Results {
-        let program = self.derivation.program(request);
-        interpret(&program, &self.environment).unwrap_or_else(|error| panic!("{error}\n{program}"))
+        self.interpreted(&self.derivation.program(request))
     }
+
+    fn interpreted(&self, program: &Program) -> Results {
+        interpret(program, &self.environment).unwrap_or_else(|error| panic!("{error}\n{program}"))
+    }
+
+    /// The time, or the parameter of this number.
+    fn value(&mut self, by: program::By) -> &mut f64 {
+        let known = "a parameter with a value";
+        match by {
+            program::By::Time => &mut self.environment.time,
+            program::By::Parameter(number) => {
+                let Parameter { field, element } = &self.sensitivities[number];
+                let environment = &mut self.environment;
+                match element {
+                    None => environment.parameters.get_mut(field).expect(known),
+                    Some(element) => &mut environment.arrays.get_mut(field).expect(known)[*element],
+                }
+            }
+        }
+    }
+
+    /// The difference quotient of eighth order of the first derivatives and forces, and how large these are.
+    fn difference_quotient(&mut self, by: program::By) -> (Vec<f64>, f64) {
+        let first = self.derivation.program(Request {
+            first: true,
+            ..Request::default()
+        });
+        let at = *self.value(by);
+        let (mut quotient, mut size) = (vec![0.0; 3 * self.environment.q.len()], 0.0_f64);
+        for (step, weight) in [
+            (1.0, 4.0 / 5.0),
+            (2.0, -1.0 / 5.0),
+            (3.0, 4.0 / 105.0),
+            (4.0, -1.0 / 280.0),
+        ] {
+            for sign in [1.0, -1.0] {
+                *self.value(by) = at + sign * step * STEP;
+                let values = flat(&self.interpreted(&first));
+                for (sum, value) in quotient.iter_mut().zip(values) {
+                    *sum += sign * weight / STEP * value;
+                    size = size.max(value.abs());
+                }
+            }
+        }
+        *self.value(by) = at;
+        (quotient, size)
+    }
+}
+
+/// Of difference quotients: h⁸ is below the last digit, and 1/h costs two digits.
+const STEP: f64 = 5e-3;
+
+/// The first derivatives and forces one after the other.
+fn flat(results: &Results) -> Vec<f64> {
+    [&results.z[..], &results.q, &results.force].concat()
 }
 
 /// `f64`, `[f64; 3]` or `[f64; N]`.
@@ -154,6 +211,56 @@ fn compare<M: Model<N>, const N: usize>(model: &M, mut oracle: Oracle) {
             ..Request::default()
         });
         vector("observables", &values, &expected.observables);
+
+        sensitivities(model, &mut oracle, t, &q, &z);
+    }
+}
+
+/// Compares the derivatives by parameters and by the time with the interpreter, to the last bit, and with difference quotients.
+fn sensitivities<M: Model<N>, const N: usize>(
+    model: &M,
+    oracle: &mut Oracle,
+    t: f64,
+    q: &[f64; N],
+    z: &[f64; N],
+) {
+    let names: Vec<String> = oracle
+        .sensitivities
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(M::SENSITIVITIES, names);
+    let beyond = names.len();
+    let mut untouched = First::<f64, N>::ZERO;
+    model.first_by(By::Parameter(beyond), t, q, z, &mut untouched);
+    assert_eq!(untouched, First::ZERO);
+    assert!(model.sensitivity_parameter(beyond).is_nan());
+    if names.is_empty() {
+        return;
+    }
+    let parameters = (0..beyond).map(|k| (By::Parameter(k), program::By::Parameter(k)));
+    for (by, same_by) in parameters.chain([(By::Time, program::By::Time)]) {
+        if let By::Parameter(k) = by {
+            same(
+                "parameter",
+                model.sensitivity_parameter(k),
+                *oracle.value(same_by),
+            );
+        }
+        let mut first = First::<f64, N>::ZERO;
+        model.first_by(by, t, q, z, &mut first);
+        let expected = oracle.interpreted(&oracle.derivation.program_by(same_by));
+        firsts(&first, &expected);
+        let (quotient, size) = oracle.difference_quotient(same_by);
+        for (derivative, quotient) in flat(&expected).into_iter().zip(quotient) {
+            // Rounding: a value is wrong by some ten units of the last place of its largest term, which may be ten times the largest
+            // result; weights of 2 in all, over the step. Truncation, h⁸ f⁽⁹⁾/630 = 6e-22 f⁽⁹⁾, is below that.
+            let tolerance = 20.0 * f64::EPSILON * 10.0 * size.max(1.0) / STEP;
+            assert!(
+                (derivative - quotient).abs() <= tolerance,
+                "{by:?}: {derivative} and {quotient}"
+            );
+        }
     }
 }
 
@@ -288,4 +395,96 @@ agrees! { rigid_body: [f64; 7]
     lagrangian = m/2*inner(dot(r), dot(r)) + (j[0]*w[0]^2 + j[1]*w[1]^2 + j[2]*w[2]^2)/2 + m/2*inner(dot(e), dot(e)) - m*g*(r + rotate(e, d))[2],
     output(spin) = norm(w),
     output(momentum) = cross(r, m*dot(r))[1],
+}
+
+agrees! { duffing_with_sensitivities: [f64; 1]
+    struct { m: f64 = 1.2, k: [f64; 3] = [2.0, 0.7, 0.4], c: f64 = 0.3, amplitude: f64 = 1.5, omega: f64 = 1.9, scale: f64 = 2.0, _spare: f64 = 1.0 }
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k[0]/2*x^2 - k[2]/4*x^4,
+    dissipation = c*k[1]/2*dot(x)^2,
+    force(x) = amplitude*cos(omega*t),
+    output(scaled) = scale*x,
+    sensitivity(omega, amplitude, k[2], k[1], m, c, scale, _spare),
+}
+
+agrees! { moving_support_with_sensitivities: [f64; 2]
+    struct { m: [f64; 2] = [1.3, 0.7], l: f64 = 1.1, g: f64 = 9.81, a: f64 = 0.2, omega: f64 = 2.3, k: f64 = 1.4, c: f64 = 0.2, n: f64 = 2.5 }
+    coordinates(theta, s),
+    let x = s + l*sin(theta) + a*sin(omega*t),
+    let y = -l*cos(theta) + a*exp(-c*t)*cos(omega*t),
+    lagrangian = m[0]/2*dot(s)^2 + m[1]/2*(dot(x)^2 + dot(y)^2) - m[1]*g*y - k/2*(sqrt(l^2 + s^2) - a)^2 - (2 + s)^n
+        - select(theta < 3, k*s^2*theta, a),
+    dissipation = c/2*(dot(x)^2 + hypot(1, dot(s))),
+    force(s) = -c*dot(theta)*abs(dot(theta)) + tanh(k*t)*atan2(s, 3 + l),
+    sensitivity(l, a, omega, m[0], m[1], k, c, g, n),
+}
+
+agrees! { hamiltonian_with_sensitivities: [f64; 2]
+    struct { m: f64 = 1.4, k: [f64; 2] = [0.9, 0.3], c: f64 = 0.25, omega: f64 = 1.7 }
+    coordinates(x, y),
+    momenta(px, py),
+    hamiltonian = (px^2 + (py - k[1]*sin(omega*t)*x)^2)/(2*m) + k[0]/2*(x^2 + y^2) + k[1]*x^2*y*cos(omega*t),
+    dissipation = c/2*(dot(x)^2 + k[1]*dot(y)^4),
+    force(y) = k[0]*exp(-c*t)*dot(x) - omega*py,
+    sensitivity(k[1], k[0], m, c, omega),
+}
+
+agrees! { chain_of_any_length_with_sensitivities: [f64; 5]
+    struct <const N: usize = 5> { m: [f64; N] = [1.0, 1.2, 0.8, 1.1, 0.9], k: [f64; N] = [2.0, 1.5, 1.7, 1.9, 1.4], a: f64 = 0.3, c: f64 = 0.1, omega: f64 = 1.4 }
+    coordinates(q[N]),
+    lagrangian = sum(i in 0..N, m[i]/2*dot(q[i])^2) - sum(i in 0..N-1, k[i]*k[i+1]/2*(q[i+1] - q[i])^2 + a/4*(q[i+1] - q[i])^4)
+        - k[1]*cos(omega*t)*sum(i in 0..N, sqrt(m[i])*cos(q[i])) - k[N-1]*q[0]^2,
+    force(q[i]) = -c*m[i]*dot(q[i])^3,
+    force(q[N-1]) = a*sin(omega*t)/(2 + sum(i in 0..N, k[i]^2*q[i]^2)),
+    sensitivity(m[2], m[0], m[4], k[1], k[4], k[3], a, c, omega),
+}
+
+agrees! { all_to_all_with_sensitivities: [f64; 6]
+    struct <const N: usize = 6> { k: f64 = 0.7, w: [f64; N] = [1.0, 0.9, 1.1, 1.3, 0.8, 0.7] }
+    coordinates(q[N]),
+    momenta(p[N]),
+    hamiltonian = sum(i in 0..N, p[i]^2/2) - k/(2*N)*sum(i in 0..N, sum(j in 0..N, w[i]*w[j]*cos(q[i] - q[j] + k*t))),
+    force(q[i]) = -k*p[i]/sqrt(1 + sum(j in 0..N, w[j]^2*p[j]^2)),
+    sensitivity(k, w[3], w[5]),
+}
+
+agrees! { long_chain_with_sensitivities: [f64; 20]
+    struct { m: f64 = 1.1, k: [f64; 20] = std::array::from_fn(|i| 1.0 + 0.05 * i as f64) }
+    coordinates(q[20]),
+    lagrangian = sum(i in 0..20, m/2*dot(q[i])^2 - k[19-i]/2*q[i]^2) - sum(i in 0..19, k[i]^2*exp(q[i+1] - q[i])),
+    force(q[i]) = -k[i]*k[3]*dot(q[i]),
+    sensitivity(k[3], k[19], k[0], m),
+}
+
+agrees! { sensitivities_named_like_the_emitter: [f64; 1]
+    struct { by: f64 = 1.2, index: f64 = 0.7, first: f64 = 0.4, t0: f64 = 0.3, row: f64 = 0.6 }
+    coordinates(x),
+    lagrangian = by/2*dot(x)^2 - index*sin(first*x) - row*x^2,
+    force(x) = t0^2*t*x,
+    sensitivity(by, index, first, t0, row),
+}
+
+#[test]
+fn an_element_that_is_not_there_has_no_value() {
+    #[dynamics(
+        coordinates(q[N]),
+        lagrangian = sum(i in 0..N, m[i]/2*dot(q[i])^2 - w[i]*q[i]^2/2),
+        sensitivity(m[2], w[1], w[3]),
+    )]
+    struct Chain<const N: usize> {
+        m: [f64; N],
+        w: Vec<f64>,
+    }
+    let chain = Chain {
+        m: [1.0, 1.5],
+        w: vec![2.0, 2.5],
+    };
+    assert!(chain.sensitivity_parameter(0).is_nan());
+    assert_eq!(chain.sensitivity_parameter(1), 2.5);
+    assert!(chain.sensitivity_parameter(2).is_nan());
+    let mut first = First::ZERO;
+    chain.first_by(By::Parameter(0), 0.0, &[0.1, 0.2], &[0.3, 0.4], &mut first);
+    assert_eq!(first, First::ZERO);
+    chain.first_by(By::Parameter(1), 0.0, &[0.1, 0.2], &[0.3, 0.4], &mut first);
+    assert_eq!(first.q, [0.0, -0.2]);
 }

@@ -418,7 +418,13 @@ pub(crate) fn index(affine: &Affine) -> TokenStream {
         sum = Some(sum.map_or(term.clone(), |sum| quote!(#sum + #term)));
     }
     if affine.constant > 0 || sum.is_none() {
-        let constant = Literal::u64_unsuffixed(affine.constant.max(0).unsigned_abs());
+        let size = affine.constant.max(0).unsigned_abs();
+        // `9.saturating_sub(i)` would be of an unknown type.
+        let subtracted_from = sum.is_none() && affine.terms.iter().any(|(_, c)| *c < 0);
+        let constant = match usize::try_from(size) {
+            Ok(size) if subtracted_from => Literal::usize_suffixed(size),
+            _ => Literal::u64_unsuffixed(size),
+        };
         sum = Some(sum.map_or(quote!(#constant), |sum| quote!(#sum + #constant)));
     }
     let mut sum = sum.unwrap_or_default();
@@ -475,7 +481,11 @@ fn symbol_tokens(symbol: &IndexSymbol) -> TokenStream {
 fn signed(affine: &Affine) -> TokenStream {
     let constant = Literal::i64_unsuffixed(affine.constant);
     let terms = affine.terms.iter().map(|(symbol, coefficient)| {
-        let (symbol, coefficient) = (symbol_tokens(symbol), Literal::i64_unsuffixed(*coefficient));
+        let symbol = symbol_tokens(symbol);
+        if *coefficient == -1 {
+            return quote!(- (#symbol as i64));
+        }
+        let coefficient = Literal::i64_unsuffixed(*coefficient);
         quote!(+ #coefficient * (#symbol as i64))
     });
     quote!(#constant #(#terms)*)

@@ -7,10 +7,11 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;
 use tfe_symbolic::compile;
-use tfe_symbolic::declared::{Declared, Form};
+use tfe_symbolic::context::{FieldKind, Length};
+use tfe_symbolic::declared::{Declared, Form, Parameter};
 use tfe_symbolic::derivation::Derivation;
 use tfe_symbolic::input::Affine;
-use tfe_symbolic::program::Request;
+use tfe_symbolic::program::{By, Program, Request};
 
 /// Expands `#[dynamics(arguments)] item`.
 pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
@@ -109,8 +110,11 @@ impl<'a> Kernels<'a> {
 
     /// The body of a kernel; second derivatives go to fields of `second`, or to an argument.
     fn body(&self, request: Request, second: TokenStream) -> emit::Body {
-        let program = self.derivation.program(request);
-        Emitter::new(&self.coordinates, second).body(&program)
+        self.emitted(&self.derivation.program(request), second)
+    }
+
+    fn emitted(&self, program: &Program, second: TokenStream) -> emit::Body {
+        Emitter::new(&self.coordinates, second).body(program)
     }
 
     /// `impl Model<N> for Name`.
@@ -151,6 +155,7 @@ impl<'a> Kernels<'a> {
         let facts = page::facts(self.derivation, &quote!(__tfe));
         let coordinate_name = self.coordinate_name();
         let observables = self.observables();
+        let sensitivities = self.sensitivities();
         quote! {
             const _: () = {
                 use #path::__private as __tfe;
@@ -200,6 +205,7 @@ impl<'a> Kernels<'a> {
 
                     #coordinate_name
                     #observables
+                    #sensitivities
                 }
             };
         }
@@ -260,6 +266,87 @@ impl<'a> Kernels<'a> {
 
             fn observables<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], values: &mut [R]) {
                 #body
+            }
+        }
+    }
+
+    /// The names and values of the parameters of `sensitivity(…)`, and the derivatives by them and by the time.
+    fn sensitivities(&self) -> TokenStream {
+        let parameters = &self.declared.sensitivities;
+        if parameters.is_empty() {
+            return TokenStream::new();
+        }
+        let names = parameters.iter().map(ToString::to_string);
+        let values = parameters.iter().enumerate().map(|(k, parameter)| {
+            let (k, value) = (Literal::usize_unsuffixed(k), self.parameter(parameter));
+            quote!(#k => #value,)
+        });
+        let first_by = self.first_by();
+        quote! {
+            const SENSITIVITIES: &'static [&'static str] = &[#(#names),*];
+
+            fn sensitivity_parameter(&self, index: usize) -> f64 {
+                match index {
+                    #(#values)*
+                    _ => f64::NAN,
+                }
+            }
+
+            #first_by
+        }
+    }
+
+    /// The value of a parameter; NaN where an array of any length is too short for it.
+    fn parameter(&self, parameter: &Parameter) -> TokenStream {
+        let field = emit::identifier(&parameter.field);
+        let Some(element) = parameter.element.map(Literal::usize_unsuffixed) else {
+            return quote!(self.#field);
+        };
+        let kind = input::context(self.item)
+            .field(&parameter.field)
+            .map(|field| field.kind.clone());
+        match kind {
+            Some(FieldKind::Array(Length::Literal(_))) => quote!(self.#field[#element]),
+            _ => quote!(self.#field.get(#element).copied().unwrap_or(f64::NAN)),
+        }
+    }
+
+    /// `first_by`, with an arm for the time and for each parameter that anything depends on.
+    fn first_by(&self) -> TokenStream {
+        let dof = &self.dof;
+        let arm = |by: By| {
+            let program = self.derivation.program_by(by);
+            let pattern = match by {
+                By::Time => quote!(__tfe::By::Time),
+                By::Parameter(k) => {
+                    let k = Literal::usize_unsuffixed(k);
+                    quote!(__tfe::By::Parameter(#k))
+                }
+            };
+            let body = self.emitted(&program, TokenStream::new()).statements;
+            (!program.statements.is_empty()).then(|| quote!(#pattern => { #body }))
+        };
+        let parameters = 0..self.declared.sensitivities.len();
+        let arms: Vec<_> = std::iter::once(By::Time)
+            .chain(parameters.map(By::Parameter))
+            .filter_map(arm)
+            .collect();
+        if arms.is_empty() {
+            return TokenStream::new();
+        }
+        quote! {
+            fn first_by<R: __tfe::Real>(
+                &self,
+                by: __tfe::By,
+                t: R,
+                q: &[R; #dof],
+                z: &[R; #dof],
+                first: &mut __tfe::First<R, #dof>,
+            ) {
+                match by {
+                    #(#arms)*
+                    _ => {}
+                }
             }
         }
     }

@@ -18,7 +18,8 @@ use proc_macro::TokenStream;
 /// Declares a mechanical model on the struct that holds its parameters.
 ///
 /// The arguments are raw tokens, separated by commas: `coordinates(...)`, `lagrangian = ...` or `hamiltonian = ...`, and as many
-/// `let`, `force(...)`, `dissipation`, `output(...)` and `solver(...)` as the model needs. Everything is differentiated symbolically while
+/// `let`, `force(...)`, `dissipation`, `output(...)` and `solver(...)` as the model needs. `sensitivity(omega, k[2])` asks for the derivatives by
+/// parameters, that is by fields of type `f64` and by elements of array fields, and by the time. Everything is differentiated symbolically while
 /// the crate compiles; mistakes are reported under the token that is wrong, all of them at once.
 ///
 /// The attribute keeps the struct as it is, implements the kernels that the elements of `tfe` integrate, and adds the methods

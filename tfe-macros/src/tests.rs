@@ -128,6 +128,29 @@ fn contact_dissipation_outputs_and_a_solver() {
 }
 
 #[test]
+fn derivatives_by_parameters() {
+    check(
+        "sensitivity",
+        quote!(
+            coordinates(x),
+            lagrangian = m / 2 * dot(x) ^ 2 - k[0] / 2 * x ^ 2 - k[1] / 4 * x ^ 4,
+            dissipation = c / 2 * dot(x) ^ 2,
+            force(x) = amplitude * cos(omega * t),
+            sensitivity(omega, k[1], c),
+        ),
+        quote!(
+            struct Duffing {
+                m: f64,
+                k: [f64; 2],
+                c: f64,
+                amplitude: f64,
+                omega: f64,
+            }
+        ),
+    );
+}
+
+#[test]
 fn a_mistake_leaves_the_struct_and_stubs() {
     check(
         "mistake",

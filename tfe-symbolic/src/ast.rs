@@ -69,6 +69,8 @@ pub enum Item {
         /// The observable.
         value: Expr,
     },
+    /// `sensitivity(a, k[2])`: the parameters by which derivatives are wanted
+    Sensitivity(Vec<Expr>),
     /// `solver(Name, Mixed::<4>)`, with an optional `.reduced()`, `.lobatto()`, `.quadrature(k)`
     Solver {
         /// The name of the emitted struct.

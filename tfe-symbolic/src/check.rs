@@ -111,6 +111,8 @@ pub struct Model {
     pub dissipation: Option<Expr>,
     /// The observables.
     pub outputs: Vec<(Name, Expr)>,
+    /// The parameters by which derivatives are wanted.
+    pub sensitivities: Vec<Expr>,
     /// The solvers.
     pub solvers: Vec<Solver>,
     /// Where `tfe` is.
@@ -192,6 +194,12 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
                 bag.push(range.variable.span.join(range.end.span), Kind::OutputFamily);
                 model.incomplete = true;
             }
+            Item::Sensitivity(parameters) => {
+                if parameters.is_empty() {
+                    bag.push(span, Kind::NoSensitivity);
+                }
+                model.sensitivities = parameters;
+            }
             Item::Solver { name, element } => model.solver(&name, &element, context, bag),
             Item::Crate(path) => model.crate_path = Some(path.node),
         }
@@ -226,6 +234,7 @@ fn once(item: &Item) -> Option<&'static str> {
         Item::Lagrangian(_) => Some("lagrangian"),
         Item::Hamiltonian(_) => Some("hamiltonian"),
         Item::Dissipation(_) => Some("dissipation"),
+        Item::Sensitivity(_) => Some("sensitivity"),
         Item::Crate(_) => Some("crate"),
         _ => None,
     }

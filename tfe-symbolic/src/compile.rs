@@ -66,13 +66,14 @@ fn broken_let(argument: &str, offset: usize) -> Option<Spanned<Item>> {
 }
 
 /// The arguments that formulas cannot refer to.
-const NAMELESS: [&str; 8] = [
+const NAMELESS: [&str; 9] = [
     "lagrangian",
     "hamiltonian",
     "force",
     "dissipation",
     "constraint",
     "output",
+    "sensitivity",
     "solver",
     "crate",
 ];

@@ -55,6 +55,25 @@ pub struct Force {
     pub value: ExprId,
 }
 
+/// A parameter by which derivatives are wanted: a field, or one element of an array field.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Parameter {
+    /// The field.
+    pub field: String,
+    /// The element of an array; `None` for a number.
+    pub element: Option<usize>,
+}
+
+/// `omega` or `k[2]`
+impl fmt::Display for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.element {
+            None => f.write_str(&self.field),
+            Some(element) => write!(f, "{}[{element}]", self.field),
+        }
+    }
+}
+
 /// A request for a stepper specialised to the model and one element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Solver {
@@ -117,6 +136,8 @@ pub struct Declared {
     pub forces: Vec<Force>,
     /// The observables by name.
     pub observables: Vec<(String, ExprId)>,
+    /// The parameters by which derivatives are wanted, in the order of `sensitivity(…)`.
+    pub sensitivities: Vec<Parameter>,
     /// The specialised steppers asked for.
     pub solvers: Vec<Solver>,
     /// Where the emitted code finds `tfe`, if the user said so.
@@ -149,6 +170,18 @@ impl fmt::Display for Declared {
                 .map(|name| crate::notation::symbol(name))
                 .collect();
             write!(f, "      parameters: {}", names.join(", "))?;
+        }
+        if !self.sensitivities.is_empty() {
+            let names: Vec<String> = self
+                .sensitivities
+                .iter()
+                .map(|parameter| Parameter {
+                    field: crate::notation::symbol(&parameter.field),
+                    element: parameter.element,
+                })
+                .map(|parameter| parameter.to_string())
+                .collect();
+            write!(f, "      sensitivity: {}", names.join(", "))?;
         }
         Ok(())
     }

@@ -12,14 +12,15 @@ use std::collections::BTreeMap;
 use crate::arrange::arrange;
 use crate::constant::Constant;
 use crate::count::Counts;
-use crate::declared::{Declared, Force, Form};
+use crate::declared::{Declared, Force, Form, Parameter};
 use crate::differentiate::{Forward, gradient};
 use crate::entry::{Array, Entry, Place, blocks, for_each_sink};
 use crate::factor::take_out_factors;
 use crate::graph::{ExprId, Graph, Node, SumRange};
 use crate::input::{Affine, IndexSymbol, Input, LoopVariable};
-use crate::program::{Program, Request};
+use crate::program::{By, Program, Request};
 use crate::schedule::schedule;
+use crate::sensitivity::{Leaf, entries_by};
 use crate::structure::Structure;
 
 /// What is differentiated.
@@ -39,6 +40,8 @@ pub struct Model {
     pub forces: Vec<Force>,
     /// The observables by name.
     pub observables: Vec<(String, ExprId)>,
+    /// The parameters by which derivatives are wanted.
+    pub sensitivities: Vec<Parameter>,
 }
 
 impl From<&Declared> for Model {
@@ -51,6 +54,7 @@ impl From<&Declared> for Model {
             dissipation: declared.dissipation,
             forces: declared.forces.clone(),
             observables: declared.observables.clone(),
+            sensitivities: declared.sensitivities.clone(),
         }
     }
 }
@@ -82,6 +86,7 @@ pub struct Derivation {
     graph: Graph,
     entries: Vec<Entry>,
     structure: Structure,
+    sensitivities: Vec<Parameter>,
 }
 
 impl Derivation {
@@ -100,6 +105,7 @@ impl Derivation {
             dissipation,
             forces,
             observables,
+            sensitivities,
         } = model;
         let mut deriver = Deriver {
             form,
@@ -122,38 +128,58 @@ impl Derivation {
             graph,
             entries,
             structure,
+            sensitivities,
         }
     }
 
     /// The program of a kernel.
     pub fn program(&self, request: Request) -> Program {
-        let wanted: Vec<&Entry> = self
+        let wanted = self
             .entries
             .iter()
-            .filter(|entry| entry.place.array.is_wanted(request))
-            .collect();
+            .filter(|entry| entry.place.array.is_wanted(request));
+        program(self.graph.clone(), wanted.cloned().collect())
+    }
+
+    /// The program of the first derivatives and forces differentiated once more, partially at fixed (q, z):
+    ///
+    /// ```text
+    /// ∂E_z/∂a, ∂E_q/∂a, ∂Q/∂a     in the places of E_z, E_q, Q;  a: a parameter of `sensitivity(…)`, or the time
+    /// ```
+    ///
+    /// Empty for the number of no such parameter.
+    ///
+    /// ```
+    /// use tfe_symbolic::compile::declare;
+    /// use tfe_symbolic::context::{Context, Field, FieldKind};
+    /// use tfe_symbolic::derivation::Derivation;
+    /// use tfe_symbolic::program::By;
+    ///
+    /// let k = Field { name: "k".to_owned(), kind: FieldKind::Scalar };
+    /// let context = Context { fields: vec![k], ..Context::default() };
+    /// let text = "coordinates(x), lagrangian = dot(x)^2/2 - k^2*x^2/2, force(x) = k*cos(t), sensitivity(k)";
+    /// let derivation = Derivation::of(&declare(text, &context).expect("no mistakes in it"));
+    /// assert_eq!(
+    ///     derivation.program_by(By::Parameter(0)).to_string(),
+    ///     "t0 = 2 * q[0]\n\
+    ///      t1 = k * t0\n\
+    ///      t2 = -t1\n\
+    ///      E_q[0] = t2\n\
+    ///      t3 = cos(t)\n\
+    ///      Q[0] = t3\n"
+    /// );
+    /// ```
+    pub fn program_by(&self, by: By) -> Program {
+        let leaf = match by {
+            By::Time => Leaf::Time,
+            By::Parameter(number) => match self.sensitivities.get(number) {
+                Some(parameter) => Leaf::Parameter(parameter),
+                None => return Program::default(),
+            },
+        };
         let mut graph = self.graph.clone();
-        let values: Vec<ExprId> = wanted.iter().map(|entry| entry.value).collect();
-        let values = graph.open_single_sums(&values);
-        let entries: Vec<Entry> = wanted
-            .into_iter()
-            .zip(values)
-            .map(|(entry, value)| Entry {
-                nest: entry.nest.clone(),
-                place: entry.place.clone(),
-                value,
-            })
-            .collect();
-        let (cleared, mut block) = blocks(&mut graph, entries);
-        let mut values = Vec::new();
-        for_each_sink(&mut block, &mut |sink| values.push(sink.value));
-        let values = take_out_factors(&mut graph, values);
-        let mut next = values.iter();
-        for_each_sink(&mut block, &mut |sink| {
-            sink.value = *next.next().unwrap_or(&sink.value);
-        });
-        let plan = arrange(&graph, &values);
-        schedule(plan, cleared, &block)
+        let entries = entries_by(&mut graph, &self.entries, leaf);
+        program(graph, entries)
     }
 
     /// What is known about the model.
@@ -165,6 +191,27 @@ impl Derivation {
     pub fn counts(&self, request: Request) -> Counts {
         Counts::of(&self.program(request))
     }
+}
+
+/// The program that computes these entries.
+fn program(mut graph: Graph, entries: Vec<Entry>) -> Program {
+    let values: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
+    let values = graph.open_single_sums(&values);
+    let entries = entries
+        .into_iter()
+        .zip(values)
+        .map(|(entry, value)| Entry { value, ..entry })
+        .collect();
+    let (cleared, mut block) = blocks(&mut graph, entries);
+    let mut values = Vec::new();
+    for_each_sink(&mut block, &mut |sink| values.push(sink.value));
+    let values = take_out_factors(&mut graph, values);
+    let mut next = values.iter();
+    for_each_sink(&mut block, &mut |sink| {
+        sink.value = *next.next().unwrap_or(&sink.value);
+    });
+    let plan = arrange(&graph, &values);
+    schedule(plan, cleared, &block)
 }
 
 /// Collects the entries.

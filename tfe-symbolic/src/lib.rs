@@ -35,5 +35,6 @@ mod print;
 pub mod program;
 mod rewrite;
 mod schedule;
+mod sensitivity;
 mod simplify;
 pub mod structure;

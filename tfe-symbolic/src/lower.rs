@@ -11,6 +11,7 @@ mod forces;
 mod names;
 mod rates;
 mod scalar;
+mod sensitivity;
 mod sums;
 mod usage;
 mod vector;
@@ -63,6 +64,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
             observables.push((name.node.clone(), value));
         }
     }
+    let sensitivities = lowerer.sensitivities();
     // Mistakes in a `let` that nothing uses are mistakes all the same.
     for at in 0..model.lets.len() {
         lowerer.named(at);
@@ -89,6 +91,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         dissipation,
         forces,
         observables,
+        sensitivities,
         solvers: model.solvers.clone(),
         crate_path: model.crate_path.clone(),
         used_fields,

@@ -45,6 +45,7 @@ pub const ARGUMENTS: &[&str] = &[
     "dissipation",
     "constraint",
     "output",
+    "sensitivity",
     "solver",
     "crate",
 ];
@@ -102,6 +103,7 @@ pub fn parse_item(text: &str, offset: usize, bag: &mut Bag) -> Option<Spanned<It
         "dissipation" => Rule::dissipation,
         "constraint" => Rule::constraint,
         "output" => Rule::output,
+        "sensitivity" => Rule::sensitivity,
         "solver" => Rule::solver,
         "crate" => Rule::location,
         "" => {
@@ -223,6 +225,7 @@ impl Builder<'_> {
                     _ => Item::Output { name, range, value },
                 }
             }
+            Rule::sensitivity => Item::Sensitivity(self.expressions(parts)?),
             Rule::solver => Item::Solver {
                 name: self.name(&parts.next(Rule::name)?),
                 element: self.element(parts.next(Rule::element)?)?,

@@ -227,6 +227,10 @@ impl fmt::Display for Item {
                 range: None,
                 value,
             } => write!(f, "output({name}) = {value}"),
+            Self::Sensitivity(parameters) => {
+                let parameters: Vec<String> = parameters.iter().map(ToString::to_string).collect();
+                write!(f, "sensitivity({})", parameters.join(", "))
+            }
             Self::Solver { name, element } => write!(f, "solver({name}, {element})"),
             Self::Crate(path) => write!(f, "crate = {path}"),
         }

@@ -155,6 +155,15 @@ pub struct Request {
     pub observables: bool,
 }
 
+/// By what the first derivatives and forces are differentiated once more, at fixed (q, z).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum By {
+    /// The time
+    Time,
+    /// The parameter of this number in `sensitivity(…)`
+    Parameter(usize),
+}
+
 /// A program ready to be interpreted, printed or emitted.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Program {

@@ -2,14 +2,14 @@
 
 use num_dual::{DualNum, HyperDual64};
 use proptest::prelude::*;
-use tfe_symbolic::declared::Form;
+use tfe_symbolic::declared::{Force, Form, Parameter};
 use tfe_symbolic::derivation::{Derivation, Model};
 use tfe_symbolic::differentiate::derivative;
 use tfe_symbolic::function::Function;
 use tfe_symbolic::graph::{ExprId, Graph};
 use tfe_symbolic::input::{Affine, Input};
 use tfe_symbolic::interpret::{Environment, Results, interpret};
-use tfe_symbolic::program::Request;
+use tfe_symbolic::program::{By, Request};
 
 const ALL: Request = Request {
     value: true,
@@ -34,7 +34,14 @@ enum Tree {
 
 impl Tree {
     fn build(&self, graph: &mut Graph) -> ExprId {
-        let pair = |graph: &mut Graph, a: &Self, b: &Self| (a.build(graph), b.build(graph));
+        self.build_on(graph, leaf)
+    }
+
+    /// The expression with other leaves.
+    fn build_on(&self, graph: &mut Graph, leaf: fn(usize) -> Input) -> ExprId {
+        let pair = |graph: &mut Graph, a: &Self, b: &Self| {
+            (a.build_on(graph, leaf), b.build_on(graph, leaf))
+        };
         match self {
             Self::Leaf(at) => graph.input(leaf(*at)),
             Self::Number(value) => graph.integer(*value),
@@ -58,11 +65,11 @@ impl Tree {
                 graph.divide(a, below)
             }
             Self::Power(a, n) => {
-                let (base, exponent) = (a.build(graph), graph.integer(i64::from(*n)));
+                let (base, exponent) = (a.build_on(graph, leaf), graph.integer(i64::from(*n)));
                 graph.power(base, exponent)
             }
             Self::Call(function, a) => {
-                let a = a.build(graph);
+                let a = a.build_on(graph, leaf);
                 let a = self.guard(graph, a, *function);
                 graph.call(*function, &[a])
             }
@@ -180,6 +187,7 @@ fn model(graph: Graph, energy: ExprId) -> Model {
         dissipation: None,
         forces: Vec::new(),
         observables: Vec::new(),
+        sensitivities: Vec::new(),
     }
 }
 
@@ -240,6 +248,44 @@ proptest! {
                 prop_assert!(distance(first, dual.eps1) < DIGITS, "{} {}", first, dual.eps1);
                 let second = block(&results, i, j);
                 prop_assert!(distance(second, dual.eps1eps2) < DIGITS, "({i},{j}) {} {}", second, dual.eps1eps2);
+            }
+        }
+    }
+
+    /// The second coordinate of the expression is a parameter here, and its second velocity the time.
+    #[test]
+    fn derivatives_by_a_parameter_and_by_the_time_agree_with_hyper_dual_numbers(
+        tree in trees(), x in prop::array::uniform4(-1.5..1.5f64)
+    ) {
+        let mut graph = Graph::default();
+        let energy = tree.build_on(&mut graph, |at| match at {
+            1 => Input::Parameter("a".to_owned()),
+            3 => Input::Time,
+            at => leaf(at),
+        });
+        let force = Force { ranges: Vec::new(), target: Affine::constant(1), value: energy };
+        let derivation = Derivation::of_model(Model {
+            forces: vec![force],
+            sensitivities: vec![Parameter { field: "a".to_owned(), element: None }],
+            ..model(graph, energy)
+        });
+        let environment = Environment {
+            time: x[3],
+            q: vec![x[0], 0.0],
+            z: vec![x[2], 0.0],
+            parameters: [("a".to_owned(), x[1])].into(),
+            ..Environment::default()
+        };
+        for (by, at) in [(By::Parameter(0), 1), (By::Time, 3)] {
+            let results = interpret(&derivation.program_by(by), &environment).expect("a complete environment");
+            for (first, found) in [(0, results.q[0]), (2, results.z[0])] {
+                let mut seeded = x.map(HyperDual64::from_re);
+                seeded[first].eps1 = 1.0;
+                seeded[at].eps2 = 1.0;
+                let dual = tree.dual(&seeded);
+                prop_assume!(dual.re.abs() < 1e6 && dual.eps1eps2.abs() < 1e6);
+                prop_assert!(distance(found, dual.eps1eps2) < DIGITS, "{by:?} {} {}", found, dual.eps1eps2);
+                prop_assert!(distance(results.force[1], dual.eps2) < DIGITS, "{by:?} {} {}", results.force[1], dual.eps2);
             }
         }
     }

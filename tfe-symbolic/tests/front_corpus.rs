@@ -143,6 +143,9 @@ fn shown(model: &Declared) -> String {
     for (name, value) in &model.observables {
         let _ = writeln!(out, "{name} = {}", graph.display(*value));
     }
+    if !model.sensitivities.is_empty() {
+        let _ = writeln!(out, "{:?}", model.sensitivities);
+    }
     for solver in &model.solvers {
         let _ = writeln!(out, "{solver:?}");
     }

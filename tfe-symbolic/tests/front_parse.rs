@@ -299,6 +299,7 @@ fn item() -> impl Strategy<Value = Item> {
             name: spanned(name),
             value
         }),
+        prop::collection::vec(expr(), 0..4).prop_map(Item::Sensitivity),
         (expr(), expr()).prop_map(|(target, value)| Item::Force { target, value }),
         (name(), ranges(), expr()).prop_map(|(name, range, value)| Item::Constraint {
             name: spanned(name),

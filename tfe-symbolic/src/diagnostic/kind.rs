@@ -192,6 +192,39 @@ kinds! {
     },
     /// A Rayleigh function that does not depend on velocities.
     DissipationWithoutVelocity,
+    /// `sensitivity()`
+    NoSensitivity,
+    /// A name in `sensitivity(...)` that nothing declares.
+    UnknownParameter {
+        /// The name.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// Something in `sensitivity(...)` that is no parameter.
+    NotAParameter {
+        /// What is named.
+        target: String,
+        /// What it is, if it is a name.
+        role: Option<Role>,
+    },
+    /// An array in `sensitivity(...)` without an index.
+    ArrayOfParameters {
+        /// The array.
+        name: String,
+    },
+    /// `sensitivity(k[n])`
+    IndexNotLiteral {
+        /// The array.
+        array: String,
+        /// The index as written.
+        index: String,
+    },
+    /// A parameter that `sensitivity(...)` names twice.
+    RepeatedParameter {
+        /// The parameter.
+        name: String,
+    },
     // ---- names ----
     /// A name that nothing declares.
     UnknownSymbol {

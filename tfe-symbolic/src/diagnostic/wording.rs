@@ -74,6 +74,24 @@ impl Kind {
                 format!("the {energy} does not depend on the state of the system")
             }
             Self::DissipationWithoutVelocity => "the dissipation depends on no velocity".into(),
+            Self::NoSensitivity => "`sensitivity` names no parameter".into(),
+            Self::NotAParameter {
+                target,
+                role: Some(role),
+            } => format!("cannot differentiate by `{target}`, which is {role}"),
+            Self::NotAParameter { target, role: None } => {
+                format!("cannot differentiate by `{target}`")
+            }
+            Self::UnknownParameter { name, .. } => format!("unknown parameter `{name}`"),
+            Self::ArrayOfParameters { name } => {
+                format!("array `{name}` of parameters needs an index")
+            }
+            Self::IndexNotLiteral { index, .. } => {
+                format!("index `{index}` of a parameter is not a literal")
+            }
+            Self::RepeatedParameter { name } => {
+                format!("`sensitivity` names `{name}` more than once")
+            }
             Self::UnknownSymbol { name, .. } => format!("unknown name `{name}`"),
             Self::UnknownFunction { name, .. } => format!("unknown function `{name}`"),
             Self::NotAFunction { name } => format!("`{name}` is not a function"),
@@ -202,6 +220,10 @@ impl Kind {
             | Self::ForceTarget {
                 nearest: Some(nearest),
                 ..
+            }
+            | Self::UnknownParameter {
+                nearest: Some(nearest),
+                ..
             } => {
                 format!("did you mean `{nearest}`?")
             }
@@ -269,6 +291,26 @@ impl Kind {
             Self::DissipationWithoutVelocity => {
                 "a Rayleigh function holds velocities, such as `c/2*dot(x)^2`".into()
             }
+            Self::NoSensitivity => "name fields of the struct, as in `sensitivity(omega)`".into(),
+            Self::UnknownParameter {
+                nearest: None,
+                name,
+            } => format!("declare `{name}` as a field of the struct"),
+            Self::NotAParameter { target, role: None } if target == "t" => {
+                "derivatives by the time come with those by any parameter".into()
+            }
+            Self::NotAParameter { .. } => {
+                "derivatives are taken by fields of type `f64` and by elements of array fields, \
+                 such as `k[2]`"
+                    .into()
+            }
+            Self::ArrayOfParameters { name } => {
+                format!("name its elements, as in `{name}[0], {name}[1]`")
+            }
+            Self::IndexNotLiteral { array, .. } => {
+                format!("name each element, as in `{array}[0], {array}[1]`")
+            }
+            Self::RepeatedParameter { .. } => "name it once".into(),
             Self::NotAFunction { name } => format!("write `{name}*(…)` for a product"),
             Self::FunctionAsValue { name } => format!("write `{name}(…)`"),
             Self::UsedBeforeLet { .. } => "move the `let` up".into(),

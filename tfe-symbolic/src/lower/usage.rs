@@ -55,18 +55,19 @@ impl Lowerer<'_> {
     fn check_fields(&mut self) {
         let context = self.context;
         // A field that a misspelt name may have meant, or with another mistake, is not to blame.
-        let meant: Vec<String> = self
-            .bag
-            .iter()
-            .filter_map(|diagnostic| match &diagnostic.kind {
-                Kind::UnknownSymbol { nearest, .. } => nearest.clone(),
-                Kind::NameClash { name, .. }
-                | Kind::NotAFunction { name }
-                | Kind::ReservedName { name, field: true }
-                | Kind::ReservedPrefix { name, field: true } => Some(name.clone()),
-                _ => None,
-            })
-            .collect();
+        let meant: Vec<String> =
+            self.bag
+                .iter()
+                .filter_map(|diagnostic| match &diagnostic.kind {
+                    Kind::UnknownSymbol { nearest, .. }
+                    | Kind::UnknownParameter { nearest, .. } => nearest.clone(),
+                    Kind::NameClash { name, .. }
+                    | Kind::NotAFunction { name }
+                    | Kind::ReservedName { name, field: true }
+                    | Kind::ReservedPrefix { name, field: true } => Some(name.clone()),
+                    _ => None,
+                })
+                .collect();
         for (field, used) in context.fields.iter().zip(self.fields.clone()) {
             let exempt = used
                 || field.name.starts_with('_')

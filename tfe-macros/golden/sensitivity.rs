@@ -1,0 +1,237 @@
+/// # Derived model
+/// ```text
+/// L = ½ m ẋ² − ½ k[0] x² − k[1]/4 x⁴
+/// D = ½ c ẋ²
+/// Q(x) = amplitude cos(ω t)
+/// coordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c
+/// operations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other
+/// operations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other
+/// operations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other
+/// declared by             Lagrangian, 1 coordinates
+/// depends on time         yes
+/// forces                  yes
+/// linear                  no
+/// quadratic in v          yes
+/// constant L_vv           yes
+/// separable (L_vq = 0)    yes
+/// cyclic coordinates      none
+/// pattern L_vv            (0,0)
+/// pattern L_vq            zero
+/// pattern L_qq            (0,0)
+/// pattern Q_v             (0,0)
+/// pattern Q_q             zero
+/// ```
+struct Duffing {
+    m: f64,
+    k: [f64; 2],
+    c: f64,
+    amplitude: f64,
+    omega: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<1> for Duffing {
+        const FORM: __tfe::Form = __tfe::Form::Lagrangian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: true,
+            forced: true,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: false,
+            separable: true,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
+            let m = R::from_f64(self.m);
+            let t0 = z[0] * z[0];
+            let t1 = m * t0;
+            let t2 = q[0] * q[0];
+            let t3 = R::from_f64(self.k[0]) * t2;
+            let t4 = t1 - t3;
+            let t5 = R::from_f64(0.5) * t4;
+            let t6 = t2 * t2;
+            let t7 = R::from_f64(0.25) * R::from_f64(self.k[1]);
+            let t8 = t6 * t7;
+            t5 - t8
+        }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            let amplitude = R::from_f64(self.amplitude);
+            let c = R::from_f64(self.c);
+            let m = R::from_f64(self.m);
+            let omega = R::from_f64(self.omega);
+            first.z[0] = m * z[0];
+            let t0 = q[0] * q[0];
+            let t1 = R::from_f64(self.k[1]) * t0;
+            let t2 = R::from_f64(self.k[0]) + t1;
+            let t3 = q[0] * t2;
+            first.q[0] = -t3;
+            let t4 = omega * t;
+            let t5 = t4.cos();
+            let t6 = amplitude * t5;
+            let t7 = z[0] * c;
+            first.force[0] = t6 - t7;
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            let amplitude = R::from_f64(self.amplitude);
+            let c = R::from_f64(self.c);
+            let m = R::from_f64(self.m);
+            let omega = R::from_f64(self.omega);
+            first.z[0] = m * z[0];
+            let t0 = q[0] * q[0];
+            let t1 = R::from_f64(self.k[1]) * t0;
+            let t2 = R::from_f64(self.k[0]) + t1;
+            let t3 = q[0] * t2;
+            first.q[0] = -t3;
+            let t4 = omega * t;
+            let t5 = t4.cos();
+            let t6 = amplitude * t5;
+            let t7 = z[0] * c;
+            first.force[0] = t6 - t7;
+            zz[0][0] = m;
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            second: &mut __tfe::Second<R, 1>,
+        ) {
+            let amplitude = R::from_f64(self.amplitude);
+            let c = R::from_f64(self.c);
+            let m = R::from_f64(self.m);
+            let omega = R::from_f64(self.omega);
+            first.z[0] = m * z[0];
+            let t0 = q[0] * q[0];
+            let t1 = R::from_f64(self.k[1]) * t0;
+            let t2 = R::from_f64(self.k[0]) + t1;
+            let t3 = q[0] * t2;
+            first.q[0] = -t3;
+            let t4 = omega * t;
+            let t5 = t4.cos();
+            let t6 = amplitude * t5;
+            let t7 = z[0] * c;
+            first.force[0] = t6 - t7;
+            second.zz[0][0] = m;
+            let t8 = R::from_f64(3.0) * t1;
+            let t9 = R::from_f64(self.k[0]) + t8;
+            second.qq[0][0] = -t9;
+            second.force_z[0][0] = -c;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const SENSITIVITIES: &'static [&'static str] = &["omega", "k[1]", "c"];
+        fn sensitivity_parameter(&self, index: usize) -> f64 {
+            match index {
+                0 => self.omega,
+                1 => self.k[1],
+                2 => self.c,
+                _ => f64::NAN,
+            }
+        }
+        fn first_by<R: __tfe::Real>(
+            &self,
+            by: __tfe::By,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            match by {
+                __tfe::By::Time => {
+                    let amplitude = R::from_f64(self.amplitude);
+                    let omega = R::from_f64(self.omega);
+                    let t0 = omega * t;
+                    let t1 = t0.sin();
+                    let t2 = amplitude * omega;
+                    let t3 = t1 * t2;
+                    first.force[0] = -t3;
+                }
+                __tfe::By::Parameter(0) => {
+                    let amplitude = R::from_f64(self.amplitude);
+                    let omega = R::from_f64(self.omega);
+                    let t0 = omega * t;
+                    let t1 = t0.sin();
+                    let t2 = amplitude * t;
+                    let t3 = t1 * t2;
+                    first.force[0] = -t3;
+                }
+                __tfe::By::Parameter(1) => {
+                    let t0 = q[0] * q[0];
+                    let t1 = q[0] * t0;
+                    first.q[0] = -t1;
+                }
+                __tfe::By::Parameter(2) => {
+                    first.force[0] = -z[0];
+                }
+                _ => {}
+            }
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl Duffing {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    fn state(&self, q: [f64; 1], v: [f64; 1]) -> ::tfe::__private::State<1> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "Duffing",
+            form: ::tfe::__private::Form::Lagrangian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: true,
+                forced: true,
+                quadratic_in_z: true,
+                constant_mass: true,
+                linear: false,
+                separable: true,
+            },
+            cyclic: &[],
+            value: ::tfe::__private::Operations {
+                additions: 2,
+                multiplications: 8,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 2,
+                multiplications: 7,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 3,
+                multiplications: 8,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            page: "L = ½ m x\u{307}² − ½ k[0] x² − k[1]/4 x⁴\nD = ½ c x\u{307}²\nQ(x) = amplitude cos(ω t)\ncoordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c\noperations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)\npattern Q_v             (0,0)\npattern Q_q             zero",
+        }
+    }
+}
