@@ -8,9 +8,9 @@
 //!
 //! The reference at t = 10 s was computed by extrapolation at two step sizes that agree to the digits given.
 
-use plotters::prelude::*;
 use std::error::Error;
 use std::time::Instant;
+use tfe::charts::{Axis, Chart, Scale, Style};
 use tfe::prelude::*;
 
 #[dynamics(
@@ -97,7 +97,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
 
     let path = "double_pendulum.svg";
-    draw(path, &curves)?;
+    chart(curves).save(path)?;
     println!("\nchart: {path}");
     Ok(())
 }
@@ -115,41 +115,12 @@ fn elements() -> Vec<Element> {
 }
 
 /// Error against step, both logarithmic: the slope of a curve is the order of its element.
-fn draw(path: &str, curves: &[Curve]) -> Result<(), Box<dyn Error>> {
-    let root = SVGBackend::new(path, (860, 560)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&root)
-        .caption("Double pendulum, t = 10 s", ("sans-serif", 22))
-        .margin(14)
-        .x_label_area_size(46)
-        .y_label_area_size(70)
-        .build_cartesian_2d((1.5e-3..0.3).log_scale(), (1e-14..10.0).log_scale())?;
-    chart
-        .configure_mesh()
-        .x_desc("step (s)")
-        .y_desc("error of the angles (rad)")
-        .label_style(("sans-serif", 14))
-        .axis_desc_style(("sans-serif", 16))
-        .x_label_formatter(&|step| format!("{step}"))
-        .y_label_formatter(&|error| format!("{error:.0e}"))
-        .light_line_style(WHITE)
-        .draw()?;
-    for (k, curve) in curves.iter().enumerate() {
-        let color = Palette99::pick(k).to_rgba();
-        chart
-            .draw_series(
-                LineSeries::new(curve.points.iter().copied(), color.stroke_width(2)).point_size(3),
-            )?
-            .label(curve.element.to_string())
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], color.stroke_width(2)));
-    }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::LowerRight)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.3))
-        .label_font(("sans-serif", 14))
-        .draw()?;
-    root.present()?;
-    Ok(())
+fn chart(curves: Vec<Curve>) -> Chart {
+    let chart = Chart::new("Double pendulum, t = 10 s")
+        .x(Axis::new("step (s)").scale(Scale::Logarithmic))
+        .y(Axis::new("error of the angles (rad)").scale(Scale::Logarithmic));
+    curves.into_iter().fold(chart, |chart, curve| {
+        let name = curve.element.to_string();
+        chart.series(name, Style::LineWithMarkers, curve.points)
+    })
 }

@@ -2,6 +2,8 @@
 
 extern crate self as tfe;
 
+#[cfg(feature = "charts")]
+pub mod charts;
 mod csv;
 pub mod error;
 pub mod motion;

@@ -3,10 +3,14 @@
 mod chebyshev;
 mod eigenvalues;
 mod intervals;
+mod map;
+mod modes;
 mod sign_functions;
 
 pub use eigenvalues::{EigenvalueError, eigenvalues};
 pub use intervals::{IntervalError, UnstableInterval, stability_changes_of, unstable_intervals_of};
+pub use map::{FloquetError, MapError, MapPlan, PointError, PointFailure, StabilityMap};
+pub use modes::{Mode, ModeError, ModeKind, modes};
 pub use tfe_runtime::transition::TransitionError;
 
 use nalgebra::{Complex, DMatrix};

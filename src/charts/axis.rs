@@ -1,0 +1,457 @@
+//! Axes: scales, ranges, ticks.
+
+use super::ChartError;
+use std::ops::Range;
+
+/// How numbers are laid along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Scale {
+    /// Equal differences are equal lengths.
+    #[default]
+    Linear,
+    /// Equal ratios are equal lengths; numbers that are not positive have no place.
+    Logarithmic,
+}
+
+/// An axis: its label with the unit, its scale, its range.
+///
+/// A label alone is a linear axis whose range fits what is drawn.
+///
+/// ```
+/// use tfe::charts::{Axis, Scale};
+///
+/// let time = Axis::from("t (s)");
+/// let error = Axis::new("error (rad)").scale(Scale::Logarithmic).range(1e-14..1.0);
+/// # let _ = (time, error);
+/// ```
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Axis {
+    label: String,
+    scale: Scale,
+    range: Option<Range<f64>>,
+}
+
+impl Axis {
+    /// A linear axis with this label.
+    pub fn new(label: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            ..Self::default()
+        }
+    }
+
+    /// With this scale.
+    #[must_use]
+    pub fn scale(mut self, scale: Scale) -> Self {
+        self.scale = scale;
+        self
+    }
+
+    /// From `range.start` to `range.end`, ascending; what lies outside is cut off. Positive on a logarithmic axis.
+    #[must_use]
+    pub fn range(mut self, range: Range<f64>) -> Self {
+        self.range = Some(range);
+        self
+    }
+
+    /// The axis over its own range, or over the values that have a place on it, longer by the fraction `margin` at each end.
+    pub(super) fn extent(
+        &self,
+        values: impl Iterator<Item = f64>,
+        margin: f64,
+    ) -> Result<Extent, ChartError> {
+        let (start, end) = match &self.range {
+            Some(range) => self.checked(range)?,
+            None => self.fitted(values, margin)?,
+        };
+        Ok(Extent {
+            label: self.label.clone(),
+            scale: self.scale,
+            start,
+            end,
+        })
+    }
+
+    fn checked(&self, range: &Range<f64>) -> Result<(f64, f64), ChartError> {
+        let (start, end) = (range.start, range.end);
+        if !(start.is_finite() && end.is_finite() && start < end) {
+            return Err(ChartError::Range {
+                axis: self.label.clone(),
+                start,
+                end,
+            });
+        }
+        if self.scale == Scale::Logarithmic && start <= 0.0 {
+            return Err(ChartError::NotPositive {
+                axis: self.label.clone(),
+            });
+        }
+        Ok((start, end))
+    }
+
+    fn fitted(
+        &self,
+        values: impl Iterator<Item = f64>,
+        margin: f64,
+    ) -> Result<(f64, f64), ChartError> {
+        let mut any = false;
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for value in values.filter(|value| value.is_finite()) {
+            any = true;
+            if self.scale == Scale::Linear || value > 0.0 {
+                (low, high) = (low.min(value), high.max(value));
+            }
+        }
+        match self.scale {
+            _ if !any => Err(ChartError::NoData),
+            _ if low > high => Err(ChartError::NotPositive {
+                axis: self.label.clone(),
+            }),
+            Scale::Linear => Ok(widened_linear(low, high, margin)),
+            Scale::Logarithmic => Ok(widened_logarithmic(low, high, margin)),
+        }
+    }
+}
+
+impl<T: Into<String>> From<T> for Axis {
+    fn from(label: T) -> Self {
+        Self::new(label)
+    }
+}
+
+/// A range around [low, high] that is not empty, within the finite numbers.
+fn widened_linear(low: f64, high: f64, margin: f64) -> (f64, f64) {
+    let size = low.abs().max(high.abs());
+    // Numbers that differ by rounding only are one number.
+    let room = if high - low <= 1e-12 * size {
+        if size == 0.0 { 1.0 } else { 0.1 * size }
+    } else {
+        margin * high - margin * low
+    };
+    ((low - room).max(f64::MIN), (high + room).min(f64::MAX))
+}
+
+fn widened_logarithmic(low: f64, high: f64, margin: f64) -> (f64, f64) {
+    let decades = high.log10() - low.log10();
+    let room = if decades < 1e-12 {
+        0.5
+    } else {
+        margin * decades
+    };
+    let factor = 10_f64.powf(room);
+    (
+        (low / factor).max(f64::MIN_POSITIVE),
+        (high * factor).min(f64::MAX),
+    )
+}
+
+/// A mark on an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Tick {
+    /// Where, as a fraction of the axis.
+    pub(super) place: f64,
+    /// What stands there; small marks have no label.
+    pub(super) label: Option<String>,
+}
+
+/// An axis with a definite range.
+#[derive(Clone, Debug)]
+pub(super) struct Extent {
+    pub(super) label: String,
+    scale: Scale,
+    start: f64,
+    end: f64,
+}
+
+impl Extent {
+    /// Where on the axis a value is: 0 at its start, 1 at its end; none for what has no place.
+    pub(super) fn fraction(&self, value: f64) -> Option<f64> {
+        let (start, end, value) = match self.scale {
+            // Of large numbers halves, because the difference of two of them may be infinite.
+            Scale::Linear if self.start.abs().max(self.end.abs()) > 1e300 => {
+                (0.5 * self.start, 0.5 * self.end, 0.5 * value)
+            }
+            Scale::Linear => (self.start, self.end, value),
+            Scale::Logarithmic if value > 0.0 => {
+                (self.start.log10(), self.end.log10(), value.log10())
+            }
+            Scale::Logarithmic => return None,
+        };
+        let fraction = (value - start) / (end - start);
+        // Far outside it does not matter how far.
+        value.is_finite().then(|| fraction.clamp(-1e6, 1e6))
+    }
+
+    /// The value at a fraction of the axis.
+    pub(super) fn value(&self, fraction: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => self.start * (1.0 - fraction) + self.end * fraction,
+            Scale::Logarithmic => {
+                10_f64.powf(self.start.log10() * (1.0 - fraction) + self.end.log10() * fraction)
+            }
+        }
+    }
+
+    /// About as many labelled ticks as asked for.
+    pub(super) fn ticks(&self, wanted: usize) -> Vec<Tick> {
+        let wanted = wanted.max(2);
+        match self.scale {
+            Scale::Linear => self.linear_ticks(wanted),
+            Scale::Logarithmic => self.logarithmic_ticks(wanted),
+        }
+    }
+
+    fn tick(&self, value: f64, label: Option<String>) -> Option<Tick> {
+        // Ticks at the very ends, moved out by rounding, count.
+        let place = self
+            .fraction(value)
+            .filter(|place| (-1e-9..=1.0 + 1e-9).contains(place))?;
+        Some(Tick {
+            place: place.clamp(0.0, 1.0),
+            label,
+        })
+    }
+
+    fn linear_ticks(&self, wanted: usize) -> Vec<Tick> {
+        let step = round_step(self.end / wanted as f64 - self.start / wanted as f64);
+        let first = (self.start / step - 1e-9).ceil();
+        (0..=2 * wanted)
+            .map(|k| (first + k as f64) * step)
+            .filter_map(|value| {
+                let largest = self.start.abs().max(self.end.abs());
+                self.tick(value, Some(number(value, step, largest)))
+            })
+            .collect()
+    }
+
+    fn logarithmic_ticks(&self, wanted: usize) -> Vec<Tick> {
+        let (start, end) = (self.start.log10(), self.end.log10());
+        let (first, last) = ((start - 1e-9).ceil() as i32, (end + 1e-9).floor() as i32);
+        // Half a decade or less looks linear.
+        if end - start < 0.7 {
+            return self.linear_ticks(wanted);
+        }
+        let decades = (last - first + 1).max(0);
+        let every = (decades as usize).div_ceil(wanted).max(1) as i32;
+        let is_plain = (-2..=4).contains(&first) && (-2..=4).contains(&last);
+        let few = decades < 3;
+        let mut ticks = Vec::new();
+        for exponent in first - 1..=last {
+            for mantissa in 1..10 {
+                let value = parse(mantissa, exponent);
+                let labelled = match mantissa {
+                    1 => exponent.rem_euclid(every) == 0,
+                    2 | 5 => few,
+                    _ => false,
+                };
+                let is_clear = if mantissa == 1 {
+                    decades <= 24
+                } else {
+                    decades <= 8
+                };
+                if !(labelled || is_clear) {
+                    continue;
+                }
+                let label = labelled.then(|| power(mantissa, exponent, is_plain));
+                ticks.extend(self.tick(value, label));
+            }
+        }
+        ticks
+    }
+}
+
+/// The double nearest to a decimal number.
+fn parse(mantissa: i32, exponent: i32) -> f64 {
+    format!("{mantissa}e{exponent}").parse().unwrap_or(f64::NAN)
+}
+
+/// 1, 2 or 5 times a power of ten, not below `step`.
+fn round_step(step: f64) -> f64 {
+    let exponent = step.log10().floor() as i32;
+    [1, 2, 5]
+        .into_iter()
+        .map(|mantissa| parse(mantissa, exponent))
+        .chain([parse(1, exponent.saturating_add(1))])
+        .find(|&round| round >= step * (1.0 - 1e-9))
+        .filter(|round| *round > 0.0 && round.is_finite())
+        .unwrap_or(step)
+}
+
+/// A number of an axis whose ticks are `step` apart and at most `largest`: with the decimals that tell it from its neighbours.
+fn number(value: f64, step: f64, largest: f64) -> String {
+    let value = if value.abs() < 1e-9 * step {
+        0.0
+    } else {
+        value
+    };
+    let digit = step.log10().floor() as i32;
+    if (1e-4..1e6).contains(&largest) {
+        return minus(&format!("{value:.*}", usize::try_from(-digit).unwrap_or(0)));
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    let digits = usize::try_from(exponent - digit).unwrap_or(0).min(16);
+    let text = format!("{value:.digits$e}");
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    format!("{}·10{}", minus(mantissa), superscript(exponent))
+}
+
+fn power(mantissa: i32, exponent: i32, is_plain: bool) -> String {
+    if is_plain {
+        return format!("{}", parse(mantissa, exponent));
+    }
+    let power = superscript(&exponent.to_string());
+    match mantissa {
+        1 => format!("10{power}"),
+        _ => format!("{mantissa}·10{power}"),
+    }
+}
+
+/// With the typographic minus.
+fn minus(text: &str) -> String {
+    text.replace('-', "−")
+}
+
+fn superscript(digits: &str) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    digits
+        .chars()
+        .map(|c| match c.to_digit(10) {
+            Some(digit) => DIGITS[digit as usize],
+            None => '⁻',
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(scale: Scale, range: Range<f64>, wanted: usize) -> Vec<String> {
+        let axis = Axis::new("x").scale(scale).range(range);
+        let ticks = axis.extent(std::iter::empty(), 0.0).unwrap().ticks(wanted);
+        assert!(ticks.iter().all(|tick| (0.0..=1.0).contains(&tick.place)));
+        ticks.into_iter().filter_map(|tick| tick.label).collect()
+    }
+
+    #[test]
+    fn linear_ticks_are_round() {
+        assert_eq!(
+            labels(Scale::Linear, 0.0..10.0, 5),
+            ["0", "2", "4", "6", "8", "10"]
+        );
+        assert_eq!(
+            labels(Scale::Linear, -0.3..0.25, 6),
+            ["−0.3", "−0.2", "−0.1", "0.0", "0.1", "0.2"]
+        );
+        assert_eq!(
+            labels(Scale::Linear, 0.0..3e-7, 3),
+            ["0", "1·10⁻⁷", "2·10⁻⁷", "3·10⁻⁷"]
+        );
+        assert_eq!(
+            labels(Scale::Linear, 1e8..3e8, 2),
+            ["1·10⁸", "2·10⁸", "3·10⁸"]
+        );
+    }
+
+    #[test]
+    fn logarithmic_ticks_are_powers_of_ten() {
+        assert_eq!(
+            labels(Scale::Logarithmic, 1e-14..1.0, 8),
+            [
+                "10⁻¹⁴",
+                "10⁻¹²",
+                "10⁻¹⁰",
+                "10⁻⁸",
+                "10⁻⁶",
+                "10⁻⁴",
+                "10⁻²",
+                "10⁰"
+            ]
+        );
+        assert_eq!(
+            labels(Scale::Logarithmic, 0.01..10.0, 6),
+            ["0.01", "0.1", "1", "10"]
+        );
+        assert_eq!(
+            labels(Scale::Logarithmic, 0.002..0.3, 6),
+            ["0.002", "0.005", "0.01", "0.02", "0.05", "0.1", "0.2"]
+        );
+        assert_eq!(
+            labels(Scale::Logarithmic, 2.0..4.0, 4),
+            ["2.0", "2.5", "3.0", "3.5", "4.0"]
+        );
+    }
+
+    #[test]
+    fn extreme_ranges_have_finite_ticks() {
+        for range in [
+            f64::MIN..f64::MAX,
+            1.0..1.0 + f64::EPSILON,
+            0.0..f64::MIN_POSITIVE,
+            0.0..5e-324,
+            1e300..1.1e300,
+        ] {
+            let axis = Axis::new("x").range(range);
+            let extent = axis.extent(std::iter::empty(), 0.0).unwrap();
+            for scale in [Scale::Linear, Scale::Logarithmic] {
+                let extent = Extent {
+                    scale,
+                    start: if scale == Scale::Linear {
+                        extent.start
+                    } else {
+                        5e-324
+                    },
+                    ..extent.clone()
+                };
+                assert!(extent.ticks(6).len() <= 100);
+            }
+            assert!(extent.fraction(f64::NAN).is_none());
+            assert_eq!(extent.fraction(extent.end), Some(1.0));
+        }
+    }
+
+    #[test]
+    fn ranges_that_fit() {
+        let axis = Axis::new("x");
+        let extent = axis.extent([f64::NAN, 1.0, 3.0].into_iter(), 0.5).unwrap();
+        assert_eq!((extent.start, extent.end), (0.0, 4.0));
+        let one = axis.extent([5.0].into_iter(), 0.0).unwrap();
+        assert_eq!((one.start, one.end), (4.5, 5.5));
+        let logarithmic = axis.clone().scale(Scale::Logarithmic);
+        let extent = logarithmic
+            .extent([0.0, -1.0, 1.0, 100.0].into_iter(), 0.5)
+            .unwrap();
+        assert!((extent.start - 0.1).abs() < 1e-15 && (extent.end - 1e3).abs() < 1e-11);
+        assert_eq!(extent.fraction(-1.0), None);
+        assert!((extent.value(0.5) - 10.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn ranges_that_do_not() {
+        let axis = Axis::new("x");
+        let none = std::iter::empty;
+        assert!(matches!(axis.extent(none(), 0.0), Err(ChartError::NoData)));
+        let reversed = Range {
+            start: 1.0,
+            end: 0.0,
+        };
+        for range in [reversed, 0.0..0.0, f64::NAN..1.0, 0.0..f64::INFINITY] {
+            assert!(matches!(
+                axis.clone().range(range).extent(none(), 0.0),
+                Err(ChartError::Range { .. })
+            ));
+        }
+        let logarithmic = axis.scale(Scale::Logarithmic);
+        assert!(matches!(
+            logarithmic.extent([-1.0, 0.0].into_iter(), 0.0),
+            Err(ChartError::NotPositive { .. })
+        ));
+        assert!(matches!(
+            logarithmic.range(0.0..1.0).extent(none(), 0.0),
+            Err(ChartError::NotPositive { .. })
+        ));
+    }
+}

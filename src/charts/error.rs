@@ -1,0 +1,104 @@
+//! Why there is no picture.
+
+use std::error::Error;
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+
+/// Why a picture could not be made or written.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum ChartError {
+    /// The file could not be written.
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// What the file system said.
+        source: io::Error,
+    },
+    /// The ending of the file name is none that can be written.
+    UnknownEnding {
+        /// Which file.
+        path: PathBuf,
+        /// The endings that can be.
+        known: &'static [&'static str],
+    },
+    /// There is nothing to draw: no point, or no cell, has finite numbers.
+    NoData,
+    /// A range was asked for whose ends are not finite or not ascending.
+    Range {
+        /// The label of the axis.
+        axis: String,
+        /// The start asked for.
+        start: f64,
+        /// The end asked for.
+        end: f64,
+    },
+    /// A logarithmic axis would begin at or below zero: by its range, or for want of a positive number.
+    NotPositive {
+        /// The label of the axis.
+        axis: String,
+    },
+    /// The picture would have more cells than fit into one.
+    TooManyCells {
+        /// Cells in a row.
+        columns: usize,
+        /// Rows.
+        rows: usize,
+    },
+    /// A figure of a page is not an SVG picture.
+    NotSvg {
+        /// The caption of the figure.
+        caption: String,
+    },
+    /// The drawing library failed.
+    Drawing {
+        /// Its reason.
+        source: Box<dyn Error + Send + Sync>,
+    },
+}
+
+impl fmt::Display for ChartError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io { path, source } => write!(f, "cannot write {}: {source}", path.display()),
+            Self::UnknownEnding { path, known } => {
+                let known = known.join(" or ");
+                write!(
+                    f,
+                    "cannot tell what to write into {}: its name should end in {known}",
+                    path.display()
+                )
+            }
+            Self::NoData => f.write_str("there is nothing to draw: no finite numbers were given"),
+            Self::Range { axis, start, end } => write!(
+                f,
+                "the axis “{axis}” cannot go from {start} to {end}: both must be finite, the end above the start"
+            ),
+            Self::NotPositive { axis } => write!(
+                f,
+                "the axis “{axis}” is logarithmic, but there are no positive numbers on it or its range begins at or below zero"
+            ),
+            Self::TooManyCells { columns, rows } => {
+                write!(
+                    f,
+                    "a map of {columns} × {rows} cells is too large for a picture"
+                )
+            }
+            Self::NotSvg { caption } => {
+                write!(f, "the figure “{caption}” is not an SVG picture")
+            }
+            Self::Drawing { source } => write!(f, "the picture could not be drawn: {source}"),
+        }
+    }
+}
+
+impl Error for ChartError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Io { source, .. } => Some(source),
+            Self::Drawing { source } => Some(source.as_ref()),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,438 @@
+//! Maps: a value or a class for every cell of a rectangle.
+
+mod image;
+
+use super::axis::Extent;
+use super::canvas::{self, Anchor, CHARACTER, Canvas, Frame, TEXT, picture, sides};
+use super::clip::{self, Point};
+use super::file::{csv_field, csv_number, ending, write};
+use super::plot::{KEY, Key, Plot, Room, Side, draw_ticks, longest, shortened};
+use super::{Axis, ChartError, Colour};
+use std::fmt::Write;
+use std::path::Path;
+
+/// A class of cells, such as “stable”.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Class {
+    /// What the legend says.
+    pub name: String,
+    /// Its colour.
+    pub colour: Colour,
+}
+
+impl Class {
+    /// A class with this name and colour.
+    pub fn new(name: impl Into<String>, colour: Colour) -> Self {
+        Self {
+            name: name.into(),
+            colour,
+        }
+    }
+}
+
+/// What the cells hold.
+#[derive(Clone, Debug)]
+enum Cells {
+    Values(Vec<Option<f64>>),
+    Classes(Vec<Option<u8>>, Vec<Class>),
+}
+
+#[derive(Clone, Debug)]
+struct Curve {
+    name: String,
+    points: Vec<Point>,
+}
+
+/// A rectangle of cells over two axes: a value in each, shown by a colour scale, or a class.
+///
+/// Column 0 is at the left, row 0 at the bottom; cells are equally wide along their axes, logarithmic ones included. The cells are one
+/// image of a byte a cell inside the SVG, so that a map of a million cells is a file of at most about a megabyte.
+///
+/// ```
+/// use tfe::charts::{Axis, HeatMap};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let centre = |k: usize| -2.0 + 4.0 * (k as f64 + 0.5) / 100.0;
+/// let map = HeatMap::new("Saddle", (100, 100), |i, j| Some(centre(i).powi(2) - centre(j).powi(2)))
+///     .x(Axis::new("x (m)").range(-2.0..2.0))
+///     .y(Axis::new("y (m)").range(-2.0..2.0))
+///     .values("height (m)")
+///     .curve("x = y", [(-2.0, -2.0), (2.0, 2.0)]);
+/// assert!(map.to_svg()?.len() < 20_000);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct HeatMap {
+    title: String,
+    columns: usize,
+    rows: usize,
+    cells: Cells,
+    x: Axis,
+    y: Axis,
+    values: Axis,
+    curves: Vec<Curve>,
+    size: (u32, u32),
+}
+
+/// Numbers a picture can have in memory without a doubt, 16384².
+const MOST_CELLS: usize = 1 << 28;
+/// From the frame to the colour bar, and the width of that, in pixels.
+const BAR: (f64, f64) = (16.0, 16.0);
+/// Height of a row of the legend above the frame.
+const LINE: f64 = 22.0;
+
+impl HeatMap {
+    /// The `endings` that [`HeatMap::save`] knows.
+    const ENDINGS: &'static [&'static str] = &[".svg", ".png", ".csv"];
+
+    /// A map of values: (columns, rows), and what is in column i and row j. A cell with `None`, or with what is not finite, is grey.
+    pub fn new(
+        title: impl Into<String>,
+        size: (usize, usize),
+        value: impl FnMut(usize, usize) -> Option<f64>,
+    ) -> Self {
+        Self::of(title.into(), size, Cells::Values(filled(size, value)))
+    }
+
+    /// A map of classes: (columns, rows), the classes, at most 255 of them, and the index of the class of column i and row j. A cell with `None`, or with
+    /// an index beyond the classes, is grey.
+    ///
+    /// ```
+    /// use tfe::charts::{Class, Colour, HeatMap};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let classes = vec![Class::new("inside", Colour(0, 114, 178)), Class::new("outside", Colour::WHITE)];
+    /// let disc = |i, j| Some(usize::from(i * i + j * j > 50 * 50));
+    /// let svg = HeatMap::classes("Quarter disc", (60, 60), classes, disc).to_svg()?;
+    /// assert!(svg.contains("inside") && svg.contains("outside"));
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn classes(
+        title: impl Into<String>,
+        size: (usize, usize),
+        mut classes: Vec<Class>,
+        mut class: impl FnMut(usize, usize) -> Option<usize>,
+    ) -> Self {
+        classes.truncate(usize::from(u8::MAX));
+        let known = classes.len();
+        let index = |i, j| {
+            let index = class(i, j).filter(|index| *index < known)?;
+            u8::try_from(index).ok()
+        };
+        let cells = filled(size, index);
+        Self::of(title.into(), size, Cells::Classes(cells, classes))
+    }
+
+    fn of(title: String, (columns, rows): (usize, usize), cells: Cells) -> Self {
+        Self {
+            title,
+            columns,
+            rows,
+            cells,
+            x: Axis::default(),
+            y: Axis::default(),
+            values: Axis::default(),
+            curves: Vec::new(),
+            size: (720, 440),
+        }
+    }
+
+    /// The horizontal axis. Its range is that of the cells, edge to edge; without one columns are counted from 0.
+    #[must_use]
+    pub fn x(mut self, axis: impl Into<Axis>) -> Self {
+        self.x = axis.into();
+        self
+    }
+
+    /// The vertical axis. Its range is that of the cells, edge to edge; without one rows are counted from 0.
+    #[must_use]
+    pub fn y(mut self, axis: impl Into<Axis>) -> Self {
+        self.y = axis.into();
+        self
+    }
+
+    /// The axis of the colours: label, scale, range. Values outside the range have the colour of its nearer end. On a logarithmic one, values that are
+    /// not positive have the colour of the least. Maps of classes have none.
+    #[must_use]
+    pub fn values(mut self, axis: impl Into<Axis>) -> Self {
+        self.values = axis.into();
+        self
+    }
+
+    /// Adds a curve through the points (x, y), drawn over the cells and cut at the frame.
+    #[must_use]
+    pub fn curve(
+        mut self,
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
+        self.curves.push(Curve {
+            name: name.into(),
+            points: points.into_iter().collect(),
+        });
+        self
+    }
+
+    /// Width and height of the picture, in pixels, each from 240 to 8000; what is outside counts as the nearer end.
+    #[must_use]
+    pub fn size(mut self, width: u32, height: u32) -> Self {
+        self.size = sides(width, height);
+        self
+    }
+
+    /// The map as an SVG picture.
+    ///
+    /// # Errors
+    /// [`ChartError::NoData`] without a cell, or without a finite value where they decide the range of the colours; [`ChartError::TooManyCells`];
+    /// [`ChartError::Range`] and [`ChartError::NotPositive`] for an axis that cannot be.
+    pub fn to_svg(&self) -> Result<String, ChartError> {
+        let (x, y) = self.extents()?;
+        let bar = self.colour_bar()?;
+        let strip = self.strip();
+        let room = Room {
+            sides: self.size,
+            above: LINE * strip.len() as f64,
+            right: bar.as_ref().map_or(24.0, ColourBar::width),
+        };
+        let plot = Plot::new(x, y, &self.title, &room);
+        let mut below = canvas::image(&self.to_png()?, &plot.frame);
+        if let Some(bar) = &bar {
+            below += &canvas::image(&image::scale()?, &bar.frame(&plot.frame));
+        }
+        picture(self.size, &below, |canvas| {
+            for (k, curve) in self.curves.iter().enumerate() {
+                draw_curve(canvas, &plot, curve, curve_key(k))?;
+            }
+            plot.draw_axes(canvas, &self.title)?;
+            let top = plot.frame.top - LINE * strip.len() as f64;
+            for (k, line) in strip.iter().enumerate() {
+                let y = top + LINE * (k as f64 + 0.5) - 4.0;
+                for (x, name, key) in line {
+                    key.draw_entry(canvas, name, (plot.frame.left + x, y))?;
+                }
+            }
+            bar.iter().try_for_each(|bar| bar.draw(canvas, &plot.frame))
+        })
+    }
+
+    /// The cells as a PNG image, a pixel each, without axes; the top row is the last.
+    ///
+    /// # Errors
+    /// Those of [`HeatMap::to_svg`] for cells and colours.
+    pub fn to_png(&self) -> Result<Vec<u8>, ChartError> {
+        self.check_cells()?;
+        let (palette, index): (Vec<Colour>, Box<dyn Fn(usize) -> u8 + '_>) = match &self.cells {
+            Cells::Values(values) => {
+                let extent = self.value_extent(values)?;
+                let index = move |k: usize| image::level_of(values[k], &extent);
+                (image::levels(), Box::new(index))
+            }
+            Cells::Classes(indices, classes) => {
+                let mut palette: Vec<_> = classes.iter().map(|class| class.colour).collect();
+                let missing = palette.len() as u8;
+                palette.push(Colour::GREY);
+                let index = move |k: usize| indices[k].unwrap_or(missing);
+                (palette, Box::new(index))
+            }
+        };
+        // From the top row downwards.
+        let pixels: Vec<u8> = (0..self.rows)
+            .rev()
+            .flat_map(|j| (0..self.columns).map(move |i| j * self.columns + i))
+            .map(index)
+            .collect();
+        image::encode((self.columns, self.rows), &palette, &pixels)
+    }
+
+    /// The cells as text: a header, then x, y and value of each, row by row from the bottom, at the cells' centres. An empty field where there is no value.
+    ///
+    /// # Errors
+    /// Those of [`HeatMap::to_svg`] for cells and axes.
+    pub fn to_csv(&self) -> Result<String, ChartError> {
+        let (x, y) = self.extents()?;
+        let centre = |k: usize, count: usize| (k as f64 + 0.5) / count as f64;
+        let xs: Vec<_> = (0..self.columns)
+            .map(|i| csv_number(Some(x.value(centre(i, self.columns)))))
+            .collect();
+        let mut text = String::from("x,y,value\n");
+        for j in 0..self.rows {
+            let y = csv_number(Some(y.value(centre(j, self.rows))));
+            for (i, x) in xs.iter().enumerate() {
+                let value = self.field(j * self.columns + i);
+                // Writing into a string cannot fail.
+                let _ = writeln!(text, "{x},{y},{value}");
+            }
+        }
+        Ok(text)
+    }
+
+    fn field(&self, k: usize) -> String {
+        match &self.cells {
+            Cells::Values(values) => csv_number(values[k]),
+            Cells::Classes(indices, classes) => indices[k].map_or_else(String::new, |index| {
+                csv_field(&classes[usize::from(index)].name)
+            }),
+        }
+    }
+
+    /// Writes the picture into a file `.svg`, the cells as pixels into a file `.png`, or as numbers (x, y, value) into a file `.csv`.
+    ///
+    /// # Errors
+    /// Those of [`HeatMap::to_svg`]; [`ChartError::UnknownEnding`]; [`ChartError::Io`].
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), ChartError> {
+        let path = path.as_ref();
+        match ending(path, Self::ENDINGS)? {
+            ".png" => write(path, self.to_png()?),
+            ".csv" => write(path, self.to_csv()?),
+            _ => write(path, self.to_svg()?),
+        }
+    }
+
+    fn check_cells(&self) -> Result<(), ChartError> {
+        let (columns, rows) = (self.columns, self.rows);
+        if columns == 0 || rows == 0 {
+            return Err(ChartError::NoData);
+        }
+        if is_too_large((columns, rows)) {
+            return Err(ChartError::TooManyCells { columns, rows });
+        }
+        Ok(())
+    }
+
+    fn extents(&self) -> Result<(Extent, Extent), ChartError> {
+        self.check_cells()?;
+        let ends = |count: usize| [0.0, count as f64].into_iter();
+        let x = self.x.extent(ends(self.columns), 0.0)?;
+        let y = self.y.extent(ends(self.rows), 0.0)?;
+        Ok((x, y))
+    }
+
+    fn value_extent(&self, values: &[Option<f64>]) -> Result<Extent, ChartError> {
+        self.values.extent(values.iter().flatten().copied(), 0.0)
+    }
+
+    fn colour_bar(&self) -> Result<Option<ColourBar>, ChartError> {
+        let Cells::Values(values) = &self.cells else {
+            return Ok(None);
+        };
+        let extent = self.value_extent(values)?;
+        let ticks = extent.ticks((f64::from(self.size.1) / 60.0) as usize);
+        Ok(Some(ColourBar { extent, ticks }))
+    }
+
+    /// The legend above the frame, in lines: from where, what, how.
+    fn strip(&self) -> Vec<Vec<(f64, String, Key)>> {
+        let mut entries = Vec::new();
+        if let Cells::Classes(_, classes) = &self.cells {
+            let entry = |class: &Class| (class.name.clone(), Key::Area(class.colour));
+            entries.extend(classes.iter().map(entry));
+        }
+        if self.has_missing() {
+            entries.push(("no value".to_owned(), Key::Area(Colour::GREY)));
+        }
+        for (k, curve) in self.curves.iter().enumerate() {
+            entries.push((curve.name.clone(), curve_key(k)));
+        }
+        let most = f64::from(self.size.0) - 120.0;
+        let mut lines: Vec<Vec<_>> = Vec::new();
+        let mut used = f64::INFINITY;
+        for (name, key) in entries.into_iter().filter(|(name, _)| !name.is_empty()) {
+            let name = shortened(&name, 40);
+            let width = KEY + 20.0 + CHARACTER * name.chars().count() as f64;
+            if used + width > most {
+                lines.push(Vec::new());
+                used = 0.0;
+            }
+            if let Some(line) = lines.last_mut() {
+                line.push((used, name, key));
+            }
+            used += width;
+        }
+        // More would leave no map.
+        lines.truncate((f64::from(self.size.1) / 4.0 / LINE) as usize);
+        lines
+    }
+
+    fn has_missing(&self) -> bool {
+        match &self.cells {
+            Cells::Values(values) => values.iter().any(Option::is_none),
+            Cells::Classes(indices, _) => indices.iter().any(Option::is_none),
+        }
+    }
+}
+
+fn is_too_large((columns, rows): (usize, usize)) -> bool {
+    columns
+        .checked_mul(rows)
+        .is_none_or(|cells| cells > MOST_CELLS)
+}
+
+/// The cells row by row from the bottom; none where they are too many, which is an error later.
+fn filled<T>(
+    size: (usize, usize),
+    mut cell: impl FnMut(usize, usize) -> Option<T>,
+) -> Vec<Option<T>> {
+    if is_too_large(size) {
+        return Vec::new();
+    }
+    let (columns, rows) = size;
+    let mut cells = Vec::with_capacity(columns * rows);
+    for j in 0..rows {
+        cells.extend((0..columns).map(|i| cell(i, j)));
+    }
+    cells
+}
+
+/// Black and colours that are seen on most images, in turn.
+fn curve_key(k: usize) -> Key {
+    const COLOURS: [Colour; 4] = [
+        Colour::BLACK,
+        Colour(213, 94, 0),
+        Colour(204, 121, 167),
+        Colour(0, 114, 178),
+    ];
+    Key::Outlined(COLOURS[k % COLOURS.len()])
+}
+
+fn draw_curve(canvas: &Canvas<'_>, plot: &Plot, curve: &Curve, key: Key) -> Result<(), ChartError> {
+    let places = curve.points.iter().map(|point| plot.fractions(*point));
+    for part in clip::parts(places, (0.0, 0.0), (1.0, 1.0)) {
+        let line: Vec<_> = part.into_iter().map(|at| plot.frame.at(at)).collect();
+        key.draw_line(canvas, &line)?;
+    }
+    Ok(())
+}
+
+/// The scale of the colours, to the right of the frame.
+struct ColourBar {
+    extent: Extent,
+    ticks: Vec<super::axis::Tick>,
+}
+
+impl ColourBar {
+    fn width(&self) -> f64 {
+        BAR.0 + BAR.1 + 40.0 + CHARACTER * longest(&self.ticks) as f64
+    }
+
+    fn frame(&self, map: &Frame) -> Frame {
+        Frame {
+            left: map.right + BAR.0,
+            right: map.right + BAR.0 + BAR.1,
+            ..*map
+        }
+    }
+
+    fn draw(&self, canvas: &Canvas<'_>, map: &Frame) -> Result<(), ChartError> {
+        let frame = self.frame(map);
+        canvas.border(&frame, Colour::BLACK)?;
+        draw_ticks(canvas, frame.right, &frame, &self.ticks, Side::Right)?;
+        let x = map.right + self.width() - 14.0;
+        let middle = f64::midpoint(frame.top, frame.bottom);
+        canvas.text(&self.extent.label, (x, middle), Anchor::Upwards, TEXT + 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests;

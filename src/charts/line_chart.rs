@@ -1,0 +1,277 @@
+//! Line charts.
+
+use super::canvas::{Anchor, CHARACTER, Canvas, Shape, TEXT, picture, sides};
+use super::clip::{self, Point};
+use super::file::{csv_field, csv_number, ending, write};
+use super::plot::{KEY, Key, Plot, Room, shortened};
+use super::{Axis, ChartError, Colour};
+use std::path::Path;
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Style {
+    /// A line through the points.
+    #[default]
+    Line,
+    /// A line, and a marker at every point.
+    LineWithMarkers,
+    /// A marker at every point.
+    Markers,
+    /// A grey dashed line, for what others are compared with.
+    Reference,
+}
+
+#[derive(Clone, Debug)]
+struct Series {
+    name: String,
+    style: Style,
+    points: Vec<Point>,
+}
+
+/// Curves in a frame with two axes.
+///
+/// A point with a coordinate that is not finite, or not positive on a logarithmic axis, is a gap in its curve; what lies outside a range is cut off at
+/// the frame. The legend stands beside the frame. Colours are told apart by the colour-blind, markers without colours.
+///
+/// ```
+/// use tfe::charts::{Axis, Chart, Style};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let times: Vec<f64> = (0..=100).map(|k| 0.1 * f64::from(k)).collect();
+/// let chart = Chart::new("Two oscillators")
+///     .x("t (s)")
+///     .y(Axis::new("x (m)").range(-1.5..1.5))
+///     .line("undamped", times.iter().map(|t| (*t, t.cos())))
+///     .line("damped", times.iter().map(|t| (*t, (-0.2 * t).exp() * t.cos())))
+///     .series("rest", Style::Reference, [(0.0, 0.0), (10.0, 0.0)]);
+/// # let folder = std::env::temp_dir().join(format!("tfe-chart-{}", std::process::id()));
+/// # std::fs::create_dir_all(&folder)?;
+/// # let (svg, csv) = (folder.join("oscillators.svg"), folder.join("oscillators.csv"));
+/// # /*
+/// chart.save("oscillators.svg")?;
+/// chart.save("oscillators.csv")?; // the points: series, x, y
+/// # */
+/// # chart.save(&svg)?;
+/// # chart.save(&csv)?;
+/// # assert!(std::fs::read_to_string(&csv)?.starts_with("series,x,y\nundamped,0.0,1.0\n"));
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Chart {
+    title: String,
+    x: Axis,
+    y: Axis,
+    series: Vec<Series>,
+    size: (u32, u32),
+}
+
+impl Chart {
+    /// An empty chart of 720 × 440 pixels with this title, which may be empty.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            x: Axis::default(),
+            y: Axis::default(),
+            series: Vec::new(),
+            size: (720, 440),
+        }
+    }
+
+    /// The horizontal axis: a label, or an [`Axis`].
+    #[must_use]
+    pub fn x(mut self, axis: impl Into<Axis>) -> Self {
+        self.x = axis.into();
+        self
+    }
+
+    /// The vertical axis.
+    #[must_use]
+    pub fn y(mut self, axis: impl Into<Axis>) -> Self {
+        self.y = axis.into();
+        self
+    }
+
+    /// Adds a line through the points (x, y), in their order.
+    #[must_use]
+    pub fn line(
+        self,
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
+        self.series(name, Style::Line, points)
+    }
+
+    /// Adds a series of points (x, y) in this style. One without a name is not in the legend.
+    #[must_use]
+    pub fn series(
+        mut self,
+        name: impl Into<String>,
+        style: Style,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
+        self.series.push(Series {
+            name: name.into(),
+            style,
+            points: points.into_iter().collect(),
+        });
+        self
+    }
+
+    /// Width and height of the picture, in pixels, each from 240 to 8000; what is outside counts as the nearer end.
+    #[must_use]
+    pub fn size(mut self, width: u32, height: u32) -> Self {
+        self.size = sides(width, height);
+        self
+    }
+
+    /// The chart as an SVG picture.
+    ///
+    /// # Errors
+    /// [`ChartError::NoData`] without a finite point; [`ChartError::Range`] and [`ChartError::NotPositive`] for an axis that cannot be.
+    pub fn to_svg(&self) -> Result<String, ChartError> {
+        let points = || {
+            let all = self.series.iter().flat_map(|series| &series.points);
+            all.filter(|(x, y)| x.is_finite() && y.is_finite())
+        };
+        if points().next().is_none() {
+            return Err(ChartError::NoData);
+        }
+        let x = self.x.extent(points().map(|point| point.0), 0.03)?;
+        let y = self.y.extent(points().map(|point| point.1), 0.05)?;
+        let legend = self.legend();
+        let room = Room {
+            sides: self.size,
+            above: 0.0,
+            right: legend.width(),
+        };
+        let plot = Plot::new(x, y, &self.title, &room);
+        picture(self.size, "", |canvas| {
+            plot.draw_grid(canvas)?;
+            for (series, key) in self.series.iter().zip(self.keys()) {
+                draw_series(canvas, &plot, series, key)?;
+            }
+            plot.draw_axes(canvas, &self.title)?;
+            legend.draw(
+                canvas,
+                (plot.frame.right, plot.frame.top),
+                plot.frame.height(),
+            )
+        })
+    }
+
+    /// Writes the picture into a file `.svg`, or the points (series, x, y) into a file `.csv`.
+    ///
+    /// # Errors
+    /// Those of [`Chart::to_svg`]; [`ChartError::UnknownEnding`]; [`ChartError::Io`].
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), ChartError> {
+        let path = path.as_ref();
+        match ending(path, &[".svg", ".csv"])? {
+            ".csv" => write(path, self.to_csv()),
+            _ => write(path, self.to_svg()?),
+        }
+    }
+
+    /// The points as text: a header, then series, x and y of each. A number that is not finite is an empty field.
+    pub fn to_csv(&self) -> String {
+        let mut text = String::from("series,x,y\n");
+        for series in &self.series {
+            let name = csv_field(&series.name);
+            for &(x, y) in &series.points {
+                let (x, y) = (csv_number(Some(x)), csv_number(Some(y)));
+                text.extend([&name, ",", &x, ",", &y, "\n"]);
+            }
+        }
+        text
+    }
+
+    /// How each series is drawn. Reference lines take no colour from the others.
+    fn keys(&self) -> Vec<Key> {
+        let mut coloured = 0..;
+        let key = |series: &Series| {
+            if series.style == Style::Reference {
+                return Key::Dashes(Colour::DARK_GREY);
+            }
+            let k = coloured.next().unwrap_or_default();
+            let (colour, shape) = (Colour::of_series(k), Shape::of_series(k));
+            match series.style {
+                Style::LineWithMarkers => Key::LineWithMarkers(colour, shape),
+                Style::Markers => Key::Markers(colour, shape),
+                Style::Line | Style::Reference => Key::Line(colour),
+            }
+        };
+        self.series.iter().map(key).collect()
+    }
+
+    fn legend(&self) -> Legend {
+        // At most about a third of the picture.
+        let most = (f64::from(self.size.0) / 3.0 / CHARACTER) as usize;
+        let names = self
+            .series
+            .iter()
+            .map(|series| shortened(&series.name, most));
+        let entries = names.zip(self.keys());
+        Legend {
+            entries: entries.filter(|(name, _)| !name.is_empty()).collect(),
+        }
+    }
+}
+
+fn draw_series(
+    canvas: &Canvas<'_>,
+    plot: &Plot,
+    series: &Series,
+    key: Key,
+) -> Result<(), ChartError> {
+    let unit = ((0.0, 0.0), (1.0, 1.0));
+    let places = || series.points.iter().map(|point| plot.fractions(*point));
+    for part in clip::parts(places(), unit.0, unit.1) {
+        let line: Vec<_> = part.into_iter().map(|at| plot.frame.at(at)).collect();
+        key.draw_line(canvas, &line)?;
+    }
+    for at in places().flatten() {
+        if clip::contains(at, unit.0, unit.1) {
+            key.draw_marker(canvas, plot.frame.at(at))?;
+        }
+    }
+    Ok(())
+}
+
+/// Names and how they are drawn, beside the frame.
+struct Legend {
+    entries: Vec<(String, Key)>,
+}
+
+impl Legend {
+    /// Between the frame and the legend, in pixels.
+    const GAP: f64 = 14.0;
+    const LINE: f64 = 20.0;
+
+    fn width(&self) -> f64 {
+        let length = |(name, _): &(String, Key)| name.chars().count();
+        match self.entries.iter().map(length).max() {
+            None => 24.0,
+            Some(longest) => Self::GAP + KEY + 14.0 + CHARACTER * longest as f64,
+        }
+    }
+
+    /// From its upper left corner; entries that do not fit are counted.
+    fn draw(&self, canvas: &Canvas<'_>, (left, top): Point, height: f64) -> Result<(), ChartError> {
+        let most = (height / Self::LINE) as usize;
+        let fits = self.entries.len() <= most;
+        let shown = if fits { most } else { most.saturating_sub(1) };
+        let at = |k: usize| (left + Self::GAP, top + Self::LINE * (k as f64 + 0.5));
+        for (k, (name, key)) in self.entries.iter().take(shown).enumerate() {
+            key.draw_entry(canvas, name, at(k))?;
+        }
+        if fits {
+            return Ok(());
+        }
+        let more = format!("… and {} more", self.entries.len() - shown);
+        canvas.text(&more, at(shown), Anchor::Left, TEXT)
+    }
+}
+
+#[cfg(test)]
+mod tests;

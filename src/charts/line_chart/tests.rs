@@ -1,0 +1,209 @@
+use super::*;
+use crate::charts::Scale;
+use roxmltree::{Document, Node};
+
+fn waves() -> Chart {
+    Chart::new("a < b & \"c\"").x("t (s)").y("x (m)").line(
+        "cosine",
+        (0..=100).map(|k| (0.1 * f64::from(k), (0.1 * f64::from(k)).cos())),
+    )
+}
+
+/// The points of the lines in this colour, in tenths of a pixel.
+fn lines(svg: &str, Colour(r, g, b): Colour) -> Vec<Vec<Point>> {
+    let stroke = format!("#{r:02X}{g:02X}{b:02X}");
+    let document = Document::parse(svg).unwrap();
+    let points = |node: Node<'_, '_>| {
+        let point = |text: &str| {
+            let (x, y) = text.split_once(',').unwrap();
+            (x.parse().unwrap(), y.parse().unwrap())
+        };
+        let text = node.attribute("points").unwrap().to_owned();
+        text.split_whitespace().map(point).collect()
+    };
+    document
+        .descendants()
+        .filter(|node| node.has_tag_name(("http://www.w3.org/2000/svg", "polyline")))
+        .filter(|node| node.attribute("stroke") == Some(&stroke))
+        .map(points)
+        .collect()
+}
+
+fn texts(svg: &str) -> Vec<String> {
+    let document = Document::parse(svg).unwrap();
+    document
+        .descendants()
+        .filter(|node| node.tag_name().name() == "text")
+        .map(|node| node.text().unwrap().trim().to_owned())
+        .collect()
+}
+
+/// Left, top, right and bottom of the frame: its border is the only black line of five points.
+fn frame(svg: &str) -> [f64; 4] {
+    let borders = lines(svg, Colour::BLACK);
+    let border = borders.iter().find(|line| line.len() == 5).unwrap();
+    let by = |part: fn(&Point) -> f64, fold: fn(f64, f64) -> f64| {
+        border.iter().map(part).reduce(fold).unwrap()
+    };
+    [
+        by(|p| p.0, f64::min),
+        by(|p| p.1, f64::min),
+        by(|p| p.0, f64::max),
+        by(|p| p.1, f64::max),
+    ]
+}
+
+#[test]
+fn text_is_escaped_and_complete() {
+    let svg = waves().to_svg().unwrap();
+    let texts = texts(&svg);
+    for expected in ["a < b & \"c\"", "t (s)", "x (m)", "cosine", "0.5", "10"] {
+        assert!(
+            texts.iter().any(|text| text == expected),
+            "{expected}: {texts:?}"
+        );
+    }
+    let root = Document::parse(&svg).unwrap();
+    let root = root.root_element();
+    assert_eq!(root.attribute("width"), Some("720"));
+    assert_eq!(root.attribute("viewBox"), Some("0 0 7200 4400"));
+    // Several charts in one page.
+    assert!(!svg.contains("id="));
+    let odd = waves().x("bell \u{7} and zero \0").to_svg().unwrap();
+    assert!(Document::parse(&odd).is_ok());
+}
+
+#[test]
+fn curves_are_cut_at_the_frame() {
+    let svg = waves()
+        .x(Axis::new("t").range(1.0..9.0))
+        .y(Axis::new("x").range(-0.5..0.5))
+        .to_svg()
+        .unwrap();
+    let [left, top, right, bottom] = frame(&svg);
+    let curves = lines(&svg, Colour::of_series(0));
+    // The cosine crosses the band at π/2, 3π/2 and 5π/2; the last line is the key of the legend.
+    assert_eq!(curves.len(), 4);
+    for (x, y) in curves[..3].iter().flatten() {
+        assert!((left..=right).contains(x) && (top..=bottom).contains(y));
+    }
+    for curve in &curves[..3] {
+        let (from, to) = (curve[0].1, curve[curve.len() - 1].1);
+        assert!((from == top && to == bottom) || (from == bottom && to == top));
+    }
+    assert!(curves[3][0].0 > right, "the legend stands beside the frame");
+}
+
+#[test]
+fn numbers_without_a_place_are_gaps() {
+    let points = [
+        (1.0, 1.0),
+        (2.0, 2.0),
+        (3.0, f64::NAN),
+        (4.0, 1.0),
+        (5.0, 2.0),
+        (f64::INFINITY, 1.0),
+        (7.0, 0.0),
+        (8.0, 1.0),
+        (9.0, 2.0),
+    ];
+    let linear = Chart::new("").line("", points);
+    let of = |chart: Chart| lines(&chart.to_svg().unwrap(), Colour::of_series(0));
+    let lengths: Vec<_> = of(linear.clone()).iter().map(Vec::len).collect();
+    assert_eq!(lengths, [2, 2, 3]);
+    let logarithmic = linear.y(Axis::new("y").scale(Scale::Logarithmic));
+    let lengths: Vec<_> = of(logarithmic).iter().map(Vec::len).collect();
+    assert_eq!(lengths, [2, 2, 2]);
+}
+
+#[test]
+fn a_straight_line_stays_straight_on_both_scales() {
+    // x⁴ on logarithmic axes; a tenth of a pixel is the resolution, and each coordinate is rounded by half of it.
+    let chart = Chart::new("")
+        .x(Axis::new("x").scale(Scale::Logarithmic))
+        .y(Axis::new("y").scale(Scale::Logarithmic))
+        .line(
+            "",
+            (0..=6).map(|k| (f64::from(k).exp2(), f64::from(4 * k).exp2())),
+        );
+    let curve = lines(&chart.to_svg().unwrap(), Colour::of_series(0)).remove(0);
+    let (from, to) = (curve[0], curve[6]);
+    for (k, point) in curve.iter().enumerate() {
+        let s = k as f64 / 6.0;
+        assert!((point.0 - from.0 - s * (to.0 - from.0)).abs() <= 1.5);
+        assert!((point.1 - from.1 - s * (to.1 - from.1)).abs() <= 1.5);
+    }
+}
+
+#[test]
+fn markers_and_dashes() {
+    let svg = Chart::new("")
+        .series("dots", Style::Markers, [(0.0, 0.0), (1.0, 1.0), (9.0, 9.0)])
+        .series("level", Style::Reference, [(0.0, 0.5), (1.0, 0.5)])
+        .x(Axis::new("x").range(-1.0..2.0))
+        .y(Axis::new("y").range(-1.0..2.0))
+        .to_svg()
+        .unwrap();
+    // Two inside the frame and one in the legend.
+    assert_eq!(svg.matches("<circle").count(), 3);
+    assert!(lines(&svg, Colour::of_series(0)).is_empty());
+    assert!(lines(&svg, Colour::DARK_GREY).len() > 10);
+}
+
+#[test]
+fn long_legends_are_cut() {
+    let mut chart = Chart::new("");
+    for k in 0..100 {
+        chart = chart.line(
+            format!("{k}{}", "w".repeat(200)),
+            [(0.0, 0.0), (1.0, f64::from(k))],
+        );
+    }
+    let texts = texts(&chart.to_svg().unwrap());
+    assert!(
+        texts
+            .iter()
+            .any(|text| text.starts_with("… and") && text.ends_with("more"))
+    );
+    assert!(texts.iter().all(|text| text.chars().count() < 40));
+    let small = chart.size(1, 1).to_svg().unwrap();
+    assert!(small.starts_with("<svg width=\"240\" height=\"240\""));
+}
+
+#[test]
+fn csv_holds_every_number() {
+    let points = vec![(0.1, 1.0 / 3.0), (-1e-300, f64::MAX), (2.0, f64::NAN)];
+    let text = Chart::new("").line("a, \"b\"", points.clone()).to_csv();
+    let mut rows = text.lines();
+    assert_eq!(rows.next(), Some("series,x,y"));
+    for (row, (x, y)) in rows.by_ref().zip(&points) {
+        let fields = row.strip_prefix("\"a, \"\"b\"\"\",").unwrap();
+        let (a, b) = fields.split_once(',').unwrap();
+        assert_eq!(a.parse(), Ok(*x));
+        if y.is_nan() {
+            assert_eq!(b, "");
+        } else {
+            assert_eq!(b.parse(), Ok(*y));
+        }
+    }
+    assert_eq!(rows.next(), None);
+}
+
+#[test]
+fn errors() {
+    assert!(matches!(Chart::new("").to_svg(), Err(ChartError::NoData)));
+    let nothing = Chart::new("").line("", [(f64::NAN, 1.0)]);
+    assert!(matches!(nothing.to_svg(), Err(ChartError::NoData)));
+    let below = Chart::new("")
+        .y(Axis::new("error").scale(Scale::Logarithmic))
+        .line("", [(0.0, -1.0), (1.0, 0.0)]);
+    let error = below.to_svg().unwrap_err();
+    assert!(matches!(&error, ChartError::NotPositive { axis } if axis == "error"));
+    assert!(matches!(
+        waves().save("chart.pdf"),
+        Err(ChartError::UnknownEnding { .. })
+    ));
+    let error = waves().save("no/such/folder/chart.svg").unwrap_err();
+    assert!(error.to_string().contains("chart.svg"));
+    assert!(matches!(error, ChartError::Io { .. }));
+}

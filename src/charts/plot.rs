@@ -1,0 +1,219 @@
+//! What every picture with two axes has: title, frame, ticks, labels, a legend.
+
+use super::axis::{Extent, Tick};
+use super::canvas::{Anchor, CHARACTER, Canvas, Frame, Shape, TEXT};
+use super::clip::Point;
+use super::{ChartError, Colour};
+
+/// Length of a labelled tick, in pixels.
+const TICK: f64 = 5.0;
+/// Size of the title.
+const TITLE: f64 = 16.0;
+
+/// Two axes around a frame.
+pub(super) struct Plot {
+    pub(super) frame: Frame,
+    pub(super) x: Extent,
+    pub(super) y: Extent,
+    x_ticks: Vec<Tick>,
+    y_ticks: Vec<Tick>,
+}
+
+/// What a picture needs around its frame, in pixels.
+pub(super) struct Room {
+    /// The picture.
+    pub(super) sides: (u32, u32),
+    /// Above the frame, beside the title.
+    pub(super) above: f64,
+    /// To the right of it.
+    pub(super) right: f64,
+}
+
+impl Plot {
+    /// Axes that fill the picture except for their labels and the room for others.
+    pub(super) fn new(x: Extent, y: Extent, title: &str, room: &Room) -> Self {
+        let (width, height) = (f64::from(room.sides.0), f64::from(room.sides.1));
+        let top = if title.is_empty() { 14.0 } else { 42.0 } + room.above;
+        let bottom = height - 52.0;
+        // Labelled ticks about 50 pixels apart upwards, 90 to the right.
+        let y_ticks = y.ticks(((bottom - top) / 50.0) as usize);
+        let left = 40.0 + CHARACTER * longest(&y_ticks) as f64;
+        let right = (width - room.right).max(left + 40.0);
+        let x_ticks = x.ticks(((right - left) / 90.0) as usize);
+        Self {
+            frame: Frame {
+                left,
+                top,
+                right,
+                bottom: bottom.max(top + 40.0),
+            },
+            x,
+            y,
+            x_ticks,
+            y_ticks,
+        }
+    }
+
+    /// Fractions of the frame where a point lies; none for what has no place.
+    pub(super) fn fractions(&self, (x, y): Point) -> Option<Point> {
+        Some((self.x.fraction(x)?, self.y.fraction(y)?))
+    }
+
+    /// Lines at the labelled ticks.
+    pub(super) fn draw_grid(&self, canvas: &Canvas<'_>) -> Result<(), ChartError> {
+        let line = |from, to| {
+            let ends = [self.frame.at(from), self.frame.at(to)];
+            canvas.line(&ends, Colour::LIGHT_GREY, 0.8)
+        };
+        for tick in self.x_ticks.iter().filter(|tick| tick.label.is_some()) {
+            line((tick.place, 0.0), (tick.place, 1.0))?;
+        }
+        for tick in self.y_ticks.iter().filter(|tick| tick.label.is_some()) {
+            line((0.0, tick.place), (1.0, tick.place))?;
+        }
+        Ok(())
+    }
+
+    /// Frame, ticks, labels and title, over what was drawn before.
+    pub(super) fn draw_axes(&self, canvas: &Canvas<'_>, title: &str) -> Result<(), ChartError> {
+        let frame = &self.frame;
+        canvas.border(frame, Colour::BLACK)?;
+        for tick in &self.x_ticks {
+            let (x, y) = frame.at((tick.place, 0.0));
+            canvas.line(&[(x, y), (x, y + length(tick))], Colour::BLACK, 1.0)?;
+            let text = tick.label.as_deref().unwrap_or_default();
+            canvas.text(text, (x, y + 9.0), Anchor::Top, TEXT)?;
+        }
+        draw_ticks(canvas, frame.left, frame, &self.y_ticks, Side::Left)?;
+        let middle = f64::midpoint(frame.left, frame.right);
+        canvas.text(
+            &self.x.label,
+            (middle, frame.bottom + 31.0),
+            Anchor::Top,
+            TEXT + 1.0,
+        )?;
+        let middle = f64::midpoint(frame.top, frame.bottom);
+        canvas.text(&self.y.label, (16.0, middle), Anchor::Upwards, TEXT + 1.0)?;
+        canvas.text(title, (frame.left, 22.0), Anchor::Left, TITLE)
+    }
+}
+
+/// On which side of its line a tick stands.
+#[derive(Clone, Copy)]
+pub(super) enum Side {
+    Left,
+    Right,
+}
+
+/// Ticks along a vertical line at `x`, as high as the frame.
+pub(super) fn draw_ticks(
+    canvas: &Canvas<'_>,
+    x: f64,
+    frame: &Frame,
+    ticks: &[Tick],
+    side: Side,
+) -> Result<(), ChartError> {
+    let (sign, anchor) = match side {
+        Side::Left => (-1.0, Anchor::Right),
+        Side::Right => (1.0, Anchor::Left),
+    };
+    for tick in ticks {
+        let (_, y) = frame.at((0.0, tick.place));
+        canvas.line(&[(x, y), (x + sign * length(tick), y)], Colour::BLACK, 1.0)?;
+        let text = tick.label.as_deref().unwrap_or_default();
+        canvas.text(text, (x + sign * 9.0, y), anchor, TEXT)?;
+    }
+    Ok(())
+}
+
+fn length(tick: &Tick) -> f64 {
+    if tick.label.is_some() {
+        TICK
+    } else {
+        0.6 * TICK
+    }
+}
+
+/// Characters of the longest label.
+pub(super) fn longest(ticks: &[Tick]) -> usize {
+    let length = |tick: &Tick| tick.label.as_ref().map_or(0, |label| label.chars().count());
+    ticks.iter().map(length).max().unwrap_or(0)
+}
+
+/// A text cut to so many characters.
+pub(super) fn shortened(text: &str, most: usize) -> String {
+    if text.chars().count() <= most {
+        return text.to_owned();
+    }
+    let mut short: String = text.chars().take(most.saturating_sub(1)).collect();
+    short.push('…');
+    short
+}
+
+/// How something is shown in a legend, and drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Key {
+    Line(Colour),
+    LineWithMarkers(Colour, Shape),
+    Markers(Colour, Shape),
+    Dashes(Colour),
+    Area(Colour),
+    /// A line on an image, with a light rim.
+    Outlined(Colour),
+}
+
+/// Width of a key in the legend, in pixels.
+pub(super) const KEY: f64 = 26.0;
+/// Width of lines, in pixels.
+const STROKE: f64 = 1.8;
+
+impl Key {
+    /// Draws a line of this kind.
+    pub(super) fn draw_line(self, canvas: &Canvas<'_>, line: &[Point]) -> Result<(), ChartError> {
+        match self {
+            Self::Line(colour) | Self::LineWithMarkers(colour, _) => {
+                canvas.line(line, colour, STROKE)
+            }
+            Self::Dashes(colour) => canvas.dashes(line, colour, 1.4, 5.0),
+            Self::Outlined(colour) => {
+                canvas.line(line, Colour::WHITE, 2.0 * STROKE)?;
+                canvas.line(line, colour, STROKE)
+            }
+            Self::Markers(..) | Self::Area(_) => Ok(()),
+        }
+    }
+
+    /// Draws its marker at a point, if it has one.
+    pub(super) fn draw_marker(self, canvas: &Canvas<'_>, at: Point) -> Result<(), ChartError> {
+        match self {
+            Self::LineWithMarkers(colour, shape) | Self::Markers(colour, shape) => {
+                canvas.marker(at, shape, colour)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Draws the entry of a legend, its left end at a point.
+    pub(super) fn draw_entry(
+        self,
+        canvas: &Canvas<'_>,
+        name: &str,
+        (x, y): Point,
+    ) -> Result<(), ChartError> {
+        let mut width = KEY;
+        if let Self::Area(colour) = self {
+            width = 16.0;
+            let swatch = Frame {
+                left: x,
+                top: y - 6.0,
+                right: x + width,
+                bottom: y + 6.0,
+            };
+            canvas.rectangle(&swatch, colour)?;
+            canvas.border(&swatch, Colour::DARK_GREY)?;
+        }
+        self.draw_line(canvas, &[(x, y), (x + KEY, y)])?;
+        self.draw_marker(canvas, (x + 0.5 * KEY, y))?;
+        canvas.text(name, (x + width + 6.0, y), Anchor::Left, TEXT)
+    }
+}

@@ -1,0 +1,217 @@
+//! What can go wrong with a map, and at a point of it.
+
+use crate::stability::{EigenvalueError, TransitionError};
+use std::error::Error;
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+use tfe_runtime::{ElementError, StepError};
+
+/// Why there is no map, or no file of it.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum MapError {
+    /// The map has no cells, or too many.
+    Resolution {
+        /// Cells in the direction of x asked for.
+        columns: usize,
+        /// Cells in the direction of y asked for.
+        rows: usize,
+    },
+    /// The ends of a range are not finite or not ascending.
+    Range {
+        /// The label of the parameter.
+        label: String,
+        /// The start asked for.
+        start: f64,
+        /// The end asked for.
+        end: f64,
+    },
+    /// The element does not exist (number of nodes, quadrature).
+    Element(ElementError),
+    /// The period is not positive and finite, or divided into no elements.
+    Period {
+        /// The period asked for.
+        period: f64,
+        /// The elements asked for.
+        elements: usize,
+    },
+    /// The file could not be written.
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// What the file system said.
+        source: io::Error,
+    },
+    /// The ending of the file name is none that can be written.
+    UnknownEnding {
+        /// Which file.
+        path: PathBuf,
+        /// The endings that can be.
+        known: &'static [&'static str],
+    },
+    /// The picture could not be made.
+    #[cfg(feature = "charts")]
+    Chart(crate::charts::ChartError),
+}
+
+#[cfg(feature = "charts")]
+impl From<crate::charts::ChartError> for MapError {
+    fn from(error: crate::charts::ChartError) -> Self {
+        Self::Chart(error)
+    }
+}
+
+impl fmt::Display for MapError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Resolution { columns, rows } => write!(
+                f,
+                "a map cannot have {columns} × {rows} cells: at least one, at most 2²⁸"
+            ),
+            Self::Range { label, start, end } => write!(
+                f,
+                "`{label}` cannot go from {start} to {end}: both must be finite, the end above the start"
+            ),
+            Self::Element(error) => error.fmt(f),
+            Self::Period { period, elements } => write!(
+                f,
+                "a period of {period} in {elements} elements: the period must be positive and finite, the elements at least one"
+            ),
+            Self::Io { path, source } => write!(f, "cannot write {}: {source}", path.display()),
+            Self::UnknownEnding { path, known } => {
+                let known = known.join(" or ");
+                write!(
+                    f,
+                    "cannot tell what to write into {}: its name should end in {known}",
+                    path.display()
+                )
+            }
+            #[cfg(feature = "charts")]
+            Self::Chart(error) => error.fmt(f),
+        }
+    }
+}
+
+impl Error for MapError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Element(error) => Some(error),
+            Self::Io { source, .. } => Some(source),
+            #[cfg(feature = "charts")]
+            Self::Chart(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+/// A cell without a number: where, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointFailure<E> {
+    /// Its column, from 0 at the smallest x.
+    pub column: usize,
+    /// Its row, from 0 at the smallest y.
+    pub row: usize,
+    /// x at its centre.
+    pub x: f64,
+    /// y at its centre.
+    pub y: f64,
+    /// Why.
+    pub error: PointError<E>,
+}
+
+/// Why a cell has no number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PointError<E> {
+    /// The number is infinite or not a number.
+    NotFinite {
+        /// What it is.
+        value: f64,
+    },
+    /// It could not be computed.
+    Failed(E),
+}
+
+impl<E: fmt::Display> fmt::Display for PointError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite { value } => write!(f, "the result is {value}"),
+            Self::Failed(error) => error.fmt(f),
+        }
+    }
+}
+
+impl<E: Error + 'static> Error for PointError<E> {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::NotFinite { .. } => None,
+            Self::Failed(error) => Some(error),
+        }
+    }
+}
+
+impl<E: fmt::Display> fmt::Display for PointFailure<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "at ({}, {}): {}", self.x, self.y, self.error)
+    }
+}
+
+impl<E: Error + 'static> Error for PointFailure<E> {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        Some(&self.error)
+    }
+}
+
+/// Why a model has no Floquet multipliers about rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum FloquetError {
+    /// An element could not be solved.
+    Step {
+        /// The number of the element in the period, from 0.
+        element: usize,
+        /// Why.
+        source: StepError,
+    },
+    /// An element has no transition matrix.
+    Transition {
+        /// The number of the element in the period, from 0.
+        element: usize,
+        /// Why.
+        source: TransitionError,
+    },
+    /// Rest, q = 0 and p = 0, is no motion of the model: an element moved it.
+    NotAtRest {
+        /// The number of the element in the period, from 0.
+        element: usize,
+        /// The largest coordinate or momentum after it.
+        distance: f64,
+    },
+    /// The monodromy matrix has no eigenvalues that could be found.
+    Eigenvalues(EigenvalueError),
+}
+
+impl fmt::Display for FloquetError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Step { element, source } => write!(f, "element {element}: {source}"),
+            Self::Transition { element, source } => write!(f, "element {element}: {source}"),
+            Self::NotAtRest { element, distance } => write!(
+                f,
+                "the model does not stay at rest: after element {element} a coordinate or momentum is {distance:e}"
+            ),
+            Self::Eigenvalues(error) => error.fmt(f),
+        }
+    }
+}
+
+impl Error for FloquetError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Step { source, .. } => Some(source),
+            Self::Transition { source, .. } => Some(source),
+            Self::Eigenvalues(error) => Some(error),
+            Self::NotAtRest { .. } => None,
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! Maps of the largest Floquet multiplier about rest.
+
+use super::{FloquetError, MapError, MapPlan, StabilityMap};
+use crate::stability::{eigenvalues, largest_modulus};
+use nalgebra::DMatrix;
+use tfe_runtime::scheme::{SchemeTable, Tables};
+use tfe_runtime::step::{Control, Interval, Memory, Method};
+use tfe_runtime::workspace::{Workspace, numbers_len, pivots_len, transition_len};
+use tfe_runtime::{Element, Model, State};
+
+impl MapPlan {
+    /// The map of the largest modulus of a Floquet multiplier of models about rest, q = 0 and p = 0: above one rest is unstable.
+    ///
+    /// `model` makes the model of a point (x, y), whose coefficients have the period T. With A_k the transition matrix of the k-th of the elements of length
+    /// T/`elements`, the multipliers are the eigenvalues λ of the monodromy matrix,
+    ///
+    /// ```text
+    /// Φ = A_K … A_2 A_1 ,     ρ = max |λ(Φ)| .                    (theory.md, transition matrices)
+    /// ```
+    ///
+    /// A model without a period has any: ρ is then e^{σT}, σ the largest growth rate. Rest must be a motion of the model; where a force moves it, the point fails with
+    /// [`FloquetError::NotAtRest`].
+    ///
+    /// # Errors
+    /// [`MapError::Element`], [`MapError::Period`] and those of [`MapPlan::run`].
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    /// use tfe::stability::StabilityMap;
+    ///
+    /// // Mathieu: y'' + (a − 2q cos 2t) y = 0.
+    /// #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - (a - 2*q*cos(2*t))*y^2/2)]
+    /// struct Mathieu { a: f64, q: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let map = StabilityMap::over(0.0..5.0, 0.0..2.0)
+    ///     .resolution(50, 20)
+    ///     .labels("a", "q")
+    ///     .title("Ince–Strutt diagram")
+    ///     .floquet(|a, q| Mathieu { a, q }, std::f64::consts::PI, Mixed::<4>, 8)?;
+    /// assert!(map.radius_at(1.0, 0.5).unwrap() > 2.0); // in the first tongue, from 0.47 to 1.47
+    /// assert!(map.radius_at(2.0, 0.5).unwrap() < 1.0 + 1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn floquet<M, F, const N: usize>(
+        &self,
+        model: F,
+        period: f64,
+        element: impl Into<Element>,
+        elements: usize,
+    ) -> Result<StabilityMap<FloquetError>, MapError>
+    where
+        M: Model<N>,
+        F: Fn(f64, f64) -> M + Sync,
+    {
+        self.check()?;
+        let tables = SchemeTable::new(element.into()).map_err(MapError::Element)?;
+        if !(period.is_finite() && period > 0.0 && elements > 0) {
+            return Err(MapError::Period { period, elements });
+        }
+        let period = Period { period, elements };
+        Ok(self.computed(
+            || Monodromy::new::<M>(&tables),
+            |monodromy, x, y| monodromy.radius(&model(x, y), period),
+        ))
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Period {
+    period: f64,
+    elements: usize,
+}
+
+impl Period {
+    fn time(self, element: usize) -> f64 {
+        self.period * (element as f64 / self.elements as f64)
+    }
+}
+
+/// The memory in which monodromy matrices are computed, one after the other.
+struct Monodromy<'a, const N: usize> {
+    tables: &'a SchemeTable,
+    numbers: Vec<f64>,
+    pivots: Vec<usize>,
+    extra: Vec<f64>,
+    /// The transition matrix of one element, by rows.
+    factor: Vec<f64>,
+    /// The product so far, by rows.
+    product: Vec<f64>,
+    /// One column of it.
+    column: Vec<f64>,
+}
+
+impl<'a, const N: usize> Monodromy<'a, N> {
+    fn new<M: Model<N>>(tables: &'a SchemeTable) -> Self {
+        let element = tables.view().element;
+        Self {
+            tables,
+            numbers: vec![0.0; numbers_len(element, M::FORM, N)],
+            pivots: vec![0; pivots_len(element, M::FORM, N)],
+            extra: vec![0.0; transition_len(element, M::FORM, N)],
+            factor: vec![0.0; 4 * N * N],
+            product: vec![0.0; 4 * N * N],
+            column: vec![0.0; 2 * N],
+        }
+    }
+
+    /// max |λ(Φ)| of a model.
+    fn radius<M: Model<N>>(&mut self, model: &M, period: Period) -> Result<f64, FloquetError> {
+        self.compute(model, period)?;
+        let matrix = DMatrix::from_row_slice(2 * N, 2 * N, &self.product);
+        let multipliers = eigenvalues(&matrix).map_err(FloquetError::Eigenvalues)?;
+        Ok(largest_modulus(&multipliers))
+    }
+
+    fn compute<M: Model<N>>(&mut self, model: &M, period: Period) -> Result<(), FloquetError> {
+        let method = Method {
+            model,
+            tables: self.tables,
+            control: Control::default(),
+        };
+        let mut memory = Memory::new();
+        self.set_identity();
+        for element in 0..period.elements {
+            let t = period.time(element);
+            let interval = Interval {
+                start: t,
+                length: period.time(element + 1) - t,
+                impulses: &[],
+            };
+            let mut state = State {
+                q: [0.0; N],
+                p: [0.0; N],
+            };
+            method
+                .advance(&mut memory, self.workspace(), interval, &mut state)
+                .map_err(|source| FloquetError::Step { element, source })?;
+            check_rest(element, &state)?;
+            let workspace = Workspace {
+                numbers: &mut self.numbers,
+                pivots: &mut self.pivots,
+            };
+            method
+                .transition(
+                    &mut memory,
+                    workspace,
+                    &mut self.extra,
+                    &[],
+                    &mut self.factor,
+                )
+                .map_err(|source| FloquetError::Transition { element, source })?;
+            self.multiply();
+        }
+        Ok(())
+    }
+
+    fn workspace(&mut self) -> Workspace<'_> {
+        Workspace {
+            numbers: &mut self.numbers,
+            pivots: &mut self.pivots,
+        }
+    }
+
+    fn set_identity(&mut self) {
+        self.product.fill(0.0);
+        for entry in self.product.iter_mut().step_by(2 * N + 1) {
+            *entry = 1.0;
+        }
+    }
+
+    /// product ← factor · product
+    fn multiply(&mut self) {
+        let size = 2 * N;
+        for j in 0..size {
+            for (i, row) in self.factor.chunks_exact(size).enumerate() {
+                self.column[i] = (0..size).map(|k| row[k] * self.product[k * size + j]).sum();
+            }
+            for i in 0..size {
+                self.product[i * size + j] = self.column[i];
+            }
+        }
+    }
+}
+
+/// Refuses an element that moved what was at rest by more than rounding does to coordinates of order one.
+fn check_rest<const N: usize>(element: usize, state: &State<N>) -> Result<(), FloquetError> {
+    const ROUNDING: f64 = 1e-12;
+    let all = state.q.iter().chain(&state.p);
+    let distance = all.fold(0.0, |most: f64, value| most.max(value.abs()));
+    if distance <= ROUNDING {
+        Ok(())
+    } else {
+        Err(FloquetError::NotAtRest { element, distance })
+    }
+}

@@ -1,0 +1,257 @@
+//! Maps of Floquet multipliers against tabulated ones: Mathieu's equation.
+
+mod common;
+
+use common::{list, number, reference, word};
+use nalgebra::DMatrix;
+use serde_json::Value;
+use std::f64::consts::PI;
+use tfe::prelude::*;
+use tfe::stability::{FloquetError, MapError, PointError, StabilityMap, TransitionError};
+
+/// y'' + (a − 2q cos 2t) y = 0
+#[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - (a - 2*q*cos(2*t))*y^2/2)]
+struct Mathieu {
+    a: f64,
+    q: f64,
+}
+
+/// The cases of the table whose names begin so.
+fn cases(table: &Value, prefix: &str) -> Vec<Value> {
+    let cases: Vec<_> = list(&table["cases"])
+        .iter()
+        .filter(|case| word(&case["name"]).starts_with(prefix))
+        .cloned()
+        .collect();
+    assert!(!cases.is_empty(), "no case {prefix}");
+    cases
+}
+
+/// One cell, whose centre is the point.
+fn radius(a: f64, q: f64, element: Element, elements: usize) -> f64 {
+    let around = |x: f64| x - 0.5..x + 0.5;
+    let map = StabilityMap::over(around(a), around(q))
+        .resolution(1, 1)
+        .floquet(|a, q| Mathieu { a, q }, PI, element, elements)
+        .unwrap();
+    map.value(0, 0).unwrap()
+}
+
+/// tr Φ over the period π.
+fn trace(a: f64, q: f64, element: Element, elements: usize) -> Result<f64, TransitionError> {
+    let model = Mathieu { a, q };
+    let rest = model.state([0.0], [0.0]);
+    let h = PI / elements as f64;
+    let mut product = DMatrix::identity(2, 2);
+    for k in 0..elements {
+        let factor = stability::transition_matrix(&model, element, &rest, k as f64 * h, h)?;
+        product = factor * product;
+    }
+    Ok(product.trace())
+}
+
+#[test]
+fn multipliers_are_those_of_the_table() {
+    let table = reference("periodic");
+    for case in cases(&table, "mathieu_a") {
+        let (a, q) = (number(&case["a"]), number(&case["q"]));
+        let expected = list(&case["multipliers"])
+            .iter()
+            .map(|value| number(&value["re"]).hypot(number(&value["im"])))
+            .fold(0.0, f64::max);
+        // Measured 1.5e-11 and 2.1e-14. In the stable case the modulus is one whatever the phase.
+        for (element, tolerance) in [(Mixed::<5>.element(), 3e-11), (Mixed::<6>.element(), 5e-14)] {
+            let error = (radius(a, q, element, 16) - expected).abs() / expected;
+            println!("{element}, a = {a}, q = {q}: {error:.1e}");
+            assert!(
+                error < tolerance,
+                "{element}, a = {a}, q = {q}: {error:.1e}"
+            );
+        }
+    }
+}
+
+/// The bisection of f(a) = |tr Φ| − 2 between ends where its sign differs.
+fn boundary(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let sign = f(low) > 0.0;
+    assert_ne!(sign, f(high) > 0.0, "no boundary from {low} to {high}");
+    for _ in 0..45 {
+        let middle = f64::midpoint(low, high);
+        if (f(middle) > 0.0) == sign {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    f64::midpoint(low, high)
+}
+
+/// The largest distance of a boundary of stability from a characteristic value, of those below `below_a` that the trace tells at all.
+fn largest_error(element: Element, elements: usize, below_a: f64) -> f64 {
+    let table = reference("periodic");
+    let mut largest: f64 = 0.0;
+    for case in cases(&table, "mathieu_characteristic") {
+        let q = number(&case["q"]);
+        let mut values: Vec<(String, f64)> = case["values"]
+            .as_object()
+            .unwrap()
+            .iter()
+            .map(|(name, value)| (name.clone(), number(value)))
+            .collect();
+        values.sort_by(|x, y| x.1.total_cmp(&y.1));
+        // The other end of the gap above the last one is not in the table.
+        for k in 0..values.len() - 1 {
+            let (name, value) = &values[k];
+            // Half way to the neighbours the sign of |tr Φ| − 2 has not changed again.
+            let below = k.checked_sub(1).map_or(1.0, |k| value - values[k].1);
+            let room = 0.5 * below.min(values[k + 1].1 - value).min(1.0);
+            // Across a gap of width w, |tr Φ| − 2 is of size w²: below this, round-off of the trace hides a change of 1e-6 in a.
+            if room < 1e-4 || *value > below_a {
+                continue;
+            }
+            let f = |a: f64| trace(a, q, element, elements).unwrap().abs() - 2.0;
+            let error = (boundary(value - room, value + room, f) - value).abs();
+            println!("{element} q = {q}, {name}: {error:.1e}");
+            largest = largest.max(error);
+        }
+    }
+    largest
+}
+
+#[test]
+fn boundaries_are_characteristic_values() {
+    // Order 2n − 2 for n nodes: the worst is the highest one, a₅ = 25.5, where a step of π/16 turns by one radian. Measured 3.5e-6, 1.4e-8 and, with half the step, 1.4e-8.
+    let five = largest_error(Mixed::<5>.element(), 16, 30.0);
+    assert!(five < 4e-6, "{five:.1e}");
+    let half = largest_error(Mixed::<5>.element(), 32, 30.0);
+    assert!((7.5..8.5).contains(&(five / half).log2()), "{half:.1e}");
+    let six = largest_error(Mixed::<6>.element(), 16, 30.0);
+    assert!(six < 2e-8, "{six:.1e}");
+    // The boundaries below a = 20, of which the usual diagram consists: 8.5e-7.
+    let lower = largest_error(Mixed::<5>.element(), 16, 20.0);
+    assert!(lower < 1e-6, "{lower:.1e}");
+}
+
+#[test]
+fn the_map_knows_the_tongues() {
+    let map = StabilityMap::over(-1.0..5.0, 0.0..2.0)
+        .resolution(120, 40)
+        .floquet(|a, q| Mathieu { a, q }, PI, Mixed::<5>, 16)
+        .unwrap();
+    assert_eq!((map.failed(), map.first_failure()), (0, None));
+    let table = reference("periodic");
+    for case in cases(&table, "mathieu_characteristic_q1") {
+        let value = |name: &str| number(&case["values"][name]);
+        let row = (0..40).find(|j| map.y(*j) > 1.0).unwrap();
+        for column in 0..120 {
+            // Along q = 1.025, cells apart from the boundaries at q = 1 by more than these move.
+            let a = map.x(column);
+            let boundaries = ["a0", "b1", "a1", "b2", "a2"].map(value);
+            if boundaries.iter().any(|boundary| (a - boundary).abs() < 0.1) {
+                continue;
+            }
+            // Below the first boundary it is unstable, and changes at each.
+            let passed = boundaries.iter().filter(|boundary| **boundary < a).count();
+            let is_unstable = map.value(column, row).unwrap() > 1.0 + 1e-6;
+            assert_eq!(is_unstable, passed % 2 == 0, "a = {a}");
+        }
+    }
+    // The cells below the limit have modulus one to round-off of the product, √ of it next to a boundary.
+    let stable = (0..120)
+        .filter_map(|i| map.value(i, 0))
+        .filter(|value| *value < 1.0 + 1e-6);
+    assert!(stable.clone().count() > 80);
+    assert!(stable.into_iter().all(|value| (value - 1.0).abs() < 1e-7));
+}
+
+/// Two Mathieu oscillators, apart from each other: the larger multiplier counts.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = dot(x)^2/2 + dot(y)^2/2 - (a - 2*q*cos(2*t))*x^2/2 - b*y^2/2
+)]
+struct Two {
+    a: f64,
+    b: f64,
+    q: f64,
+}
+
+#[test]
+fn more_coordinates_have_more_multipliers() {
+    // y'' = y/4 grows by e^{π/2} over π; the others are those of one oscillator. A few hundred ε for a matrix of entries about 5.
+    let plan = StabilityMap::over(0.5..1.5, 0.0..1.0).resolution(3, 3);
+    let two = |b: f64| {
+        plan.floquet(|a, q| Two { a, b, q }, PI, Mixed::<6>, 16)
+            .unwrap()
+    };
+    let one = plan
+        .floquet(|a, q| Mathieu { a, q }, PI, Mixed::<6>, 16)
+        .unwrap();
+    let (growing, resting) = (two(-0.25), two(0.3));
+    for (i, j) in [(0, 0), (1, 1), (2, 2), (0, 2)] {
+        let alone = one.value(i, j).unwrap();
+        let tolerance = if alone > 1.0 + 1e-6 { 1e-12 } else { 1e-7 };
+        assert!((resting.value(i, j).unwrap() - alone).abs() < tolerance);
+        let expected = alone.max((PI / 2.0).exp());
+        assert!((growing.value(i, j).unwrap() - expected).abs() < 1e-12);
+    }
+}
+
+/// An oscillator that a force keeps from resting where f ≠ 0.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k*x^2/2 + f*x)]
+struct Forced {
+    k: f64,
+    f: f64,
+}
+
+#[test]
+fn motion_is_not_rest() {
+    let map = StabilityMap::over(0.0..1.0, -1.0..1.0)
+        .resolution(1, 3)
+        .floquet(|k, f| Forced { k, f }, 1.0, Mixed::<3>, 4)
+        .unwrap();
+    assert_eq!(map.failed(), 2);
+    // The middle row has no force: an oscillator, stable.
+    assert!(map.value(0, 1).unwrap() < 1.0 + 1e-12);
+    let first = map.first_failure().unwrap();
+    assert_eq!((first.column, first.row), (0, 0));
+    assert!(matches!(
+        first.error,
+        PointError::Failed(FloquetError::NotAtRest { element: 0, distance }) if distance > 0.1
+    ));
+}
+
+#[test]
+fn models_that_break_are_failures() {
+    let map = StabilityMap::over(0.0..2.0, 0.0..1.0)
+        .resolution(2, 1)
+        .floquet(
+            |a, q| Mathieu {
+                a: if a < 1.0 { f64::NAN } else { a },
+                q,
+            },
+            PI,
+            Mixed::<4>,
+            8,
+        )
+        .unwrap();
+    assert_eq!((map.failed(), map.value(0, 0)), (1, None));
+    assert!(map.value(1, 0).is_some());
+}
+
+#[test]
+fn plans_that_cannot_be() {
+    let plan = StabilityMap::over(0.0..1.0, 0.0..1.0).resolution(2, 2);
+    let model = |a, q| Mathieu { a, q };
+    for (period, elements) in [
+        (0.0, 4),
+        (-1.0, 4),
+        (f64::NAN, 4),
+        (f64::INFINITY, 4),
+        (1.0, 0),
+    ] {
+        let map = plan.floquet(model, period, Mixed::<4>, elements);
+        assert!(matches!(map, Err(MapError::Period { .. })));
+    }
+    let map = plan.floquet(model, 1.0, Element::mixed(99), 4);
+    assert!(matches!(map, Err(MapError::Element(_))));
+}
