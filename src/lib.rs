@@ -2,17 +2,23 @@
 
 extern crate self as tfe;
 
+mod assembly;
+pub mod boundary;
 #[cfg(feature = "charts")]
 pub mod charts;
 mod csv;
 pub mod error;
 pub mod motion;
+pub mod periodic;
 pub mod periodic_schur;
 pub mod simulation;
 pub mod stability;
 
+pub use assembly::{AssemblyError, MeshError};
+pub use boundary::{BoundaryMotion, BoundaryValue};
 pub use error::{AtError, RunError, RunErrorKind};
 pub use motion::{Motion, Node, Outputs};
+pub use periodic::{Orbit, PeriodicOrbit};
 pub use simulation::{Simulation, Steps};
 pub use tfe_macros::dynamics;
 /// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
@@ -25,8 +31,8 @@ pub use tfe_runtime::{
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
     pub use crate::{
-        Element, EnergyConserving, Mixed, Model, Motion, Node, Primal, Radau, Simulation, Solve,
-        State, dynamics, stability,
+        BoundaryValue, Element, EnergyConserving, Mixed, Model, Motion, Node, PeriodicOrbit,
+        Primal, Radau, Simulation, Solve, State, dynamics, stability,
     };
 }
 

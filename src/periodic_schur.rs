@@ -46,6 +46,9 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use arithmetic::{exponent, power_of_two, reflection};
+pub(crate) use chain::balancing;
+
 use arithmetic::Scaled;
 use chain::{Chain, Wanted};
 use nalgebra::{Complex, DMatrix};
@@ -108,6 +111,13 @@ impl Multiplier {
 pub enum PeriodicSchurError {
     /// There is no factor, hence no size.
     Empty,
+    /// A slice does not hold a whole number of factors.
+    Length {
+        /// The number of rows of a factor.
+        order: usize,
+        /// The length of the slice.
+        found: usize,
+    },
     /// A factor is not square.
     NotSquare {
         /// Which factor.
@@ -146,6 +156,12 @@ impl fmt::Display for PeriodicSchurError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Empty => write!(f, "the product has no factor"),
+            Self::Length { order, found } => {
+                write!(
+                    f,
+                    "{found} entries are not a whole number of {order} × {order} factors"
+                )
+            }
             Self::NotSquare {
                 index,
                 rows,
@@ -214,6 +230,48 @@ impl Error for PeriodicSchurError {}
 /// # Ok::<(), tfe::periodic_schur::PeriodicSchurError>(())
 /// ```
 pub fn multipliers(factors: &[DMatrix<f64>]) -> Result<Vec<Multiplier>, PeriodicSchurError> {
+    eigenvalues_of_product(factors.to_vec())
+}
+
+/// As [`multipliers`], of factors of `order` rows in one slice, one after the other and each row by row.
+///
+/// # Errors
+/// As [`multipliers`]; [`PeriodicSchurError::Length`] if the slice does not hold a whole number of factors.
+///
+/// # Example
+/// ```
+/// use tfe::periodic_schur::multipliers_of;
+///
+/// let factors = [2.0, 1.0, 0.0, 3.0, /* then */ 5.0, 1.0, 0.0, 7.0];
+/// let multipliers = multipliers_of(2, &factors)?;
+/// assert!((multipliers[0].modulus() - 21.0).abs() < 1e-12);
+/// assert!((multipliers[1].modulus() - 10.0).abs() < 1e-12);
+/// # Ok::<(), tfe::periodic_schur::PeriodicSchurError>(())
+/// ```
+pub fn multipliers_of(
+    order: usize,
+    entries: &[f64],
+) -> Result<Vec<Multiplier>, PeriodicSchurError> {
+    if entries.is_empty() {
+        return Err(PeriodicSchurError::Empty);
+    }
+    let size = order.checked_mul(order).filter(|&size| size > 0);
+    let size = size.filter(|size| entries.len().is_multiple_of(*size));
+    let size = size.ok_or(PeriodicSchurError::Length {
+        order,
+        found: entries.len(),
+    })?;
+    let factors = entries.chunks_exact(size);
+    eigenvalues_of_product(
+        factors
+            .map(|factor| DMatrix::from_row_slice(order, order, factor))
+            .collect(),
+    )
+}
+
+fn eigenvalues_of_product(
+    factors: Vec<DMatrix<f64>>,
+) -> Result<Vec<Multiplier>, PeriodicSchurError> {
     let mut chain = Chain::new(factors, Wanted::Multipliers)?;
     chain.reduce();
     chain.iterate()?;
@@ -261,7 +319,7 @@ impl PeriodicSchur {
     /// # Errors
     /// As [`multipliers`]; [`PeriodicSchurError::NonFinite`] too if an entry of a triangular factor overflows.
     pub fn new(factors: &[DMatrix<f64>]) -> Result<Self, PeriodicSchurError> {
-        let mut chain = Chain::new(factors, Wanted::SchurForm)?;
+        let mut chain = Chain::new(factors.to_vec(), Wanted::SchurForm)?;
         chain.reduce();
         chain.iterate()?;
         let multipliers = eigenvalues(&chain)?;

@@ -10,14 +10,19 @@ pub(super) fn times_power_of_two(mut x: f64, exponent: i64) -> f64 {
     let mut left = exponent.clamp(-2200, 2200);
     while left != 0 {
         let part = left.clamp(-1000, 1000);
-        x *= f64::from_bits(((1023 + part) as u64) << 52);
+        x *= power_of_two(part);
         left -= part;
     }
     x
 }
 
+/// 2^exponent, as near as a normal number comes to it.
+pub(crate) fn power_of_two(exponent: i64) -> f64 {
+    f64::from_bits(((1023 + exponent.clamp(-1022, 1023)) as u64) << 52)
+}
+
 /// The integer e with 2^e ≤ |x| < 2^(e+1), of a finite number; −1075 for zero, below that of every other.
-pub(super) fn exponent(x: f64) -> i64 {
+pub(crate) fn exponent(x: f64) -> i64 {
     let bits = |x: f64| (x.to_bits() >> 52 & 0x7ff) as i64;
     match bits(x) {
         _ if x == 0.0 => -1075,
@@ -117,7 +122,7 @@ fn norm(x: &[f64]) -> f64 {
 /// Overwrites x by the vector v of the reflection I − τ v vᵀ that takes x to β e₁; returns (τ, β).
 ///
 /// v₁ = 1. If x is a multiple of e₁ already, the reflection is the identity: τ = 0, β = x₁.
-pub(super) fn reflection(x: &mut [f64]) -> (f64, f64) {
+pub(crate) fn reflection(x: &mut [f64]) -> (f64, f64) {
     let Some(&alpha) = x.first() else {
         return (0.0, 0.0);
     };

@@ -32,11 +32,8 @@ pub(super) struct Chain {
 }
 
 impl Chain {
-    /// Checks and copies the factors.
-    pub(super) fn new(
-        factors: &[DMatrix<f64>],
-        wanted: Wanted,
-    ) -> Result<Self, PeriodicSchurError> {
+    /// Checks the factors.
+    pub(super) fn new(mut factors: Matrices, wanted: Wanted) -> Result<Self, PeriodicSchurError> {
         let order = factors.first().ok_or(PeriodicSchurError::Empty)?.nrows();
         for (index, factor) in factors.iter().enumerate() {
             let (rows, columns) = factor.shape();
@@ -58,7 +55,6 @@ impl Chain {
                 return Err(PeriodicSchurError::NonFinite { index });
             }
         }
-        let mut factors = factors.to_vec();
         let exponents = factors.iter_mut().map(keep_from_overflow).collect();
         let bases = match wanted {
             Wanted::Multipliers => {
@@ -286,12 +282,33 @@ fn balance(factors: &mut [DMatrix<f64>], n: usize) {
         }
     }
     let mut scales = vec![0i64; n];
+    balancing(most.as_mut_slice(), 0.0, &mut scales);
+    if scales.iter().any(|&scale| scale != scales[0]) {
+        for factor in factors {
+            for i in 0..n {
+                for j in 0..n {
+                    factor[(i, j)] = times_power_of_two(factor[(i, j)], scales[j] - scales[i]);
+                }
+            }
+        }
+    }
+}
+
+/// Finds exponents s for which 2^−s_i · `most`_ij · 2^s_j is balanced, and applies this similarity to `most`.
+///
+/// `most` holds moduli, n × n by columns; for one by rows the exponents come with the opposite sign. Balanced are the
+/// sums of each row and of the column of the same number, without the diagonal and with `floor` added: entries that are
+/// small beside a positive `floor` are left as they are.
+pub(crate) fn balancing(most: &mut [f64], floor: f64, exponents: &mut [i64]) {
+    let n = exponents.len();
+    exponents.fill(0);
     // Each pass at least halves what is left to do; a dozen reach every scale of an f64.
     for _ in 0..24 {
         let mut changed = false;
         for i in 0..n {
-            let column: f64 = (0..n).filter(|&j| j != i).map(|j| most[(j, i)]).sum();
-            let row: f64 = (0..n).filter(|&j| j != i).map(|j| most[(i, j)]).sum();
+            let others = || (0..n).filter(|&j| j != i);
+            let column = floor + others().map(|j| most[j + i * n]).sum::<f64>();
+            let row = floor + others().map(|j| most[i + j * n]).sum::<f64>();
             if column == 0.0 || row == 0.0 {
                 continue;
             }
@@ -300,24 +317,15 @@ fn balance(factors: &mut [DMatrix<f64>], n: usize) {
             if e == 0 || after >= 0.95 * (column + row) {
                 continue;
             }
-            for j in (0..n).filter(|&j| j != i) {
-                most[(j, i)] = times_power_of_two(most[(j, i)], e);
-                most[(i, j)] = times_power_of_two(most[(i, j)], -e);
+            for j in others() {
+                most[j + i * n] = times_power_of_two(most[j + i * n], e);
+                most[i + j * n] = times_power_of_two(most[i + j * n], -e);
             }
-            scales[i] += e;
+            exponents[i] += e;
             changed = true;
         }
         if !changed {
             break;
-        }
-    }
-    if scales.iter().any(|&scale| scale != scales[0]) {
-        for factor in factors {
-            for i in 0..n {
-                for j in 0..n {
-                    factor[(i, j)] = times_power_of_two(factor[(i, j)], scales[j] - scales[i]);
-                }
-            }
         }
     }
 }

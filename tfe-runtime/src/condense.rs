@@ -14,7 +14,7 @@ use crate::lu;
 use crate::model::{By, First, Form, Model, Second};
 use crate::phase_form::PhaseForm;
 use crate::scheme::SchemeRef;
-use crate::velocity_form::{PointDerivatives, VelocityForm};
+use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm};
 
 /// What a unit of a global unknown γ changes in one element, beside its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,8 +29,8 @@ pub struct Direction {
     pub damping: f64,
 }
 
-/// The linear system of one element: tangent, residual, and a right side, later the solution, for each direction: first the 2N of
-/// the start, (p₀, q₀), then the others.
+/// The linear system of one element: tangent, residual, and the right sides, later the solutions: a row for each interior unknown, a column
+/// for each direction, first the 2N of the start, (p₀, q₀), then the others.
 pub(crate) struct System<'a> {
     pub(crate) tangent: &'a mut [f64],
     pub(crate) pivots: &'a mut [usize],
@@ -38,7 +38,41 @@ pub(crate) struct System<'a> {
     pub(crate) sides: &'a mut [f64],
 }
 
+/// What the end of an element in velocity form depends on, as far as it is the momentum: derivatives of h Σ b F.
+pub(crate) struct EndForces<'a, const N: usize> {
+    /// By the interior, N rows.
+    pub(crate) by_interior: &'a mut [f64],
+    /// By the coordinates at the start.
+    pub(crate) by_start: &'a mut [[f64; N]],
+    /// By the directions.
+    pub(crate) by_direction: &'a mut [[f64; N]],
+}
+
+impl<'a, const N: usize> EndForces<'a, N> {
+    /// The numbers that it needs for so many interior unknowns and directions.
+    pub(crate) const fn length(interior: usize, directions: usize) -> usize {
+        N * (interior + N + directions)
+    }
+
+    /// In memory of [`EndForces::length`] numbers.
+    pub(crate) fn of(memory: &'a mut [f64], interior: usize) -> Self {
+        memory.fill(0.0);
+        let (by_interior, rest) = memory.split_at_mut(N * interior);
+        let (by_start, by_direction) = rest.as_chunks_mut().0.split_at_mut(N);
+        Self {
+            by_interior,
+            by_start,
+            by_direction,
+        }
+    }
+}
+
 impl System<'_> {
+    /// The number of columns of the sides.
+    fn columns(&self) -> usize {
+        self.sides.len() / self.residual.len()
+    }
+
     /// Sets it up in phase space.
     pub(crate) fn of_phase<M, const N: usize>(
         &mut self,
@@ -49,7 +83,7 @@ impl System<'_> {
         M: Model<N>,
     {
         let points = equations.scheme.points();
-        let (half, m) = (points * N, x.len());
+        let (half, columns) = (points * N, self.columns());
         let (mut first, mut second) = (First::ZERO, Second::ZERO);
         for k in 0..points {
             let (t, q, p) = equations.place(k, x);
@@ -60,27 +94,23 @@ impl System<'_> {
                 self.residual[pi] = x[pi] - (first.force[a] - first.q[a]);
                 self.residual[kappa] = x[kappa] - first.z[a];
                 for b in 0..N {
-                    let (p, q) = (b * m, (N + b) * m);
-                    self.sides[p + pi] = second.force_z[a][b] - second.zq[b][a];
-                    self.sides[q + pi] = second.force_q[a][b] - second.qq[a][b];
-                    self.sides[p + kappa] = second.zz[a][b];
-                    self.sides[q + kappa] = second.zq[a][b];
+                    self.sides[pi * columns + b] = second.force_z[a][b] - second.zq[b][a];
+                    self.sides[pi * columns + N + b] = second.force_q[a][b] - second.qq[a][b];
+                    self.sides[kappa * columns + b] = second.zz[a][b];
+                    self.sides[kappa * columns + N + b] = second.zq[a][b];
                 }
             }
-            for (direction, side) in directions
-                .iter()
-                .zip(self.sides[2 * N * m..].chunks_exact_mut(m))
-            {
+            for (direction, column) in directions.iter().zip(2 * N..) {
                 let node = equations.scheme.nodes[k];
                 let explicit = explicit(equations.model, t, &q, &p, direction, node);
                 // The stage moves with h at a fixed interior.
                 let row = k * points..(k + 1) * points;
                 let (forces, velocities) = x.as_chunks::<N>().0.split_at(points);
-                let mut moved = ([0.0; N], [0.0; N]);
+                let (mut dp, mut dq) = ([0.0; N], [0.0; N]);
                 for (l, weight) in equations.scheme.position[row].iter().enumerate() {
                     for a in 0..N {
-                        moved.0[a] += direction.length * weight * forces[l][a];
-                        moved.1[a] += direction.length * weight * velocities[l][a];
+                        dp[a] += direction.length * weight * forces[l][a];
+                        dq[a] += direction.length * weight * velocities[l][a];
                     }
                 }
                 for a in 0..N {
@@ -89,38 +119,38 @@ impl System<'_> {
                         + equations.span.damping * explicit.z[a];
                     let mut velocity = explicit.z[a];
                     for b in 0..N {
-                        force += (second.force_z[a][b] - second.zq[b][a]) * moved.0[b]
-                            + (second.force_q[a][b] - second.qq[a][b]) * moved.1[b];
-                        velocity += second.zz[a][b] * moved.0[b] + second.zq[a][b] * moved.1[b];
+                        force += (second.force_z[a][b] - second.zq[b][a]) * dp[b]
+                            + (second.force_q[a][b] - second.qq[a][b]) * dq[b];
+                        velocity += second.zz[a][b] * dp[b] + second.zq[a][b] * dq[b];
                     }
-                    side[k * N + a] = force;
-                    side[half + k * N + a] = velocity;
+                    self.sides[(k * N + a) * columns + column] = force;
+                    self.sides[(half + k * N + a) * columns + column] = velocity;
                 }
             }
         }
     }
 
-    /// Sets it up for velocities; `points` keeps, at each point, the derivatives of L_q + Q by v, by q and by the directions.
+    /// Sets it up for velocities.
     pub(crate) fn of_velocities<M, const N: usize>(
         &mut self,
         equations: &mut VelocityForm<'_, M, N>,
         x: &[f64],
         directions: &[Direction],
-        points: &mut [[f64; N]],
+        ends: &mut EndForces<'_, N>,
     ) -> Result<(), StepError>
     where
         M: Model<N>,
     {
         let rates = x.as_chunks::<N>().0;
         let scheme = equations.scheme;
-        let (count, rows, m) = (scheme.points(), rates.len(), x.len());
+        let (count, rows, columns) = (scheme.points(), rates.len(), self.columns());
         let h = equations.span.h;
         self.tangent.fill(0.0);
         self.sides.fill(0.0);
         self.residual.fill(0.0);
         for i in 0..rows {
             for a in 0..N {
-                self.sides[a * m + i * N + a] = 1.0;
+                self.sides[(i * N + a) * columns + a] = 1.0;
             }
         }
         let mut point = PointDerivatives {
@@ -128,44 +158,52 @@ impl System<'_> {
             force: [0.0; N],
             second: Second::ZERO,
         };
-        let stored = points.chunks_exact_mut(2 * N + directions.len());
-        for (l, stored) in stored.enumerate().take(count) {
+        for l in 0..count {
             equations.derivatives(l, rates, &mut point)?;
-            equations.add_to_tangent(l, &point.second, self.tangent);
             equations.forces[l] = point.force;
+            let by = PointTangent::of(h, &point.second);
+            equations.add_to_tangent(l, &by, self.tangent);
+            let end = h * scheme.weights[l];
+            for (a, row) in ends.by_interior.chunks_exact_mut(x.len()).enumerate() {
+                equations.add_row(l, &by, a, 0.0, end, row);
+            }
             let second = &point.second;
-            let (by_v, rest) = stored.split_at_mut(N);
-            let (by_q, by_direction) = rest.split_at_mut(N);
+            let mut by_q = [[0.0; N]; N];
             for a in 0..N {
                 for b in 0..N {
-                    by_v[a][b] = second.zq[b][a] + second.force_z[a][b];
                     by_q[a][b] = second.qq[a][b] + second.force_q[a][b];
+                    ends.by_start[a][b] += end * by_q[a][b];
                 }
             }
             for i in 0..rows {
-                let momentum = scheme.momentum[i * count + l];
                 let force = h * scheme.force[i * count + l];
                 for a in 0..N {
-                    self.residual[i * N + a] += momentum * point.p[a];
+                    let side = &mut self.sides[(i * N + a) * columns + N..][..N];
                     for b in 0..N {
-                        self.sides[(N + b) * m + i * N + a] +=
-                            force * by_q[a][b] - momentum * second.zq[a][b];
+                        side[b] += force * by_q[a][b];
+                    }
+                }
+                let momentum = scheme.momentum[i * count + l];
+                if momentum != 0.0 {
+                    for a in 0..N {
+                        self.residual[i * N + a] += momentum * point.p[a];
+                        for b in 0..N {
+                            self.sides[(i * N + a) * columns + N + b] -= momentum * second.zq[a][b];
+                        }
                     }
                 }
             }
-            let sides = self.sides[2 * N * m..].chunks_exact_mut(m);
-            for ((direction, side), of_force) in directions.iter().zip(sides).zip(by_direction) {
-                let (of_momentum, moved) = equations.along(l, rates, &point, direction, of_force);
+            for (k, direction) in directions.iter().enumerate() {
+                let (of_momentum, of_force) = equations.along(l, rates, &point, &by_q, direction);
                 for a in 0..N {
-                    for b in 0..N {
-                        of_force[a] += by_q[a][b] * moved[b];
-                    }
+                    ends.by_direction[k][a] +=
+                        end * of_force[a] + direction.length * scheme.weights[l] * point.force[a];
                 }
                 for i in 0..rows {
                     let momentum = scheme.momentum[i * count + l];
                     let force = scheme.force[i * count + l];
                     for a in 0..N {
-                        side[i * N + a] += force
+                        self.sides[(i * N + a) * columns + 2 * N + k] += force
                             * (direction.length * point.force[a] + h * of_force[a])
                             - momentum * of_momentum[a];
                     }
@@ -178,15 +216,13 @@ impl System<'_> {
 
     /// Solves all sides.
     pub(crate) fn solve(self) -> Result<Self, StepError> {
-        let size = self.residual.len();
+        let (size, columns) = (self.residual.len(), self.columns());
         lu::factor(size, self.tangent, self.pivots).map_err(|singular| {
             StepError::SingularTangent {
                 unknown: singular.column,
             }
         })?;
-        for side in self.sides.chunks_exact_mut(size) {
-            lu::solve(size, self.tangent, self.pivots, side);
-        }
+        lu::solve_columns(self.tangent, self.pivots, columns, self.sides);
         Ok(self)
     }
 }
@@ -195,15 +231,14 @@ impl<M, const N: usize> VelocityForm<'_, M, N>
 where
     M: Model<N>,
 {
-    /// What a direction changes at a point while velocities and start stay: writes the explicit part of the derivative of the
-    /// force, returns that of the momentum (with that of the moved coordinates) and how the coordinates move.
+    /// What a direction changes at a point while velocities and start stay: the derivatives of the momentum and of the force.
     fn along(
         &self,
         l: usize,
         rates: &[[f64; N]],
         point: &PointDerivatives<N>,
+        by_q: &[[f64; N]; N],
         direction: &Direction,
-        of_force: &mut [f64; N],
     ) -> ([f64; N], [f64; N]) {
         let (t, q, v) = self.place(l, rates);
         let second = &point.second;
@@ -217,7 +252,7 @@ where
             }
         }
         let node = self.scheme.nodes[l];
-        let mut of_momentum = [0.0; N];
+        let (mut of_momentum, mut of_force) = ([0.0; N], [0.0; N]);
         match M::FORM {
             Form::Lagrangian => {
                 let by = explicit(self.model, t, &q, &v, direction, node);
@@ -243,9 +278,10 @@ where
             of_force[a] += direction.damping * v[a];
             for b in 0..N {
                 of_momentum[a] += second.zq[a][b] * moved[b];
+                of_force[a] += by_q[a][b] * moved[b];
             }
         }
-        (of_momentum, moved)
+        (of_momentum, of_force)
     }
 }
 
@@ -278,8 +314,7 @@ where
     sum
 }
 
-/// The derivatives of the end, row by row: one column for each of the 2N directions of the start and for each other one. A further side, if there
-/// is one, is a change of the interior alone and gives the last column.
+/// The derivatives of the end, row by row, with the columns of the sides; one beyond start and directions is a change of the interior alone.
 ///
 /// ```text
 /// δy₁ = δy₀ + h Σ b δx + δh Σ b x
@@ -294,92 +329,74 @@ pub(crate) fn phase_ends<const N: usize>(
 ) {
     let half = scheme.points() * N;
     let columns = sides.len() / x.len();
-    for (column, side) in sides.chunks_exact(x.len()).enumerate() {
-        let length = column
-            .checked_sub(2 * N)
-            .and_then(|direction| directions.get(direction))
-            .map_or(0.0, |direction| direction.length);
-        for (block, (half, rates)) in side
-            .chunks_exact(half)
-            .zip(x.chunks_exact(half))
-            .enumerate()
-        {
-            let (half, rates) = (half.as_chunks::<N>().0, rates.as_chunks::<N>().0);
-            for a in 0..N {
-                let row = block * N + a;
-                let (mut sum, mut rate) = (0.0, 0.0);
-                for (l, weight) in scheme.weights.iter().enumerate() {
-                    sum += weight * half[l][a];
-                    rate += weight * rates[l][a];
-                }
-                let start = if row == column { 1.0 } else { 0.0 };
-                ends[row * columns + column] = h * sum + length * rate + start;
-            }
+    for (row, end) in ends.chunks_exact_mut(columns).enumerate().take(2 * N) {
+        let (block, a) = (row / N, row % N);
+        let mut rate = 0.0;
+        end.fill(0.0);
+        for (l, weight) in scheme.weights.iter().enumerate() {
+            let at = block * half + l * N + a;
+            rate += weight * x[at];
+            add(end, h * weight, &sides[at * columns..(at + 1) * columns]);
         }
+        for (entry, direction) in end[2 * N..].iter_mut().zip(directions) {
+            *entry += direction.length * rate;
+        }
+        end[row] += 1.0;
     }
 }
 
 /// The same for velocities:
 ///
 /// ```text
-/// δq₁ = δq₀ + h Σ β δν + δh Σ β ν ,     δp₁ = δp₀ + h Σ b (F_v δv + F_q δq + F_γ δγ) + δh Σ b F .
+/// δq₁ = δq₀ + h Σ β δν + δh Σ β ν ,     δp₁ = δp₀ + δ(h Σ b F) .
 /// ```
-pub(crate) fn velocity_ends<M, const N: usize>(
-    equations: &VelocityForm<'_, M, N>,
+pub(crate) fn velocity_ends<const N: usize>(
+    scheme: &SchemeRef<'_>,
+    h: f64,
     x: &[f64],
     directions: &[Direction],
-    points: &[[f64; N]],
+    forces: &EndForces<'_, N>,
     sides: &[f64],
     ends: &mut [f64],
-) where
-    M: Model<N>,
-{
-    let (scheme, h) = (&equations.scheme, equations.span.h);
-    let unknowns = scheme.unknowns();
+) {
     let columns = sides.len() / x.len();
-    let width = 2 * N + directions.len();
-    for (column, side) in sides.chunks_exact(x.len()).enumerate() {
-        let rates = side.as_chunks::<N>().0;
-        let direction = column
-            .checked_sub(2 * N)
-            .filter(|direction| *direction < directions.len());
-        let length = direction.map_or(0.0, |direction| directions[direction].length);
-        let (mut dp, mut dq) = ([0.0; N], [0.0; N]);
-        for ((weight, rate), old) in scheme.advance.iter().zip(rates).zip(x.as_chunks::<N>().0) {
-            for a in 0..N {
-                dq[a] += weight * (h * rate[a] + length * old[a]);
-            }
+    let (momenta, coordinates) = ends.split_at_mut(N * columns);
+    let rows = momenta.chunks_exact_mut(columns);
+    for (a, (end, weights)) in rows
+        .zip(forces.by_interior.chunks_exact(x.len()))
+        .enumerate()
+    {
+        end.fill(0.0);
+        for (weight, side) in weights.iter().zip(sides.chunks_exact(columns)) {
+            add(end, *weight, side);
         }
-        for (l, stored) in points.chunks_exact(width).enumerate().take(scheme.points()) {
-            let (mut velocity, mut position) = ([0.0; N], [0.0; N]);
-            for (j, rate) in rates.iter().enumerate() {
-                let row = l * unknowns + j;
-                for a in 0..N {
-                    velocity[a] += scheme.velocity[row] * rate[a];
-                    position[a] += h * scheme.position[row] * rate[a];
-                }
-            }
-            if (N..2 * N).contains(&column) {
-                position[column - N] += 1.0;
-            }
-            let (by_v, rest) = stored.split_at(N);
-            let (by_q, by_direction) = rest.split_at(N);
-            for a in 0..N {
-                let mut force = direction.map_or(0.0, |direction| by_direction[direction][a]);
-                for b in 0..N {
-                    force += by_v[a][b] * velocity[b] + by_q[a][b] * position[b];
-                }
-                dp[a] += scheme.weights[l] * (h * force + length * equations.forces[l][a]);
-            }
+        end[a] += 1.0;
+        for b in 0..N {
+            end[N + b] += forces.by_start[a][b];
         }
-        if column < N {
-            dp[column] += 1.0;
-        } else if column < 2 * N {
-            dq[column - N] += 1.0;
+        for (entry, by_direction) in end[2 * N..].iter_mut().zip(&*forces.by_direction) {
+            *entry += by_direction[a];
         }
-        for a in 0..N {
-            ends[a * columns + column] = dp[a];
-            ends[(N + a) * columns + column] = dq[a];
+    }
+    for (a, end) in coordinates.chunks_exact_mut(columns).enumerate().take(N) {
+        let mut rate = 0.0;
+        end.fill(0.0);
+        for (j, weight) in scheme.advance.iter().enumerate() {
+            let at = j * N + a;
+            rate += weight * x[at];
+            add(end, h * weight, &sides[at * columns..(at + 1) * columns]);
         }
+        end[N + a] += 1.0;
+        for (entry, direction) in end[2 * N..].iter_mut().zip(directions) {
+            *entry += direction.length * rate;
+        }
+    }
+}
+
+/// sum += weight · row
+#[inline(always)]
+fn add(sum: &mut [f64], weight: f64, row: &[f64]) {
+    for (sum, entry) in sum.iter_mut().zip(row) {
+        *sum += weight * entry;
     }
 }

@@ -12,7 +12,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::condense::{System, phase_ends, velocity_ends};
+use crate::condense::{EndForces, System, phase_ends, velocity_ends};
 use crate::dense::DenseElement;
 use crate::element::{Element, ElementError};
 use crate::equations::Span;
@@ -49,7 +49,7 @@ pub struct Condensed<'a> {
     /// A and C and, in the last column, what the end of the Newton step is beyond A δy₀ + C δγ: 2N rows of 2N + g + 1 columns,
     /// ordered (p, q).
     pub ends: &'a mut [f64],
-    /// The interior as a function of the nodes: 2N + g + 1 vectors of [`Condenser::interior`] numbers, the last one its own Newton step.
+    /// The interior as a function of the nodes: a row of the same columns for each of the [`Condenser::interior`] numbers, the last one its own Newton step.
     pub response: &'a mut [f64],
 }
 
@@ -112,7 +112,7 @@ pub struct Condenser<const N: usize> {
     memory: Memory<N>,
     numbers: Vec<f64>,
     pivots: Vec<usize>,
-    points: Vec<[f64; N]>,
+    forces: Vec<f64>,
 }
 
 impl<const N: usize> Condenser<N> {
@@ -128,7 +128,7 @@ impl<const N: usize> Condenser<N> {
             memory: Memory::new(),
             numbers: vec![0.0; numbers_len(element, M::FORM, N)],
             pivots: vec![0; pivots_len(element, M::FORM, N)],
-            points: Vec::new(),
+            forces: Vec::new(),
         })
     }
 
@@ -214,10 +214,8 @@ impl<const N: usize> Condenser<N> {
             return Err(StepError::Workspace { needed, given });
         }
         let scheme = self.table.view();
-        let rows = scheme.points() * (2 * N + directions.len());
-        if self.points.len() < rows {
-            self.points.resize(rows, [0.0; N]);
-        }
+        self.forces
+            .resize(EndForces::<N>::length(m, directions.len()), 0.0);
         let workspace = Workspace {
             numbers: &mut self.numbers,
             pivots: &mut self.pivots,
@@ -270,9 +268,10 @@ impl<const N: usize> Condenser<N> {
                 constant_mass: &mut self.memory.mass,
                 statistics: &mut self.memory.statistics,
             };
-            system.of_velocities(&mut equations, interior, directions, &mut self.points)?;
+            let mut forces = EndForces::of(&mut self.forces, m);
+            system.of_velocities(&mut equations, interior, directions, &mut forces)?;
             let sides = system.with_newton_step().solve()?.sides;
-            velocity_ends(&equations, interior, directions, &self.points, sides, ends);
+            velocity_ends(&scheme, length, interior, directions, &forces, sides, ends);
             end_of(
                 &scheme,
                 &span,
@@ -342,10 +341,13 @@ impl<const N: usize> Condenser<N> {
 impl System<'_> {
     /// Lets the last side be the Newton step of the interior itself.
     fn with_newton_step(self) -> Self {
-        let m = self.residual.len();
-        let last = self.sides.len() - m;
-        for (side, residual) in self.sides[last..].iter_mut().zip(&*self.residual) {
-            *side = -residual;
+        let rows = self
+            .sides
+            .chunks_exact_mut(self.sides.len() / self.residual.len());
+        for (row, residual) in rows.zip(&*self.residual) {
+            if let Some(last) = row.last_mut() {
+                *last = -residual;
+            }
         }
         self
     }

@@ -39,8 +39,9 @@ pub fn factor(size: usize, matrix: &mut [f64], pivots: &mut [usize]) -> Result<(
             row[column] = factor;
             // Zero blocks are common in tangents of several coordinates.
             if factor != 0.0 {
-                for j in column + 1..size {
-                    row[j] -= factor * pivot_row[j];
+                let tail = row[column + 1..].iter_mut();
+                for (entry, pivot) in tail.zip(&pivot_row[column + 1..]) {
+                    *entry -= factor * pivot;
                 }
             }
         }
@@ -67,6 +68,40 @@ pub fn solve(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64])
             sum -= factors[row * size + j] * vector[j];
         }
         vector[row] = sum / factors[row * size + row];
+    }
+}
+
+/// Solves A X = B in place with the factors of A, `columns` right sides at once, B row by row.
+pub(crate) fn solve_columns(factors: &[f64], pivots: &[usize], columns: usize, sides: &mut [f64]) {
+    let size = pivots.len();
+    for (k, &pivot) in pivots.iter().enumerate() {
+        if pivot != k {
+            for column in 0..columns {
+                sides.swap(k * columns + column, pivot * columns + column);
+            }
+        }
+    }
+    let subtract = |row: &mut [f64], factor: f64, other: &[f64]| {
+        for (entry, other) in row.iter_mut().zip(other) {
+            *entry -= factor * other;
+        }
+    };
+    for (k, factors) in factors.chunks_exact(size).enumerate() {
+        let (done, rest) = sides.split_at_mut(k * columns);
+        for (factor, other) in factors.iter().zip(done.chunks_exact(columns)) {
+            subtract(&mut rest[..columns], *factor, other);
+        }
+    }
+    for (k, factors) in factors.chunks_exact(size).enumerate().rev() {
+        let (rest, done) = sides.split_at_mut((k + 1) * columns);
+        let row = &mut rest[k * columns..];
+        for (factor, other) in factors[k + 1..].iter().zip(done.chunks_exact(columns)) {
+            subtract(row, *factor, other);
+        }
+        let inverse = 1.0 / factors[k];
+        for entry in row {
+            *entry *= inverse;
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 
 use core::fmt;
 
-use crate::condense::{System, phase_ends, velocity_ends};
+use crate::condense::{EndForces, System, phase_ends, velocity_ends};
 use crate::element::ElementError;
 use crate::equations::Span;
 use crate::error::StepError;
@@ -158,8 +158,8 @@ where
             damping: 0.0,
         };
         // One right side, or solution, for each of the 2N directions of the start.
-        let (sides, derivatives) = extra.split_at_mut(2 * N * parts.unknowns.len());
-        let points = derivatives.as_chunks_mut::<N>().0;
+        let m = parts.unknowns.len();
+        let (sides, forces) = extra[..needed].split_at_mut(2 * N * m);
         let mut system = System {
             tangent: parts.tangent,
             pivots: parts.tangent_pivots,
@@ -199,9 +199,10 @@ where
                 constant_mass: &mut memory.mass,
                 statistics: &mut memory.statistics,
             };
-            system.of_velocities(&mut equations, parts.unknowns, &[], points)?;
-            let sides = system.solve()?.sides;
-            velocity_ends(&equations, parts.unknowns, &[], points, sides, matrix);
+            let mut forces = EndForces::of(forces, m);
+            system.of_velocities(&mut equations, parts.unknowns, &[], &mut forces)?;
+            let (sides, h) = (system.solve()?.sides, span.h);
+            velocity_ends(&scheme, h, parts.unknowns, &[], &forces, sides, matrix);
         }
         Ok(())
     }

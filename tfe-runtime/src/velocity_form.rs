@@ -35,6 +35,35 @@ pub(crate) struct PointDerivatives<const N: usize> {
     pub(crate) second: Second<f64, N>,
 }
 
+/// The derivatives of momentum and force at a point by its velocity and by h times the rate of its coordinates.
+pub(crate) struct PointTangent<const N: usize> {
+    pub(crate) momentum_v: [[f64; N]; N],
+    pub(crate) momentum_q: [[f64; N]; N],
+    pub(crate) force_v: [[f64; N]; N],
+    pub(crate) force_q: [[f64; N]; N],
+}
+
+impl<const N: usize> PointTangent<N> {
+    #[inline(always)]
+    pub(crate) fn of(h: f64, second: &Second<f64, N>) -> Self {
+        let mut by = Self {
+            momentum_v: second.zz,
+            momentum_q: second.zq,
+            force_v: second.force_z,
+            force_q: second.qq,
+        };
+        for a in 0..N {
+            for b in 0..N {
+                by.momentum_q[a][b] *= h;
+                // L_qv is the transpose of L_vq; forces need not be symmetric.
+                by.force_v[a][b] += second.zq[b][a];
+                by.force_q[a][b] = h * (by.force_q[a][b] + second.force_q[a][b]);
+            }
+        }
+        by
+    }
+}
+
 impl<M, const N: usize> VelocityForm<'_, M, N>
 where
     M: Model<N>,
@@ -198,30 +227,60 @@ where
     }
 
     /// Adds what one point gives to the tangent ∂r/∂ν.
-    pub(crate) fn add_to_tangent(&self, l: usize, second: &Second<f64, N>, tangent: &mut [f64]) {
-        let (points, unknowns) = (self.scheme.points(), self.scheme.unknowns());
-        let (h, size) = (self.span.h, unknowns * N);
-        for i in 0..unknowns {
+    pub(crate) fn add_to_tangent(&self, l: usize, by: &PointTangent<N>, tangent: &mut [f64]) {
+        let points = self.scheme.points();
+        let size = self.scheme.unknowns() * N;
+        for (i, rows) in tangent.chunks_exact_mut(N * size).enumerate() {
             let momentum = self.scheme.momentum[i * points + l];
-            let force = -h * self.scheme.force[i * points + l];
-            for j in 0..unknowns {
-                let velocity = self.scheme.velocity[l * unknowns + j];
-                let position = h * self.scheme.position[l * unknowns + j];
-                let weights = [
-                    momentum * velocity,
-                    momentum * position,
-                    force * velocity,
-                    force * position,
-                ];
-                for a in 0..N {
-                    let row = &mut tangent[(i * N + a) * size + j * N..][..N];
-                    for b in 0..N {
-                        row[b] += weights[0] * second.zz[a][b]
-                            + weights[1] * second.zq[a][b]
-                            // L_qv is the transpose of L_vq; forces need not be symmetric.
-                            + weights[2] * (second.zq[b][a] + second.force_z[a][b])
-                            + weights[3] * (second.qq[a][b] + second.force_q[a][b]);
-                    }
+            let force = -self.span.h * self.scheme.force[i * points + l];
+            for (a, row) in rows.chunks_exact_mut(size).enumerate() {
+                self.add_row(l, by, a, momentum, force, row);
+            }
+        }
+    }
+
+    /// Adds the derivative by all unknown rates of component a of weighted momentum and force at a point.
+    #[inline(always)]
+    pub(crate) fn add_row(
+        &self,
+        l: usize,
+        by: &PointTangent<N>,
+        a: usize,
+        momentum: f64,
+        force: f64,
+        row: &mut [f64],
+    ) {
+        let unknowns = self.scheme.unknowns();
+        let weights = l * unknowns..(l + 1) * unknowns;
+        let (mut by_v, mut by_q) = ([0.0; N], [0.0; N]);
+        for b in 0..N {
+            by_v[b] = force * by.force_v[a][b];
+            by_q[b] = force * by.force_q[a][b];
+        }
+        // Of a collocation method a row has the momentum of one point only.
+        if momentum != 0.0 {
+            for b in 0..N {
+                by_v[b] += momentum * by.momentum_v[a][b];
+                by_q[b] += momentum * by.momentum_q[a][b];
+            }
+        }
+        let blocks = row.as_chunks_mut::<N>().0;
+        for (block, weight) in blocks
+            .iter_mut()
+            .zip(&self.scheme.position[weights.clone()])
+        {
+            for b in 0..N {
+                block[b] += weight * by_q[b];
+            }
+        }
+        if self.scheme.collocated {
+            for b in 0..N {
+                blocks[l][b] += by_v[b];
+            }
+        } else {
+            for (block, weight) in blocks.iter_mut().zip(&self.scheme.velocity[weights]) {
+                for b in 0..N {
+                    block[b] += weight * by_v[b];
                 }
             }
         }
@@ -300,7 +359,8 @@ where
         };
         for l in 0..points {
             self.derivatives(l, rates, &mut point)?;
-            self.add_to_tangent(l, &point.second, tangent);
+            let by = PointTangent::of(self.span.h, &point.second);
+            self.add_to_tangent(l, &by, tangent);
             self.forces[l] = point.force;
             for (i, row) in rows.iter_mut().enumerate() {
                 let weight = self.scheme.momentum[i * points + l];

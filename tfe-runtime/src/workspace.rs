@@ -44,9 +44,9 @@ pub const fn pivots_len(element: Element, form: Form, coordinates: usize) -> usi
 /// The numbers that a transition matrix needs beside the workspace.
 #[must_use]
 pub const fn transition_len(element: Element, form: Form, coordinates: usize) -> usize {
-    let (k, u) = (element.points(), element.unknowns());
-    let m = u * width(&element, form, coordinates);
-    2 * coordinates * m + 2 * k * coordinates * coordinates
+    let m = element.unknowns() * width(&element, form, coordinates);
+    // A side for each direction of the start, and the derivatives of the momentum at the end.
+    2 * coordinates * m + coordinates * (m + coordinates)
 }
 
 /// The workspace cut into its parts.

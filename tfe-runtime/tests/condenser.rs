@@ -248,8 +248,8 @@ fn solve<M: Model<1>>(
         condenser
             .linearise(model, placed, directions, condensed)
             .expect("a regular element");
-        for (x, step) in interior.iter_mut().zip(&response[(columns - 1) * m..]) {
-            *x += step;
+        for (x, row) in interior.iter_mut().zip(response.chunks_exact(columns)) {
+            *x += row[columns - 1];
         }
     }
     let end = [ends[columns - 1], ends[2 * columns - 1]];

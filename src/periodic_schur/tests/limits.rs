@@ -213,6 +213,31 @@ fn errors_name_the_factor() {
 }
 
 #[test]
+fn factors_in_one_slice_are_taken_row_by_row() {
+    let mut random = Random(31);
+    let factors: Vec<_> = (0..7).map(|_| random.matrix(3)).collect();
+    let entries: Vec<f64> = factors
+        .iter()
+        .flat_map(|factor| factor.transpose().as_slice().to_vec())
+        .collect();
+    assert_eq!(multipliers_of(3, &entries), multipliers(&factors));
+
+    assert_eq!(multipliers_of(3, &[]), Err(PeriodicSchurError::Empty));
+    let mut broken = entries.clone();
+    broken[20] = f64::NAN;
+    let expected = Err(PeriodicSchurError::NonFinite { index: 2 });
+    assert_eq!(multipliers_of(3, &broken), expected);
+    for order in [0, 2, 9, usize::MAX] {
+        let found = entries.len();
+        let expected = PeriodicSchurError::Length { order, found };
+        assert_eq!(multipliers_of(order, &entries), Err(expected));
+    }
+    let text = "7 entries are not a whole number of 2 × 2 factors";
+    let error = multipliers_of(2, &entries[..7]).unwrap_err();
+    assert_eq!(error.to_string(), text);
+}
+
+#[test]
 fn exponents_of_the_smallest_and_largest_numbers() {
     for (x, expected) in [
         (1.0, 0),

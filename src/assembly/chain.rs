@@ -1,0 +1,366 @@
+//! A chain of links with conditions at its ends, solved by structured orthogonal elimination.
+//!
+//! The unknowns are the values y₀, …, y_E of E + 1 nodes, m numbers each, and g global ones γ. They satisfy
+//!
+//! ```text
+//! links     y_{e+1} − A_e y_e − C_e γ = r_e ,         e = 0, …, E − 1        (m rows each)
+//! closure   B_0 y_0 + B_E y_E + B_γ γ = b             (m + g − k rows)
+//! dense     Σ_e w_e · y_e + w_γ · γ = d               (k rows)
+//! ```
+//!
+//! # Method
+//! The nodes y₁, …, y_{E−1} are eliminated in turn. Two block rows hold y_e: its own link and the relation between y_0
+//! and y_e that the elimination so far has left,
+//!
+//! ```text
+//! ⎡  U_e   0   S_e   G_e ⎤                    ⎡ R   T        S        G       ⎤
+//! ⎣ −A_e   I    0   −C_e ⎦   ──reflections──▶ ⎣ 0   U_{e+1}  S_{e+1}  G_{e+1} ⎦   on (y_e, y_{e+1}, y_0, γ) .
+//! ```
+//!
+//! Householder reflections of the 2m rows leave R triangular: the upper half is kept for the back substitution, the
+//! lower is the relation between y_0 and y_{e+1}. The dense rows go along, y_e eliminated from each by R. At the end a
+//! small system in (y_0, y_E, γ) remains (`closing`).
+//!
+//! Where the recursion y_E = A_{E−1} ··· A_0 y_0 would keep the growing solutions only, the reflections weigh the two block
+//! rows by size: a solution that grows is carried by its value at the end, one that decays by that at the start. Such a
+//! chain is solved to the accuracy that its conditions at the ends allow. The converse holds as well: where these are
+//! initial values and solutions grow a billion times, the recursion is the better method, and this one loses nine digits.
+//!
+//! The cost is E (m³ 23/3 + O(m² (g + k + 1))) multiplications, the storage E m (4m + 2g + 2).
+//!
+//! # Scaling
+//! Coordinates and momenta have units of their own, which may make entries of A_e as large as they like; reflections
+//! mix rows and would lose what is small in them. So the nodes are first scaled by one diagonal matrix of powers of two,
+//! ŷ_e = D⁻¹ y_e, which balances the links and costs no round-off.
+//!
+//! # Reference
+//! S. J. Wright, *Stable parallel algorithms for two-point boundary value problems*, SIAM J. Sci. Stat. Comput. 13 (1992)
+//! 742–764; U. M. Ascher, R. M. M. Mattheij, R. D. Russell, *Numerical Solution of Boundary Value Problems for Ordinary
+//! Differential Equations*, SIAM 1995, chapter 7.
+
+mod closing;
+mod sweep;
+#[cfg(test)]
+mod tests;
+
+use closing::Closing;
+use std::error::Error;
+use std::fmt;
+use sweep::Sweep;
+
+/// The numbers of unknowns and equations.
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    /// m, the unknowns of a node.
+    block: usize,
+    /// g, the global unknowns.
+    globals: usize,
+    /// E, at least one.
+    links: usize,
+    /// k, at most m + g.
+    dense: usize,
+    /// The right sides that are solved for together.
+    rights: usize,
+}
+
+impl Shape {
+    /// The rows of the closure: m + g − k.
+    fn closure(&self) -> usize {
+        self.block + self.globals - self.dense
+    }
+
+    /// The unknowns of all nodes.
+    fn nodes(&self) -> usize {
+        (self.links + 1) * self.block
+    }
+
+    /// The unknowns of the closing system, (y_0, y_E, γ).
+    fn closing(&self) -> usize {
+        2 * self.block + self.globals
+    }
+}
+
+/// The equations as given; all matrices row by row.
+#[derive(Clone, Debug)]
+struct Equations {
+    matrices: Vec<f64>,
+    link_globals: Vec<f64>,
+    first: Vec<f64>,
+    last: Vec<f64>,
+    closure_globals: Vec<f64>,
+    dense_nodes: Vec<f64>,
+    dense_globals: Vec<f64>,
+    rights: Vec<RightSide>,
+}
+
+impl Equations {
+    fn new(shape: &Shape) -> Self {
+        let (m, g, c) = (shape.block, shape.globals, shape.closure());
+        let right = RightSide {
+            links: vec![0.0; shape.links * m],
+            closure: vec![0.0; c],
+            dense: vec![0.0; shape.dense],
+        };
+        Self {
+            matrices: vec![0.0; shape.links * m * m],
+            link_globals: vec![0.0; shape.links * m * g],
+            first: vec![0.0; c * m],
+            last: vec![0.0; c * m],
+            closure_globals: vec![0.0; c * g],
+            dense_nodes: vec![0.0; shape.dense * shape.nodes()],
+            dense_globals: vec![0.0; shape.dense * g],
+            rights: vec![right; shape.rights],
+        }
+    }
+}
+
+/// One right side of all equations.
+#[derive(Clone, Debug)]
+pub(crate) struct RightSide {
+    /// r_0, …, r_{E−1}, one after the other.
+    pub(crate) links: Vec<f64>,
+    /// b.
+    pub(crate) closure: Vec<f64>,
+    /// d, one number a dense row.
+    pub(crate) dense: Vec<f64>,
+}
+
+/// The coefficients of one link, y_{e+1} − A y_e − C γ = r.
+pub(crate) struct LinkMut<'a> {
+    /// A, m × m.
+    pub(crate) matrix: &'a mut [f64],
+    /// C, m × g.
+    pub(crate) global: &'a mut [f64],
+    /// r, of the first right side.
+    pub(crate) right: &'a mut [f64],
+}
+
+/// The coefficients of the closure, B_0 y_0 + B_E y_E + B_γ γ = b, of c = m + g − k rows.
+pub(crate) struct ClosureMut<'a> {
+    /// B_0, c × m.
+    pub(crate) first: &'a mut [f64],
+    /// B_E, c × m.
+    pub(crate) last: &'a mut [f64],
+    /// B_γ, c × g.
+    pub(crate) global: &'a mut [f64],
+    /// b, of the first right side.
+    pub(crate) right: &'a mut [f64],
+}
+
+impl ClosureMut<'_> {
+    /// Makes all rows empty.
+    pub(crate) fn clear(&mut self) {
+        self.first.fill(0.0);
+        self.last.fill(0.0);
+        self.global.fill(0.0);
+        self.right.fill(0.0);
+    }
+}
+
+/// The coefficients of one dense row, Σ w_e · y_e + w_γ · γ = d.
+pub(crate) struct DenseMut<'a> {
+    /// w_0, …, w_E, one after the other.
+    pub(crate) nodes: &'a mut [f64],
+    /// w_γ.
+    pub(crate) global: &'a mut [f64],
+    /// d, of the first right side.
+    pub(crate) right: &'a mut f64,
+}
+
+/// A chain of links, its storage and its solution.
+///
+/// All coefficients are zero at first and keep their values until they are written again: [`solve`](Self::solve) leaves
+/// them as they are, and it does not allocate.
+#[derive(Clone, Debug)]
+pub(crate) struct Chain {
+    shape: Shape,
+    equations: Equations,
+    sweep: Sweep,
+    closing: Closing,
+    /// For each right side y_0, …, y_E.
+    nodes: Vec<f64>,
+    /// For each right side γ.
+    globals: Vec<f64>,
+    sign: f64,
+}
+
+impl Chain {
+    /// A chain of `links` ≥ 1 links between nodes of `block` unknowns, with `globals` global unknowns, `dense` ≤ `block` +
+    /// `globals` dense rows and one right side.
+    pub(crate) fn new(block: usize, globals: usize, links: usize, dense: usize) -> Self {
+        Self::with_right_sides(block, globals, links, dense, 1)
+    }
+
+    /// As [`new`](Self::new), with several right sides of the same equations: see [`right_side_mut`](Self::right_side_mut).
+    pub(crate) fn with_right_sides(
+        block: usize,
+        globals: usize,
+        links: usize,
+        dense: usize,
+        rights: usize,
+    ) -> Self {
+        debug_assert!(links > 0, "a chain has a link");
+        debug_assert!(dense <= block + globals, "more equations than unknowns");
+        let shape = Shape {
+            block,
+            globals,
+            links,
+            dense,
+            rights,
+        };
+        Self {
+            equations: Equations::new(&shape),
+            sweep: Sweep::new(&shape),
+            closing: Closing::new(&shape),
+            nodes: vec![0.0; rights * shape.nodes()],
+            globals: vec![0.0; rights * globals],
+            sign: 0.0,
+            shape,
+        }
+    }
+
+    /// The link from node `e` to node `e` + 1.
+    pub(crate) fn link_mut(&mut self, e: usize) -> LinkMut<'_> {
+        let (m, g) = (self.shape.block, self.shape.globals);
+        let equations = &mut self.equations;
+        LinkMut {
+            matrix: &mut equations.matrices[e * m * m..(e + 1) * m * m],
+            global: &mut equations.link_globals[e * m * g..(e + 1) * m * g],
+            right: &mut equations.rights[0].links[e * m..(e + 1) * m],
+        }
+    }
+
+    /// The closure.
+    pub(crate) fn closure_mut(&mut self) -> ClosureMut<'_> {
+        let equations = &mut self.equations;
+        ClosureMut {
+            first: &mut equations.first,
+            last: &mut equations.last,
+            global: &mut equations.closure_globals,
+            right: &mut equations.rights[0].closure,
+        }
+    }
+
+    /// The dense row `k`, from 0.
+    pub(crate) fn dense_mut(&mut self, k: usize) -> DenseMut<'_> {
+        let (g, nodes) = (self.shape.globals, self.shape.nodes());
+        let equations = &mut self.equations;
+        DenseMut {
+            nodes: &mut equations.dense_nodes[k * nodes..(k + 1) * nodes],
+            global: &mut equations.dense_globals[k * g..(k + 1) * g],
+            right: &mut equations.rights[0].dense[k],
+        }
+    }
+
+    /// The whole of one right side, from 0; the first is the one that the other accessors show.
+    ///
+    /// Newton's step and the tangent of a branch have the same matrix: the tangent's right side is zero but for the last
+    /// dense row, which is one.
+    #[allow(dead_code)] // until branches of solutions are followed
+    pub(crate) fn right_side_mut(&mut self, side: usize) -> &mut RightSide {
+        &mut self.equations.rights[side]
+    }
+
+    /// The matrices A_0, …, A_{E−1}, one after the other, each row by row.
+    pub(crate) fn matrices(&self) -> &[f64] {
+        &self.equations.matrices
+    }
+
+    /// Solves for all right sides.
+    ///
+    /// The coefficients are kept; the solution is what [`node`](Self::node) and [`globals`](Self::globals) return. After
+    /// an error it has no meaning.
+    ///
+    /// # Errors
+    /// [`Singular`] if the equations do not determine the unknowns, to round-off, or hold what is not finite.
+    pub(crate) fn solve(&mut self) -> Result<(), Singular> {
+        let shape = self.shape;
+        let m = shape.block;
+        self.sign = 0.0;
+        let swept = self.sweep.eliminate(&shape, &self.equations);
+        self.closing.load(&shape, &self.equations, &self.sweep);
+        let closed = self.closing.solve()?;
+        for side in 0..shape.rights {
+            let nodes = &mut self.nodes[side * shape.nodes()..(side + 1) * shape.nodes()];
+            let globals = &mut self.globals[side * shape.globals..(side + 1) * shape.globals];
+            for (i, x) in self.closing.solution(side).enumerate() {
+                match i {
+                    _ if i < m => nodes[i] = x,
+                    _ if i < 2 * m => nodes[(shape.links - 1) * m + i] = x,
+                    _ => globals[i - 2 * m] = x,
+                }
+            }
+            self.sweep.substitute(&shape, side, nodes, globals);
+            if !nodes.iter().chain(&*globals).all(|x| x.is_finite()) {
+                return Err(Singular::NotFinite);
+            }
+        }
+        self.sign = swept * closed;
+        Ok(())
+    }
+
+    /// The value y_e of a node.
+    pub(crate) fn node(&self, e: usize) -> &[f64] {
+        self.node_of(0, e)
+    }
+
+    /// The global unknowns γ.
+    pub(crate) fn globals(&self) -> &[f64] {
+        self.globals_of(0)
+    }
+
+    /// The value y_e of a node, for one of several right sides.
+    pub(crate) fn node_of(&self, side: usize, e: usize) -> &[f64] {
+        let m = self.shape.block;
+        let start = side * self.shape.nodes() + e * m;
+        &self.nodes[start..start + m]
+    }
+
+    /// The global unknowns γ, for one of several right sides.
+    pub(crate) fn globals_of(&self, side: usize) -> &[f64] {
+        let g = self.shape.globals;
+        &self.globals[side * g..(side + 1) * g]
+    }
+
+    /// The sign of the determinant of all equations: 1 or −1 after a successful [`solve`](Self::solve), otherwise 0.
+    ///
+    /// The rows are those of the links, the closure and the dense rows, the columns y_0, …, y_E, γ, in these orders. Along
+    /// a branch of solutions it changes where another branch crosses.
+    #[allow(dead_code)] // until branches of solutions are followed
+    pub(crate) fn sign(&self) -> f64 {
+        self.sign
+    }
+}
+
+/// Why the equations of a chain were not solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Singular {
+    /// The conditions do not determine the unknowns, to round-off.
+    Rank {
+        /// The number of independent equations found among those that remain for the two ends and the global unknowns.
+        rank: usize,
+        /// The number of these equations, 2m + g.
+        size: usize,
+        /// The size of the first pivot that is taken for zero, relative to the largest.
+        pivot: f64,
+    },
+    /// A coefficient, or a number of the solution, is infinite or not a number.
+    NotFinite,
+}
+
+impl fmt::Display for Singular {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Rank { rank, size, pivot } => write!(
+                f,
+                "the linear equations are singular: the conditions at the ends have rank {rank} of {size} (relative pivot {pivot:.1e})"
+            ),
+            Self::NotFinite => write!(
+                f,
+                "the linear equations or their solution hold a number that is not finite"
+            ),
+        }
+    }
+}
+
+impl Error for Singular {}

@@ -1,0 +1,459 @@
+//! Newton's method on assembled elements.
+//!
+//! Unknowns are the states of all nodes, the interior rates of all elements, and a few global numbers γ such as a period. In each
+//! iteration every element is linearised and its interior condensed,
+//!
+//! ```text
+//! δy_{e+1} − A_e δy_e − C_e δγ = Y_e − y_{e+1}                                                     (theory.md, T-81)
+//! ```
+//!
+//! with Y_e the end of the element after its own Newton step; what closes the chain is the [`Problem`]'s.
+
+use super::chain::{Chain, ClosureMut, DenseMut};
+use std::fmt;
+use tfe_runtime::condenser::{Condensed, Condenser, Direction, Placed};
+use tfe_runtime::{Element, ElementError, LegendreError, Model, State, Statistics, StepError};
+
+/// What is to be solved: elements in time, and the equations that close their chain.
+pub(crate) trait Problem<const N: usize> {
+    /// The type of the model.
+    type Model: Model<N>;
+    /// The model at the current globals.
+    fn model(&self) -> &Self::Model;
+    /// Start time and length of an element at the current globals.
+    fn place(&self, element: usize) -> (f64, f64);
+    /// γ of an additional force γ v, at the current globals.
+    fn damping(&self) -> f64 {
+        0.0
+    }
+    /// What each global changes in an element.
+    fn directions(&self, element: usize, directions: &mut [Direction]);
+    /// A size of a global beside which corrections are small.
+    fn scale(&self, _global: usize) -> f64 {
+        1.0
+    }
+    /// Takes over new globals.
+    fn set_globals(&mut self, globals: &[f64]);
+    /// The equations at the ends: B₀ δy₀ + B_E δy_E + B_γ δγ = b.
+    fn close(&self, iterate: &Iterate<N>, closure: ClosureMut<'_>) -> Result<(), LegendreError>;
+    /// The k-th equation over all nodes.
+    fn span(&self, _k: usize, _iterate: &Iterate<N>, _dense: DenseMut<'_>) {}
+}
+
+/// The unknowns.
+#[derive(Clone, Debug)]
+pub(crate) struct Iterate<const N: usize> {
+    /// The states of the nodes.
+    pub(crate) nodes: Vec<State<N>>,
+    /// The interior rates of the elements, one after the other.
+    pub(crate) interiors: Vec<f64>,
+    /// The global unknowns.
+    pub(crate) globals: Vec<f64>,
+}
+
+/// The largest of some values and of their corrections.
+#[derive(Clone, Copy, Default)]
+struct Largest {
+    value: f64,
+    correction: f64,
+    /// Zero, or not a number where a correction is none.
+    sum: f64,
+}
+
+impl Largest {
+    fn take(&mut self, values: &[f64], corrections: &[f64]) {
+        for (value, correction) in values.iter().zip(corrections) {
+            self.value = self.value.max(value.abs());
+            self.correction = self.correction.max(correction.abs());
+            self.sum += 0.0 * correction;
+        }
+    }
+
+    /// The correction beside the value or beside another scale, whichever is larger; one at most.
+    fn beside(&self, scale: f64) -> f64 {
+        if self.correction == 0.0 {
+            0.0
+        } else {
+            self.correction / self.value.max(scale).max(self.correction)
+        }
+    }
+}
+
+/// How an assembled problem is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Control {
+    /// The relative size of the last correction.
+    pub(crate) tolerance: f64,
+    /// The most iterations.
+    pub(crate) max_iterations: u32,
+}
+
+impl Default for Control {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-13,
+            max_iterations: 50,
+        }
+    }
+}
+
+/// Why an assembled problem has no solution.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum AssemblyError {
+    /// The time element does not exist.
+    Element(ElementError),
+    /// An element could not be linearised.
+    Linearise {
+        /// The number of the element, from 0.
+        element: usize,
+        /// Its start time.
+        time: f64,
+        /// Why.
+        source: StepError,
+    },
+    /// A velocity or a momentum at a node could not be found.
+    Legendre(LegendreError),
+    /// The equations of the chain are singular: there is no solution, or there are many near each other.
+    Singular {
+        /// Iterations done.
+        iterations: u32,
+    },
+    /// Newton's method came to no end.
+    Stalled {
+        /// Iterations done.
+        iterations: u32,
+        /// The size of the last correction beside the solution.
+        correction: f64,
+        /// What was asked for.
+        tolerance: f64,
+    },
+}
+
+impl fmt::Display for AssemblyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Element(error) => error.fmt(f),
+            Self::Linearise {
+                element,
+                time,
+                source,
+            } => write!(f, "element {element}, at t = {time}: {source}"),
+            Self::Legendre(error) => error.fmt(f),
+            Self::Singular { iterations } => write!(
+                f,
+                "the assembled equations are singular after {iterations} iterations: no solution near the guess, or a whole family of them"
+            ),
+            Self::Stalled {
+                iterations,
+                correction,
+                tolerance,
+            } => write!(
+                f,
+                "no solution after {iterations} iterations: the last correction is {correction:.1e} of the solution, {tolerance:.1e} was asked for; \
+                 a better guess or more elements may help"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for AssemblyError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Element(error) => Some(error),
+            Self::Linearise { source, .. } => Some(source),
+            Self::Legendre(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<ElementError> for AssemblyError {
+    fn from(error: ElementError) -> Self {
+        Self::Element(error)
+    }
+}
+
+impl From<LegendreError> for AssemblyError {
+    fn from(error: LegendreError) -> Self {
+        Self::Legendre(error)
+    }
+}
+
+/// The memory of the iteration: linearised elements and the chain that they form.
+#[derive(Debug)]
+pub(crate) struct Assembly<const N: usize> {
+    condenser: Condenser<N>,
+    chain: Chain,
+    /// [A | C | end] of each element, row by row.
+    ends: Vec<f64>,
+    responses: Vec<f64>,
+    directions: Vec<Direction>,
+    elements: usize,
+    dense: usize,
+    iterations: u32,
+}
+
+impl<const N: usize> Assembly<N> {
+    /// For so many elements and global unknowns, with so many equations over all nodes.
+    pub(crate) fn new<M: Model<N>>(
+        element: Element,
+        elements: usize,
+        globals: usize,
+        dense: usize,
+    ) -> Result<Self, ElementError> {
+        let condenser = Condenser::new::<M>(element)?;
+        let columns = 2 * N + globals + 1;
+        let interior = condenser.interior();
+        Ok(Self {
+            chain: Chain::new(2 * N, globals, elements, dense),
+            ends: vec![0.0; elements * 2 * N * columns],
+            responses: vec![0.0; elements * interior * columns],
+            directions: vec![Direction::default(); globals],
+            condenser,
+            elements,
+            dense,
+            iterations: 0,
+        })
+    }
+
+    /// The tool that linearises elements.
+    pub(crate) fn condenser(&self) -> &Condenser<N> {
+        &self.condenser
+    }
+
+    /// Iterations so far.
+    pub(crate) fn iterations(&self) -> u32 {
+        self.iterations
+    }
+
+    /// What they cost.
+    pub(crate) fn statistics(&self) -> Statistics {
+        let mut statistics = *self.condenser.statistics();
+        statistics.newton_iterations = u64::from(self.iterations);
+        statistics.iterations = u64::from(self.iterations);
+        statistics
+    }
+
+    /// The sign of the determinant of the last system.
+    pub(crate) fn sign(&self) -> f64 {
+        self.chain.sign()
+    }
+
+    /// The transition matrices A_e of the last linearisation, one after the other, row by row.
+    pub(crate) fn transitions(&self) -> &[f64] {
+        self.chain.matrices()
+    }
+
+    /// An iterate along a curve t ↦ (q, dq/dt).
+    pub(crate) fn along<P: Problem<N>>(
+        &self,
+        problem: &P,
+        mut curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
+        globals: Vec<f64>,
+    ) -> Result<Iterate<N>, LegendreError> {
+        let m = self.condenser.interior();
+        let mut nodes = Vec::with_capacity(self.elements + 1);
+        let mut interiors = vec![0.0; self.elements * m];
+        let state = |t: f64, curve: &mut dyn FnMut(f64) -> ([f64; N], [f64; N])| {
+            let (q, v) = curve(t);
+            tfe_runtime::legendre::state(problem.model(), t, &q, &v)
+        };
+        for element in 0..self.elements {
+            let (t, h) = problem.place(element);
+            nodes.push(state(t, &mut curve)?);
+            let interior = &mut interiors[element * m..(element + 1) * m];
+            self.condenser
+                .interpolate(problem.model(), t, h, &mut curve, interior)?;
+            if element + 1 == self.elements {
+                nodes.push(state(t + h, &mut curve)?);
+            }
+        }
+        Ok(Iterate {
+            nodes,
+            interiors,
+            globals,
+        })
+    }
+
+    /// Linearises everything at the iterate and solves; the correction is then in the chain.
+    pub(crate) fn linearise<P: Problem<N>>(
+        &mut self,
+        problem: &P,
+        iterate: &Iterate<N>,
+    ) -> Result<(), AssemblyError> {
+        let globals = self.directions.len();
+        let (m, columns) = (self.condenser.interior(), 2 * N + globals + 1);
+        self.iterations += 1;
+        for element in 0..self.elements {
+            let (time, length) = problem.place(element);
+            problem.directions(element, &mut self.directions);
+            let ends = &mut self.ends[element * 2 * N * columns..(element + 1) * 2 * N * columns];
+            let placed = Placed {
+                time,
+                length,
+                start: &iterate.nodes[element],
+                interior: &iterate.interiors[element * m..(element + 1) * m],
+                damping: problem.damping(),
+            };
+            let condensed = Condensed {
+                ends,
+                response: &mut self.responses[element * m * columns..(element + 1) * m * columns],
+            };
+            self.condenser
+                .linearise(problem.model(), placed, &self.directions, condensed)
+                .map_err(|source| AssemblyError::Linearise {
+                    element,
+                    time,
+                    source,
+                })?;
+            let link = self.chain.link_mut(element);
+            let next = &iterate.nodes[element + 1];
+            for (row, end) in ends.chunks_exact(columns).enumerate() {
+                link.matrix[row * 2 * N..(row + 1) * 2 * N].copy_from_slice(&end[..2 * N]);
+                link.global[row * globals..(row + 1) * globals]
+                    .copy_from_slice(&end[2 * N..2 * N + globals]);
+                let reached = if row < N {
+                    next.p[row]
+                } else {
+                    next.q[row - N]
+                };
+                link.right[row] = end[columns - 1] - reached;
+            }
+        }
+        problem.close(iterate, self.chain.closure_mut())?;
+        for k in 0..self.dense {
+            problem.span(k, iterate, self.chain.dense_mut(k));
+        }
+        self.chain.solve().map_err(|_| AssemblyError::Singular {
+            iterations: self.iterations,
+        })
+    }
+
+    /// The correction beside the iterate: the largest of those of coordinates, momenta and globals.
+    ///
+    /// An orbit near an equilibrium may have no momenta to compare with. The matrices of the elements tell what its coordinates are
+    /// worth: momenta count as small beside max |∂p₁/∂q₀| max |q|, and coordinates the other way round.
+    pub(crate) fn size<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> f64 {
+        let [mut p, mut q] = [Largest::default(); 2];
+        for (e, node) in iterate.nodes.iter().enumerate() {
+            let (by_p, by_q) = self.chain.node(e).split_at(N);
+            p.take(&node.p, by_p);
+            q.take(&node.q, by_q);
+        }
+        let (mut p_by_q, mut q_by_p) = (0.0_f64, 0.0_f64);
+        for (row, entries) in self.chain.matrices().chunks_exact(2 * N).enumerate() {
+            let (by_p, by_q) = entries.split_at(N);
+            let (entries, largest) = if row % (2 * N) < N {
+                (by_q, &mut p_by_q)
+            } else {
+                (by_p, &mut q_by_p)
+            };
+            *largest = entries
+                .iter()
+                .fold(*largest, |largest, entry| largest.max(entry.abs()));
+        }
+        let mut size = p.beside(p_by_q * q.value).max(q.beside(q_by_p * p.value));
+        let mut sum = p.sum + q.sum;
+        for (k, correction) in self.chain.globals().iter().enumerate() {
+            size = size.max((correction / problem.scale(k)).abs());
+            sum += 0.0 * correction;
+        }
+        // Maxima ignore what is not a number; the sum does not.
+        size + sum
+    }
+
+    /// Adds a fraction of the correction.
+    pub(crate) fn correct(&self, iterate: &mut Iterate<N>, fraction: f64) {
+        let globals = self.chain.globals();
+        let (m, columns) = (self.condenser.interior(), 2 * N + globals.len() + 1);
+        let mut weights = Vec::with_capacity(columns);
+        for element in 0..self.elements {
+            let response = &self.responses[element * m * columns..(element + 1) * m * columns];
+            let interior = &mut iterate.interiors[element * m..(element + 1) * m];
+            weights.clear();
+            weights.extend_from_slice(self.chain.node(element));
+            weights.extend_from_slice(globals);
+            weights.push(1.0);
+            for (x, row) in interior.iter_mut().zip(response.chunks_exact(columns)) {
+                let change: f64 = row
+                    .iter()
+                    .zip(&weights)
+                    .map(|(entry, weight)| entry * weight)
+                    .sum();
+                *x += fraction * change;
+            }
+        }
+        for (e, node) in iterate.nodes.iter_mut().enumerate() {
+            let correction = self.chain.node(e);
+            for a in 0..N {
+                node.p[a] += fraction * correction[a];
+                node.q[a] += fraction * correction[N + a];
+            }
+        }
+        for (value, correction) in iterate.globals.iter_mut().zip(globals) {
+            *value += fraction * correction;
+        }
+    }
+
+    /// Iterates to a solution. Afterwards the linearisation is that of the solution, up to the tolerance.
+    ///
+    /// A step after which the next correction would be more than twice as large, or which leaves where the model is defined, is tried again
+    /// at half its length.
+    pub(crate) fn solve<P: Problem<N>>(
+        &mut self,
+        problem: &mut P,
+        iterate: &mut Iterate<N>,
+        control: Control,
+    ) -> Result<(), AssemblyError> {
+        problem.set_globals(&iterate.globals);
+        self.linearise(problem, iterate)?;
+        let (mut size, mut last) = (self.size(problem, iterate), f64::INFINITY);
+        let mut fraction = 1.0_f64;
+        let start = self.iterations;
+        loop {
+            let stagnates = last < ROUND_OFF && size >= 0.25 * last;
+            if size <= control.tolerance || stagnates {
+                self.correct(iterate, 1.0);
+                problem.set_globals(&iterate.globals);
+                return Ok(());
+            }
+            let iterations = self.iterations - start;
+            if !(size.is_finite() && iterations < control.max_iterations) {
+                return Err(AssemblyError::Stalled {
+                    iterations,
+                    correction: size,
+                    tolerance: control.tolerance,
+                });
+            }
+            let before = iterate.clone();
+            self.correct(iterate, fraction);
+            problem.set_globals(&iterate.globals);
+            let tried = self.linearise(problem, iterate);
+            let next = self.size(problem, iterate);
+            if tried.is_ok() && (next <= 2.0 * size || next < ROUND_OFF) {
+                (last, size) = (size, next);
+                fraction = (2.0 * fraction).min(1.0);
+                continue;
+            }
+            fraction *= 0.5;
+            if fraction < SHORTEST {
+                tried?;
+                return Err(AssemblyError::Stalled {
+                    iterations,
+                    correction: size,
+                    tolerance: control.tolerance,
+                });
+            }
+            *iterate = before;
+            problem.set_globals(&iterate.globals);
+            self.linearise(problem, iterate)?;
+        }
+    }
+}
+
+/// Corrections below this one that no longer fall are round-off: a step from here would square them.
+const ROUND_OFF: f64 = 1e-9;
+
+/// The shortest part of a step that is tried.
+const SHORTEST: f64 = 1.0 / 256.0;

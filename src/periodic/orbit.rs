@@ -1,0 +1,264 @@
+//! A periodic orbit, solved.
+
+use super::OrbitError;
+use super::problem::Periodic;
+use crate::assembly::{Assembly, Iterate, Solution};
+use crate::motion::{Motion, Node};
+use crate::periodic_schur::{self, Multiplier};
+use nalgebra::{Complex, DMatrix};
+use std::f64::consts::PI;
+use tfe_runtime::{Element, Model, State, Statistics};
+
+/// A periodic orbit with its Floquet multipliers; made by [`PeriodicOrbit`](super::PeriodicOrbit).
+#[derive(Clone, Debug)]
+pub struct Orbit<'m, M, const N: usize> {
+    pub(crate) solution: Solution<'m, M, N>,
+    pub(crate) advance: [f64; N],
+    floquet: Vec<Multiplier>,
+    multipliers: Vec<Complex<f64>>,
+    trivial: usize,
+    unfolding: Option<f64>,
+}
+
+/// What an orbit does to its neighbours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// All but the trivial multipliers are inside the unit circle: neighbours come nearer.
+    Stable {
+        /// 1 − max |μ|.
+        margin: f64,
+    },
+    /// The largest one is on the unit circle, to [`Verdict::NEUTRAL`]: the best that a conservative model can have.
+    Neutral {
+        /// 1 − max |μ|.
+        margin: f64,
+    },
+    /// One is outside.
+    Unstable {
+        /// 1 − max |μ|, negative.
+        margin: f64,
+    },
+}
+
+impl Verdict {
+    /// How near to one a modulus counts as one: multipliers of conservative models come in multiple ones, which round-off moves by
+    /// its square root.
+    pub const NEUTRAL: f64 = 1e-7;
+
+    /// From the largest modulus.
+    pub(crate) fn of(largest: f64) -> Self {
+        let margin = 1.0 - largest;
+        if margin > Self::NEUTRAL {
+            Self::Stable { margin }
+        } else if margin >= -Self::NEUTRAL {
+            Self::Neutral { margin }
+        } else {
+            Self::Unstable { margin }
+        }
+    }
+}
+
+/// A Floquet exponent σ + iω = ln μ / T.
+///
+/// The imaginary part is known up to multiples of 2π/T only: the multiplier cannot tell ω from ω + 2πk/T. Here it is the one of
+/// least modulus.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exponent {
+    /// Growth rate σ = ln |μ| / T, an inverse time; negative for decay.
+    pub growth: f64,
+    /// Frequency ω = arg μ / T in (−π/T, π/T], up to multiples of 2π/T.
+    pub frequency: f64,
+}
+
+impl Exponent {
+    /// The damping ratio ζ = −σ / √(σ² + ω²), with the frequency as it is.
+    pub fn damping_ratio(&self) -> f64 {
+        let modulus = self.growth.hypot(self.frequency);
+        if modulus == 0.0 {
+            0.0
+        } else {
+            -self.growth / modulus
+        }
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
+    pub(super) fn new(
+        element: Element,
+        problem: &Periodic<'m, M, N>,
+        iterate: Iterate<N>,
+        assembly: &Assembly<N>,
+        unfolding: Option<f64>,
+    ) -> Result<Self, OrbitError> {
+        let trivial = match (&problem.phase, unfolding) {
+            (None, _) => 0,
+            (Some(_), None) => 1,
+            (Some(_), Some(_)) => 2,
+        };
+        let transitions = assembly.transitions().to_vec();
+        let floquet = multipliers_of::<N>(&transitions)?;
+        Ok(Self {
+            solution: Solution {
+                model: problem.model,
+                element,
+                mesh: problem.mesh.clone(),
+                start: problem.start,
+                length: problem.period,
+                damping: problem.unfolding,
+                iterate,
+                transitions,
+                statistics: assembly.statistics(),
+            },
+            advance: problem.advance,
+            multipliers: floquet.iter().map(Multiplier::to_complex).collect(),
+            floquet,
+            trivial,
+            unfolding,
+        })
+    }
+
+    /// The period T, as given or as found.
+    pub fn period(&self) -> f64 {
+        self.solution.length
+    }
+
+    /// The state at the start of the period.
+    pub fn start(&self) -> State<N> {
+        self.solution.start()
+    }
+
+    /// The ends of the elements, in order; the last one is the first one a period later.
+    pub fn nodes(&self) -> Vec<Node<N>> {
+        self.solution.nodes()
+    }
+
+    /// The transition matrices A_e of the elements in order, 2N × 2N, ordered (p, q).
+    pub fn transitions(&self) -> Vec<DMatrix<f64>> {
+        self.solution.matrices()
+    }
+
+    /// The monodromy matrix A_E ⋯ A_1, 2N × 2N, ordered (p, q): the derivative of the state after a period by that before.
+    ///
+    /// Small multipliers of this matrix drown in the round-off of the large ones; [`multipliers`](Self::multipliers) do not come from it.
+    pub fn monodromy(&self) -> DMatrix<f64> {
+        self.transitions()
+            .iter()
+            .fold(DMatrix::identity(2 * N, 2 * N), |product, matrix| {
+                matrix * product
+            })
+    }
+
+    /// The Floquet multipliers μ, the largest modulus first, each to a relative accuracy of its own.
+    ///
+    /// An autonomous model has the trivial one, μ = 1, with the flow as its direction; a conservative one has it twice, as a defective
+    /// pair that is known to the square root of the accuracy only. See [`trivial`](Self::trivial).
+    pub fn multipliers(&self) -> &[Complex<f64>] {
+        &self.multipliers
+    }
+
+    /// The multipliers as logarithm of the modulus and argument, in the same order: also where the modulus is no `f64`.
+    pub fn floquet(&self) -> &[Multiplier] {
+        &self.floquet
+    }
+
+    /// The exponents ln μ / T, in the same order.
+    pub fn exponents(&self) -> Vec<Exponent> {
+        let exponent = |multiplier: &Multiplier| Exponent {
+            growth: multiplier.log_modulus / self.solution.length,
+            frequency: multiplier.argument / self.solution.length,
+        };
+        self.floquet.iter().map(exponent).collect()
+    }
+
+    /// The trivial multipliers: the places, among [`multipliers`](Self::multipliers), of the one nearest to 1 for an autonomous model, of the two
+    /// nearest for a conservative one; empty for a forced one.
+    ///
+    /// How far they are from 1 says how good the others may be expected to be.
+    pub fn trivial(&self) -> Vec<usize> {
+        trivial_of(&self.floquet, self.trivial)
+    }
+
+    /// Whether neighbours stay near: [`verdict`](Self::verdict) is not unstable.
+    pub fn is_stable(&self) -> bool {
+        !matches!(self.verdict(), Verdict::Unstable { .. })
+    }
+
+    /// Stability, from all but the trivial multipliers, with its margin.
+    pub fn verdict(&self) -> Verdict {
+        let trivial = self.trivial();
+        let others = (0..self.floquet.len()).filter(|place| !trivial.contains(place));
+        Verdict::of(
+            others
+                .map(|place| self.floquet[place].modulus())
+                .fold(0.0, f64::max),
+        )
+    }
+
+    /// The force γ v that had to be added to close an orbit of an autonomous model whose period or energy was given: as small as
+    /// the discretization makes it. `None` for other orbits.
+    pub fn unfolding(&self) -> Option<f64> {
+        self.unfolding
+    }
+
+    /// Lengths for [`graded`](super::PeriodicOrbit::graded) that give each of so many elements the same piece of the orbit: arc length, with time, every
+    /// coordinate and every momentum scaled by its range. Relaxation oscillations need such elements.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = mu*(1 - x^2)*dot(x))]
+    /// struct VanDerPol { mu: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let model = VanDerPol { mu: 5.0 };
+    /// let cycle = PeriodicOrbit::of(&model).unknown_period(11.6);
+    /// let coarse = cycle.elements(400).guess_from(model.state([2.0], [0.0])).solve()?;
+    /// let graded = PeriodicOrbit::of(&model)
+    ///     .graded(coarse.equidistributed(80))
+    ///     .unknown_period(coarse.period())
+    ///     .guess_from(coarse.start())
+    ///     .solve()?;
+    /// assert!((graded.period() / coarse.period() - 1.0).abs() < 1e-5);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn equidistributed(&self, elements: usize) -> Vec<f64> {
+        self.solution.equidistributed(elements)
+    }
+
+    /// What the solution cost.
+    pub fn statistics(&self) -> &Statistics {
+        &self.solution.statistics
+    }
+
+    /// The motion over one period, with dense output: the polynomials of the elements.
+    pub fn motion(&self) -> Motion<N> {
+        self.solution.motion()
+    }
+}
+
+/// The multipliers of a chain of matrices, the largest first.
+pub(crate) fn multipliers_of<const N: usize>(
+    transitions: &[f64],
+) -> Result<Vec<Multiplier>, OrbitError> {
+    let mut floquet =
+        periodic_schur::multipliers_of(2 * N, transitions).map_err(OrbitError::Multipliers)?;
+    floquet.sort_by(|a, b| {
+        let by_modulus = b.log_modulus.total_cmp(&a.log_modulus);
+        by_modulus.then(b.argument.total_cmp(&a.argument))
+    });
+    Ok(floquet)
+}
+
+/// The places of the `count` multipliers nearest to one.
+pub(crate) fn trivial_of(floquet: &[Multiplier], count: usize) -> Vec<usize> {
+    let mut places: Vec<usize> = (0..floquet.len()).collect();
+    let distance = |place: &usize| {
+        let multiplier = &floquet[*place];
+        multiplier.log_modulus.hypot(multiplier.argument.min(PI))
+    };
+    places.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    places.truncate(count);
+    places.sort_unstable();
+    places
+}

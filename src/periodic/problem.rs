@@ -1,0 +1,169 @@
+//! The equations of a periodic orbit.
+
+use super::Phase;
+use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem};
+use tfe_runtime::condenser::Direction;
+use tfe_runtime::{LegendreError, Model, State, legendre};
+
+/// What the global unknowns of an orbit are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Global {
+    /// The period T.
+    Period,
+    /// The force γ v that unfolds the families of a conservative model; zero in the solution, up to discretization.
+    Unfolding,
+}
+
+/// The chain of elements over one period, closed by periodicity.
+#[derive(Clone, Debug)]
+pub(crate) struct Periodic<'m, M, const N: usize> {
+    pub(crate) model: &'m M,
+    pub(crate) mesh: Mesh,
+    pub(crate) start: f64,
+    pub(crate) period: f64,
+    pub(crate) unfolding: f64,
+    pub(crate) globals: Vec<Global>,
+    /// How much the coordinates grow over a period.
+    pub(crate) advance: [f64; N],
+    /// Which of the orbits that differ in phase; `None` where time or the guess decides.
+    pub(crate) phase: Option<Phase>,
+    /// The energy at the start.
+    pub(crate) energy: Option<f64>,
+}
+
+impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
+    /// How many equations run over all nodes.
+    pub(crate) fn dense(&self) -> usize {
+        usize::from(self.phase == Some(Phase::Orthogonal))
+    }
+}
+
+/// The rows of periodicity: y_E − y_0 = (0, advance).
+pub(crate) fn close_periodically<const N: usize>(
+    advance: &[f64; N],
+    iterate: &Iterate<N>,
+    closure: &mut ClosureMut<'_>,
+) {
+    let (Some(first), Some(last)) = (iterate.nodes.first(), iterate.nodes.last()) else {
+        return;
+    };
+    for row in 0..2 * N {
+        closure.first[row * 2 * N + row] = -1.0;
+        closure.last[row * 2 * N + row] = 1.0;
+        closure.right[row] = match row.checked_sub(N) {
+            None => first.p[row] - last.p[row],
+            Some(a) => first.q[a] + advance[a] - last.q[a],
+        };
+    }
+}
+
+/// The row Σ h_e ẏ_e · δy_e = 0: the correction is orthogonal to the flow, so that the phase of the guess stays.
+///
+/// The flow is the difference of the neighbours; a condition of phase need not be exact.
+pub(crate) fn orthogonal_to_flow<const N: usize>(
+    advance: &[f64; N],
+    nodes: &[State<N>],
+    weights: &mut [f64],
+) {
+    let last = nodes.len() - 1;
+    for e in 0..last {
+        let previous = if e == 0 {
+            &nodes[last - 1]
+        } else {
+            &nodes[e - 1]
+        };
+        let next = &nodes[e + 1];
+        for a in 0..N {
+            let turn = if e == 0 { advance[a] } else { 0.0 };
+            weights[e * 2 * N + a] = next.p[a] - previous.p[a];
+            weights[e * 2 * N + N + a] = next.q[a] - previous.q[a] + turn;
+        }
+    }
+    weights[last * 2 * N..].fill(0.0);
+}
+
+impl<M: Model<N>, const N: usize> Problem<N> for Periodic<'_, M, N> {
+    type Model = M;
+
+    fn model(&self) -> &M {
+        self.model
+    }
+
+    fn place(&self, element: usize) -> (f64, f64) {
+        self.mesh.place(element, self.start, self.period)
+    }
+
+    fn directions(&self, element: usize, directions: &mut [Direction]) {
+        for (direction, global) in directions.iter_mut().zip(&self.globals) {
+            *direction = match global {
+                Global::Period => self.mesh.stretched(element),
+                Global::Unfolding => Direction {
+                    damping: 1.0,
+                    ..Direction::default()
+                },
+            };
+        }
+    }
+
+    fn damping(&self) -> f64 {
+        self.unfolding
+    }
+
+    fn scale(&self, global: usize) -> f64 {
+        match self.globals[global] {
+            Global::Period => self.period,
+            // A force that acts within a period.
+            Global::Unfolding => 1.0 / self.period,
+        }
+    }
+
+    fn set_globals(&mut self, globals: &[f64]) {
+        for (global, value) in self.globals.iter().zip(globals) {
+            match global {
+                Global::Period => self.period = *value,
+                Global::Unfolding => self.unfolding = *value,
+            }
+        }
+    }
+
+    fn close(
+        &self,
+        iterate: &Iterate<N>,
+        mut closure: ClosureMut<'_>,
+    ) -> Result<(), LegendreError> {
+        closure.clear();
+        close_periodically(&self.advance, iterate, &mut closure);
+        let Some(first) = iterate.nodes.first() else {
+            return Ok(());
+        };
+        let mut row = 2 * N;
+        match self.phase {
+            Some(Phase::Coordinate { index, value }) => {
+                closure.first[row * 2 * N + N + index] = 1.0;
+                closure.right[row] = value - first.q[index];
+                row += 1;
+            }
+            Some(Phase::Momentum { index, value }) => {
+                closure.first[row * 2 * N + index] = 1.0;
+                closure.right[row] = value - first.p[index];
+                row += 1;
+            }
+            Some(Phase::Orthogonal) | None => {}
+        }
+        if let Some(energy) = self.energy {
+            let view = legendre::hamiltonian_view(self.model, self.start, &first.q, &first.p)?;
+            for a in 0..N {
+                closure.first[row * 2 * N + a] = view.first.z[a];
+                closure.first[row * 2 * N + N + a] = view.first.q[a];
+            }
+            closure.right[row] = energy - view.hamiltonian;
+        }
+        Ok(())
+    }
+
+    fn span(&self, _k: usize, iterate: &Iterate<N>, dense: DenseMut<'_>) {
+        orthogonal_to_flow(&self.advance, &iterate.nodes, dense.nodes);
+        dense.global.fill(0.0);
+        *dense.right = 0.0;
+    }
+}

@@ -1,0 +1,184 @@
+//! Boundary-value problems against closed forms, and assembled initial-value problems against steps.
+
+use crate::models::{Duffing, HenonHeiles, Pendulum, Projectile};
+use std::f64::consts::PI;
+use tfe::boundary::Component;
+use tfe::prelude::*;
+
+#[test]
+fn a_projectile_between_two_points() {
+    let projectile = Projectile { g: 9.81 };
+    for element in [
+        Element::mixed(3),
+        Element::primal(3),
+        Element::energy_conserving(3),
+        Element::radau(4),
+    ] {
+        let arc = BoundaryValue::of(&projectile)
+            .element(element)
+            .elements(7)
+            .from_to([1.0, 2.0], [13.0, -4.0], 0.5..2.0)
+            .solve()
+            .expect("an arc");
+        // y = 2 + v (t − ½) − g (t − ½)²/2 with y(2) = −4.
+        let (vx, vy) = (8.0, (-6.0 + 0.5 * 9.81 * 1.5 * 1.5) / 1.5);
+        let start = arc.start();
+        assert!((start.p[0] - vx).abs() < 1e-13 && (start.p[1] - vy).abs() < 1e-13);
+        let motion = arc.motion();
+        for k in 0..=30 {
+            let s = 0.05 * f64::from(k);
+            let node = motion.at(0.5 + s).expect("inside");
+            let y = 2.0 + vy * s - 0.5 * 9.81 * s * s;
+            assert!((node.q[0] - (1.0 + vx * s)).abs() < 1e-13 && (node.q[1] - y).abs() < 1e-13);
+        }
+        // Linear: the first correction is the solution, the second sees it.
+        assert!(arc.statistics().newton_iterations <= 3);
+    }
+}
+
+/// sn(u, k) by descending Landen transformations.
+fn sn(u: f64, k: f64) -> f64 {
+    if k < 1e-9 {
+        return u.sin();
+    }
+    let kc = (1.0 - k * k).sqrt();
+    let k1 = (1.0 - kc) / (1.0 + kc);
+    let s = sn(u / (1.0 + k1), k1);
+    (1.0 + k1) * s / (1.0 + k1 * s * s)
+}
+
+/// From hanging at rest at the bottom… to the top it is a heteroclinic orbit; with a finite time to θ = π a push is needed: p₀ = 2/k, and
+/// θ(t) = 2 asin sn(t/k, k) reaches π at t = k K(k).
+#[test]
+fn a_pendulum_swings_up() {
+    let pendulum = Pendulum {};
+    let k: f64 = 0.999;
+    let (mut a, mut b) = (1.0, (1.0 - k * k).sqrt());
+    for _ in 0..10 {
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+    }
+    let time = k * PI / (2.0 * a);
+    let arc = BoundaryValue::of(&pendulum)
+        .element(Mixed::<8>)
+        .elements(30)
+        .from_to([0.0], [PI], 0.0..time)
+        .solve()
+        .expect("a swing up");
+    assert!((arc.start().p[0] - 2.0 / k).abs() < 1e-12);
+    assert!((arc.end().p[0] - 2.0 / k * (1.0 - k * k).sqrt()).abs() < 1e-12);
+    let motion = arc.motion();
+    for part in 1..10 {
+        let t = time * f64::from(part) / 10.0;
+        let node = arc.nodes()[3 * part as usize];
+        assert!((node.t - t).abs() < 1e-14);
+        assert!((node.q[0] - 2.0 * sn(t / k, k).asin()).abs() < 1e-12);
+        assert!((motion.at(t).expect("inside").q[0] - node.q[0]).abs() < 1e-10);
+    }
+    // Swinging back first is another solution of the same problem for a longer time; the guess decides.
+    let long = |guess: f64| {
+        BoundaryValue::of(&pendulum)
+            .element(Mixed::<6>)
+            .elements(60)
+            .from_to([0.0], [1.0], 0.0..7.0)
+            .guess(move |t| ([guess * t.sin()], [guess * t.cos()]))
+            .solve()
+            .expect("a swing")
+    };
+    let (one, other) = (long(1.5), long(-1.5));
+    assert!((one.start().p[0] - other.start().p[0]).abs() > 0.1);
+    for arc in [&one, &other] {
+        assert!((arc.end().q[0] - 1.0).abs() < 1e-13);
+        let run = Simulation::new(&pendulum)
+            .element(Mixed::<6>)
+            .step(7.0 / 60.0)
+            .run(arc.start(), 0.0..7.0)
+            .expect("a run");
+        assert!((run.last().q[0] - 1.0).abs() < 1e-12);
+    }
+}
+
+/// Released from rest (p = 0) at an unknown angle, at the bottom after a quarter period 1.8 > π/2.
+#[test]
+fn coordinates_and_momenta_mixed() {
+    let pendulum = Pendulum {};
+    let arc = BoundaryValue::of(&pendulum)
+        .element(Mixed::<6>)
+        .elements(40)
+        .span(0.0..1.8)
+        .start(Component::Momentum(0), 0.0)
+        .end(Component::Coordinate(0), 0.0)
+        .guess(|t| ([1.5 * (0.87 * t).cos()], [-1.3 * (0.87 * t).sin()]))
+        .solve()
+        .expect("a quarter of a swing");
+    let amplitude = arc.start().q[0];
+    // K(sin θ₀/2) = 1.8 by the arithmetic–geometric mean.
+    let (mut a, mut b) = (1.0, (0.5 * amplitude).cos());
+    for _ in 0..8 {
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+    }
+    assert!(amplitude > 0.5 && (PI / (2.0 * a) - 1.8).abs() < 1e-12);
+}
+
+#[test]
+fn an_assembled_initial_value_problem_is_stepping() {
+    let model = HenonHeiles {};
+    let start = tfe::State {
+        q: [0.1, -0.2],
+        p: [0.3, 0.15],
+    };
+    let duffing = Duffing {
+        alpha: -1.0,
+        beta: 1.0,
+        delta: 0.1,
+        f: 0.2,
+        omega: 1.2,
+    };
+    let at = duffing.state([0.3], [-0.2]);
+    for nodes in 2..=5 {
+        for element in [
+            Element::mixed(nodes),
+            Element::mixed(nodes).quadrature(nodes),
+            Element::primal(nodes),
+            Element::primal(nodes).lobatto(),
+            Element::energy_conserving(nodes),
+            Element::radau(nodes),
+        ] {
+            let assembled = BoundaryValue::of(&model)
+                .element(element)
+                .elements(50)
+                .initial(start, 0.0..10.0)
+                .solve()
+                .expect("a motion");
+            let stepped = Simulation::new(&model)
+                .element(element)
+                .step(0.2)
+                .run(start, 0.0..10.0)
+                .expect("a run");
+            for (one, other) in assembled.nodes().iter().zip(stepped.states()) {
+                for a in 0..2 {
+                    assert!((one.q[a] - other.q[a]).abs() < 5e-14, "{element:?}");
+                    assert!((one.p[a] - other.p[a]).abs() < 5e-14, "{element:?}");
+                }
+            }
+            let assembled = BoundaryValue::of(&duffing)
+                .element(element)
+                .elements(40)
+                .initial(at, 1.0..9.0)
+                .solve()
+                .expect("a motion");
+            let stepped = Simulation::new(&duffing)
+                .element(element)
+                .step(0.2)
+                .run(at, 1.0..9.0)
+                .expect("a run");
+            assert!(
+                (assembled.end().q[0] - stepped.last().q[0]).abs() < 5e-14,
+                "{element:?}"
+            );
+            assert!(
+                (assembled.end().p[0] - stepped.last().p[0]).abs() < 5e-14,
+                "{element:?}"
+            );
+        }
+    }
+}

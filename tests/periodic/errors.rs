@@ -1,0 +1,199 @@
+//! What makes no sense, or has no solution, is a typed error.
+
+use crate::models::{Duffing, Pendulum, Projectile, VanDerPol};
+use std::f64::consts::PI;
+use tfe::boundary::{BoundaryError, Component};
+use tfe::periodic::{OrbitError, Phase};
+use tfe::prelude::*;
+use tfe::{AssemblyError, MeshError};
+
+#[test]
+fn orbits_that_are_ill_posed() {
+    let cycle = VanDerPol { mu: 1.0 };
+    let forced = Duffing {
+        alpha: 1.0,
+        beta: 1.0,
+        delta: 0.2,
+        f: 0.3,
+        omega: 1.4,
+    };
+    let circle = |t: f64| ([2.0 * t.cos()], [-2.0 * t.sin()]);
+    let problem = || PeriodicOrbit::of(&cycle).guess(circle);
+    assert!(matches!(problem().solve(), Err(OrbitError::NoPeriod)));
+    for period in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(
+            problem().unknown_period(period).solve(),
+            Err(OrbitError::Period { .. })
+        ));
+    }
+    let error = PeriodicOrbit::of(&forced).unknown_period(4.0).solve();
+    assert!(matches!(error, Err(OrbitError::ForcedPeriod)));
+    let error = problem().unknown_period(6.0).elements(0).solve();
+    assert!(matches!(
+        error,
+        Err(OrbitError::Mesh(MeshError::NoElements))
+    ));
+    let error = problem().unknown_period(6.0).graded([1.0, 0.0]).solve();
+    assert!(matches!(
+        error,
+        Err(OrbitError::Mesh(MeshError::Weight { element: 1, .. }))
+    ));
+    let phase = Phase::Coordinate {
+        index: 1,
+        value: 0.0,
+    };
+    let error = problem().unknown_period(6.0).phase(phase).solve();
+    assert!(matches!(error, Err(OrbitError::Phase { index: 1 })));
+    let error = problem()
+        .unknown_period(6.0)
+        .element(Element::mixed(1))
+        .solve();
+    assert!(matches!(
+        error,
+        Err(OrbitError::Assembly(AssemblyError::Element(_)))
+    ));
+    // The limit cycle has one period only: with another one the equations need a force.
+    let error = problem().period(7.5).solve();
+    assert!(
+        matches!(error, Err(OrbitError::NoFamily { .. })),
+        "{:?}",
+        error.map(|_| ())
+    );
+}
+
+#[test]
+fn orbits_that_do_not_exist() {
+    let pendulum = Pendulum {};
+    let rest = PeriodicOrbit::of(&pendulum).unknown_period(6.0).solve();
+    // Everything is an orbit of an equilibrium: no period is singled out.
+    assert!(matches!(
+        rest,
+        Err(OrbitError::Assembly(AssemblyError::Singular { .. }))
+    ));
+    let far = VanDerPol { mu: 1.0 };
+    let error = PeriodicOrbit::of(&far)
+        .unknown_period(6.0)
+        .guess(|t| ([2.0 * t.cos()], [-2.0 * t.sin()]))
+        .max_iterations(2)
+        .solve();
+    match error {
+        Err(OrbitError::Assembly(AssemblyError::Stalled {
+            iterations: 2,
+            correction,
+            ..
+        })) => {
+            assert!(correction > 1e-13);
+        }
+        other => panic!("{:?}", other.map(|_| ())),
+    }
+    let not_a_number = PeriodicOrbit::of(&far)
+        .unknown_period(6.0)
+        .guess(|_| ([f64::NAN], [0.0]))
+        .solve();
+    assert!(matches!(
+        not_a_number,
+        Err(OrbitError::Assembly(AssemblyError::Linearise {
+            element: 0,
+            ..
+        }))
+    ));
+    for error in [
+        OrbitError::NoPeriod,
+        OrbitError::ForcedPeriod,
+        OrbitError::NoFamily { unfolding: 0.3 },
+        OrbitError::Phase { index: 3 },
+    ] {
+        assert!(error.to_string().len() > 20);
+    }
+}
+
+#[test]
+fn multipliers_of_an_equilibrium() {
+    let pendulum = Pendulum {};
+    let hanging = PeriodicOrbit::of(&pendulum)
+        .element(Mixed::<6>)
+        .elements(10)
+        .period(1.0)
+        .solve();
+    let hanging = hanging.expect("rest");
+    assert!((hanging.multipliers()[0].re - 1.0_f64.cos()).abs() < 1e-12);
+    assert!(hanging.is_stable() && hanging.trivial().is_empty());
+    let standing = PeriodicOrbit::of(&pendulum)
+        .element(Mixed::<6>)
+        .elements(10)
+        .period(1.0)
+        .guess(|_| ([PI], [0.0]))
+        .solve()
+        .expect("rest");
+    assert!((standing.multipliers()[0].re - 1.0_f64.exp()).abs() < 1e-11);
+    assert!(!standing.is_stable());
+}
+
+#[test]
+fn boundary_values_that_are_ill_posed() {
+    let projectile = Projectile { g: 9.81 };
+    let problem = || BoundaryValue::of(&projectile);
+    assert!(matches!(problem().solve(), Err(BoundaryError::Span { .. })));
+    let error = problem().from_to([0.0; 2], [1.0; 2], 1.0..1.0).solve();
+    assert!(matches!(error, Err(BoundaryError::Span { .. })));
+    let error = problem()
+        .span(0.0..1.0)
+        .start(Component::Coordinate(0), 0.0)
+        .solve();
+    assert!(matches!(
+        error,
+        Err(BoundaryError::Count {
+            needed: 4,
+            given: 1
+        })
+    ));
+    let three = || {
+        let three = problem()
+            .span(0.0..1.0)
+            .start(Component::Coordinate(0), 0.0);
+        three
+            .start(Component::Momentum(0), 1.0)
+            .end(Component::Coordinate(1), 0.0)
+    };
+    let error = three().end(Component::Coordinate(2), 0.0).solve();
+    assert!(matches!(
+        error,
+        Err(BoundaryError::Component {
+            component: Component::Coordinate(2)
+        })
+    ));
+    let error = three().end(Component::Coordinate(1), 0.0).solve();
+    assert!(matches!(
+        error,
+        Err(BoundaryError::Twice {
+            component: Component::Coordinate(1)
+        })
+    ));
+    let error = three().end(Component::Momentum(1), f64::NAN).solve();
+    assert!(matches!(error, Err(BoundaryError::Value { .. })));
+    let error = problem()
+        .elements(0)
+        .from_to([0.0; 2], [1.0; 2], 0.0..1.0)
+        .solve();
+    assert!(matches!(
+        error,
+        Err(BoundaryError::Mesh(MeshError::NoElements))
+    ));
+    // px is conserved: giving it at both ends says nothing about x.
+    let error = problem()
+        .span(0.0..1.0)
+        .start(Component::Momentum(0), 1.0)
+        .end(Component::Momentum(0), 1.0)
+        .start(Component::Coordinate(1), 0.0)
+        .end(Component::Coordinate(1), 0.0)
+        .solve();
+    assert!(matches!(
+        error,
+        Err(BoundaryError::Assembly(AssemblyError::Singular { .. }))
+    ));
+    let solved = three()
+        .end(Component::Momentum(1), 2.0)
+        .solve()
+        .expect("an arc");
+    assert!((solved.start().q[1] + 2.0 + 0.5 * 9.81).abs() < 1e-13);
+}

@@ -1,0 +1,9 @@
+//! Periodic orbits, their multipliers, and boundary-value problems against reference values and closed forms.
+
+mod boundary;
+#[path = "../common/mod.rs"]
+mod common;
+mod convergence;
+mod errors;
+mod models;
+mod orbits;
