@@ -3,6 +3,7 @@
 use crate::motion::Motion;
 use std::error::Error;
 use std::fmt;
+use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{ElementError, StepError};
 
 /// Why a run stopped.
@@ -54,6 +55,17 @@ pub enum RunErrorKind {
         step: f64,
         /// Why.
         source: StepError,
+    },
+    /// An element was solved, but has no transition matrix.
+    Transition {
+        /// The number of the element, from 0.
+        element: usize,
+        /// Its start time.
+        time: f64,
+        /// Its length.
+        step: f64,
+        /// Why.
+        source: TransitionError,
     },
 }
 
@@ -121,6 +133,15 @@ impl fmt::Display for RunErrorKind {
             } => {
                 write!(f, "element {element} (t = {time}, h = {step}): {source}")
             }
+            Self::Transition {
+                element,
+                time,
+                step,
+                source,
+            } => write!(
+                f,
+                "element {element} (t = {time}, h = {step}) has no transition matrix: {source}"
+            ),
         }
     }
 }
@@ -130,6 +151,7 @@ impl Error for RunErrorKind {
         match self {
             Self::Element(error) => Some(error),
             Self::Solve { source, .. } => Some(source),
+            Self::Transition { source, .. } => Some(source),
             _ => None,
         }
     }
@@ -140,9 +162,14 @@ impl<const N: usize> fmt::Display for RunError<N> {
         self.kind.fmt(f)?;
         match self.partial.states().last() {
             Some(node) if self.partial.states().len() > 1 => {
-                write!(f, "; the motion up to t = {} is in `partial()`", node.t)
+                write!(f, "; the motion up to t = {} is in `partial()`", node.t)?;
             }
-            _ => Ok(()),
+            _ => {}
+        }
+        // The likely reason of the failure.
+        match self.partial.warnings().last() {
+            Some(warning) => write!(f, "; {warning}"),
+            None => Ok(()),
         }
     }
 }

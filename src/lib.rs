@@ -8,6 +8,7 @@ pub mod boundary;
 pub mod charts;
 mod csv;
 pub mod error;
+pub mod linearised;
 pub mod motion;
 pub mod periodic;
 pub mod periodic_schur;
@@ -17,9 +18,10 @@ pub mod stability;
 pub use assembly::{AssemblyError, MeshError};
 pub use boundary::{BoundaryMotion, BoundaryValue};
 pub use error::{AtError, RunError, RunErrorKind};
+pub use linearised::Linearised;
 pub use motion::{Motion, Node, Outputs};
 pub use periodic::{Orbit, PeriodicOrbit};
-pub use simulation::{Simulation, Steps};
+pub use simulation::{Simulation, Steps, Warning};
 pub use tfe_macros::dynamics;
 /// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
 pub use tfe_runtime as runtime;
@@ -31,8 +33,8 @@ pub use tfe_runtime::{
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
     pub use crate::{
-        BoundaryValue, Element, EnergyConserving, Mixed, Model, Motion, Node, PeriodicOrbit,
-        Primal, Radau, Simulation, Solve, State, dynamics, stability,
+        BoundaryValue, Element, EnergyConserving, Mixed, Model, Motion, Node,
+        PeriodicOrbit, Primal, Radau, Simulation, Solve, State, dynamics, stability,
     };
 }
 

@@ -2,6 +2,7 @@
 
 use crate::csv;
 use crate::error::AtError;
+use crate::simulation::Warning;
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -74,6 +75,7 @@ pub struct Motion<const N: usize> {
     outputs: Outputs,
     elements: Vec<DenseElement<N>>,
     statistics: Statistics,
+    warnings: Vec<Warning>,
     names: Vec<CoordinateName>,
 }
 
@@ -90,6 +92,7 @@ impl<const N: usize> Motion<N> {
             },
             elements: Vec::new(),
             statistics: Statistics::default(),
+            warnings: Vec::new(),
             names: (0..N).map(M::coordinate_name).collect(),
         };
         motion.record(model, t, start);
@@ -130,6 +133,10 @@ impl<const N: usize> Motion<N> {
 
     pub(crate) fn set_statistics(&mut self, statistics: Statistics) {
         self.statistics = statistics;
+    }
+
+    pub(crate) fn set_warnings(&mut self, warnings: Vec<Warning>) {
+        self.warnings = warnings;
     }
 
     /// The last recorded node: the end of the span after a complete run.
@@ -216,6 +223,13 @@ impl<const N: usize> Motion<N> {
         &self.statistics
     }
 
+    /// What is doubtful about the motion although no element failed, in the order of time; each can be printed.
+    ///
+    /// None is no proof that the motion is right: [`Warning`] says what is looked for, and how often.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
     /// The observables at the recorded nodes.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
@@ -252,6 +266,7 @@ impl<const N: usize> fmt::Debug for Motion<N> {
             .field("last", &self.nodes.last())
             .field("nodes", &self.nodes.len())
             .field("statistics", &self.statistics)
+            .field("warnings", &self.warnings)
             .finish_non_exhaustive()
     }
 }

@@ -1,13 +1,20 @@
 //! Runs: a model, an element, a step, a span.
 
 mod mesh;
+mod watch;
 
 use crate::error::{RunError, RunErrorKind};
+use crate::linearised::Linearised;
 use crate::motion::{Motion, Node};
 use mesh::Mesh;
+use nalgebra::DMatrix;
 use std::ops::Range;
 use tfe_runtime::step::{Control, Impulse, Stepper};
+use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
+use watch::Watch;
+
+pub use watch::Warning;
 
 /// A run to be: which model, with which element and step.
 ///
@@ -136,37 +143,101 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 
     /// Runs over the span, backwards where it ends before it starts. The last node is exactly at the end of the span.
     ///
+    /// What is doubtful about the result without being an error is in [`Motion::warnings`].
+    ///
     /// # Errors
     /// [`RunError`] says where and why the run stopped and holds the motion so far.
+    ///
+    /// ```
+    /// # use tfe::prelude::*;
+    /// # #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2)]
+    /// # struct Oscillator { m: f64, k: f64 }
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let oscillator = Oscillator { m: 1.0, k: 1.0 };
+    /// // The amplitude grows between √10 and √12, where the oscillator's own does not.
+    /// let simulation = Simulation::new(&oscillator).element(Primal::<3>).step(3.3);
+    /// let motion = simulation.run(oscillator.state([1.0], [0.0]), 0.0..330.0)?;
+    /// for warning in motion.warnings() {
+    ///     println!("{warning}");
+    /// }
+    /// assert_eq!(motion.warnings().len(), 1);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn run(&self, start: State<N>, span: Range<f64>) -> Result<Motion<N>, RunError<N>> {
+        self.drive(start, &span, |_| Ok(()))
+    }
+
+    /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion.
+    ///
+    /// A matrix costs a factorisation of the element's tangent and 2N solutions with it: half a step for one coordinate, some twenty steps
+    /// for twenty coordinates that a step iterates without Newton's method. Impulses are constant, so that they enter through the
+    /// motion only. The example is at [`Linearised`].
+    ///
+    /// # Errors
+    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element has no transition matrix.
+    pub fn run_linearised(
+        &self,
+        start: State<N>,
+        span: Range<f64>,
+    ) -> Result<Linearised<N>, RunError<N>> {
+        let mut transitions = Vec::new();
+        let mut entries = vec![0.0; 4 * N * N];
+        let motion = self.drive(start, &span, |stepper| {
+            stepper.transition(&mut entries)?;
+            transitions.push(DMatrix::from_row_slice(2 * N, 2 * N, &entries));
+            Ok(())
+        })?;
+        Ok(Linearised::new(motion, transitions))
+    }
+
+    /// Runs over the span and shows every finished element to `finished`.
+    fn drive(
+        &self,
+        start: State<N>,
+        span: &Range<f64>,
+        mut finished: impl FnMut(&mut Stepper<'m, M, N>) -> Result<(), TransitionError>,
+    ) -> Result<Motion<N>, RunError<N>> {
         let mut motion = Motion::from_start(self.model, span.start, &start);
-        let prepared = check_start(&start)
-            .and_then(|()| self.mesh(&span))
-            .and_then(|mesh| {
-                let stepper = Stepper::new(self.model, self.element, self.control);
-                Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
-            });
-        let (mesh, mut stepper) = match prepared {
+        let (mesh, mut stepper) = match self.prepare(&start, span) {
             Ok(prepared) => prepared,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
+        let mut watch = Watch::new(self.element);
         let mut state = start;
         let mut bar = progress::Bar::new(self.progress, mesh.steps());
         let mut failure = None;
         for (element, (t, next, h)) in mesh.elements().enumerate() {
             let last = element + 1 == mesh.steps();
-            let impulses = mesh.impulses_in(t, next, last);
-            if let Err(source) = stepper.advance(t, h, &mut state, impulses) {
-                failure = Some(RunErrorKind::Solve {
+            let before = state;
+            watch.look(self.model, element, (t, h), &before);
+            let step = stepper.advance(t, h, &mut state, mesh.impulses_in(t, next, last));
+            let step = step.map_err(|source| RunErrorKind::Solve {
+                element,
+                time: t,
+                step: h,
+                source,
+            });
+            // Before the matrix, which needs the same memory.
+            let dense = (self.record_every == 1 && step.is_ok()).then(|| stepper.dense(t, next));
+            let step = step.and_then(|()| {
+                finished(&mut stepper).map_err(|source| RunErrorKind::Transition {
                     element,
                     time: t,
                     step: h,
                     source,
-                });
+                })
+            });
+            if let Err(kind) = step {
+                watch.examine(self.model, element, (t, h), &before);
+                if motion.last().t != t {
+                    motion.record(self.model, t, &before);
+                }
+                failure = Some(kind);
                 break;
             }
-            if self.record_every == 1 {
-                motion.keep_element(stepper.dense(t, next));
+            if let Some(dense) = dense {
+                motion.keep_element(dense);
             }
             if last || (element + 1) % self.record_every == 0 {
                 motion.record(self.model, next, &state);
@@ -174,20 +245,27 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             bar.advance();
         }
         motion.set_statistics(*stepper.statistics());
+        motion.set_warnings(watch.into_warnings());
         match failure {
             None => Ok(motion),
-            Some(kind) => {
-                if let RunErrorKind::Solve { time, .. } = &kind
-                    && motion.states().last().is_some_and(|node| node.t != *time)
-                {
-                    motion.record(self.model, *time, &state);
-                }
-                Err(RunError::new(kind, motion))
-            }
+            Some(kind) => Err(RunError::new(kind, motion)),
         }
     }
 
-    /// The states that follow `start`, one a step, without end and in constant memory. After an error the iterator is finished.
+    /// The elements of a run and its stepper, if all arguments are good.
+    fn prepare(
+        &self,
+        start: &State<N>,
+        span: &Range<f64>,
+    ) -> Result<(Mesh<N>, Stepper<'m, M, N>), RunErrorKind> {
+        check_start(start)?;
+        let mesh = self.mesh(span)?;
+        let stepper = Stepper::new(self.model, self.element, self.control);
+        Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
+    }
+
+    /// The states that follow `start`, one a step, without end and in constant memory. After an error the iterator is finished. There are no
+    /// [warnings](Motion::warnings).
     ///
     /// ```
     /// # use tfe::prelude::*;

@@ -1,7 +1,8 @@
 //! Linearised behaviour of steps: transition matrices, their spectra, and the steps at which a method fails.
 
-mod chebyshev;
+pub(crate) mod chebyshev;
 mod eigenvalues;
+pub(crate) mod frozen;
 mod intervals;
 mod map;
 mod modes;

@@ -1,7 +1,7 @@
 //! The unstable intervals of step size, the "bubbles" of Figure 1: ends by root finding against the roots of (T-57) to 20 digits.
 
 use crate::Oscillator;
-use crate::common::{count, list, number, reference};
+use crate::common::{assert_close, count, list, number, reference, word};
 use tfe::prelude::*;
 use tfe::stability::{UnstableInterval, unstable_intervals};
 
@@ -81,6 +81,62 @@ fn beyond_the_last_limit_the_radius_tends_to_its_value_at_infinity() {
             (last.radius - radius).abs() <= 1e-6 * radius,
             "{nodes} nodes: {last:?}, expected {radius}"
         );
+    }
+}
+
+/// Σ c ρᵏ, written as `-4*rho**6 + 540*rho**4 - 25200` in the table.
+fn polynomial(text: &str, rho: f64) -> f64 {
+    let value = |term: &str| {
+        let (coefficient, power) = match term.split_once("rho**") {
+            Some((coefficient, power)) => (coefficient.trim_end_matches('*'), power),
+            None => (term, "0"),
+        };
+        let power: i32 = power.parse().expect("a power");
+        let coefficient = match coefficient {
+            "" => 1.0,
+            "-" => -1.0,
+            number => number.parse().expect("a coefficient"),
+        };
+        coefficient * rho.powi(power)
+    };
+    text.replace(" - ", " + -").split(" + ").map(value).sum()
+}
+
+#[test]
+fn nothing_is_lost_where_the_interior_block_is_singular() {
+    // (T-25): ρ² = 10 for three nodes, 10 and 42 for four. All are ends of bubbles, where a₁₁ = ±1.
+    let table = reference("stability_bubbles");
+    for (nodes, square, end) in [(3, 10.0_f64, -1.0), (4, 10.0, -1.0), (4, 42.0, 1.0)] {
+        let case = list(&table["cases"])
+            .iter()
+            .find(|case| count(&case["n"]) == nodes)
+            .expect("a row for these nodes");
+        let (above, below) = word(&case["a11"])
+            .trim_matches(['(', ')'])
+            .split_once(")/(")
+            .expect("a quotient");
+        let rho = square.sqrt();
+        let a11 = polynomial(above, rho) / polynomial(below, rho);
+        assert!((a11 - end).abs() < 1e-13, "{nodes} nodes: {a11}");
+        let oscillator = Oscillator::scaled(rho, 0.0, 1.0);
+        let a = oscillator.transition(Element::primal(nodes), 1.0);
+        // Some roundings of entries of the size of ρ² = 42.
+        for diagonal in [a[(0, 0)], a[(1, 1)]] {
+            assert!(
+                (diagonal - a11).abs() < 1e-13,
+                "{nodes} nodes at ρ² = {square}: {diagonal}, expected {a11}"
+            );
+        }
+        assert!((a.determinant() - 1.0).abs() < 1e-13);
+        // A step is the matrix times the state.
+        let motion = Simulation::new(&oscillator)
+            .element(Element::primal(nodes))
+            .step(1.0)
+            .run(State { q: [0.3], p: [0.7] }, 0.0..1.0)
+            .expect("a linear step");
+        let expected = &a * nalgebra::DVector::from_column_slice(&[0.7, 0.3]);
+        let State { q, p } = motion.last().state();
+        assert_close(&[p[0], q[0]], expected.as_slice(), 1e-13, "one step");
     }
 }
 

@@ -1,0 +1,337 @@
+//! Continuation of periodic orbits in one parameter: branches through folds, and the places where something happens on them.
+//!
+//! The unknowns are those of a periodic orbit ([`crate::periodic`]; `docs/theory.md`, (T-81)–(T-83)) and the parameter λ,
+//!
+//! ```text
+//! δy_{e+1} − A_e δy_e − C_e δ(T, λ) = r_e ,     y_E = y_0 ,     ⟨τ, u − u_0⟩ = s      (and a condition of phase if T is unknown)
+//! ```
+//!
+//! with u all unknowns, u_0 the last orbit, τ the unit tangent of the branch there and s the step in arc length: regular also where the
+//! branch turns back in λ. The predictor is u_0 + s τ, interiors of elements included; the corrector is Newton's method on the assembled elements.
+//! The next tangent comes from the same matrix with the right side (0, …, 0, 1), which also orients it. Arc length is measured in
+//! units of the parameter: ds² is dλ² plus w² times the mean square of the change of the orbit beside its size, w the length of the range.
+//!
+//! # Events
+//! Between two orbits a test function changes sign: dλ/ds at a fold, ∏ (μ + 1) at a period doubling, ∏ (μ_i μ_j − 1) where a pair goes
+//! through the unit circle, and the determinant of all equations where another branch crosses. Brent's method on the arc length, with the
+//! corrector at each trial, finds the place to round-off. The multipliers are those of [`crate::periodic_schur`].
+//!
+//! # Not guaranteed
+//! Two events of one kind between two points are not seen, nor are collisions of multipliers on the unit circle away from ±1 (conservative
+//! models). Branches that fork off are not followed. A closed branch is run round until there are as many points as asked for.
+//!
+//! # Reference
+//! H. B. Keller, *Numerical solution of bifurcation and nonlinear eigenvalue problems*, in: P. Rabinowitz (ed.), *Applications of
+//! Bifurcation Theory*, Academic Press 1977; E. Doedel, H. B. Keller, J. P. Kernévez, *Numerical analysis and control of
+//! bifurcation problems (II)*, Int. J. Bifurcation and Chaos 1 (1991) 745–772.
+
+mod arc;
+mod branch;
+mod error;
+mod events;
+mod follow;
+mod problem;
+
+pub use branch::{Branch, End, Event, Point};
+pub use error::{ContinuationError, ContinuationErrorKind};
+pub use events::EventKind;
+
+use crate::periodic::{PeriodicOrbit, Phase};
+use arc::Row;
+use follow::{Course, Follower, Progress, Steps};
+use problem::{Continued, Field, PeriodOf};
+use std::ops::Range;
+use tfe_runtime::{Element, Model, State};
+
+/// A branch of periodic orbits to be followed in one parameter of its model.
+///
+/// It begins at the model as given and goes towards the end of the range; through folds it may come back. It ends where it leaves the range,
+/// with a point exactly there.
+///
+/// - *Forced*: the [`period`](Self::period) is a function of the model.
+/// - *Autonomous with damping or forces*: the period is unknown ([`unknown_period`](Self::unknown_period)).
+/// - *Conservative*: orbits of a [`period`](Self::period) that is a function of the model, or with an unknown one those of the energy
+///   of the first orbit. The equations are unfolded as for [`PeriodicOrbit`].
+///
+/// The parameter must be named in the `sensitivity(…)` of the model.
+///
+/// Defaults: as [`PeriodicOrbit`]; a first step of a hundredth of the range, steps up to a twentieth, at most 1000 points.
+///
+/// ```
+/// use std::f64::consts::TAU;
+/// use tfe::continuation::EventKind;
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - alpha/2*x^2 - beta/4*x^4,
+///            force(x) = f*cos(omega*t) - delta*dot(x), sensitivity(omega, f))]
+/// #[derive(Clone)]
+/// struct Duffing { alpha: f64, beta: f64, delta: f64, f: f64, omega: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let duffing = Duffing { alpha: 1.0, beta: 1.0, delta: 0.2, f: 0.5, omega: 0.6 };
+/// let branch = Continuation::of(&duffing)
+///     .parameter(|duffing| &mut duffing.omega)
+///     .range(0.6..3.0)
+///     .period(|duffing| TAU / duffing.omega)
+///     .guess(|t| ([0.6 * (0.6 * t).cos()], [-0.36 * (0.6 * t).sin()]))
+///     .run()?;
+///
+/// // Over the resonance the response is threefold: up to one fold, back to the other, and on.
+/// let folds: Vec<f64> = branch.events_of(EventKind::Fold).map(|fold| fold.point.parameter).collect();
+/// assert_eq!(folds.len(), 2);
+/// assert!(folds[0] > folds[1]);
+/// let unstable = branch.points().iter().filter(|point| !point.is_stable());
+/// assert!(unstable.into_iter().all(|point| point.parameter > folds[1] && point.parameter < folds[0]));
+/// assert_eq!(branch.points()[branch.points().len() - 1].parameter, 3.0);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Continuation<'m, M, const N: usize> {
+    model: &'m M,
+    orbit: PeriodicOrbit<'m, M, N>,
+    field: Option<Box<Field<'m, M>>>,
+    period: Option<Box<PeriodOf<'m, M>>>,
+    range: Option<Range<f64>>,
+    step: Option<f64>,
+    smallest: Option<f64>,
+    largest: Option<f64>,
+    max_points: usize,
+    progress: bool,
+}
+
+impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
+    /// A branch that begins at `model`, with the defaults.
+    pub fn of(model: &'m M) -> Self {
+        Self {
+            model,
+            orbit: PeriodicOrbit::of(model),
+            field: None,
+            period: None,
+            range: None,
+            step: None,
+            smallest: None,
+            largest: None,
+            max_points: 1000,
+            progress: false,
+        }
+    }
+
+    /// The field of the model that is the parameter: one of those of `sensitivity(…)`.
+    #[must_use]
+    pub fn parameter(mut self, field: impl Fn(&mut M) -> &mut f64 + 'm) -> Self {
+        self.field = Some(Box::new(field));
+        self
+    }
+
+    /// The range of the parameter, ascending or descending. The branch begins at the value that the model has and goes towards the end.
+    #[must_use]
+    pub fn range(mut self, range: Range<f64>) -> Self {
+        self.range = Some(range);
+        self
+    }
+
+    /// The period, a function of the model: `|model| TAU / model.omega`.
+    #[must_use]
+    pub fn period(mut self, period: impl Fn(&M) -> f64 + 'm) -> Self {
+        self.orbit = self.orbit.period(period(self.model));
+        self.period = Some(Box::new(period));
+        self
+    }
+
+    /// The period is to be found; at the start, near `guess`.
+    #[must_use]
+    pub fn unknown_period(mut self, guess: f64) -> Self {
+        self.orbit = self.orbit.unknown_period(guess);
+        self.period = None;
+        self
+    }
+
+    /// The element: `Mixed::<6>`, `Element::primal(n)`, …
+    #[must_use]
+    pub fn element(mut self, element: impl Into<Element>) -> Self {
+        self.orbit = self.orbit.element(element);
+        self
+    }
+
+    /// The number of elements, equally long unless [`graded`](Self::graded).
+    #[must_use]
+    pub fn elements(mut self, elements: usize) -> Self {
+        self.orbit = self.orbit.elements(elements);
+        self
+    }
+
+    /// One element a weight, each as long as its weight says beside the others, at every point.
+    #[must_use]
+    pub fn graded(mut self, weights: impl IntoIterator<Item = f64>) -> Self {
+        self.orbit = self.orbit.graded(weights);
+        self
+    }
+
+    /// The time at which the period begins; 0 by default.
+    #[must_use]
+    pub fn start_time(mut self, time: f64) -> Self {
+        self.orbit = self.orbit.start_time(time);
+        self
+    }
+
+    /// Where to look for the first orbit: a curve t ↦ (q, dq/dt).
+    #[must_use]
+    pub fn guess(mut self, curve: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
+        self.orbit = self.orbit.guess(curve);
+        self
+    }
+
+    /// Where to look for the first orbit: the motion that starts here.
+    #[must_use]
+    pub fn guess_from(mut self, state: State<N>) -> Self {
+        self.orbit = self.orbit.guess_from(state);
+        self
+    }
+
+    /// Which of the orbits that differ in phase; for autonomous models.
+    #[must_use]
+    pub fn phase(mut self, phase: Phase) -> Self {
+        self.orbit = self.orbit.phase(phase);
+        self
+    }
+
+    /// How much the coordinates grow over a period: a full turn for an angle that rotates.
+    #[must_use]
+    pub fn advance(mut self, advance: [f64; N]) -> Self {
+        self.orbit = self.orbit.advance(advance);
+        self
+    }
+
+    /// When an orbit is found: the relative size of the last correction, 10⁻¹³ by default.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.orbit = self.orbit.tolerance(tolerance);
+        self
+    }
+
+    /// The first step of the parameter; a hundredth of the range by default. Later ones are adapted.
+    #[must_use]
+    pub fn step(mut self, step: f64) -> Self {
+        self.step = Some(step);
+        self
+    }
+
+    /// The smallest step in arc length, before the run is given up: a millionth of the range by default.
+    #[must_use]
+    pub fn smallest_step(mut self, step: f64) -> Self {
+        self.smallest = Some(step);
+        self
+    }
+
+    /// The largest step in arc length: how far apart points are at most. A twentieth of the range by default.
+    #[must_use]
+    pub fn largest_step(mut self, step: f64) -> Self {
+        self.largest = Some(step);
+        self
+    }
+
+    /// The most points, 1000 by default.
+    #[must_use]
+    pub fn max_points(mut self, points: usize) -> Self {
+        self.max_points = points;
+        self
+    }
+
+    /// Shows the progress of long runs on standard error, once a second.
+    #[must_use]
+    pub fn progress(mut self) -> Self {
+        self.progress = true;
+        self
+    }
+
+    /// Follows the branch.
+    ///
+    /// # Errors
+    /// [`ContinuationError`] says why and holds the branch so far.
+    pub fn run(&self) -> Result<Branch<M, N>, ContinuationError<M, N>> {
+        let mut branch = Branch::new("");
+        match self.follow(&mut branch) {
+            Ok(()) => Ok(branch),
+            Err(kind) => Err(ContinuationError::new(kind, branch)),
+        }
+    }
+
+    fn follow(&self, branch: &mut Branch<M, N>) -> Result<(), ContinuationErrorKind> {
+        let field = self
+            .field
+            .as_deref()
+            .ok_or(ContinuationErrorKind::NoParameter)?;
+        let (sensitivity, name) = self.sensitivity(field)?;
+        branch.parameter = name;
+        let mut model = self.model.clone();
+        let course = self.course(*field(&mut model))?;
+        let (orbit, iterate, _) = self.orbit.solved()?;
+        let problem = Continued {
+            width: (course.range.end - course.range.start).abs(),
+            row: Row::Parameter(*field(&mut model)),
+            model,
+            orbit,
+            field,
+            sensitivity,
+            period: self.period.as_deref(),
+            rate: 0.0,
+        };
+        let follower = Follower::start(problem, iterate, self.orbit.method(), course)?;
+        follower.run(branch, Progress::new(self.progress))
+    }
+
+    /// Which of the parameters of `sensitivity(…)` changes with the field.
+    fn sensitivity(
+        &self,
+        field: &Field<'m, M>,
+    ) -> Result<(usize, &'static str), ContinuationErrorKind> {
+        let mut moved = self.model.clone();
+        let value = *field(&mut moved);
+        *field(&mut moved) = value + value.abs().max(1.0);
+        let changes = |index: &usize| {
+            self.model.sensitivity_parameter(*index).to_bits()
+                != moved.sensitivity_parameter(*index).to_bits()
+        };
+        let mut names = M::SENSITIVITIES.iter().copied().enumerate();
+        names
+            .find(|(index, _)| changes(index))
+            .ok_or(ContinuationErrorKind::NoSensitivity {
+                known: M::SENSITIVITIES,
+            })
+    }
+
+    /// Range and steps, checked.
+    fn course(&self, value: f64) -> Result<Course, ContinuationErrorKind> {
+        let range = self.range.clone().ok_or(ContinuationErrorKind::NoRange)?;
+        let Range { start, end } = range;
+        let width = (end - start).abs();
+        let inside = (start.min(end)..=start.max(end)).contains(&value) && value != end;
+        if !(width.is_finite() && inside) {
+            return Err(ContinuationErrorKind::Range { start, end, value });
+        }
+        let largest = self.largest.unwrap_or(0.05 * width);
+        let steps = Steps {
+            first: self.step.unwrap_or((0.01 * width).min(largest)),
+            smallest: self.smallest.unwrap_or((1e-6 * width).min(largest)),
+            largest,
+        };
+        let Steps {
+            first, smallest, ..
+        } = steps;
+        let positive = [first, smallest, largest]
+            .iter()
+            .all(|step| step.is_finite() && *step > 0.0);
+        if !(positive && smallest <= largest) {
+            return Err(ContinuationErrorKind::Steps {
+                step: first,
+                smallest,
+                largest,
+            });
+        }
+        Ok(Course {
+            range: start..end,
+            steps,
+            max_points: self.max_points,
+        })
+    }
+}

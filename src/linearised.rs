@@ -1,0 +1,113 @@
+//! A motion with its linearisation: the transition matrix of every element.
+
+use crate::motion::Motion;
+use crate::periodic_schur::{self, Multiplier, PeriodicSchurError};
+use nalgebra::DMatrix;
+
+/// A motion together with the transition matrices of its elements, from
+/// [`Simulation::run_linearised`](crate::Simulation::run_linearised).
+///
+/// With y = (p, q) and A_e the derivative of the step over element e at the motion,
+///
+/// ```text
+/// δy_{e+1} = A_e δy_e ,      δy_end = A_{N−1} ⋯ A₁ A₀ δy_start .                                     (T-83)
+/// ```
+///
+/// It is the derivative of the numbers that the run computes, not an approximation of the linearised differential equation.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + k*cos(theta))]
+/// struct Pendulum { k: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let pendulum = Pendulum { k: 1.0 };
+/// let simulation = Simulation::new(&pendulum).step(0.1);
+/// let run = simulation.run_linearised(pendulum.state([1.0], [0.0]), 0.0..5.0)?;
+/// let product = run.product();
+///
+/// // One of the four: how the angle at the end depends on the angle at the start.
+/// let end = |angle| -> Result<f64, tfe::RunError<1>> {
+///     Ok(simulation.run(pendulum.state([angle], [0.0]), 0.0..5.0)?.last().q[0])
+/// };
+/// let difference = (end(1.0 + 1e-4)? - end(1.0 - 1e-4)?) / 2e-4;
+/// assert!((product[(1, 1)] - difference).abs() < 1e-6);
+/// assert!(stability::symplecticity_defect(&product) < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Linearised<const N: usize> {
+    motion: Motion<N>,
+    transitions: Vec<DMatrix<f64>>,
+}
+
+impl<const N: usize> Linearised<N> {
+    pub(crate) fn new(motion: Motion<N>, transitions: Vec<DMatrix<f64>>) -> Self {
+        Self {
+            motion,
+            transitions,
+        }
+    }
+
+    /// The motion.
+    pub fn motion(&self) -> &Motion<N> {
+        &self.motion
+    }
+
+    /// The transition matrices, one an element in the order of the run, each 2N × 2N and ordered (p, q).
+    ///
+    /// One for every element, also where [`record_every`](crate::Simulation::record_every) keeps only some of the nodes.
+    pub fn transitions(&self) -> &[DMatrix<f64>] {
+        &self.transitions
+    }
+
+    /// The motion and the transition matrices, by value.
+    pub fn into_parts(self) -> (Motion<N>, Vec<DMatrix<f64>>) {
+        (self.motion, self.transitions)
+    }
+
+    /// The derivative of the end by the start: the product of all transition matrices, the first one to the right. The identity for an empty span.
+    ///
+    /// Over one period of a periodic motion it is the monodromy matrix.
+    ///
+    /// # Not guaranteed
+    /// Where some directions grow and others decay by more than ten orders of magnitude the product holds the growing ones only, and
+    /// beyond 10³⁰⁸ its entries are infinite or NaN: use [`multipliers`](Self::multipliers), which does not form it.
+    pub fn product(&self) -> DMatrix<f64> {
+        self.transitions
+            .iter()
+            .fold(DMatrix::identity(2 * N, 2 * N), |product, a| a * product)
+    }
+
+    /// The eigenvalues of the [`product`](Self::product), largest modulus first, without forming it: tiny ones beside huge ones keep
+    /// their digits, and none over- or underflows.
+    ///
+    /// Over one period of a periodic motion they are its Floquet multipliers. Over a span that ends elsewhere they depend on the
+    /// coordinates and have no such meaning.
+    ///
+    /// # Errors
+    /// [`PeriodicSchurError`] if a matrix is not finite or the iteration does not converge.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + x^2/2)]
+    /// struct Saddle {}
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let run = Simulation::new(&Saddle {}).step(0.1).run_linearised(Saddle {}.state([0.0], [0.0]), 0.0..1000.0)?;
+    /// let multipliers = run.multipliers()?; // e^±1000
+    /// assert!((multipliers[0].log_modulus - 1000.0).abs() < 1e-3);
+    /// assert!((multipliers[1].log_modulus + 1000.0).abs() < 1e-3);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn multipliers(&self) -> Result<Vec<Multiplier>, PeriodicSchurError> {
+        if self.transitions.is_empty() {
+            return periodic_schur::multipliers(&[DMatrix::identity(2 * N, 2 * N)]);
+        }
+        periodic_schur::multipliers(&self.transitions)
+    }
+}

@@ -1,0 +1,104 @@
+//! The speed below which an upright top is unstable, as the elements see it: (T-87), (T-88), (T-89).
+
+use crate::top::Top;
+use std::convert::Infallible;
+use tfe::prelude::*;
+use tfe::stability::stability_changes_of;
+
+/// J_t = 2, J_a = 0.3, mgd = 5: Ω_c = 21.08, and σ = 2.5 h².
+const TOP: Top = Top {
+    jt: 2.0,
+    ja: 0.3,
+    mgd: 5.0,
+    omega: 0.0,
+};
+
+/// From short steps to those over which the unstable top grows by a factor of 100.
+const STEPS: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
+
+/// The one speed between ½ Ω_c and 2 Ω_c at which the stability of an element changes.
+///
+/// The double eigenvalue there is defective and known to half of the digits only, but the root is found of a smooth function of the
+/// matrix, ∏ (μᵢ − μⱼ)² with μ = λ + 1/λ, which has a simple zero.
+#[track_caller]
+fn limit_speed(element: Element, h: f64) -> f64 {
+    let critical = TOP.critical_speed();
+    let matrix = |omega: f64| {
+        let top = Top { omega, ..TOP };
+        Ok::<_, Infallible>(top.transition(element, h))
+    };
+    let changes = stability_changes_of(matrix, 0.5 * critical..2.0 * critical)
+        .unwrap_or_else(|error| panic!("{element}, h = {h}: {error}"));
+    assert_eq!(changes.len(), 1, "{element}, h = {h}: {changes:?}");
+    changes[0]
+}
+
+#[test]
+fn mixed_and_reduced_elements_have_the_exact_limit_at_every_step() {
+    let critical = TOP.critical_speed();
+    for nodes in 2..=6 {
+        for element in [Element::mixed(nodes), Element::primal(nodes).reduced()] {
+            for h in STEPS {
+                let found = limit_speed(element, h);
+                assert!(
+                    (found / critical - 1.0).abs() <= 1e-12,
+                    "{element}, h = {h}: {found}, expected {critical}, {:e}",
+                    found / critical - 1.0
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_limit_of_primal_elements_depends_on_the_step() {
+    let critical = TOP.critical_speed();
+    for h in STEPS {
+        let sigma = TOP.sigma(h);
+        let two = 1.0 + sigma / 12.0;
+        let three = two * (1.0 + sigma / 60.0) / (1.0 + sigma / 10.0);
+        for (nodes, ratio) in [(2, two), (3, three)] {
+            // At h = 3 two nodes want more than twice Ω_c², still inside the range.
+            let (found, expected) = (
+                limit_speed(Element::primal(nodes), h),
+                critical * ratio.sqrt(),
+            );
+            assert!(
+                (found / expected - 1.0).abs() <= 1e-12,
+                "{nodes} nodes, h = {h}: {found}, expected {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn nothing_breaks_at_the_critical_speed() {
+    let top = Top {
+        omega: TOP.critical_speed(),
+        ..TOP
+    };
+    for nodes in 2..=6 {
+        for element in [Element::mixed(nodes), Element::primal(nodes).reduced()] {
+            for h in STEPS {
+                let a = top.transition(element, h);
+                assert!(
+                    a.iter().all(|entry| entry.is_finite()),
+                    "{element}, h = {h}"
+                );
+                // A double eigenvalue in one Jordan block is known to the square root of round-off, 1.5e-8, in units of the block's size.
+                let radius = stability::spectral_radius(&a);
+                assert!(
+                    (radius - 1.0).abs() <= 2e-7,
+                    "{element}, h = {h}: {:e}",
+                    radius - 1.0
+                );
+            }
+        }
+        // Above Ω_c by (T-87), (T-88) the primal limit: unstable at Ω_c, but finite.
+        let radius = stability::spectral_radius(&top.transition(Element::primal(nodes), 1.0));
+        assert!(
+            radius.is_finite() && radius > 1.0,
+            "{nodes} nodes: {radius}"
+        );
+    }
+}
