@@ -55,12 +55,18 @@ struct Monitor {
     last: f64,
     rate: f64,
     risen: u32,
+    /// The smallest increment so far, and for how many iterations it has not been halved.
+    best: f64,
+    idle: u32,
 }
 
 enum Verdict {
     Converged,
     GoOn,
 }
+
+/// So many iterations without a smaller increment are noise, if the coordinates do not move any more.
+const IDLE: u32 = 6;
 
 impl Monitor {
     fn new(tolerance: f64) -> Self {
@@ -69,6 +75,8 @@ impl Monitor {
             last: f64::INFINITY,
             rate: 1.0,
             risen: 0,
+            best: f64::INFINITY,
+            idle: 0,
         }
     }
 
@@ -90,14 +98,21 @@ impl Monitor {
             size * cautious / (1.0 - cautious)
         };
         self.risen = if rate >= 1.0 { self.risen + 1 } else { 0 };
+        if size < 0.5 * self.best {
+            (self.best, self.idle) = (size, 0);
+        } else {
+            self.idle += 1;
+        }
         self.last = size;
         self.rate = if first { 1.0 } else { rate };
         if left <= self.tolerance {
             return Ok(Verdict::Converged);
         }
+        // Near rest the velocities are noise themselves, and increments beside them say nothing.
+        let settled = increment.position <= 4.0 * f64::EPSILON;
         let stalled = (self.risen >= 1 && size <= ROUND_OFF)
-            || (self.risen >= 3
-                && (size <= ROUGH_ROUND_OFF || increment.position <= 4.0 * f64::EPSILON));
+            || (self.risen >= 3 && (size <= ROUGH_ROUND_OFF || settled))
+            || (self.idle >= IDLE && settled);
         Ok(if stalled {
             Verdict::Converged
         } else {
