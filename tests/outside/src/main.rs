@@ -1,5 +1,6 @@
 //! What a user writes, in a crate that depends on nothing but `tfe`.
 
+use std::f64::consts::TAU;
 use tfe::prelude::*;
 
 /// A double pendulum of two point masses; angles from the downward vertical, SI units.
@@ -45,6 +46,23 @@ struct Chain<const N: usize> {
     m: f64,
     k: f64,
     a: f64,
+}
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - alpha/2*x^2 - beta/4*x^4,
+           force(x) = f*cos(omega*t) - delta*dot(x), sensitivity(omega))]
+#[derive(Clone)]
+struct Duffing {
+    alpha: f64,
+    beta: f64,
+    delta: f64,
+    f: f64,
+    omega: f64,
+}
+
+#[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y)]
+struct Projectile {
+    m: f64,
+    g: f64,
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -160,5 +178,57 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     )?;
     println!("spectral radius {}", stability::spectral_radius(&a));
     println!("{}", DoublePendulum::structure());
+
+    let undamped = Oscillator {
+        m: 1.0,
+        k: 1.0,
+        c: 0.0,
+    };
+    let equilibrium = undamped.state([0.0], [0.0]);
+    for gap in stability::unstable_intervals(&undamped, Primal::<3>, &equilibrium, 0.0..30.0)? {
+        println!(
+            "{} .. {}: radius up to {} at {}",
+            gap.start, gap.end, gap.radius, gap.worst
+        );
+    }
+    for mode in stability::modes(&a, 0.5)? {
+        println!(
+            "{} rad per time, damping {:?}",
+            mode.frequency(),
+            mode.damping_ratio()
+        );
+    }
+
+    let (x0, omega) = (-0.3, 1.4);
+    let duffing = Duffing {
+        alpha: 1.0,
+        beta: 1.0,
+        delta: 0.2,
+        f: 0.3,
+        omega,
+    };
+    let orbit = PeriodicOrbit::of(&duffing)
+        .element(Mixed::<6>)
+        .elements(40)
+        .period(TAU / omega)
+        .guess(|t| ([x0 * (omega * t).cos()], [-x0 * omega * (omega * t).sin()]))
+        .solve()?;
+    println!(
+        "period {}, multipliers {:?}, stable: {}, trace {}, {} nodes",
+        orbit.period(),
+        orbit.multipliers(),
+        orbit.is_stable(),
+        orbit.monodromy().trace(),
+        orbit.motion().states().len(),
+    );
+    assert!((orbit.monodromy().trace() - 0.1330786602569841).abs() < 1e-10);
+
+    let projectile = Projectile { m: 2.0, g: 9.81 };
+    let arc = BoundaryValue::of(&projectile)
+        .element(Mixed::<4>)
+        .elements(20)
+        .from_to([0.0, 0.0], [10.0, 0.0], 0.0..2.0)
+        .solve()?;
+    assert!((arc.start().p[1] - 2.0 * 9.81).abs() < 1e-12);
     Ok(())
 }
