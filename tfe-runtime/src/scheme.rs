@@ -238,13 +238,21 @@ impl<const K: usize, const U: usize> Tables for Scheme<K, U> {
     }
 }
 
-/// Tables of an element chosen at run time.
+/// Tables of an element chosen at run time; clones share them.
+///
+/// With the feature `std` the tables of an element are computed once in a program: in double-double arithmetic they cost as much as a
+/// hundred steps.
 #[cfg(feature = "alloc")]
 #[derive(Clone, Debug)]
 pub struct SchemeTable {
     element: Element,
-    numbers: alloc::vec::Vec<f64>,
+    numbers: alloc::sync::Arc<[f64]>,
 }
+
+/// The tables computed so far. There are a few hundred elements in all.
+#[cfg(feature = "std")]
+static KNOWN: std::sync::Mutex<std::vec::Vec<SchemeTable>> =
+    std::sync::Mutex::new(std::vec::Vec::new());
 
 #[cfg(feature = "alloc")]
 impl SchemeTable {
@@ -254,13 +262,29 @@ impl SchemeTable {
     /// [`ElementError`] if the element is not valid.
     pub fn new(element: Element) -> Result<Self, ElementError> {
         element.validate()?;
+        #[cfg(feature = "std")]
+        {
+            // A panic elsewhere leaves the list as good as it was.
+            let mut known = KNOWN
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner);
+            if let Some(table) = known.iter().find(|table| table.element == element) {
+                return Ok(table.clone());
+            }
+            let table = Self::computed(element);
+            known.push(table.clone());
+            Ok(table)
+        }
+        #[cfg(not(feature = "std"))]
+        Ok(Self::computed(element))
+    }
+
+    /// The tables of a valid element.
+    fn computed(element: Element) -> Self {
         let (k, u, s) = (element.points(), element.unknowns(), element.degree());
         let length = Self::offsets(k, u, s)[Self::PARTS];
-        let mut table = Self {
-            element,
-            numbers: alloc::vec![0.0; length],
-        };
-        let mut rest = table.numbers.as_mut_slice();
+        let mut numbers = alloc::vec![0.0; length];
+        let mut rest = numbers.as_mut_slice();
         let mut take = |length: usize| {
             let (part, tail) = core::mem::take(&mut rest).split_at_mut(length);
             rest = tail;
@@ -284,7 +308,10 @@ impl SchemeTable {
             force_rate: take(s * k),
         };
         target.fill(element);
-        Ok(table)
+        Self {
+            element,
+            numbers: numbers.into(),
+        }
     }
 
     const PARTS: usize = 15;
