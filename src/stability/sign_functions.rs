@@ -102,7 +102,7 @@ impl Measure {
 
 /// Whether tr Aᵏ = tr A⁻ᵏ for k = 1..N and det A = 1 to round-off, so that with λ also 1/λ is an eigenvalue.
 ///
-/// Measured against tr |A|ᵏ, which like the spectrum does not depend on the units of momenta and coordinates.
+/// Measured against tr |A|ᵏ and tr |A||A⁻¹|, which like the spectrum do not depend on the units of momenta and coordinates.
 fn has_reciprocal_spectrum(a: &DMatrix<f64>) -> bool {
     const ROUND_OFF: f64 = 1e-10;
     let size = a.nrows();
@@ -120,15 +120,18 @@ fn has_reciprocal_spectrum(a: &DMatrix<f64>) -> bool {
     else {
         return false;
     };
-    if (a.determinant() - 1.0).abs() > ROUND_OFF * (a.abs() * inverse.abs()).trace() {
+    let condition = (a.abs() * inverse.abs()).trace();
+    if (a.determinant() - 1.0).abs() > ROUND_OFF * condition {
         return false;
     }
+    // Where the map grows by much its entries have lost digits in an element, and the inverse loses them again.
+    let round_off = ROUND_OFF.max(1024.0 * f64::EPSILON * condition);
     let (size_of_a, size_of_inverse) = (a.abs(), inverse.abs());
     let (mut power, mut inverse_power) = (a.clone(), inverse.clone());
     let (mut bound, mut inverse_bound) = (size_of_a.clone(), size_of_inverse.clone());
     for _ in 0..size / 2 {
         let defect = (power.trace() - inverse_power.trace()).abs();
-        if defect > ROUND_OFF * (bound.trace() + inverse_bound.trace()) {
+        if defect > round_off * (bound.trace() + inverse_bound.trace()) {
             return false;
         }
         (power, inverse_power) = (&power * a, &inverse_power * &inverse);

@@ -3,7 +3,7 @@
 use crate::top::Top;
 use std::convert::Infallible;
 use tfe::prelude::*;
-use tfe::stability::stability_changes_of;
+use tfe::stability::{stability_changes_of, unstable_intervals_of};
 
 /// J_t = 2, J_a = 0.3, mgd = 5: Ω_c = 21.08, and σ = 2.5 h².
 const TOP: Top = Top {
@@ -100,5 +100,28 @@ fn nothing_breaks_at_the_critical_speed() {
             radius.is_finite() && radius > 1.0,
             "{nodes} nodes: {radius}"
         );
+    }
+}
+
+/// J_t = 1, J_a = 2, mgd = 1 with steps of 6: four nodes have a narrow band of instability within the stable speeds, wherever the search begins.
+#[test]
+fn a_narrow_band_is_found_from_far_away() {
+    let matrix = |omega: f64| {
+        let top = Top {
+            jt: 1.0,
+            ja: 2.0,
+            mgd: 1.0,
+            omega,
+        };
+        Ok::<_, Infallible>(top.transition(Element::primal(4), 6.0))
+    };
+    for start in [0.01, 0.1, 0.3, 0.37, 0.5, 0.9, 1.3] {
+        for end in [2.5, 4.0, 10.0] {
+            let found = unstable_intervals_of(matrix, start..end).expect("smooth");
+            let band = found.iter().find(|interval| interval.start < 1.88 && interval.end > 1.88);
+            let band = band.unwrap_or_else(|| panic!("{start}..{end}: {found:?}"));
+            assert!((band.start - 1.866).abs() < 1e-3 && (band.end - 1.887).abs() < 1e-3);
+            assert!((band.radius - 1.010).abs() < 1e-3, "{band:?}");
+        }
     }
 }
