@@ -161,7 +161,7 @@ fn sign_changes(series: Vec<f64>) -> Vec<f64> {
 /// A root between two points (x, f(x)) of opposite signs, by Brent's method, to the last digits.
 ///
 /// An end where f is zero is itself the answer.
-pub(super) fn bracketed_root<E>(
+pub(crate) fn bracketed_root<E>(
     mut function: impl FnMut(f64) -> Result<f64, E>,
     start: (f64, f64),
     end: (f64, f64),

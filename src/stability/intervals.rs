@@ -169,16 +169,7 @@ pub fn unstable_intervals_of<E>(
             None => unstable_since = Some(change),
         }
     }
-    intervals.retain(|interval| !is_round_off(interval));
     Ok(intervals)
-}
-
-/// Whether an interval is as narrow as a few units in the last place: double eigenvalues of free coordinates, which round-off splits.
-///
-/// The excess of a radius is of the order of the width of its interval, so that a true one as narrow is out of reach.
-fn is_round_off(interval: &UnstableInterval) -> bool {
-    let width = interval.end - interval.start;
-    width <= 64.0 * f64::EPSILON * interval.end.abs() && interval.radius < 1.0 + 1e-7
 }
 
 /// Every parameter in `range` at which the spectral radius of `matrix` rises above one or returns to it, ascending.

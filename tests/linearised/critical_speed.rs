@@ -118,10 +118,56 @@ fn a_narrow_band_is_found_from_far_away() {
     for start in [0.01, 0.1, 0.3, 0.37, 0.5, 0.9, 1.3] {
         for end in [2.5, 4.0, 10.0] {
             let found = unstable_intervals_of(matrix, start..end).expect("smooth");
-            let band = found.iter().find(|interval| interval.start < 1.88 && interval.end > 1.88);
+            let band = found
+                .iter()
+                .find(|interval| interval.start < 1.88 && interval.end > 1.88);
             let band = band.unwrap_or_else(|| panic!("{start}..{end}: {found:?}"));
             assert!((band.start - 1.866).abs() < 1e-3 && (band.end - 1.887).abs() < 1e-3);
             assert!((band.radius - 1.010).abs() < 1e-3, "{band:?}");
         }
     }
+}
+
+/// From far below, through poles of the element: one limit, at its closed form. At h = 2 the matrix with two mixed nodes has a pole at Ω = 0.
+#[test]
+fn one_limit_from_far_below() {
+    for (element, limit) in [
+        (Element::primal(2), primal_2 as fn(f64) -> f64),
+        (Element::primal(3), primal_3),
+        (Element::mixed(2), exact),
+        (Element::mixed(3), exact),
+    ] {
+        for k in 1..=30 {
+            let h = 6.0 / 30.0 + (6.0 - 6.0 / 30.0) * (f64::from(k) - 1.0) / 29.0;
+            let matrix = |omega: f64| {
+                let top = Top {
+                    jt: 1.0,
+                    ja: 2.0,
+                    mgd: 1.0,
+                    omega,
+                };
+                Ok::<_, Infallible>(top.transition(element, h))
+            };
+            let found = unstable_intervals_of(matrix, 0.1..2.5).expect("smooth");
+            assert_eq!(found.len(), 1, "{element}, h = {h}: {found:?}");
+            let error = (found[0].end / limit(h * h).sqrt() - 1.0).abs();
+            assert!(
+                found[0].start == 0.1 && error < 1e-12,
+                "{element}, h = {h}: {error:e}"
+            );
+        }
+    }
+}
+
+/// (T-87), (T-88), (T-89) over σ: (Ω/Ω_c)².
+fn primal_2(s: f64) -> f64 {
+    1.0 + s / 12.0
+}
+
+fn primal_3(s: f64) -> f64 {
+    (1.0 + s / 12.0) * (1.0 + s / 60.0) / (1.0 + s / 10.0)
+}
+
+fn exact(_: f64) -> f64 {
+    1.0
 }

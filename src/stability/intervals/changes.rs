@@ -12,6 +12,9 @@ const LEAST_EXCESS: f64 = 1e-10;
 /// Roots closer than this, relative to their position, are one.
 const SAME_ROOT: f64 = 1e-12;
 
+/// Two changes nearer than this, relative to their position, are round-off that came and went.
+const SLIVER: f64 = 64.0 * f64::EPSILON;
+
 /// A place where stability may change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
@@ -121,7 +124,7 @@ where
         changes.retain(|&at| range.start < at && at < range.end);
         Ok(Verdict {
             unstable_at_start,
-            changes,
+            changes: without_slivers(changes),
         })
     }
 
@@ -249,4 +252,21 @@ where
             is_root: false,
         })
     }
+}
+
+/// Changes in ascending order without pairs that are as near as a few units in the last place.
+///
+/// Double eigenvalues of free coordinates, which round-off splits, and values near a pole give such pairs. The excess of a true radius is of the
+/// order of the width of its interval, so nothing is lost.
+fn without_slivers(changes: Vec<f64>) -> Vec<f64> {
+    let mut kept: Vec<f64> = Vec::with_capacity(changes.len());
+    for at in changes {
+        match kept.last() {
+            Some(last) if at - last <= SLIVER * at.abs().max(last.abs()) => {
+                kept.pop();
+            }
+            _ => kept.push(at),
+        }
+    }
+    kept
 }
