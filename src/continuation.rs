@@ -1,6 +1,6 @@
 //! Continuation of periodic orbits in one parameter: branches through folds, and the places where something happens on them.
 //!
-//! The unknowns are those of a periodic orbit ([`crate::periodic`]; `docs/theory.md`, (T-81)–(T-83)) and the parameter λ,
+//! The unknowns are those of a periodic orbit ([`crate::periodic`]; `docs/theory.md`, (T-81)–(T-83), (T-91)) and the parameter λ,
 //!
 //! ```text
 //! δy_{e+1} − A_e δy_e − C_e δ(T, λ) = r_e ,     y_E = y_0 ,     ⟨τ, u − u_0⟩ = s      (and a condition of phase if T is unknown)
@@ -14,7 +14,8 @@
 //! # Events
 //! Between two orbits a test function changes sign: dλ/ds at a fold, ∏ (μ + 1) at a period doubling, ∏ (μ_i μ_j − 1) where a pair goes
 //! through the unit circle, and the determinant of all equations where another branch crosses. Brent's method on the arc length, with the
-//! corrector at each trial, finds the place to round-off. The multipliers are those of [`crate::periodic_schur`].
+//! corrector at each trial, finds the place to round-off. Where another branch crosses the equations are singular, so the orbit there is that
+//! of a polynomial through solved orbits on both sides. The multipliers are those of [`crate::periodic_schur`].
 //!
 //! # Not guaranteed
 //! Two events of one kind between two points are not seen, nor are collisions of multipliers on the unit circle away from ±1 (conservative
@@ -32,7 +33,7 @@ mod events;
 mod follow;
 mod problem;
 
-pub use branch::{Branch, End, Event, Point};
+pub use branch::{Branch, End, Event, Point, Tangent};
 pub use error::{ContinuationError, ContinuationErrorKind};
 pub use events::EventKind;
 

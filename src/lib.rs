@@ -6,6 +6,7 @@ mod assembly;
 pub mod boundary;
 #[cfg(feature = "charts")]
 pub mod charts;
+pub mod continuation;
 mod csv;
 pub mod error;
 pub mod linearised;
@@ -17,6 +18,7 @@ pub mod stability;
 
 pub use assembly::{AssemblyError, MeshError};
 pub use boundary::{BoundaryMotion, BoundaryValue};
+pub use continuation::{Branch, Continuation};
 pub use error::{AtError, RunError, RunErrorKind};
 pub use linearised::Linearised;
 pub use motion::{Motion, Node, Outputs};
@@ -33,7 +35,7 @@ pub use tfe_runtime::{
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
     pub use crate::{
-        BoundaryValue, Element, EnergyConserving, Mixed, Model, Motion, Node,
+        BoundaryValue, Continuation, Element, EnergyConserving, Mixed, Model, Motion, Node,
         PeriodicOrbit, Primal, Radau, Simulation, Solve, State, dynamics, stability,
     };
 }

@@ -9,12 +9,12 @@
 //! a periodic Schur decomposition of the matrices of the elements ([`crate::periodic_schur`]), never from the product, so that a multiplier of
 //! 10⁻¹² keeps its digits beside one of 10¹².
 
-mod orbit;
+pub(crate) mod orbit;
 pub(crate) mod problem;
 
 pub use orbit::{Exponent, Orbit, Verdict};
 
-use crate::assembly::{Assembly, AssemblyError, Control, Curve, Mesh, MeshError};
+use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh, MeshError};
 use crate::error::RunErrorKind;
 use crate::motion::Motion;
 use crate::periodic_schur::PeriodicSchurError;
@@ -221,6 +221,14 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// # Errors
     /// [`OrbitError`]: what was asked for makes no sense, or there is no solution near the guess.
     pub fn solve(&self) -> Result<Orbit<'m, M, N>, OrbitError> {
+        let (problem, iterate, assembly) = self.solved()?;
+        let unfolded = problem.globals.contains(&Global::Unfolding);
+        let unfolding = unfolded.then_some(problem.unfolding);
+        Orbit::new(self.element, &problem, iterate, &assembly, unfolding)
+    }
+
+    /// The equations and their solution.
+    pub(crate) fn solved(&self) -> Result<Solved<'m, M, N>, OrbitError> {
         let period = self.checked_period()?;
         let autonomous = !M::FACTS.time_dependent;
         let conservative = autonomous && !M::FACTS.forced;
@@ -269,20 +277,13 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             .along(&problem, &curve, globals)
             .map_err(AssemblyError::Legendre)?;
         assembly.solve(&mut problem, &mut iterate, self.control)?;
-        if !(problem.period > 0.0) {
-            return Err(OrbitError::Period {
-                period: problem.period,
-            });
-        }
-        let unfolded = problem.globals.contains(&Global::Unfolding);
-        let unfolding = unfolded.then_some(problem.unfolding);
-        // Damping that takes a percent of the motion over a period is no discretization error.
-        if !(problem.unfolding.abs() * problem.period < 1e-2) {
-            return Err(OrbitError::NoFamily {
-                unfolding: problem.unfolding,
-            });
-        }
-        Orbit::new(self.element, &problem, iterate, &assembly, unfolding)
+        problem.check()?;
+        Ok((problem, iterate, assembly))
+    }
+
+    /// The element, and how a solution is iterated.
+    pub(crate) fn method(&self) -> (Element, Control) {
+        (self.element, self.control)
     }
 
     fn checked_period(&self) -> Result<f64, OrbitError> {
@@ -347,6 +348,9 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         Ok(energy)
     }
 }
+
+/// The equations of an orbit, their solution and the memory that it took.
+pub(crate) type Solved<'m, M, const N: usize> = (Periodic<'m, M, N>, Iterate<N>, Assembly<N>);
 
 /// Coordinates and velocities of a motion; its last ones beyond its end.
 pub(crate) fn along_motion<M: Model<N>, const N: usize>(

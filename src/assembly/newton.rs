@@ -51,6 +51,37 @@ pub(crate) struct Iterate<const N: usize> {
     pub(crate) globals: Vec<f64>,
 }
 
+impl<const N: usize> Iterate<N> {
+    /// All numbers times a factor.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        for node in &mut self.nodes {
+            node.q = node.q.map(|q| factor * q);
+            node.p = node.p.map(|p| factor * p);
+        }
+        for value in self.interiors.iter_mut().chain(&mut self.globals) {
+            *value *= factor;
+        }
+    }
+
+    /// This and `factor` times another.
+    #[must_use]
+    pub(crate) fn plus(&self, factor: f64, other: &Self) -> Self {
+        let mut sum = self.clone();
+        for (node, change) in sum.nodes.iter_mut().zip(&other.nodes) {
+            for a in 0..N {
+                node.q[a] += factor * change.q[a];
+                node.p[a] += factor * change.p[a];
+            }
+        }
+        let values = sum.interiors.iter_mut().chain(&mut sum.globals);
+        let changes = other.interiors.iter().chain(&other.globals);
+        for (value, change) in values.zip(changes) {
+            *value += factor * change;
+        }
+        sum
+    }
+}
+
 /// The largest of some values and of their corrections.
 #[derive(Clone, Copy, Default)]
 struct Largest {
@@ -217,9 +248,45 @@ impl<const N: usize> Assembly<N> {
         })
     }
 
-    /// The tool that linearises elements.
-    pub(crate) fn condenser(&self) -> &Condenser<N> {
-        &self.condenser
+    /// Lets each linearisation give the tangent as well: how the solution changes with the right side of the last equation over all nodes.
+    #[must_use]
+    pub(crate) fn with_tangent(mut self) -> Self {
+        let (globals, dense) = (self.directions.len(), self.dense);
+        self.chain = Chain::with_right_sides(2 * N, globals, self.elements, dense, 2);
+        if let Some(right) = self.chain.right_side_mut(1).dense.last_mut() {
+            *right = 1.0;
+        }
+        self
+    }
+
+    /// The tangent of the last linearisation, nodes, interiors and globals; see [`with_tangent`](Self::with_tangent).
+    pub(crate) fn tangent(&self) -> Iterate<N> {
+        let globals = self.chain.globals_of(1);
+        let (m, columns) = (self.condenser.interior(), 2 * N + globals.len() + 1);
+        let mut interiors = vec![0.0; self.elements * m];
+        let mut weights = Vec::with_capacity(columns);
+        for element in 0..self.elements {
+            let response = &self.responses[element * m * columns..(element + 1) * m * columns];
+            let interior = &mut interiors[element * m..(element + 1) * m];
+            weights.clear();
+            weights.extend_from_slice(self.chain.node_of(1, element));
+            weights.extend_from_slice(globals);
+            for (x, row) in interior.iter_mut().zip(response.chunks_exact(columns)) {
+                *x = inner(row, &weights);
+            }
+        }
+        let nodes = (0..=self.elements).map(|e| {
+            let (p, q) = self.chain.node_of(1, e).split_at(N);
+            State {
+                q: std::array::from_fn(|a| q[a]),
+                p: std::array::from_fn(|a| p[a]),
+            }
+        });
+        Iterate {
+            nodes: nodes.collect(),
+            interiors,
+            globals: globals.to_vec(),
+        }
     }
 
     /// Iterations so far.
@@ -376,12 +443,7 @@ impl<const N: usize> Assembly<N> {
             weights.extend_from_slice(globals);
             weights.push(1.0);
             for (x, row) in interior.iter_mut().zip(response.chunks_exact(columns)) {
-                let change: f64 = row
-                    .iter()
-                    .zip(&weights)
-                    .map(|(entry, weight)| entry * weight)
-                    .sum();
-                *x += fraction * change;
+                *x += fraction * inner(row, &weights);
             }
         }
         for (e, node) in iterate.nodes.iter_mut().enumerate() {
@@ -450,6 +512,11 @@ impl<const N: usize> Assembly<N> {
             self.linearise(problem, iterate)?;
         }
     }
+}
+
+/// Σ a b, as far as both go.
+fn inner(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Corrections below this one that no longer fall are round-off: a step from here would square them.

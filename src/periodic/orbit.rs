@@ -7,6 +7,7 @@ use crate::motion::{Motion, Node};
 use crate::periodic_schur::{self, Multiplier};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
+use std::fmt;
 use tfe_runtime::{Element, Model, State, Statistics};
 
 /// A periodic orbit with its Floquet multipliers; made by [`PeriodicOrbit`](super::PeriodicOrbit).
@@ -90,31 +91,45 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
         assembly: &Assembly<N>,
         unfolding: Option<f64>,
     ) -> Result<Self, OrbitError> {
-        let trivial = match (&problem.phase, unfolding) {
-            (None, _) => 0,
-            (Some(_), None) => 1,
-            (Some(_), Some(_)) => 2,
-        };
         let transitions = assembly.transitions().to_vec();
         let floquet = multipliers_of::<N>(&transitions)?;
-        Ok(Self {
-            solution: Solution {
-                model: problem.model,
-                element,
-                mesh: problem.mesh.clone(),
-                start: problem.start,
-                length: problem.period,
-                damping: problem.unfolding,
-                iterate,
-                transitions,
-                statistics: assembly.statistics(),
-            },
-            advance: problem.advance,
+        let solution = Solution {
+            model: problem.model,
+            element,
+            mesh: problem.mesh.clone(),
+            start: problem.start,
+            length: problem.period,
+            damping: problem.unfolding,
+            iterate,
+            transitions,
+            statistics: assembly.statistics(),
+        };
+        let trivial = problem.trivial();
+        Ok(Self::of_solution(
+            solution,
+            problem.advance,
+            floquet,
+            trivial,
+            unfolding,
+        ))
+    }
+
+    /// From a solved chain and its multipliers.
+    pub(crate) fn of_solution(
+        solution: Solution<'m, M, N>,
+        advance: [f64; N],
+        floquet: Vec<Multiplier>,
+        trivial: usize,
+        unfolding: Option<f64>,
+    ) -> Self {
+        Self {
+            solution,
+            advance,
             multipliers: floquet.iter().map(Multiplier::to_complex).collect(),
             floquet,
             trivial,
             unfolding,
-        })
+        }
     }
 
     /// The period T, as given or as found.
@@ -234,6 +249,52 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
     /// The motion over one period, with dense output: the polynomials of the elements.
     pub fn motion(&self) -> Motion<N> {
         self.solution.motion()
+    }
+}
+
+/// A summary: period, multipliers, verdict.
+///
+/// ```text
+/// periodic orbit: T = 4.4879895051, 40 elements, 5 iterations
+///   μ = 6.6539330e-2 + 6.3491730e-1 i, |μ| = 6.3839451e-1
+///   μ = 6.6539330e-2 − 6.3491730e-1 i, |μ| = 6.3839451e-1
+///   stable, margin 3.6e-1
+/// ```
+impl<M: Model<N>, const N: usize> fmt::Display for Orbit<'_, M, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "periodic orbit: T = {:.10}, {} elements, {} iterations",
+            self.period(),
+            self.solution.mesh.elements(),
+            self.statistics().newton_iterations
+        )?;
+        let trivial = self.trivial();
+        for (place, multiplier) in self.multipliers.iter().enumerate() {
+            let note = if trivial.contains(&place) {
+                ", trivial"
+            } else {
+                ""
+            };
+            let sign = match multiplier.im {
+                0.0 => {
+                    writeln!(f, "  μ = {:.7e}{note}", multiplier.re)?;
+                    continue;
+                }
+                im if im > 0.0 => '+',
+                _ => '−',
+            };
+            let (re, im, modulus) = (multiplier.re, multiplier.im.abs(), multiplier.norm());
+            writeln!(
+                f,
+                "  μ = {re:.7e} {sign} {im:.7e} i, |μ| = {modulus:.7e}{note}"
+            )?;
+        }
+        match self.verdict() {
+            Verdict::Stable { margin } => write!(f, "  stable, margin {margin:.1e}"),
+            Verdict::Neutral { .. } => write!(f, "  neutrally stable"),
+            Verdict::Unstable { margin } => write!(f, "  unstable, margin {margin:.1e}"),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The equations of a periodic orbit.
 
-use super::Phase;
+use super::{OrbitError, Phase};
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem};
 use tfe_runtime::condenser::Direction;
 use tfe_runtime::{LegendreError, Model, State, legendre};
@@ -35,6 +35,25 @@ impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
     /// How many equations run over all nodes.
     pub(crate) fn dense(&self) -> usize {
         usize::from(self.phase == Some(Phase::Orthogonal))
+    }
+
+    /// Whether a solution is an orbit.
+    pub(crate) fn check(&self) -> Result<(), OrbitError> {
+        let (period, unfolding) = (self.period, self.unfolding);
+        if !(period > 0.0) {
+            return Err(OrbitError::Period { period });
+        }
+        // Damping that takes a percent of the motion over a period is no discretization error.
+        if !(unfolding.abs() * period < 1e-2) {
+            return Err(OrbitError::NoFamily { unfolding });
+        }
+        Ok(())
+    }
+
+    /// How many multipliers are one: none of a forced orbit, one of an autonomous, two of a conservative one.
+    pub(crate) fn trivial(&self) -> usize {
+        let unfolded = self.globals.contains(&Global::Unfolding);
+        usize::from(self.phase.is_some()) * (1 + usize::from(unfolded))
     }
 }
 

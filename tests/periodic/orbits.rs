@@ -81,7 +81,7 @@ fn van_der_pol() {
         let orbit = limit_cycle(&model, element, elements);
         assert_relative(orbit.period(), number(&case["period"]), 1e-13);
         assert_relative(orbit.start().q[0], numbers(&case["initial"])[0], 1e-13);
-        assert_relative(orbit.multipliers()[1].re, 8.596_950_636_038_051_9e-4, 1e-11);
+        assert_relative(orbit.multipliers()[1].re, 8.596_950_636_038_052e-4, 1e-11);
         assert_multipliers(&orbit, &expected(&case), 1e-11);
         assert_eq!(orbit.trivial(), [0]);
         assert!(
@@ -144,6 +144,16 @@ fn forced_duffing() {
     assert_relative(orbit.start().p[0], initial[1], 1e-13);
     assert_multipliers(&orbit, &expected(&case), 1e-12);
     assert!(orbit.is_stable() && orbit.trivial().is_empty());
+    let text = orbit.to_string();
+    assert!(
+        text.starts_with("periodic orbit: T = 4.4879895051, 24 elements"),
+        "{text}"
+    );
+    assert!(
+        text.contains("μ = 6.6539330e-2 − 6.3491730e-1 i")
+            && text.ends_with("stable, margin 3.6e-1"),
+        "{text}"
+    );
     // e^{−δT} is shared by both.
     let exponents = orbit.exponents();
     assert!((exponents[0].growth + 0.1).abs() < 1e-13);

@@ -1,0 +1,225 @@
+//! Arc length along a branch, and the equations that fix a place on it.
+
+use crate::assembly::{DenseMut, Iterate};
+use crate::periodic::problem::{Global, Periodic};
+use tfe_runtime::State;
+
+/// The scalar product in which arc length is measured, in units of the parameter:
+///
+/// ```text
+/// ⟨a, b⟩ = λ_a λ_b + w² [ Σ_e h_e/T (q_a·q_b / Q² + p_a·p_b / P²)_e + T_a T_b / T² ]
+/// ```
+///
+/// with w the length of the range of λ and Q, P the largest coordinate and momentum so far. Where the branch starts at rest they say nothing, so
+/// they are at least a hundredth of |∂q/∂λ| w and |∂p/∂λ| w there. The part h_e/T of an element makes it a mean over time, whatever the mesh.
+#[derive(Clone, Debug)]
+pub(super) struct Metric {
+    /// The part of each node; none for the last, which is the first.
+    shares: Vec<f64>,
+    width: f64,
+    largest_p: f64,
+    largest_q: f64,
+    /// T, unless it is no unknown.
+    period: Option<f64>,
+}
+
+impl Metric {
+    /// From the first orbit and its derivative by the parameter.
+    pub(super) fn new<M, const N: usize>(
+        orbit: &Periodic<'_, M, N>,
+        width: f64,
+        start: &Iterate<N>,
+        derivative: &Iterate<N>,
+    ) -> Self {
+        let shares = (0..orbit.mesh.elements()).map(|e| orbit.mesh.share(e));
+        let [p, q] = largest(derivative);
+        let mut metric = Self {
+            shares: shares.chain([0.0]).collect(),
+            width,
+            largest_p: 1e-2 * width * p,
+            largest_q: 1e-2 * width * q,
+            period: (orbit.globals.first() == Some(&Global::Period)).then_some(orbit.period),
+        };
+        metric.grow(start);
+        metric
+    }
+
+    /// Takes one more orbit into account.
+    pub(super) fn grow<const N: usize>(&mut self, iterate: &Iterate<N>) {
+        let [p, q] = largest(iterate);
+        self.largest_p = self.largest_p.max(p);
+        self.largest_q = self.largest_q.max(q);
+    }
+
+    /// The weights of momenta and coordinates.
+    fn weights(&self) -> [f64; 2] {
+        [self.largest_p, self.largest_q].map(|largest| {
+            if largest > 0.0 {
+                (self.width / largest).powi(2)
+            } else {
+                0.0
+            }
+        })
+    }
+
+    /// The weight of the k-th of `globals` unknowns: a period, an unfolding, the parameter.
+    fn global(&self, k: usize, globals: usize) -> f64 {
+        if k + 1 == globals {
+            1.0
+        } else if k == 0 {
+            self.period
+                .map_or(0.0, |period| (self.width / period).powi(2))
+        } else {
+            0.0
+        }
+    }
+
+    /// b ↦ ⟨a, b⟩ as numbers to multiply b with.
+    fn dual<const N: usize>(&self, a: &Iterate<N>) -> (Vec<State<N>>, Vec<f64>) {
+        let [by_p, by_q] = self.weights();
+        let nodes = a.nodes.iter().zip(&self.shares);
+        let nodes = nodes.map(|(state, share)| State {
+            q: state.q.map(|q| share * by_q * q),
+            p: state.p.map(|p| share * by_p * p),
+        });
+        let globals = a.globals.iter().enumerate();
+        let globals = globals.map(|(k, value)| self.global(k, a.globals.len()) * value);
+        (nodes.collect(), globals.collect())
+    }
+
+    /// ⟨a, b⟩.
+    pub(super) fn product<const N: usize>(&self, a: &Iterate<N>, b: &Iterate<N>) -> f64 {
+        let (nodes, globals) = self.dual(a);
+        pair(&nodes, &globals, b)
+    }
+
+    /// a / √⟨a, a⟩.
+    pub(super) fn unit<const N: usize>(&self, mut a: Iterate<N>) -> Iterate<N> {
+        let norm = self.product(&a, &a).sqrt();
+        a.scale(1.0 / norm);
+        a
+    }
+
+    /// The place at an arc length from `base`, measured along the unit vector `tangent`.
+    pub(super) fn row<const N: usize>(
+        &self,
+        base: &Iterate<N>,
+        tangent: &Iterate<N>,
+        length: f64,
+    ) -> Row<N> {
+        let (nodes, globals) = self.dual(tangent);
+        let value = pair(&nodes, &globals, base) + length;
+        Row::Arc {
+            nodes,
+            globals,
+            value,
+        }
+    }
+}
+
+/// The largest momentum and the largest coordinate.
+fn largest<const N: usize>(iterate: &Iterate<N>) -> [f64; 2] {
+    let largest = |values: &dyn Fn(&State<N>) -> [f64; N]| {
+        let values = iterate.nodes.iter().flat_map(values);
+        values.fold(0.0_f64, |largest, value| largest.max(value.abs()))
+    };
+    [largest(&|state| state.p), largest(&|state| state.q)]
+}
+
+fn pair<const N: usize>(nodes: &[State<N>], globals: &[f64], b: &Iterate<N>) -> f64 {
+    let mut sum = 0.0;
+    for (weights, state) in nodes.iter().zip(&b.nodes) {
+        for a in 0..N {
+            sum += weights.p[a] * state.p[a] + weights.q[a] * state.q[a];
+        }
+    }
+    let globals = globals.iter().zip(&b.globals);
+    sum + globals.map(|(weight, value)| weight * value).sum::<f64>()
+}
+
+/// The branch between two orbits u₀ and u₁: the cubic with their tangents, in x = ⟨τ₀, u − u₀⟩ / ⟨τ₀, u₁ − u₀⟩ ∈ [0, 1].
+pub(super) struct Between<const N: usize> {
+    ends: [Iterate<N>; 2],
+    /// u₁ − u₀.
+    change: Iterate<N>,
+    /// du/dx.
+    slopes: [Iterate<N>; 2],
+    /// τ₀, of unit length.
+    tangent: Iterate<N>,
+    length: f64,
+}
+
+impl<const N: usize> Between<N> {
+    /// Between two orbits with their unit tangents.
+    pub(super) fn new(metric: &Metric, ends: [&Iterate<N>; 2], tangents: [&Iterate<N>; 2]) -> Self {
+        let change = ends[1].plus(-1.0, ends[0]);
+        let length = metric.product(tangents[0], &change);
+        let mut slopes = tangents.map(Clone::clone);
+        slopes[0].scale(length);
+        slopes[1].scale(length / metric.product(tangents[0], tangents[1]));
+        Self {
+            ends: ends.map(Clone::clone),
+            change,
+            slopes,
+            tangent: tangents[0].clone(),
+            length,
+        }
+    }
+
+    /// The cubic.
+    pub(super) fn guess(&self, x: f64) -> Iterate<N> {
+        let y = 1.0 - x;
+        self.ends[0]
+            .plus(x * x * (3.0 - 2.0 * x), &self.change)
+            .plus(x * y * y, &self.slopes[0])
+            .plus(-x * x * y, &self.slopes[1])
+    }
+
+    /// The equation of a place.
+    pub(super) fn row(&self, metric: &Metric, x: f64) -> Row<N> {
+        metric.row(&self.ends[0], &self.tangent, x * self.length)
+    }
+}
+
+/// The equation that says where on the branch an orbit is.
+#[derive(Clone, Debug)]
+pub(super) enum Row<const N: usize> {
+    /// λ = value.
+    Parameter(f64),
+    /// ⟨τ, u⟩ = value, the weights of ⟨τ, ·⟩ being given.
+    Arc {
+        nodes: Vec<State<N>>,
+        globals: Vec<f64>,
+        value: f64,
+    },
+}
+
+impl<const N: usize> Row<N> {
+    /// The equation, linearised at an iterate.
+    pub(super) fn write(&self, iterate: &Iterate<N>, dense: DenseMut<'_>) {
+        dense.nodes.fill(0.0);
+        dense.global.fill(0.0);
+        match self {
+            Self::Parameter(value) => {
+                if let (Some(weight), Some(parameter)) =
+                    (dense.global.last_mut(), iterate.globals.last())
+                {
+                    *weight = 1.0;
+                    *dense.right = value - parameter;
+                }
+            }
+            Self::Arc {
+                nodes,
+                globals,
+                value,
+            } => {
+                for (weights, state) in dense.nodes.chunks_exact_mut(2 * N).zip(nodes) {
+                    weights[..N].copy_from_slice(&state.p);
+                    weights[N..].copy_from_slice(&state.q);
+                }
+                dense.global.copy_from_slice(globals);
+                *dense.right = value - pair(nodes, globals, iterate);
+            }
+        }
+    }
+}

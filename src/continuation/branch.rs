@@ -1,0 +1,337 @@
+//! A branch of periodic orbits: what continuation found.
+
+use super::events::EventKind;
+use crate::assembly::{Iterate, Mesh, Solution};
+use crate::csv;
+use crate::periodic::{Orbit, Verdict};
+use crate::periodic_schur::Multiplier;
+use nalgebra::Complex;
+use std::fmt;
+use std::io;
+use std::path::Path;
+use tfe_runtime::{CoordinateName, Element, Model, State, Statistics};
+
+/// An orbit of a branch, in numbers.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Point<const N: usize> {
+    /// The parameter.
+    pub parameter: f64,
+    /// The period T.
+    pub period: f64,
+    /// The state at the start of the period.
+    pub start: State<N>,
+    /// Half the distance between the largest and the smallest value of each coordinate over the period, less what it grows in all.
+    ///
+    /// From nodes, three places inside each element, and a parabola through the largest three: six digits with a few dozen elements.
+    pub amplitudes: [f64; N],
+    /// The Floquet multipliers, the largest modulus first.
+    pub multipliers: Vec<Complex<f64>>,
+    /// The same as logarithms of the modulus and arguments.
+    pub floquet: Vec<Multiplier>,
+    /// The places of those that are always one, see [`Orbit::trivial`].
+    pub trivial: Vec<usize>,
+    /// Stability, from the others.
+    pub verdict: Verdict,
+    /// The direction of the branch.
+    pub tangent: Tangent<N>,
+    /// Iterations of Newton's method that the orbit took.
+    pub iterations: u32,
+}
+
+/// How an orbit changes along its branch, a unit of arc length s.
+///
+/// Off folds the derivatives by the parameter are the others divided by the first. For an autonomous model those of the start depend on the
+/// condition of phase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tangent<const N: usize> {
+    /// dλ/ds.
+    pub parameter: f64,
+    /// dT/ds.
+    pub period: f64,
+    /// d(q, p)/ds at the start of the period.
+    pub start: State<N>,
+}
+
+impl<const N: usize> Point<N> {
+    /// Whether neighbours stay near: the verdict is not unstable.
+    pub fn is_stable(&self) -> bool {
+        !matches!(self.verdict, Verdict::Unstable { .. })
+    }
+}
+
+/// A place where the branch turns, or where other orbits begin.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Event<const N: usize> {
+    /// What happens.
+    pub kind: EventKind,
+    /// The orbit there.
+    pub point: Point<N>,
+    /// The event lies between this place of [`Branch::points`] and the next.
+    pub after: usize,
+    /// How far the parameter is known: the size of the last interval in which the sign of the test function changed. Where another branch
+    /// crosses, the equations are singular; the orbit there is interpolated, and this is the difference of two interpolations.
+    pub width: f64,
+}
+
+/// How a branch ended without an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// At an end of the range; the last point lies exactly on it.
+    Range,
+    /// After as many points as were asked for.
+    Points,
+}
+
+/// What an orbit needs to be one again.
+#[derive(Clone)]
+pub(super) struct Member<M, const N: usize> {
+    pub(super) model: M,
+    pub(super) iterate: Iterate<N>,
+    pub(super) transitions: Vec<f64>,
+    pub(super) period: f64,
+    pub(super) unfolding: f64,
+}
+
+/// What all orbits of a branch have in common.
+#[derive(Clone, Debug)]
+pub(super) struct Frame<const N: usize> {
+    pub(super) element: Element,
+    pub(super) mesh: Mesh,
+    pub(super) start: f64,
+    pub(super) advance: [f64; N],
+    /// How many multipliers are one.
+    pub(super) trivial: usize,
+    /// Whether there is an unfolding force.
+    pub(super) unfolded: bool,
+}
+
+impl<const N: usize> Frame<N> {
+    /// An orbit.
+    pub(super) fn orbit<'b, M: Model<N>>(
+        &self,
+        member: &'b Member<M, N>,
+        floquet: Vec<Multiplier>,
+        iterations: u32,
+    ) -> Orbit<'b, M, N> {
+        let solution = Solution {
+            model: &member.model,
+            element: self.element,
+            mesh: self.mesh.clone(),
+            start: self.start,
+            length: member.period,
+            damping: member.unfolding,
+            iterate: member.iterate.clone(),
+            transitions: member.transitions.clone(),
+            statistics: Statistics {
+                iterations: iterations.into(),
+                newton_iterations: iterations.into(),
+                ..Statistics::NONE
+            },
+        };
+        let unfolding = self.unfolded.then_some(member.unfolding);
+        Orbit::of_solution(solution, self.advance, floquet, self.trivial, unfolding)
+    }
+}
+
+/// A branch of periodic orbits in one parameter, made by [`Continuation`](super::Continuation).
+///
+/// It holds a clone of the model at each of its points.
+#[derive(Clone)]
+pub struct Branch<M, const N: usize> {
+    pub(super) parameter: &'static str,
+    pub(super) frame: Option<Frame<N>>,
+    pub(super) points: Vec<Point<N>>,
+    pub(super) events: Vec<Event<N>>,
+    pub(super) members: Vec<Member<M, N>>,
+    pub(super) event_members: Vec<Member<M, N>>,
+    pub(super) end: Option<End>,
+    pub(super) statistics: Statistics,
+}
+
+impl<M: Model<N>, const N: usize> Branch<M, N> {
+    /// A branch without points.
+    pub(super) fn new(parameter: &'static str) -> Self {
+        Self {
+            parameter,
+            frame: None,
+            points: Vec::new(),
+            events: Vec::new(),
+            members: Vec::new(),
+            event_members: Vec::new(),
+            end: None,
+            statistics: Statistics::NONE,
+        }
+    }
+
+    /// The orbits, in order along the branch; the first is that of the model as given.
+    pub fn points(&self) -> &[Point<N>] {
+        &self.points
+    }
+
+    /// Folds, period doublings, tori and other branches, in order along the branch.
+    pub fn events(&self) -> &[Event<N>] {
+        &self.events
+    }
+
+    /// The events of one kind.
+    pub fn events_of(&self, kind: EventKind) -> impl Iterator<Item = &Event<N>> {
+        self.events.iter().filter(move |event| event.kind == kind)
+    }
+
+    /// How the branch ended; `None` where an error cut it short.
+    pub fn end(&self) -> Option<End> {
+        self.end
+    }
+
+    /// The name of the parameter.
+    pub fn parameter(&self) -> &'static str {
+        self.parameter
+    }
+
+    /// The orbit at a point, with its motion and its matrices; `None` beyond the last.
+    pub fn orbit(&self, point: usize) -> Option<Orbit<'_, M, N>> {
+        let (frame, point, member) = (
+            self.frame.as_ref()?,
+            self.points.get(point)?,
+            self.members.get(point)?,
+        );
+        Some(frame.orbit(member, point.floquet.clone(), point.iterations))
+    }
+
+    /// The orbit at an event.
+    pub fn event_orbit(&self, event: usize) -> Option<Orbit<'_, M, N>> {
+        let (frame, event, member) = (
+            self.frame.as_ref()?,
+            self.events.get(event)?,
+            self.event_members.get(event)?,
+        );
+        let point = &event.point;
+        Some(frame.orbit(member, point.floquet.clone(), point.iterations))
+    }
+
+    /// The model at a point.
+    pub fn model(&self, point: usize) -> Option<&M> {
+        self.members.get(point).map(|member| &member.model)
+    }
+
+    /// The model at an event.
+    pub fn event_model(&self, event: usize) -> Option<&M> {
+        self.event_members.get(event).map(|member| &member.model)
+    }
+
+    /// What the branch cost, with its events.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// Writes the points as CSV with a header line: parameter, period, amplitudes, multipliers (real and imaginary parts), and 1 where stable,
+    /// else 0. Numbers read back exactly.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn write_csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        let mut header = vec![self.parameter.to_owned(), "period".to_owned()];
+        let names: Vec<CoordinateName> = (0..N).map(M::coordinate_name).collect();
+        header.extend(names.iter().map(|name| format!("amplitude_{name}")));
+        for k in 1..=2 * N {
+            header.extend([format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
+        }
+        header.push("stable".to_owned());
+        let rows = self.points.iter().map(|point| {
+            let mut row = vec![point.parameter, point.period];
+            row.extend(point.amplitudes);
+            row.extend(point.multipliers.iter().flat_map(|one| [one.re, one.im]));
+            row.push(if point.is_stable() { 1.0 } else { 0.0 });
+            row
+        });
+        csv::write(path.as_ref(), &header, rows)
+    }
+}
+
+impl<M, const N: usize> fmt::Debug for Branch<M, N> {
+    /// The extent of the branch, not its thousands of numbers.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parameter = |point: &Point<N>| point.parameter;
+        let events = self.events.iter();
+        let events: Vec<_> = events
+            .map(|event| (event.kind, event.point.parameter))
+            .collect();
+        f.debug_struct("Branch")
+            .field("parameter", &self.parameter)
+            .field("first", &self.points.first().map(parameter))
+            .field("last", &self.points.last().map(parameter))
+            .field("points", &self.points.len())
+            .field("events", &events)
+            .field("end", &self.end)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Half the range of each coordinate over the period of an orbit, less its steady growth.
+pub(super) fn amplitudes<M: Model<N>, const N: usize>(orbit: &Orbit<'_, M, N>) -> [f64; N] {
+    let motion = orbit.motion();
+    let (start, period) = (orbit.solution.start, orbit.period());
+    let mut samples: Vec<(f64, [f64; N])> = Vec::new();
+    for pair in motion.states().windows(2) {
+        for part in 0..SAMPLES {
+            let t = pair[0].t + (pair[1].t - pair[0].t) * f64::from(part) / f64::from(SAMPLES);
+            let mut q = motion.at(t).unwrap_or(pair[0]).q;
+            for a in 0..N {
+                q[a] -= orbit.advance[a] * (t - start) / period;
+            }
+            samples.push((t, q));
+        }
+    }
+    std::array::from_fn(|a| {
+        let values: Vec<(f64, f64)> = samples.iter().map(|(t, q)| (*t, q[a])).collect();
+        let negated: Vec<(f64, f64)> = values.iter().map(|(t, q)| (*t, -q)).collect();
+        0.5 * (largest(&values, period) + largest(&negated, period))
+    })
+}
+
+/// Places in an element, its first node included.
+const SAMPLES: u32 = 4;
+
+/// The largest value of a periodic function given at ascending places: the top of the parabola through the largest value and its neighbours.
+fn largest(values: &[(f64, f64)], period: f64) -> f64 {
+    let by_value = |a: &usize, b: &usize| values[*a].1.total_cmp(&values[*b].1);
+    let Some(top) = (0..values.len()).max_by(by_value) else {
+        return f64::NAN;
+    };
+    let (t, value) = values[top];
+    let (before, after) = (
+        (top + values.len() - 1) % values.len(),
+        (top + 1) % values.len(),
+    );
+    let distance = |from: f64, to: f64| (to - from).rem_euclid(period);
+    let (left, right) = (distance(values[before].0, t), distance(t, values[after].0));
+    let (rise, fall) = (value - values[before].1, values[after].1 - value);
+    let curvature = (fall / right - rise / left) / (left + right);
+    let slope = rise / left + curvature * left;
+    if curvature < 0.0 {
+        value - slope * slope / (4.0 * curvature)
+    } else {
+        value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_top_of_a_parabola_is_exact_also_across_the_period() {
+        // 1 − (t − 0.05)² in the neighbourhood of t = 0, with period 1 and uneven places.
+        let value = |t: f64| 1.0 - (t - 0.05) * (t - 0.05);
+        let values = [
+            (0.0, value(0.0)),
+            (0.2, value(0.2)),
+            (0.5, 0.3),
+            (0.9, value(-0.1)),
+        ];
+        assert!((largest(&values, 1.0) - 1.0).abs() < 1e-15);
+        assert_eq!(largest(&[(0.0, 2.0), (0.5, 2.0)], 1.0), 2.0);
+    }
+}

@@ -1,0 +1,170 @@
+//! Why a branch could not be followed.
+
+use super::branch::Branch;
+use crate::periodic::OrbitError;
+use std::error::Error;
+use std::fmt;
+use tfe_runtime::Model;
+
+/// Why continuation stopped.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ContinuationErrorKind {
+    /// No parameter was chosen.
+    NoParameter,
+    /// The model has no derivative by the parameter.
+    NoSensitivity {
+        /// Those by which it has.
+        known: &'static [&'static str],
+    },
+    /// No range was given.
+    NoRange,
+    /// The range is not finite or does not hold the value that the model has, before its end.
+    Range {
+        /// Its start.
+        start: f64,
+        /// Its end.
+        end: f64,
+        /// The value of the model.
+        value: f64,
+    },
+    /// The steps are not positive and finite, or the smallest is larger than the largest.
+    Steps {
+        /// The first step.
+        step: f64,
+        /// The smallest one.
+        smallest: f64,
+        /// The largest one.
+        largest: f64,
+    },
+    /// There is no orbit at the start.
+    Start(OrbitError),
+    /// The smallest step was still too long.
+    Step {
+        /// The parameter of the last orbit.
+        parameter: f64,
+        /// The step that failed.
+        step: f64,
+        /// Why; `None` if the branch turned too much.
+        source: Option<OrbitError>,
+    },
+}
+
+impl From<OrbitError> for ContinuationErrorKind {
+    fn from(error: OrbitError) -> Self {
+        Self::Start(error)
+    }
+}
+
+impl fmt::Display for ContinuationErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoParameter => {
+                f.write_str("no parameter: give `.parameter(|model| &mut model.omega)`")
+            }
+            Self::NoSensitivity { known } => {
+                f.write_str(
+                    "the model has no derivative by this parameter: add `sensitivity(name)` to its `#[dynamics(...)]`",
+                )?;
+                match known {
+                    [] => Ok(()),
+                    known => write!(f, "; it has those by {}", known.join(", ")),
+                }
+            }
+            Self::NoRange => f.write_str("no range of the parameter: give `.range(0.3..2.5)`"),
+            Self::Range { start, end, value } => write!(
+                f,
+                "the range {start}..{end} must be finite and hold the value {value} of the model, before its end"
+            ),
+            Self::Steps {
+                step,
+                smallest,
+                largest,
+            } => write!(
+                f,
+                "the steps (first {step}, smallest {smallest}, largest {largest}) must be positive and finite, the smallest below the largest"
+            ),
+            Self::Start(error) => write!(f, "no orbit at the start of the branch: {error}"),
+            Self::Step {
+                parameter,
+                step,
+                source,
+            } => {
+                write!(
+                    f,
+                    "the branch cannot be followed beyond the parameter {parameter} with a step of {step:.1e}: "
+                )?;
+                match source {
+                    Some(error) => error.fmt(f),
+                    None => f.write_str("it turns too much"),
+                }
+            }
+        }
+    }
+}
+
+impl Error for ContinuationErrorKind {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Start(error) => Some(error),
+            Self::Step { source, .. } => source.as_ref().map(|error| error as _),
+            _ => None,
+        }
+    }
+}
+
+/// A branch that stopped before its end: why, and the branch so far.
+#[derive(Clone)]
+pub struct ContinuationError<M, const N: usize> {
+    kind: ContinuationErrorKind,
+    partial: Box<Branch<M, N>>,
+}
+
+impl<M: Model<N>, const N: usize> ContinuationError<M, N> {
+    pub(super) fn new(kind: ContinuationErrorKind, partial: Branch<M, N>) -> Self {
+        Self {
+            kind,
+            partial: Box::new(partial),
+        }
+    }
+
+    /// Why it stopped.
+    pub fn kind(&self) -> &ContinuationErrorKind {
+        &self.kind
+    }
+
+    /// The branch so far; without points where it never began.
+    pub fn partial(&self) -> &Branch<M, N> {
+        &self.partial
+    }
+
+    /// The branch so far, by value.
+    pub fn into_partial(self) -> Branch<M, N> {
+        *self.partial
+    }
+}
+
+impl<M, const N: usize> fmt::Debug for ContinuationError<M, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ContinuationError")
+            .field("kind", &self.kind)
+            .field("partial", &self.partial)
+            .finish()
+    }
+}
+
+impl<M, const N: usize> fmt::Display for ContinuationError<M, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.kind.fmt(f)?;
+        if self.partial.points.is_empty() {
+            return Ok(());
+        }
+        write!(f, "; the branch so far is in `partial()`")
+    }
+}
+
+impl<M, const N: usize> Error for ContinuationError<M, N> {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.kind.source()
+    }
+}

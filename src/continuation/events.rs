@@ -1,0 +1,254 @@
+//! Functions of an orbit that change sign where something happens on its branch.
+
+use crate::periodic_schur::Multiplier;
+use nalgebra::Complex;
+
+/// What happens at a place of a branch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum EventKind {
+    /// The branch turns back in the parameter; a multiplier goes through +1.
+    Fold,
+    /// A real multiplier goes through −1: a branch of orbits of twice the period begins.
+    PeriodDoubling,
+    /// A complex pair goes through the unit circle: an invariant torus begins (Neimark and Sacker).
+    Torus,
+    /// A real multiplier goes through +1 and the branch does not turn: another branch of the same period crosses or forks off.
+    Branch,
+}
+
+impl EventKind {
+    /// All of them.
+    pub(super) const ALL: [Self; 4] = [Self::Fold, Self::PeriodDoubling, Self::Torus, Self::Branch];
+}
+
+/// What the test functions of an orbit are made of.
+pub(super) struct Circumstances<'a> {
+    /// The parameter's part of the unit tangent.
+    pub(super) slope: f64,
+    /// The sign of the determinant of the equations with an equation of arc length.
+    pub(super) sign: f64,
+    /// The multipliers.
+    pub(super) floquet: &'a [Multiplier],
+    /// The places of those that are always one.
+    pub(super) trivial: &'a [usize],
+    /// Whether multipliers come in pairs μ, 1/μ, which are on the circle together.
+    pub(super) symplectic: bool,
+}
+
+/// The test functions of an orbit:
+///
+/// ```text
+/// fold             dλ/ds
+/// period doubling  ∏ (μ_i + 1) / (|μ_i| + 1)
+/// torus            ∏_{i<j} (μ_i μ_j − 1) / (|μ_i μ_j| + 1)
+/// branch           ±∏ (μ_i − 1) / (|μ_i| + 1) ,   the sign that of the determinant of all equations
+/// ```
+///
+/// over the multipliers that are not trivial. The denominators keep the functions bounded and have no zeros. The determinant changes
+/// sign where branches cross, not at folds, where the product does; only together do they tell the two apart and show by how much.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tests {
+    values: [f64; 4],
+}
+
+impl Tests {
+    pub(super) fn new(at: &Circumstances<'_>) -> Self {
+        let others: Vec<Multiplier> = (0..at.floquet.len())
+            .filter(|place| !at.trivial.contains(place))
+            .map(|place| at.floquet[place])
+            .collect();
+        let shifted = |by: f64| -> f64 {
+            let factors = others
+                .iter()
+                .map(|one| beside(one.log_modulus, unit(one), by));
+            factors.product::<Complex<f64>>().re
+        };
+        let torus = if at.symplectic {
+            1.0
+        } else {
+            pairs(&others)
+                .map(|(one, other)| product_beside_one(one, other))
+                .product::<Complex<f64>>()
+                .re
+        };
+        Self {
+            values: [at.slope, shifted(-1.0), torus, at.sign * shifted(1.0).abs()],
+        }
+    }
+
+    /// The value of the test function of an event.
+    pub(super) fn value(&self, kind: EventKind) -> f64 {
+        self.values[kind as usize]
+    }
+
+    /// The events between two orbits: test functions that have changed sign, from and to values beyond round-off.
+    pub(super) fn changes(&self, next: &Self) -> impl Iterator<Item = EventKind> {
+        let (before, after) = (*self, *next);
+        EventKind::ALL.into_iter().filter(move |kind| {
+            let (before, after) = (before.value(*kind), after.value(*kind));
+            before * after < 0.0 && before.abs() > ROUND_OFF && after.abs() > ROUND_OFF
+        })
+    }
+}
+
+/// A function that vanishes identically, because multipliers are tied to each other, is not larger than this.
+const ROUND_OFF: f64 = 1e-9;
+
+/// Whether a zero of the test function of tori is one: the pair with product one is complex. Two real multipliers μ, 1/μ mean nothing.
+pub(super) fn is_torus(floquet: &[Multiplier], trivial: &[usize]) -> bool {
+    let others: Vec<Multiplier> = (0..floquet.len())
+        .filter(|place| !trivial.contains(place))
+        .map(|place| floquet[place])
+        .collect();
+    let nearest = pairs(&others).min_by(|(a, b), (c, d)| {
+        let (first, second) = (product_beside_one(a, b), product_beside_one(c, d));
+        first.norm().total_cmp(&second.norm())
+    });
+    nearest.is_some_and(|(one, _)| unit(one).im != 0.0)
+}
+
+fn pairs(multipliers: &[Multiplier]) -> impl Iterator<Item = (&Multiplier, &Multiplier)> {
+    let rest = |i: usize| multipliers.iter().skip(i + 1);
+    let firsts = multipliers.iter().enumerate();
+    firsts.flat_map(move |(i, one)| rest(i).map(move |other| (one, other)))
+}
+
+/// μ / |μ|, real where μ is.
+fn unit(multiplier: &Multiplier) -> Complex<f64> {
+    Multiplier {
+        log_modulus: 0.0,
+        argument: multiplier.argument,
+    }
+    .to_complex()
+}
+
+/// (μ − σ) / (|μ| + 1), also where |μ| is no `f64`.
+fn beside(log_modulus: f64, unit: Complex<f64>, sigma: f64) -> Complex<f64> {
+    let small = (-log_modulus.abs()).exp();
+    let difference = if log_modulus > 0.0 {
+        unit - sigma * small
+    } else {
+        unit * small - sigma
+    };
+    difference / (1.0 + small)
+}
+
+fn product_beside_one(one: &Multiplier, other: &Multiplier) -> Complex<f64> {
+    let log_modulus = one.log_modulus + other.log_modulus;
+    beside(log_modulus, unit(one) * unit(other), 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn multiplier(modulus: f64, argument: f64) -> Multiplier {
+        Multiplier {
+            log_modulus: modulus.ln(),
+            argument,
+        }
+    }
+
+    fn at(slope: f64, floquet: &[Multiplier]) -> Tests {
+        // The determinant by the parameter fixed has the sign of ∏ (μ − 1); the one by arc length that over the slope.
+        let product: f64 = floquet
+            .iter()
+            .map(|one| {
+                if one.argument == 0.0 {
+                    one.modulus() - 1.0
+                } else {
+                    1.0
+                }
+            })
+            .product();
+        Tests::new(&Circumstances {
+            slope,
+            sign: product.signum() * slope.signum(),
+            floquet,
+            trivial: &[],
+            symplectic: false,
+        })
+    }
+
+    #[track_caller]
+    fn check(before: &Tests, after: &Tests, expected: &[EventKind]) {
+        let found: Vec<EventKind> = before.changes(after).collect();
+        assert_eq!(found, expected);
+        let back: Vec<EventKind> = after.changes(before).collect();
+        assert_eq!(back, expected);
+    }
+
+    #[test]
+    fn each_crossing_is_one_event() {
+        let fixed = multiplier(0.3, 0.0);
+        let inside = at(1.0, &[multiplier(0.9, 0.0), fixed]);
+        let outside = [multiplier(1.1, 0.0), fixed];
+        check(&inside, &at(-1.0, &outside), &[EventKind::Fold]);
+        check(&inside, &at(1.0, &outside), &[EventKind::Branch]);
+        check(
+            &at(1.0, &[multiplier(0.9, PI), fixed]),
+            &at(1.0, &[multiplier(1.1, PI), fixed]),
+            &[EventKind::PeriodDoubling],
+        );
+        let pair = |modulus| {
+            at(
+                1.0,
+                &[multiplier(modulus, 0.7), multiplier(modulus, -0.7), fixed],
+            )
+        };
+        check(&pair(0.9), &pair(1.1), &[EventKind::Torus]);
+    }
+
+    #[test]
+    fn multipliers_that_meet_off_the_circle_are_no_event() {
+        let both =
+            |a: (f64, f64), b: (f64, f64)| at(1.0, &[multiplier(a.0, a.1), multiplier(b.0, b.1)]);
+        let complex = both((0.5, 0.1), (0.5, -0.1));
+        check(&complex, &both((0.6, 0.0), (0.4, 0.0)), &[]);
+        let complex = both((1.5, 3.0), (1.5, -3.0));
+        check(&complex, &both((1.6, PI), (1.4, PI)), &[]);
+    }
+
+    #[test]
+    fn two_real_multipliers_with_product_one_are_no_torus() {
+        let before = at(1.0, &[multiplier(2.0, 0.0), multiplier(0.4, 0.0)]);
+        let after = at(1.0, &[multiplier(2.0, 0.0), multiplier(0.6, 0.0)]);
+        check(&before, &after, &[EventKind::Torus]);
+        let real = [multiplier(2.0, 0.0), multiplier(0.5, 0.0)];
+        assert!(!is_torus(&real, &[]));
+        let complex = [multiplier(1.0, 0.4), multiplier(1.0, -0.4)];
+        assert!(is_torus(&complex, &[]));
+        // Beside the trivial multiplier, a conjugate pair.
+        let cycle = [
+            multiplier(1.0, 0.4),
+            multiplier(1.0, -0.4),
+            multiplier(1.0, 0.0),
+        ];
+        assert!(is_torus(&cycle, &[2]));
+    }
+
+    #[test]
+    fn what_vanishes_identically_is_no_event() {
+        // The product of an undamped, forced pair is one up to round-off, on either side.
+        let pair = |noise: f64| at(1.0, &[multiplier(1.0 + noise, 0.4), multiplier(1.0, -0.4)]);
+        check(&pair(1e-14), &pair(-1e-14), &[]);
+    }
+
+    #[test]
+    fn huge_and_vanishing_multipliers_stay_finite() {
+        for log_modulus in [1e4, -1e4, f64::NEG_INFINITY] {
+            let extreme = Multiplier {
+                log_modulus,
+                argument: 0.0,
+            };
+            let tests = at(1.0, &[extreme, multiplier(0.5, 0.0)]);
+            assert!(
+                EventKind::ALL
+                    .iter()
+                    .all(|kind| tests.value(*kind).is_finite())
+            );
+        }
+    }
+}

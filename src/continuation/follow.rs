@@ -1,0 +1,552 @@
+//! Following a branch: predictor, corrector, length of steps, and the search for events between two orbits.
+
+use super::arc::{Between, Metric, Row};
+use super::branch::{Branch, End, Event, Frame, Member, Point, Tangent, amplitudes};
+use super::error::ContinuationErrorKind;
+use super::events::{Circumstances, EventKind, Tests, is_torus};
+use super::problem::Continued;
+use crate::assembly::{Assembly, AssemblyError, Control, Iterate, Problem};
+use crate::periodic::OrbitError;
+use crate::periodic::orbit::{multipliers_of, trivial_of};
+use crate::periodic::problem::Global;
+use crate::periodic_schur::Multiplier;
+use crate::stability::chebyshev::bracketed_root;
+use std::ops::Range;
+use tfe_runtime::{Element, Model};
+
+/// The lengths of steps, in arc length.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Steps {
+    pub(super) first: f64,
+    pub(super) smallest: f64,
+    pub(super) largest: f64,
+}
+
+/// Where a branch goes.
+#[derive(Clone, Debug)]
+pub(super) struct Course {
+    pub(super) range: Range<f64>,
+    pub(super) steps: Steps,
+    pub(super) max_points: usize,
+}
+
+impl Course {
+    /// The end of the range that a parameter is beyond, if any.
+    fn left(&self, parameter: f64) -> Option<f64> {
+        let (low, high) = (
+            self.range.start.min(self.range.end),
+            self.range.start.max(self.range.end),
+        );
+        if parameter < low {
+            Some(low)
+        } else if parameter > high {
+            Some(high)
+        } else {
+            None
+        }
+    }
+}
+
+/// An orbit with what is needed to go on from it.
+#[derive(Clone)]
+struct Solved<M, const N: usize> {
+    member: Member<M, N>,
+    floquet: Vec<Multiplier>,
+    /// Of unit length.
+    tangent: Iterate<N>,
+    /// dT/dλ, where the period is a function of the parameter.
+    rate: f64,
+    tests: Tests,
+    iterations: u32,
+}
+
+impl<M, const N: usize> Solved<M, N> {
+    fn parameter(&self) -> f64 {
+        let globals = &self.member.iterate.globals;
+        globals.last().copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// A step that was taken.
+struct Step<M, const N: usize> {
+    next: Solved<M, N>,
+    /// The cosine of the angle between the tangents.
+    turn: f64,
+    /// Whether an end of the range is reached.
+    ended: bool,
+}
+
+/// An event.
+struct Located<M, const N: usize> {
+    /// How much of the way between two points it is.
+    part: f64,
+    solved: Solved<M, N>,
+    /// How far the parameter is known.
+    width: f64,
+}
+
+/// A branch that is being followed.
+pub(super) struct Follower<'c, M, const N: usize> {
+    problem: Continued<'c, M, N>,
+    assembly: Assembly<N>,
+    control: Control,
+    course: Course,
+    metric: Metric,
+    frame: Frame<N>,
+    last: Solved<M, N>,
+}
+
+impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
+    /// At the first orbit, about which the iterate is already right, up to a tolerance.
+    pub(super) fn start(
+        mut problem: Continued<'c, M, N>,
+        mut iterate: Iterate<N>,
+        (element, control): (Element, Control),
+        course: Course,
+    ) -> Result<Self, OrbitError> {
+        let elements = problem.orbit.mesh.elements();
+        let (globals, dense) = (iterate.globals.len() + 1, problem.orbit.dense() + 1);
+        let mut assembly = Assembly::new::<M>(element, elements, globals, dense)
+            .map_err(|error| OrbitError::Assembly(error.into()))?
+            .with_tangent();
+        let parameter = problem.parameter();
+        iterate.globals.push(parameter);
+        problem.row = Row::Parameter(parameter);
+        assembly.solve(&mut problem, &mut iterate, control)?;
+        problem.orbit.check()?;
+        let derivative = assembly.tangent();
+        let metric = Metric::new(&problem.orbit, problem.width, &iterate, &derivative);
+        let mut tangent = metric.unit(derivative);
+        if course.range.end < parameter {
+            tangent.scale(-1.0);
+        }
+        let frame = Frame {
+            element,
+            mesh: problem.orbit.mesh.clone(),
+            start: problem.orbit.start,
+            advance: problem.orbit.advance,
+            trivial: problem.orbit.trivial(),
+            unfolded: problem.orbit.globals.contains(&Global::Unfolding),
+        };
+        let last = solved(&problem, &assembly, iterate, tangent, assembly.iterations())?;
+        Ok(Self {
+            problem,
+            assembly,
+            // A step that needs more is too long.
+            control: Control {
+                max_iterations: MOST_ITERATIONS,
+                ..control
+            },
+            course,
+            metric,
+            frame,
+            last,
+        })
+    }
+
+    /// Follows the branch to its end.
+    pub(super) fn run(
+        mut self,
+        branch: &mut Branch<M, N>,
+        mut progress: Progress,
+    ) -> Result<(), ContinuationErrorKind> {
+        branch.frame = Some(self.frame.clone());
+        self.record(branch);
+        // The first step is one of the parameter.
+        let slope = self.last.tests.value(EventKind::Fold).abs();
+        let Steps {
+            first,
+            smallest,
+            largest,
+        } = self.course.steps;
+        let mut step = (first / slope.max(1e-2)).clamp(smallest, largest);
+        while branch.points.len() < self.course.max_points {
+            let taken = match self.step(step) {
+                Ok(taken) => taken,
+                Err(_) if step > smallest => {
+                    step = (0.5 * step).max(smallest);
+                    continue;
+                }
+                Err(source) => {
+                    branch.statistics = self.assembly.statistics();
+                    return Err(ContinuationErrorKind::Step {
+                        parameter: self.last.parameter(),
+                        step,
+                        source,
+                    });
+                }
+            };
+            self.find_events(&taken.next, branch);
+            let iterations = taken.next.iterations;
+            self.accept(taken.next);
+            self.record(branch);
+            progress.show(branch.points.len(), self.last.parameter());
+            if taken.ended {
+                branch.end = Some(End::Range);
+                break;
+            }
+            step = adapted(step, iterations, taken.turn).clamp(smallest, largest);
+        }
+        branch.statistics = self.assembly.statistics();
+        branch.end = branch.end.or(Some(End::Points));
+        Ok(())
+    }
+
+    /// Appends the last orbit to the branch.
+    fn record(&self, branch: &mut Branch<M, N>) {
+        branch.points.push(self.point(&self.last));
+        branch.members.push(self.last.member.clone());
+    }
+
+    fn point(&self, solved: &Solved<M, N>) -> Point<N> {
+        let orbit = self
+            .frame
+            .orbit(&solved.member, solved.floquet.clone(), solved.iterations);
+        Point {
+            parameter: solved.parameter(),
+            period: orbit.period(),
+            start: orbit.start(),
+            amplitudes: amplitudes(&orbit),
+            multipliers: orbit.multipliers().to_vec(),
+            floquet: solved.floquet.clone(),
+            trivial: orbit.trivial(),
+            verdict: orbit.verdict(),
+            tangent: self.tangent(solved),
+            iterations: solved.iterations,
+        }
+    }
+
+    fn tangent(&self, solved: &Solved<M, N>) -> Tangent<N> {
+        let along = &solved.tangent;
+        let parameter = along.globals.last().copied().unwrap_or(f64::NAN);
+        let unknown = self.problem.orbit.globals.first() == Some(&Global::Period);
+        Tangent {
+            parameter,
+            period: if unknown {
+                along.globals[0]
+            } else {
+                solved.rate * parameter
+            },
+            start: along.nodes[0],
+        }
+    }
+
+    /// Goes on from an orbit.
+    fn accept(&mut self, next: Solved<M, N>) {
+        self.last = next;
+        self.metric.grow(&self.last.member.iterate);
+        // The length of a vector has changed.
+        self.last.tangent = self.metric.unit(self.last.tangent.clone());
+    }
+
+    /// The orbit at an arc length from the last one, or at the end of the range before it. Without an error the branch turned too much.
+    fn step(&mut self, length: f64) -> Result<Step<M, N>, Option<OrbitError>> {
+        let last = &self.last;
+        let guess = last.member.iterate.plus(length, &last.tangent);
+        let row = self.metric.row(&last.member.iterate, &last.tangent, length);
+        let (next, turn) = self.correct(guess, row)?;
+        if turn < MOST_TURN {
+            return Err(None);
+        }
+        let Some(bound) = self.course.left(next.parameter()) else {
+            return Ok(Step {
+                next,
+                turn,
+                ended: false,
+            });
+        };
+        let last = &self.last.member.iterate;
+        let part = (bound - self.last.parameter()) / (next.parameter() - self.last.parameter());
+        let change = next.member.iterate.plus(-1.0, last);
+        let (next, turn) = self.correct(last.plus(part, &change), Row::Parameter(bound))?;
+        if turn < MOST_TURN {
+            return Err(None);
+        }
+        Ok(Step {
+            next,
+            turn,
+            ended: true,
+        })
+    }
+
+    /// Newton's method from a guess; the solution, and the cosine of the angle between its tangent and the last one.
+    fn correct(
+        &mut self,
+        mut iterate: Iterate<N>,
+        row: Row<N>,
+    ) -> Result<(Solved<M, N>, f64), OrbitError> {
+        self.problem.row = row;
+        let before = self.assembly.iterations();
+        self.assembly
+            .solve(&mut self.problem, &mut iterate, self.control)?;
+        self.problem.orbit.check()?;
+        if let (Row::Parameter(value), Some(parameter)) =
+            (&self.problem.row, iterate.globals.last_mut())
+        {
+            // Exactly, not up to round-off.
+            *parameter = *value;
+            self.problem.set_globals(&iterate.globals);
+        }
+        let mut tangent = self.metric.unit(self.assembly.tangent());
+        let mut turn = self.metric.product(&tangent, &self.last.tangent);
+        if turn < 0.0 {
+            tangent.scale(-1.0);
+            turn = -turn;
+        }
+        let iterations = self.assembly.iterations() - before;
+        let solved = solved(&self.problem, &self.assembly, iterate, tangent, iterations)?;
+        Ok((solved, turn))
+    }
+
+    /// Looks for events between the last orbit and the next, and records them.
+    fn find_events(&mut self, next: &Solved<M, N>, branch: &mut Branch<M, N>) {
+        let kinds: Vec<EventKind> = self.last.tests.changes(&next.tests).collect();
+        let mut found: Vec<(EventKind, Located<M, N>)> = Vec::new();
+        for kind in kinds {
+            let located = self.locate(next, kind);
+            let floquet = &located.solved.floquet;
+            let trivial = trivial_of(floquet, self.frame.trivial);
+            if kind != EventKind::Torus || is_torus(floquet, &trivial) {
+                found.push((kind, located));
+            }
+        }
+        found.sort_by(|(_, a), (_, b)| a.part.total_cmp(&b.part));
+        for (kind, at) in found {
+            branch.events.push(Event {
+                kind,
+                point: self.point(&at.solved),
+                after: branch.points.len() - 1,
+                width: at.width,
+            });
+            branch.event_members.push(at.solved.member);
+        }
+    }
+
+    /// The orbit where a test function vanishes, between the last one and the next.
+    fn locate(&mut self, next: &Solved<M, N>, kind: EventKind) -> Located<M, N> {
+        let ends = [&self.last, next];
+        let between = Between::new(
+            &self.metric,
+            ends.map(|end| &end.member.iterate),
+            ends.map(|end| &end.tangent),
+        );
+        let values = ends.map(|end| end.tests.value(kind));
+        // The nearest orbit on either side of the root.
+        let mut low = (0.0, self.last.clone());
+        let mut high = (1.0, next.clone());
+        let near = if kind == EventKind::Branch {
+            NEAR * values[0].abs().max(values[1].abs())
+        } else {
+            0.0
+        };
+        // Where a trial fails the search ends with what it has.
+        let root = bracketed_root(
+            |part| {
+                let solved = self.trial(&between, part)?;
+                let value = solved.tests.value(kind);
+                let side = if value * values[0] > 0.0 {
+                    &mut low
+                } else {
+                    &mut high
+                };
+                *side = (part, solved);
+                Ok::<f64, OrbitError>(if value.abs() < near { 0.0 } else { value })
+            },
+            (0.0, values[0]),
+            (1.0, values[1]),
+        );
+        if let (EventKind::Branch, Ok(part)) = (kind, root)
+            && let Ok(crossing) = self.crossing(&between, part)
+        {
+            return crossing;
+        }
+        let width = (low.1.parameter() - high.1.parameter()).abs();
+        let value = |end: &(f64, Solved<M, N>)| end.1.tests.value(kind).abs();
+        let (part, solved) = if value(&low) < value(&high) {
+            low
+        } else {
+            high
+        };
+        Located {
+            part,
+            solved,
+            width,
+        }
+    }
+
+    /// An orbit between the last one and the next.
+    fn trial(&mut self, between: &Between<N>, part: f64) -> Result<Solved<M, N>, OrbitError> {
+        let row = between.row(&self.metric, part);
+        Ok(self.correct(between.guess(part), row)?.0)
+    }
+
+    /// The orbit where another branch crosses, near a place between the last one and the next.
+    ///
+    /// The equations are singular there: Newton's method finds it to the root of round-off at best, and may leave the branch. But the branch
+    /// itself is smooth, so orbits at a distance on both sides are solved, and polynomials through them evaluated where the test function vanishes.
+    fn crossing(&mut self, between: &Between<N>, part: f64) -> Result<Located<M, N>, OrbitError> {
+        let places = STENCIL.map(|k| part + k * SPACING);
+        let mut orbits = Vec::with_capacity(places.len());
+        for place in places {
+            orbits.push(self.trial(between, place)?);
+        }
+        let values: Vec<f64> = orbits
+            .iter()
+            .map(|orbit| orbit.tests.value(EventKind::Branch))
+            .collect();
+        // Once from all, once without the outermost two, to see the difference.
+        let root = |from: usize, to: usize| {
+            let weights = lagrange(&values[from..to], 0.0);
+            let terms = weights.iter().zip(&places[from..to]);
+            let part: f64 = terms.map(|(weight, place)| weight * place).sum();
+            let weights = lagrange(&places[from..to], part);
+            let terms = weights.iter().zip(&orbits[from..to]);
+            let parameter: f64 = terms
+                .map(|(weight, orbit)| weight * orbit.parameter())
+                .sum();
+            (part, parameter)
+        };
+        let (part, parameter) = root(0, places.len());
+        let width = (parameter - root(1, places.len() - 1).1).abs();
+        let weights = lagrange(&places, part);
+        let blend = |of: &dyn Fn(&Solved<M, N>) -> &Iterate<N>| {
+            let mut sum = of(&orbits[0]).clone();
+            sum.scale(weights[0]);
+            let terms = weights.iter().zip(&orbits).skip(1);
+            terms.fold(sum, |sum, (weight, orbit)| sum.plus(*weight, of(orbit)))
+        };
+        let iterate = blend(&|orbit| &orbit.member.iterate);
+        let tangent = self.metric.unit(blend(&|orbit| &orbit.tangent));
+        self.problem.set_globals(&iterate.globals);
+        match self.assembly.linearise(&self.problem, &iterate) {
+            // The matrices of the elements are all that is wanted.
+            Ok(()) | Err(AssemblyError::Singular { .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+        let solved = solved(&self.problem, &self.assembly, iterate, tangent, 1)?;
+        Ok(Located {
+            part,
+            solved,
+            width,
+        })
+    }
+}
+
+/// The weights of the polynomial through given places, at x.
+fn lagrange(places: &[f64], x: f64) -> Vec<f64> {
+    let weight = |(k, place): (usize, &f64)| {
+        let others = places.iter().enumerate().filter(|(other, _)| *other != k);
+        others
+            .map(|(_, other)| (x - other) / (place - other))
+            .product()
+    };
+    places.iter().enumerate().map(weight).collect()
+}
+
+/// Places about the crossing of another branch, in units of [`SPACING`].
+const STENCIL: [f64; 6] = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
+
+/// A part of the way between two points: the sixth power is below 10⁻¹⁰, and the singular place some way off.
+const SPACING: f64 = 0.02;
+
+/// The part of its larger end value below which the test function of a crossing need not be known before interpolation.
+const NEAR: f64 = 1e-2;
+
+/// An orbit from a converged iterate.
+fn solved<M: Model<N> + Clone, const N: usize>(
+    problem: &Continued<'_, M, N>,
+    assembly: &Assembly<N>,
+    iterate: Iterate<N>,
+    tangent: Iterate<N>,
+    iterations: u32,
+) -> Result<Solved<M, N>, OrbitError> {
+    let transitions = assembly.transitions().to_vec();
+    let floquet = multipliers_of::<N>(&transitions)?;
+    let trivial = trivial_of(&floquet, problem.orbit.trivial());
+    let slope = tangent.globals.last().copied().unwrap_or(f64::NAN);
+    // With the parameter given instead of the arc length the determinant is dλ/ds times as large.
+    let sign = match problem.row {
+        Row::Parameter(_) => assembly.sign() * slope.signum(),
+        Row::Arc { .. } => assembly.sign(),
+    };
+    let tests = Tests::new(&Circumstances {
+        slope,
+        sign,
+        floquet: &floquet,
+        trivial: &trivial,
+        symplectic: !M::FACTS.forced,
+    });
+    Ok(Solved {
+        rate: problem.rate,
+        member: Member {
+            model: problem.model.clone(),
+            iterate,
+            transitions,
+            period: problem.orbit.period,
+            unfolding: problem.orbit.unfolding,
+        },
+        floquet,
+        tangent,
+        tests,
+        iterations,
+    })
+}
+
+/// The length of the next step.
+fn adapted(step: f64, iterations: u32, turn: f64) -> f64 {
+    if iterations <= 4 && turn > EASY_TURN {
+        1.5 * step
+    } else if iterations >= 7 || turn < 0.5 * (MOST_TURN + EASY_TURN) {
+        0.7 * step
+    } else {
+        step
+    }
+}
+
+/// A corrector that takes more says that the step was too long.
+const MOST_ITERATIONS: u32 = 8;
+
+/// The cosine of 25°: a branch does not turn by more in a step.
+const MOST_TURN: f64 = 0.906;
+
+/// The cosine of 10°: below this angle steps may grow.
+const EASY_TURN: f64 = 0.985;
+
+/// A line on standard error, rewritten once a second.
+pub(super) struct Progress {
+    shown: Option<std::time::Instant>,
+    is_dirty: bool,
+}
+
+impl Progress {
+    pub(super) fn new(wanted: bool) -> Self {
+        Self {
+            shown: wanted.then(std::time::Instant::now),
+            is_dirty: false,
+        }
+    }
+
+    fn show(&mut self, points: usize, parameter: f64) {
+        use std::io::Write;
+        let Some(shown) = &mut self.shown else { return };
+        if shown.elapsed().as_secs() < 1 {
+            return;
+        }
+        *shown = std::time::Instant::now();
+        self.is_dirty = true;
+        // Progress that cannot be shown is no reason to stop.
+        let _ = write!(
+            std::io::stderr(),
+            "\r{points} orbits, parameter {parameter:.6} "
+        );
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if self.is_dirty {
+            use std::io::Write;
+            let _ = writeln!(std::io::stderr());
+        }
+    }
+}
