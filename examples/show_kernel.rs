@@ -68,11 +68,39 @@ fn main() -> Result<(), Box<dyn Error>> {
             },
         ),
     ];
-    for (name, request) in kernels {
+    let constraints = [
+        (
+            "constraints",
+            Request {
+                constraint_values: true,
+                ..Request::default()
+            },
+        ),
+        (
+            "rows of the constraints",
+            Request {
+                constraint_rows: true,
+                ..Request::default()
+            },
+        ),
+        (
+            "derivatives of the constraints",
+            Request {
+                constraint_second: true,
+                ..Request::default()
+            },
+        ),
+    ];
+    let constraints = if declared.constraints.is_empty() {
+        &[]
+    } else {
+        constraints.as_slice()
+    };
+    for (name, request) in kernels.iter().chain(constraints) {
         println!(
             "\n{name}: {}\n{}",
-            derivation.counts(request),
-            derivation.program(request)
+            derivation.counts(*request),
+            derivation.program(*request)
         );
     }
     Ok(())

@@ -3,10 +3,10 @@
 
 use tfe::Model;
 use tfe::prelude::dynamics;
-use tfe::runtime::{By, First, Second};
+use tfe::runtime::{By, ConstraintKind, ConstraintSecond, First, Second};
 use tfe_symbolic::compile::declare;
 use tfe_symbolic::context::{Context, Field, FieldKind, Length};
-use tfe_symbolic::declared::Parameter;
+use tfe_symbolic::declared::{self, Constraint, Parameter};
 use tfe_symbolic::derivation::Derivation;
 use tfe_symbolic::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{self, Program, Request};
@@ -15,6 +15,7 @@ use tfe_symbolic::program::{self, Program, Request};
 struct Oracle {
     derivation: Derivation,
     sensitivities: Vec<Parameter>,
+    constraints: Vec<Constraint>,
     environment: Environment,
 }
 
@@ -48,6 +49,7 @@ impl Oracle {
         Self {
             derivation: Derivation::of(&declared),
             sensitivities: declared.sensitivities,
+            constraints: declared.constraints,
             environment,
         }
     }
@@ -213,6 +215,9 @@ fn compare<M: Model<N>, const N: usize>(model: &M, mut oracle: Oracle) {
         vector("observables", &values, &expected.observables);
 
         sensitivities(model, &mut oracle, t, &q, &z);
+
+        oracle.environment.mu = oracle.constraints.iter().map(|_| next() - 0.5).collect();
+        constraints(model, &oracle, t, &q, &z);
     }
 }
 
@@ -262,6 +267,67 @@ fn sensitivities<M: Model<N>, const N: usize>(
             );
         }
     }
+}
+
+/// Compares the kernels of the constraints with the interpreter, to the last bit; the engine's own tests compare that with dual numbers.
+fn constraints<M: Model<N>, const N: usize>(
+    model: &M,
+    oracle: &Oracle,
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+) {
+    let kinds = oracle.constraints.iter().map(|constraint| {
+        let kind = match constraint.kind {
+            declared::ConstraintKind::Holonomic { quadratic } => {
+                ConstraintKind::Holonomic { quadratic }
+            }
+            declared::ConstraintKind::Velocity { integrable } => {
+                ConstraintKind::Velocity { integrable }
+            }
+        };
+        (constraint.name.as_str(), kind)
+    });
+    let declared = M::CONSTRAINTS.iter().map(|c| (c.name, c.kind));
+    assert!(declared.eq(kinds));
+    let count = M::CONSTRAINTS.len();
+
+    let mut values = vec![0.0; count];
+    model.constraint_values(t, q, &mut values);
+    let expected = oracle.run(Request {
+        constraint_values: true,
+        ..Request::default()
+    });
+    vector("phi", &values, &expected.phi);
+
+    let (mut rows, mut drift) = (vec![[0.0; N]; count], vec![0.0; count]);
+    model.constraint_rows(t, q, &mut rows, &mut drift);
+    let expected = oracle.run(Request {
+        constraint_rows: true,
+        ..Request::default()
+    });
+    vector("drift", &drift, &expected.drift);
+    vector("rows", rows.as_flattened(), &expected.rows.concat());
+
+    let (mut psi_q, mut row_rates) = (vec![[0.0; N]; count], vec![[0.0; N]; count]);
+    let mut second = ConstraintSecond {
+        psi_q: &mut psi_q,
+        row_rates: &mut row_rates,
+        bend: [[0.0; N]; N],
+        rate_q: [[0.0; N]; N],
+        rate_v: [[0.0; N]; N],
+    };
+    model.constraint_second(t, q, v, &oracle.environment.mu, &mut second);
+    let expected = oracle.run(Request {
+        constraint_second: true,
+        ..Request::default()
+    });
+    block("bend", &second.bend, &expected.bend);
+    block("rate_q", &second.rate_q, &expected.rate_q);
+    block("rate_v", &second.rate_v, &expected.rate_v);
+    vector("psi_q", psi_q.as_flattened(), &expected.psi_q.concat());
+    let expected = expected.row_rates.concat();
+    vector("row_rates", row_rates.as_flattened(), &expected);
 }
 
 #[track_caller]
@@ -462,6 +528,96 @@ agrees! { sensitivities_named_like_the_emitter: [f64; 1]
     lagrangian = by/2*dot(x)^2 - index*sin(first*x) - row*x^2,
     force(x) = t0^2*t*x,
     sensitivity(by, index, first, t0, row),
+}
+
+agrees! { rod_pendulum: [f64; 2]
+    struct { m: f64 = 1.3, l: f64 = 0.9, g: f64 = 9.81 }
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    constraint(rod) = x^2 + y^2 - l^2,
+}
+
+agrees! { knife_edge: [f64; 3]
+    struct { m: f64 = 1.3, j: f64 = 0.9, g: f64 = 9.81, alpha: f64 = 0.3 }
+    coordinates(x, y, phi),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(phi)^2 + m*g*sin(alpha)*x,
+    constraint(blade) = dot(x)*sin(phi) - dot(y)*cos(phi),
+}
+
+agrees! { moving_wire: [f64; 2]
+    struct { m: f64 = 1.3, g: f64 = 9.81 }
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    constraint(wire) = y - x^4/4*(1 + sin(t)/5),
+}
+
+agrees! { chaplygin_sleigh: [f64; 3]
+    struct { m: f64 = 1.3, j: f64 = 0.9, a: f64 = 0.4 }
+    coordinates(x, y, phi),
+    lagrangian = m/2*((dot(x) - a*sin(phi)*dot(phi))^2 + (dot(y) + a*cos(phi)*dot(phi))^2) + j/2*dot(phi)^2,
+    constraint(blade) = dot(y)*cos(phi) - dot(x)*sin(phi),
+}
+
+agrees! { ball_on_a_turntable: [f64; 7]
+    struct { m: f64 = 1.3, j: [f64; 3] = [0.4, 0.5, 0.6], a: f64 = 0.3, d: [f64; 3] = [0.2, -0.1, 0.4], mu: f64 = 0.7 }
+    coordinates(r[3], e[4]),
+    let w = body_rate(e),
+    let w_space = rotate(e, w),
+    lagrangian = m/2*inner(dot(r), dot(r)) + (j[0]*w[0]^2 + j[1]*w[1]^2 + j[2]*w[2]^2)/2,
+    constraint(unit) = inner(e, e) - 1,
+    constraint(roll) = dot(r) - cross(w_space, [0, 0, a]) - mu*cross([0, 0, cos(t)], r),
+    constraint(ball) = r + rotate(e, [0, 0, 1]),
+    constraint(hinge) = inner(rotate(e, [1, 0, 0]), [0, 0, 1]),
+    constraint(arm) = norm(r + rotate(e, d)) - 1,
+}
+
+agrees! { rods_of_a_hamiltonian_model: [f64; 6]
+    struct { l: [f64; 2] = [0.7, 1.1], rows: f64 = 0.2, v: f64 = 0.3 }
+    coordinates(x[3], y[3]),
+    momenta(px[3], py[3]),
+    let slip = cos(rows*t)*dot(y[0]),
+    hamiltonian = inner(px, px)/2 + inner(py, py)/3 + px[0]*x[1],
+    constraint(rod[i in 0..2]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - l[i]^2*cosh(t),
+    constraint(given) = exp(x[2])*dot(x[2]) - slip - v,
+}
+
+agrees! { ends_of_a_chain: [f64; 5]
+    struct <const N: usize = 5> { l: f64 = 0.7 }
+    coordinates(q[N]),
+    lagrangian = sum(i in 0..N, dot(q[i])^2/2),
+    constraint(ends) = (q[N-1] - q[0])^3 - l^2,
+    constraint(middle) = q[N-2]*dot(q[N-1]) - sin(q[1])*dot(q[0]),
+}
+
+agrees! { parameters_with_an_underscore: [f64; 1]
+    struct { q: f64 = 1.2, q_: f64 = 0.7, mu: f64 = 0.4, mu_: f64 = 0.3, mu__: f64 = 0.9 }
+    coordinates(x),
+    lagrangian = q/2*dot(x)^2 - q_*sin(mu*x) - mu_*x^2 + mu__*x,
+    constraint(a) = mu*x^3 - mu_*x + mu__*q - q_,
+}
+
+#[test]
+fn short_slices_are_left_alone() {
+    #[dynamics(
+        coordinates(x, y),
+        lagrangian = (dot(x)^2 + dot(y)^2)/2,
+        constraint(rod) = x^2 + y^2 - 1,
+        constraint(blade) = x*dot(y) - t,
+    )]
+    struct Short {}
+    let (mut values, mut rows, mut drift) = ([7.0], [[7.0; 2]], [7.0]);
+    Short {}.constraint_values(0.5, &[1.0, 2.0], &mut values);
+    Short {}.constraint_rows(0.5, &[1.0, 2.0], &mut rows, &mut drift);
+    assert_eq!((values, rows, drift), ([7.0], [[7.0; 2]], [7.0]));
+    let mut second = ConstraintSecond {
+        psi_q: &mut [],
+        row_rates: &mut [],
+        bend: [[7.0; 2]; 2],
+        rate_q: [[7.0; 2]; 2],
+        rate_v: [[7.0; 2]; 2],
+    };
+    Short {}.constraint_second(0.5, &[1.0, 2.0], &[0.0; 2], &[1.0], &mut second);
+    assert_eq!(second.bend, [[7.0; 2]; 2]);
 }
 
 #[test]

@@ -284,11 +284,13 @@ struct Fast {
         Fast::ELEMENT,
         ::tfe::__private::Form::Lagrangian,
         2,
+        0,
     )],
     pivots: [usize; ::tfe::__private::pivots_len(
         Fast::ELEMENT,
         ::tfe::__private::Form::Lagrangian,
         2,
+        0,
     )],
 }
 #[automatically_derived]
@@ -320,11 +322,13 @@ impl Fast {
                 Fast::ELEMENT,
                 ::tfe::__private::Form::Lagrangian,
                 2,
+                0,
             )],
             pivots: [0; ::tfe::__private::pivots_len(
                 Fast::ELEMENT,
                 ::tfe::__private::Form::Lagrangian,
                 2,
+                0,
             )],
         }
     }

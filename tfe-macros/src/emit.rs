@@ -14,6 +14,8 @@ pub(crate) struct Emitter<'a> {
     coordinates: &'a [String],
     /// Where second derivatives go: `second.`, or nothing where the mass matrix alone is an argument.
     second: TokenStream,
+    /// What velocities and momenta are called.
+    z: Ident,
     /// How often each temporary is read.
     reads: BTreeMap<Temporary, usize>,
     /// The indices of all loops.
@@ -39,6 +41,7 @@ impl<'a> Emitter<'a> {
         Self {
             coordinates,
             second,
+            z: format_ident!("z"),
             reads: BTreeMap::new(),
             indices: BTreeSet::new(),
             names: BTreeMap::new(),
@@ -47,6 +50,12 @@ impl<'a> Emitter<'a> {
             parameters: BTreeMap::new(),
             value: None,
         }
+    }
+
+    /// The same with `v` for velocities, as in the kernels of constraints.
+    pub(crate) fn with_velocity(mut self) -> Self {
+        self.z = format_ident!("v");
+        self
     }
 
     /// The body of a kernel.
@@ -188,6 +197,14 @@ impl<'a> Emitter<'a> {
                 let k = Literal::usize_unsuffixed(*k);
                 quote!(values[#k])
             }
+            Output::Phi(k) => one(&quote!(values), *k),
+            Output::Drift(k) => one(&quote!(drift), *k),
+            Output::Row(_, a) | Output::PsiQ(_, a) | Output::RowRate(_, a) => {
+                at(&row(output), &[a])
+            }
+            Output::Bend(a, b) => at(&quote!(#second bend), &[a, b]),
+            Output::RateQ(a, b) => at(&quote!(#second rate_q), &[a, b]),
+            Output::RateV(a, b) => at(&quote!(#second rate_v), &[a, b]),
         }
     }
 
@@ -211,7 +228,13 @@ impl<'a> Emitter<'a> {
             Output::QQ(..) => matrix(quote!(#second qq)),
             Output::ForceZ(..) => matrix(quote!(#second force_z)),
             Output::ForceQ(..) => matrix(quote!(#second force_q)),
-            Output::Value | Output::Observable(_) => TokenStream::new(),
+            Output::Row(..) | Output::PsiQ(..) | Output::RowRate(..) => vector(row(output)),
+            Output::Bend(..) => matrix(quote!(#second bend)),
+            Output::RateQ(..) => matrix(quote!(#second rate_q)),
+            Output::RateV(..) => matrix(quote!(#second rate_v)),
+            Output::Value | Output::Observable(_) | Output::Phi(_) | Output::Drift(_) => {
+                TokenStream::new()
+            }
         }
     }
 
@@ -285,9 +308,16 @@ impl<'a> Emitter<'a> {
         match input {
             Input::Time => quote!(t),
             Input::Coordinate(a) => at(&quote!(q), &[a]),
-            Input::Velocity(a) | Input::Momentum(a) => at(&quote!(z), &[a]),
+            Input::Velocity(a) | Input::Momentum(a) => {
+                let z = &self.z;
+                at(&quote!(#z), &[a])
+            }
+            Input::Multiplier(k) => one(&quote!(mu), *k),
             Input::Parameter(name) => {
-                let local = self.local_name(name);
+                let local = match self.parameters.get(name) {
+                    Some(local) => local.clone(),
+                    None => self.local_name(name),
+                };
                 self.parameters.insert(name.clone(), local.clone());
                 quote!(#local)
             }
@@ -345,7 +375,21 @@ impl<'a> Emitter<'a> {
 
     /// The local variable of a parameter: its own name unless that could be one of the emitter's.
     fn local_name(&self, field: &str) -> Ident {
-        let taken = ["q", "z", "first", "second", "zz", "values", "row"];
+        let taken = [
+            "q",
+            "z",
+            "v",
+            "first",
+            "second",
+            "zz",
+            "values",
+            "row",
+            "rows",
+            "drift",
+            "mu",
+            "psi_q",
+            "row_rates",
+        ];
         let temporary = field
             .strip_prefix('t')
             .is_some_and(|rest| rest.chars().all(|c| c.is_ascii_digit()))
@@ -353,11 +397,17 @@ impl<'a> Emitter<'a> {
             || field.starts_with("cos_");
         // A `let` cannot have the name of a constant around it, such as `G`.
         let constant = field.starts_with(char::is_uppercase);
-        if taken.contains(&field) || temporary || constant || self.indices.contains(field) {
-            format_ident!("{field}_")
-        } else {
-            identifier(field)
+        let mut local =
+            if taken.contains(&field) || temporary || constant || self.indices.contains(field) {
+                format_ident!("{field}_")
+            } else {
+                identifier(field)
+            };
+        // Beside `q` there may be a field `q_`.
+        while self.parameters.values().any(|other| *other == local) {
+            local = format_ident!("{local}_");
         }
+        local
     }
 }
 
@@ -403,6 +453,22 @@ pub(crate) fn identifier(name: &str) -> Ident {
 
 fn loop_name(variable: LoopVariable) -> Ident {
     format_ident!("{}", variable.to_string())
+}
+
+/// The row of a constraint.
+fn row(output: &Output) -> TokenStream {
+    match output {
+        Output::PsiQ(k, _) => one(&quote!(psi_q), *k),
+        Output::RowRate(k, _) => one(&quote!(row_rates), *k),
+        Output::Row(k, _) => one(&quote!(rows), *k),
+        _ => TokenStream::new(),
+    }
+}
+
+/// The element of an array that this number names.
+fn one(array: &TokenStream, number: usize) -> TokenStream {
+    let number = Literal::usize_unsuffixed(number);
+    quote!(#array[#number])
 }
 
 fn at(array: &TokenStream, indices: &[&Affine]) -> TokenStream {

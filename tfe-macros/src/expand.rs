@@ -2,7 +2,7 @@
 
 use crate::emit::{self, Emitter};
 use crate::source_map::SourceMap;
-use crate::{fallback, input, page, solver};
+use crate::{constraint, fallback, input, page, solver};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;
@@ -155,6 +155,7 @@ impl<'a> Kernels<'a> {
         let facts = page::facts(self.derivation, &quote!(__tfe));
         let coordinate_name = self.coordinate_name();
         let observables = self.observables();
+        let constraints = constraint::members(self.declared, self.derivation, &self.coordinates);
         let sensitivities = self.sensitivities();
         quote! {
             const _: () = {
@@ -205,6 +206,7 @@ impl<'a> Kernels<'a> {
 
                     #coordinate_name
                     #observables
+                    #constraints
                     #sensitivities
                 }
             };

@@ -3,6 +3,7 @@
 //! A thin shell: tokens become text with a table of places (`source_map`), the engine `tfe-symbolic` derives the model, and
 //! `expand` writes the resulting programs as Rust. See the documentation of `tfe` for the language.
 
+mod constraint;
 mod emit;
 mod expand;
 mod fallback;
@@ -18,7 +19,7 @@ use proc_macro::TokenStream;
 /// Declares a mechanical model on the struct that holds its parameters.
 ///
 /// The arguments are raw tokens, separated by commas: `coordinates(...)`, `lagrangian = ...` or `hamiltonian = ...`, and as many
-/// `let`, `force(...)`, `dissipation`, `output(...)` and `solver(...)` as the model needs. `sensitivity(omega, k[2])` asks for the derivatives by
+/// `let`, `force(...)`, `dissipation`, `constraint(...)`, `output(...)` and `solver(...)` as the model needs. `sensitivity(omega, k[2])` asks for the derivatives by
 /// parameters, that is by fields of type `f64` and by elements of array fields, and by the time. Everything is differentiated symbolically while
 /// the crate compiles; mistakes are reported under the token that is wrong, all of them at once.
 ///

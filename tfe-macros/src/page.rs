@@ -69,6 +69,13 @@ fn page(declared: &Declared, derivation: &Derivation) -> String {
         let _ = writeln!(page, "operations, {name}: {}", told(counts));
     }
     let _ = write!(page, "{}", derivation.structure());
+    if !declared.constraints.is_empty() {
+        let constraints = declared.constraints.iter();
+        let kinds: Vec<String> = constraints
+            .map(|constraint| format!("{} ({})", constraint.name, constraint.kind))
+            .collect();
+        let _ = write!(page, "\nconstraints             {}", kinds.join(", "));
+    }
     let total = kernels.second.additions + kernels.second.multiplications;
     if total > LARGE {
         let _ = write!(

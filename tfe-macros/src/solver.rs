@@ -17,6 +17,7 @@ pub(crate) fn expand(
     let (model, vis) = (&item.ident, &item.vis);
     let name = identifier(&solver.name);
     let dof = index(&declared.dof);
+    let constraints = Literal::usize_unsuffixed(declared.constraints.len());
     let element = element(solver, &path);
     let form = match declared.form {
         Form::Lagrangian => quote!(Lagrangian),
@@ -40,8 +41,8 @@ pub(crate) fn expand(
             step: f64,
             steps: u64,
             memory: #path::Memory<#dof>,
-            numbers: [f64; #path::numbers_len(#name::ELEMENT, #path::Form::#form, #dof)],
-            pivots: [usize; #path::pivots_len(#name::ELEMENT, #path::Form::#form, #dof)],
+            numbers: [f64; #path::numbers_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints)],
+            pivots: [usize; #path::pivots_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints)],
         }
 
         #[automatically_derived]
@@ -61,8 +62,8 @@ pub(crate) fn expand(
                     step: h,
                     steps: 0,
                     memory: #path::Memory::new(),
-                    numbers: [0.0; #path::numbers_len(#name::ELEMENT, #path::Form::#form, #dof)],
-                    pivots: [0; #path::pivots_len(#name::ELEMENT, #path::Form::#form, #dof)],
+                    numbers: [0.0; #path::numbers_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints)],
+                    pivots: [0; #path::pivots_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints)],
                 }
             }
 

@@ -151,6 +151,47 @@ fn derivatives_by_parameters() {
 }
 
 #[test]
+fn a_holonomic_constraint() {
+    check(
+        "rod_pendulum",
+        quote!(
+            coordinates(x, y),
+            lagrangian = m / 2 * (dot(x) ^ 2 + dot(y) ^ 2) - m * g * y,
+            constraint(rod) = x ^ 2 + y ^ 2 - l ^ 2,
+        ),
+        quote!(
+            struct RodPendulum {
+                m: f64,
+                l: f64,
+                g: f64,
+            }
+        ),
+    );
+}
+
+#[test]
+fn a_nonholonomic_constraint_and_a_solver() {
+    check(
+        "knife_edge",
+        quote!(
+            coordinates(x, y, phi),
+            lagrangian =
+                m / 2 * (dot(x) ^ 2 + dot(y) ^ 2) + j / 2 * dot(phi) ^ 2 + m * g * sin(alpha) * x,
+            constraint(blade) = dot(x) * sin(phi) - dot(y) * cos(phi),
+            solver(Fast, Mixed::<3>),
+        ),
+        quote!(
+            struct KnifeEdge {
+                m: f64,
+                j: f64,
+                g: f64,
+                alpha: f64,
+            }
+        ),
+    );
+}
+
+#[test]
 fn a_mistake_leaves_the_struct_and_stubs() {
     check(
         "mistake",

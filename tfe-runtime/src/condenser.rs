@@ -13,10 +13,14 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::condense::{EndForces, System, phase_ends, velocity_ends};
+use crate::constrained::element::ConstrainedForm;
+use crate::constrained::layout::Layout;
+use crate::constrained::rows::Rows;
+use crate::constrained::{self, linearise, refused};
 use crate::dense::DenseElement;
 use crate::element::{Element, ElementError};
 use crate::equations::Span;
-use crate::error::{LegendreError, StepError};
+use crate::error::{ConstraintError, LegendreError, StepError};
 use crate::legendre;
 use crate::model::{First, Model, State};
 use crate::phase_form::PhaseForm;
@@ -24,7 +28,7 @@ use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
 use crate::step::{Interval, Last, Memory, end_of, is_phase};
 use crate::velocity_form::VelocityForm;
-use crate::workspace::{Parts, Workspace, numbers_len, pivots_len, width};
+use crate::workspace::{Parts, Workspace, interior_len, numbers_len, pivots_len};
 
 pub use crate::condense::Direction;
 
@@ -124,10 +128,10 @@ impl<const N: usize> Condenser<N> {
         let table = SchemeTable::new(element)?;
         Ok(Self {
             table,
-            interior: element.unknowns() * width(&element, M::FORM, N),
+            interior: interior_len(&element, M::FORM, N, M::CONSTRAINTS.len()),
             memory: Memory::new(),
-            numbers: vec![0.0; numbers_len(element, M::FORM, N)],
-            pivots: vec![0; pivots_len(element, M::FORM, N)],
+            numbers: vec![0.0; numbers_len(element, M::FORM, N, M::CONSTRAINTS.len())],
+            pivots: vec![0; pivots_len(element, M::FORM, N, M::CONSTRAINTS.len())],
             forces: Vec::new(),
         })
     }
@@ -157,6 +161,20 @@ impl<const N: usize> Condenser<N> {
         interior: &mut [f64],
     ) -> Result<(), LegendreError> {
         let scheme = self.table.view();
+        let interior = if M::CONSTRAINTS.is_empty() {
+            interior
+        } else {
+            let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
+            let (_, v) = curve(time + length);
+            interior[layout.end(0)..layout.node(0)].copy_from_slice(&v);
+            // A rod without tension holds nothing: the reactions of the curve belong to the guess.
+            let middle = time + 0.5 * length;
+            let (q, v) = curve(middle);
+            let state = legendre::state(model, middle, &q, &v)?;
+            let reactions = constrained::reactions(model, middle, &state, &v);
+            layout.guess::<M, N>(scheme.nodes, reactions.ok().as_deref(), interior);
+            &mut interior[..layout.rates()]
+        };
         let rates = interior.as_chunks_mut::<N>().0;
         if is_phase::<M, N>(&scheme) {
             let (forces, velocities) = rates.split_at_mut(scheme.points());
@@ -220,7 +238,7 @@ impl<const N: usize> Condenser<N> {
             numbers: &mut self.numbers,
             pivots: &mut self.pivots,
         };
-        let parts = Parts::of(workspace, &scheme.element, M::FORM)?;
+        let parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
         parts.kicks.fill([0.0; N]);
         let kicks: &[[f64; N]] = parts.kicks;
         let low = State::ZERO;
@@ -239,7 +257,38 @@ impl<const N: usize> Condenser<N> {
             sides: condensed.response,
         };
         let ends = condensed.ends;
-        let end = if is_phase::<M, N>(&scheme) {
+        let end = if !M::CONSTRAINTS.is_empty() {
+            let element = scheme.element;
+            if let Some(constraint) = refused::<M, N>(&element) {
+                return Err(ConstraintError::Element {
+                    element,
+                    constraint,
+                }
+                .into());
+            }
+            parts.momenta.fill(start.p);
+            let mut rows = Rows::at_start(parts.rows, model, time, &start.q);
+            rows.choose::<M>(parts.active);
+            let mut form = ConstrainedForm {
+                inner: VelocityForm {
+                    model,
+                    scheme,
+                    span,
+                    forces: parts.forces,
+                    momenta: parts.momenta,
+                    masses: parts.masses,
+                    mass_pivots: parts.mass_pivots,
+                    constant_mass: &mut self.memory.mass,
+                    statistics: &mut self.memory.statistics,
+                },
+                layout: Layout::new(&element, N, M::CONSTRAINTS.len()),
+                rows,
+                active: parts.active,
+                impulse: [0.0; N],
+            };
+            linearise(&mut form, interior, directions, true, system, ends)?;
+            form.end_state(interior)?.0
+        } else if is_phase::<M, N>(&scheme) {
             let mut equations = PhaseForm {
                 model,
                 scheme,
@@ -305,8 +354,24 @@ impl<const N: usize> Condenser<N> {
         end: &State<N>,
     ) -> DenseElement<N> {
         let scheme = self.table.view();
-        let rates = placed.interior.as_chunks().0;
         let m = self.interior;
+        if !M::CONSTRAINTS.is_empty() {
+            let points = scheme.points() * N;
+            // The workspace begins with the unknowns, their start, the increments and the forces.
+            let momenta = &self.numbers[3 * m + points..3 * m + 2 * points];
+            let rates = &placed.interior[..scheme.unknowns() * N];
+            let ends = (placed.start, end);
+            let (rates, momenta) = (rates.as_chunks().0, momenta.as_chunks().0);
+            return DenseElement::constrained(
+                &scheme,
+                (placed.time, next),
+                placed.length,
+                ends,
+                rates,
+                momenta,
+            );
+        }
+        let rates = placed.interior.as_chunks().0;
         let (rates, forces) = if is_phase::<M, N>(&scheme) {
             let (forces, velocities) = rates.split_at(scheme.points());
             (velocities, forces)

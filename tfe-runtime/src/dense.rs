@@ -64,6 +64,58 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
+    /// Of a constrained element: momenta jump at its nodes, so their polynomial is made from those at the points, with what is missing at
+    /// the ends spread by ½(P_s ± P_{s−1}), which vanish (nearly) at the points (T-79).
+    pub(crate) fn constrained(
+        scheme: &SchemeRef<'_>,
+        times: (f64, f64),
+        h: f64,
+        (start, end): (&State<N>, &State<N>),
+        rates: &[[f64; N]],
+        momenta: &[[f64; N]],
+    ) -> Self {
+        let count = scheme.rates();
+        let mut coefficients = vec![[0.0; N]; 2 * count].into_boxed_slice();
+        let (q, p) = coefficients.split_at_mut(count);
+        project(scheme.rate, rates, h, q);
+        // Legendre coefficients of the momentum: the polynomial of degree s − 1 through the points, or the nearest one.
+        let mut values = vec![[0.0; N]; count + 1];
+        for ((node, weight), momentum) in scheme.nodes.iter().zip(scheme.weights).zip(momenta) {
+            let mut legendre_values = [0.0; MAX_NODES];
+            legendre(*node, &mut legendre_values);
+            for (m, value) in values.iter_mut().enumerate().take(count) {
+                for a in 0..N {
+                    value[a] += (2 * m + 1) as f64 * weight * legendre_values[m] * momentum[a];
+                }
+            }
+        }
+        for a in 0..N {
+            let (mut at_start, mut at_end, mut sign) = (start.p[a], end.p[a], 1.0);
+            for value in &values[..count] {
+                at_start -= sign * value[a];
+                at_end -= value[a];
+                sign = -sign;
+            }
+            // P_s(0) = sign, P_{s−1}(0) = −sign.
+            values[count][a] += 0.5 * (at_end + sign * at_start);
+            values[count - 1][a] += 0.5 * (at_end - sign * at_start);
+        }
+        // dP_n/dτ = 2 Σ (2k + 1) P_k over k = n − 1, n − 3, …
+        for (n, value) in values.iter().enumerate() {
+            for k in (0..n).rev().step_by(2) {
+                for a in 0..N {
+                    p[k][a] += 2.0 * (2 * k + 1) as f64 * value[a];
+                }
+            }
+        }
+        Self {
+            times,
+            start: *start,
+            end: *end,
+            rates: coefficients,
+        }
+    }
+
     /// Time at the start.
     #[must_use]
     pub fn start(&self) -> f64 {

@@ -1,5 +1,6 @@
 //! Why a step failed.
 
+use crate::element::Element;
 use core::fmt;
 
 /// Why the pointwise change between velocity and momentum failed.
@@ -45,6 +46,93 @@ impl fmt::Display for LegendreError {
 
 impl core::error::Error for LegendreError {}
 
+/// What constraints do not allow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ConstraintError {
+    /// The element has no place for the multipliers of a constraint.
+    Element {
+        /// The element.
+        element: Element,
+        /// The first constraint that it cannot hold.
+        constraint: &'static str,
+    },
+    /// The start is not on the constraints.
+    Start {
+        /// The constraint that is violated most.
+        constraint: &'static str,
+        /// Whether positions violate it, or velocities.
+        position: bool,
+        /// By how much: |φ| or |A v + a| over the length of its row.
+        residual: f64,
+    },
+    /// The rows of the constraints depend on one another, and those that follow from others are violated: they contradict, or a singular position was
+    /// met.
+    Dependent {
+        /// The constraint that is violated.
+        constraint: &'static str,
+        /// By how much, as at the start.
+        residual: f64,
+    },
+    /// The fixed-point iteration does not solve constraints; Newton's method does.
+    NeedsNewton,
+    /// No velocity belongs to the momentum: the kinetic energy is singular for motions that the constraints allow.
+    SingularMass,
+    /// The number of independent constraints is not the same at all nodes.
+    RankChanged,
+    /// The derivative by a parameter was asked for; constraints have none.
+    Parameter,
+}
+
+impl fmt::Display for ConstraintError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Element {
+                element,
+                constraint,
+            } => write!(
+                f,
+                "`{element}` cannot hold the constraint `{constraint}`; `Mixed::<{}>` can",
+                element.nodes()
+            ),
+            Self::Start {
+                constraint,
+                position,
+                residual,
+            } => write!(
+                f,
+                "the start violates the constraint `{constraint}`: {} {residual:.1e}; `consistent_state` finds a start that does not",
+                if *position {
+                    "position off by"
+                } else {
+                    "velocity off by"
+                }
+            ),
+            Self::Dependent {
+                constraint,
+                residual,
+            } => write!(
+                f,
+                "the constraints are dependent and `{constraint}`, which should follow from the others, is off by {residual:.1e}: they contradict, or the position is singular"
+            ),
+            Self::NeedsNewton => f.write_str(
+                "constraints are solved by Newton's method, not by the fixed-point iteration",
+            ),
+            Self::SingularMass => {
+                f.write_str("the kinetic energy is singular for motions that the constraints allow")
+            }
+            Self::RankChanged => {
+                f.write_str("the number of independent constraints changes along the motion")
+            }
+            Self::Parameter => {
+                f.write_str("models with constraints are not differentiated by parameters")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ConstraintError {}
+
 /// Why a step failed. Where it failed is known to whoever counts the steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -88,6 +176,14 @@ pub enum StepError {
     },
     /// The change between velocities and momenta failed at a point of the element.
     Legendre(LegendreError),
+    /// Something about the constraints.
+    Constraint(ConstraintError),
+}
+
+impl From<ConstraintError> for StepError {
+    fn from(error: ConstraintError) -> Self {
+        Self::Constraint(error)
+    }
 }
 
 impl From<LegendreError> for StepError {
@@ -134,6 +230,7 @@ impl fmt::Display for StepError {
                  iterations, tolerance {tolerance:.1e}"
             ),
             Self::Legendre(source) => source.fmt(f),
+            Self::Constraint(source) => source.fmt(f),
         }
     }
 }
@@ -143,6 +240,7 @@ impl core::error::Error for StepError {
         match self {
             // Its text is the source's own.
             Self::Legendre(source) => source.source(),
+            Self::Constraint(source) => source.source(),
             _ => None,
         }
     }

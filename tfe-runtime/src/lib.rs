@@ -18,9 +18,11 @@ pub mod basis;
 mod condense;
 #[cfg(feature = "alloc")]
 pub mod condenser;
+pub mod constrained;
 #[cfg(feature = "alloc")]
 mod dense;
 mod double_double;
+mod dual;
 pub mod element;
 mod equations;
 pub mod error;
@@ -45,8 +47,11 @@ pub mod weak_form;
 pub mod workspace;
 
 pub use element::{Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule};
-pub use error::{LegendreError, StepError};
-pub use model::{By, CoordinateName, Facts, First, Form, Model, Second, State};
+pub use error::{ConstraintError, LegendreError, StepError};
+pub use model::{
+    By, Constraint, ConstraintKind, ConstraintSecond, CoordinateName, Facts, First, Form, Model,
+    Second, State,
+};
 pub use newton::Solve;
 pub use real::{Lanes, Real};
 pub use statistics::Statistics;
@@ -57,7 +62,10 @@ pub use structure::{Operations, Structure};
 pub mod __private {
     pub use crate::element::{Element, EnergyConserving, Mixed, Primal, Radau, Rule};
     pub use crate::error::StepError;
-    pub use crate::model::{By, CoordinateName, Facts, First, Form, Model, Second, State};
+    pub use crate::model::{
+        By, Constraint, ConstraintKind, ConstraintSecond, CoordinateName, Facts, First, Form,
+        Model, Second, State,
+    };
     pub use crate::newton::{Control, Solve};
     pub use crate::real::Real;
     pub use crate::scheme::{Scheme, SchemeRef, Tables};

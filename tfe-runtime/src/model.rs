@@ -118,6 +118,55 @@ impl Facts {
     };
 }
 
+/// A constraint of a model: one scalar equation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Constraint {
+    /// The name as declared.
+    pub name: &'static str,
+    /// What kind of equation it is.
+    pub kind: ConstraintKind,
+}
+
+/// What kind of equation a constraint is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConstraintKind {
+    /// φ(q, t) = 0: positions are constrained, and with them velocities, A = φ_q, a = φ_t.
+    Holonomic {
+        /// φ is a polynomial of at most second degree in the coordinates.
+        quadratic: bool,
+    },
+    /// A(q, t) v + a(q, t) = 0: velocities alone are constrained.
+    Velocity {
+        /// It is the time derivative of some φ(q, t): the macro found ∂A_i/∂q_j = ∂A_j/∂q_i and ∂A_i/∂t = ∂a/∂q_i.
+        integrable: bool,
+    },
+}
+
+impl ConstraintKind {
+    /// Whether positions are constrained.
+    #[must_use]
+    pub const fn is_holonomic(self) -> bool {
+        matches!(self, Self::Holonomic { .. })
+    }
+}
+
+/// The constraints differentiated once more, with one multiplier μ for each; ψ = A v + a.
+///
+/// Rows have the order of [`Model::CONSTRAINTS`].
+#[derive(Debug)]
+pub struct ConstraintSecond<'a, R, const N: usize> {
+    /// ∂ψ/∂q, a row for each constraint.
+    pub psi_q: &'a mut [[R; N]],
+    /// Ȧ = ∂A/∂q · v + ∂A/∂t, a row for each constraint.
+    pub row_rates: &'a mut [[R; N]],
+    /// ∂(Aᵀμ)/∂q; row: the component of Aᵀμ.
+    pub bend: [[R; N]; N],
+    /// ∂(Ȧᵀμ)/∂q
+    pub rate_q: [[R; N]; N],
+    /// ∂(Ȧᵀμ)/∂v
+    pub rate_v: [[R; N]; N],
+}
+
 /// The kernels of one model with N coordinates.
 ///
 /// Implemented by `#[dynamics]`; by hand where one wants to.
@@ -177,6 +226,28 @@ pub trait Model<const N: usize> {
         _q: &[R; N],
         _z: &[R; N],
         _first: &mut First<R, N>,
+    ) {
+    }
+
+    /// The constraints, in order.
+    const CONSTRAINTS: &'static [Constraint] = &[];
+
+    /// φ of every holonomic constraint, by its position in [`CONSTRAINTS`](Self::CONSTRAINTS); entries of others stay as they are.
+    fn constraint_values<R: Real>(&self, _t: R, _q: &[R; N], _values: &mut [R]) {}
+
+    /// A and a of every constraint; for holonomic ones φ_q and φ_t. Writes only entries that can be non-zero.
+    fn constraint_rows<R: Real>(&self, _t: R, _q: &[R; N], _rows: &mut [[R; N]], _drift: &mut [R]) {
+    }
+
+    /// The derivatives of the constraints that tangents need, at (t, q, v) and for the multipliers μ. Writes only entries that can be
+    /// non-zero.
+    fn constraint_second<R: Real>(
+        &self,
+        _t: R,
+        _q: &[R; N],
+        _v: &[R; N],
+        _mu: &[R],
+        _second: &mut ConstraintSecond<'_, R, N>,
     ) {
     }
 

@@ -53,7 +53,7 @@ pub struct Memory<const N: usize> {
     /// Start and end of the last step; `None` before the first and after a failure.
     pub(crate) last: Option<Last<N>>,
     /// What the end is more than its rounded numbers.
-    low: State<N>,
+    pub(crate) low: State<N>,
     pub(crate) mass: Option<Block<N>>,
     /// The step for which the workspace holds the factors of a linear, autonomous model.
     factored: Option<f64>,
@@ -165,8 +165,11 @@ where
         if !(h.is_finite() && h != 0.0) {
             return Err(StepError::InvalidStep { step: h });
         }
+        if !M::CONSTRAINTS.is_empty() {
+            return crate::constrained::advance(self, memory, workspace, interval, state);
+        }
         let scheme = self.tables.view();
-        let mut parts = Parts::of(workspace, &scheme.element, M::FORM)?;
+        let mut parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
         let warm = self.prepare(memory, &mut parts, h, state)?;
         set_kicks(&scheme, &interval, parts.kicks);
         let low = if warm { memory.low } else { State::ZERO };
@@ -257,7 +260,7 @@ where
     }
 
     /// Sets the unknowns to where the iteration starts; true if that continues the last step.
-    fn prepare<const N: usize>(
+    pub(crate) fn prepare<const N: usize>(
         &self,
         memory: &mut Memory<N>,
         parts: &mut Parts<'_, N>,
@@ -285,7 +288,11 @@ where
             memory.ratio = Some(fraction);
         }
         let unknowns = scheme.unknowns();
-        let halves = parts.unknowns.len() / (unknowns * N);
+        let halves = if M::CONSTRAINTS.is_empty() {
+            parts.unknowns.len() / (unknowns * N)
+        } else {
+            1
+        };
         for half in 0..halves {
             let range = half * unknowns * N..(half + 1) * unknowns * N;
             let old = parts.unknowns[range.clone()].as_chunks::<N>().0;
@@ -302,7 +309,8 @@ where
                 }
             }
         }
-        parts.unknowns.copy_from_slice(parts.origin);
+        let continued = halves * unknowns * N;
+        parts.unknowns[..continued].copy_from_slice(&parts.origin[..continued]);
         Ok(true)
     }
 }
@@ -312,7 +320,7 @@ pub(crate) fn is_phase<M, const N: usize>(scheme: &SchemeRef<'_>) -> bool
 where
     M: Model<N>,
 {
-    matches!(M::FORM, Form::Hamiltonian) && scheme.collocated
+    matches!(M::FORM, Form::Hamiltonian) && scheme.collocated && M::CONSTRAINTS.is_empty()
 }
 
 /// ω_i(τ*) J for every row.
@@ -331,6 +339,17 @@ pub(crate) fn set_kicks<const N: usize>(
             }
         }
     }
+}
+
+/// The sum of impulses.
+pub(crate) fn total<const N: usize>(impulses: &[Impulse<N>]) -> [f64; N] {
+    let mut sum = [0.0; N];
+    for impulse in impulses {
+        for a in 0..N {
+            sum[a] += impulse.value[a];
+        }
+    }
+    sum
 }
 
 /// Old unknown rates to new ones: the polynomial of the last element, continued (T-65).

@@ -12,7 +12,7 @@ use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
 use crate::step::{Impulse, Interval, Memory, Method, is_phase};
 use crate::transition::TransitionError;
-use crate::workspace::{Workspace, numbers_len, pivots_len, transition_len, width};
+use crate::workspace::{Workspace, interior_len, numbers_len, pivots_len, transition_len, width};
 
 /// Steps a model with one element, on memory of its own.
 ///
@@ -93,8 +93,8 @@ where
     /// [`ElementError`] if the element is none.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
         let table = SchemeTable::new(element)?;
-        let numbers = numbers_len(element, M::FORM, N);
-        let pivots = pivots_len(element, M::FORM, N);
+        let numbers = numbers_len(element, M::FORM, N, M::CONSTRAINTS.len());
+        let pivots = pivots_len(element, M::FORM, N, M::CONSTRAINTS.len());
         Ok(Self {
             model,
             table,
@@ -146,6 +146,15 @@ where
         let Some(last) = self.memory.last else {
             return DenseElement::constant(start, end, State::ZERO);
         };
+        if !M::CONSTRAINTS.is_empty() {
+            let m = interior_len(&scheme.element, M::FORM, N, M::CONSTRAINTS.len());
+            let points = scheme.points() * N;
+            let momenta = &self.numbers[3 * m + points..3 * m + 2 * points];
+            let rates = &self.numbers[..scheme.unknowns() * N];
+            let (rates, momenta) = (rates.as_chunks().0, momenta.as_chunks().0);
+            let ends = (&last.start, &last.end);
+            return DenseElement::constrained(&scheme, (start, end), last.h, ends, rates, momenta);
+        }
         // The workspace begins with the unknowns, their start and the increments.
         let m = scheme.unknowns() * width(&scheme.element, M::FORM, N);
         let unknowns = self.numbers[..m].as_chunks().0;
@@ -175,7 +184,7 @@ where
     /// is singular, or `matrix` is too short.
     pub fn transition(&mut self, matrix: &mut [f64]) -> Result<(), TransitionError> {
         let element = self.table.view().element;
-        let length = transition_len(element, M::FORM, N);
+        let length = transition_len(element, M::FORM, N, M::CONSTRAINTS.len());
         let mut extra = vec![0.0; length];
         let workspace = Workspace {
             numbers: &mut self.numbers,

@@ -6,6 +6,10 @@
 use core::fmt;
 
 use crate::condense::{EndForces, System, phase_ends, velocity_ends};
+use crate::constrained::element::ConstrainedForm;
+use crate::constrained::layout::Layout;
+use crate::constrained::linearise;
+use crate::constrained::rows::Rows;
 use crate::element::ElementError;
 use crate::equations::Span;
 use crate::error::StepError;
@@ -14,7 +18,7 @@ use crate::model::Model;
 use crate::model::State;
 use crate::phase_form::PhaseForm;
 use crate::scheme::Tables;
-use crate::step::{Impulse, Interval, Memory, Method, is_phase, set_kicks};
+use crate::step::{Impulse, Interval, Memory, Method, is_phase, set_kicks, total};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Workspace, transition_len};
 
@@ -125,8 +129,8 @@ where
             return Err(TransitionError::NoStep);
         };
         let scheme = self.tables.view();
-        let parts = Parts::of(workspace, &scheme.element, M::FORM)?;
-        let needed = transition_len(scheme.element, M::FORM, N);
+        let parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
+        let needed = transition_len(scheme.element, M::FORM, N, M::CONSTRAINTS.len());
         if extra.len() < needed {
             return Err(StepError::Workspace {
                 needed,
@@ -166,6 +170,33 @@ where
             residual: parts.step,
             sides,
         };
+        if !M::CONSTRAINTS.is_empty() {
+            let mut form = ConstrainedForm {
+                inner: VelocityForm {
+                    model: self.model,
+                    scheme,
+                    span,
+                    forces: parts.forces,
+                    momenta: parts.momenta,
+                    masses: parts.masses,
+                    mass_pivots: parts.mass_pivots,
+                    constant_mass: &mut memory.mass,
+                    statistics: &mut memory.statistics,
+                },
+                layout: Layout::new(&scheme.element, N, M::CONSTRAINTS.len()),
+                rows: Rows::at_start(parts.rows, self.model, last.t, &last.start.q),
+                active: parts.active,
+                impulse: total(impulses),
+            };
+            return Ok(linearise(
+                &mut form,
+                parts.unknowns,
+                &[],
+                false,
+                system,
+                &mut matrix[..4 * N * N],
+            )?);
+        }
         if is_phase::<M, N>(&scheme) {
             let mut equations = PhaseForm {
                 model: self.model,

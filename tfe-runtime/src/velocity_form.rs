@@ -184,6 +184,36 @@ where
         }
     }
 
+    /// Momentum and force at a point.
+    pub(crate) fn values(
+        &mut self,
+        l: usize,
+        rates: &[[f64; N]],
+        point: &mut PointDerivatives<N>,
+    ) -> Result<(), StepError> {
+        let (t, q, v) = self.place(l, rates);
+        let mut first = First::ZERO;
+        let sign = match M::FORM {
+            Form::Lagrangian => {
+                self.model.first(t, &q, &v, &mut first);
+                point.p = first.z;
+                1.0
+            }
+            Form::Hamiltonian => {
+                let p = conjugate(self.model, t, &q, &v, &self.momenta[l])?;
+                self.model.first(t, &q, &p, &mut first);
+                self.momenta[l] = p;
+                point.p = p;
+                -1.0
+            }
+        };
+        for a in 0..N {
+            point.force[a] = sign * first.q[a] + first.force[a] + self.span.damping * v[a];
+        }
+        self.statistics.residual_evaluations += 1;
+        Ok(())
+    }
+
     /// First and second derivatives at a point.
     pub(crate) fn derivatives(
         &mut self,

@@ -1,5 +1,7 @@
 //! The memory of one element, given by the caller: no allocation while stepping.
 
+use crate::constrained::layout::Layout;
+use crate::constrained::rows::rows_len;
 use crate::element::Element;
 use crate::error::StepError;
 use crate::model::Form;
@@ -24,27 +26,61 @@ pub(crate) const fn width(element: &Element, form: Form, coordinates: usize) -> 
     }
 }
 
-/// The numbers that a [`Workspace`] needs for a valid element and a model with so many coordinates.
+/// How many unknowns an element has inside: rates, and with constraints the velocity at the end and all multipliers.
+pub(crate) const fn interior_len(
+    element: &Element,
+    form: Form,
+    coordinates: usize,
+    constraints: usize,
+) -> usize {
+    if constraints == 0 {
+        element.unknowns() * width(element, form, coordinates)
+    } else {
+        Layout::new(element, coordinates, constraints).size()
+    }
+}
+
+/// The numbers that a [`Workspace`] needs for a valid element and a model with so many coordinates and constraints.
 #[must_use]
-pub const fn numbers_len(element: Element, form: Form, coordinates: usize) -> usize {
+pub const fn numbers_len(
+    element: Element,
+    form: Form,
+    coordinates: usize,
+    constraints: usize,
+) -> usize {
     let (k, u) = (element.points(), element.unknowns());
-    let m = u * width(&element, form, coordinates);
+    let m = interior_len(&element, form, coordinates, constraints);
     // Unknowns, their start, increments; forces and momenta at the points; impulses and mass
-    // matrices of the rows; extrapolation; tangent.
-    3 * m + 2 * k * coordinates + u * coordinates * (1 + coordinates) + u * u + m * m
+    // matrices of the rows; extrapolation; rows of constraints; tangent.
+    3 * m
+        + 2 * k * coordinates
+        + u * coordinates * (1 + coordinates)
+        + u * u
+        + rows_len(coordinates, constraints)
+        + m * m
 }
 
 /// The indices that a [`Workspace`] needs.
 #[must_use]
-pub const fn pivots_len(element: Element, form: Form, coordinates: usize) -> usize {
-    let u = element.unknowns();
-    u * width(&element, form, coordinates) + u * coordinates
+pub const fn pivots_len(
+    element: Element,
+    form: Form,
+    coordinates: usize,
+    constraints: usize,
+) -> usize {
+    let m = interior_len(&element, form, coordinates, constraints);
+    m + element.unknowns() * coordinates + constraints
 }
 
 /// The numbers that a transition matrix needs beside the workspace.
 #[must_use]
-pub const fn transition_len(element: Element, form: Form, coordinates: usize) -> usize {
-    let m = element.unknowns() * width(&element, form, coordinates);
+pub const fn transition_len(
+    element: Element,
+    form: Form,
+    coordinates: usize,
+    constraints: usize,
+) -> usize {
+    let m = interior_len(&element, form, coordinates, constraints);
     // A side for each direction of the start, and the derivatives of the momentum at the end.
     2 * coordinates * m + coordinates * (m + coordinates)
 }
@@ -67,10 +103,14 @@ pub(crate) struct Parts<'a, const N: usize> {
     pub(crate) masses: &'a mut [f64],
     /// Old unknowns to new ones; U × U.
     pub(crate) extrapolation: &'a mut [f64],
+    /// Rows of constraints.
+    pub(crate) rows: &'a mut [f64],
     /// Matrix of Newton's method, or its factors.
     pub(crate) tangent: &'a mut [f64],
     pub(crate) tangent_pivots: &'a mut [usize],
     pub(crate) mass_pivots: &'a mut [usize],
+    /// One for each constraint that is independent of those before, else zero.
+    pub(crate) active: &'a mut [usize],
 }
 
 impl<'a, const N: usize> Parts<'a, N> {
@@ -78,11 +118,12 @@ impl<'a, const N: usize> Parts<'a, N> {
         workspace: Workspace<'a>,
         element: &Element,
         form: Form,
+        constraints: usize,
     ) -> Result<Self, StepError> {
         let (k, u) = (element.points(), element.unknowns());
-        let m = u * width(element, form, N);
-        let needed = numbers_len(*element, form, N);
-        let indices = pivots_len(*element, form, N);
+        let m = interior_len(element, form, N, constraints);
+        let needed = numbers_len(*element, form, N, constraints);
+        let indices = pivots_len(*element, form, N, constraints);
         if workspace.numbers.len() < needed || workspace.pivots.len() < indices {
             let given = workspace.numbers.len();
             return Err(StepError::Workspace { needed, given });
@@ -95,9 +136,11 @@ impl<'a, const N: usize> Parts<'a, N> {
         let (kicks, rest) = rest.split_at_mut(u * N);
         let (masses, rest) = rest.split_at_mut(u * N * N);
         let (extrapolation, rest) = rest.split_at_mut(u * u);
+        let (rows, rest) = rest.split_at_mut(rows_len(N, constraints));
         let (tangent, _) = rest.split_at_mut(m * m);
         let (tangent_pivots, rest) = workspace.pivots.split_at_mut(m);
-        let (mass_pivots, _) = rest.split_at_mut(u * N);
+        let (mass_pivots, rest) = rest.split_at_mut(u * N);
+        let (active, _) = rest.split_at_mut(constraints);
         Ok(Self {
             unknowns,
             origin,
@@ -107,9 +150,11 @@ impl<'a, const N: usize> Parts<'a, N> {
             kicks: kicks.as_chunks_mut().0,
             masses,
             extrapolation,
+            rows,
             tangent,
             tangent_pivots,
             mass_pivots,
+            active,
         })
     }
 }

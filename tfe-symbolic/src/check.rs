@@ -7,7 +7,7 @@ mod solver;
 
 use std::collections::BTreeMap;
 
-use crate::ast::{Array, Expr, ExprKind, Item, Name, Spanned};
+use crate::ast::{Array, Expr, ExprKind, Item, Name, Range, Spanned};
 use crate::context::{Context, FieldKind, Length};
 use crate::declared::{Form, Solver};
 use crate::diagnostic::{Bag, Kind, Role, Span, nearest};
@@ -109,6 +109,8 @@ pub struct Model {
     pub forces: Vec<(Expr, Expr)>,
     /// The Rayleigh function.
     pub dissipation: Option<Expr>,
+    /// The constraints: name, range of a family, value.
+    pub constraints: Vec<(Name, Option<Range>, Expr)>,
     /// The observables.
     pub outputs: Vec<(Name, Expr)>,
     /// The parameters by which derivatives are wanted.
@@ -123,8 +125,10 @@ pub struct Model {
     pub names_missing: bool,
     /// Fields of a type that formulas cannot use.
     other_fields: Vec<String>,
-    /// Where the solvers' elements stand.
+    /// Where the elements of all solvers stand, those with mistakes too.
     solver_spans: Vec<Span>,
+    /// The elements of `solvers` as written, and where.
+    pub(crate) solver_elements: Vec<(String, Span)>,
 }
 
 /// What the parser made of an attribute.
@@ -179,9 +183,8 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
             Item::Hamiltonian(value) => model.set_energy(Form::Hamiltonian, value, span, bag),
             Item::Dissipation(value) => model.dissipation = Some(value),
             Item::Force { target, value } => model.forces.push((target, value)),
-            Item::Constraint { .. } => {
-                bag.push(span, Kind::Constraints);
-                model.incomplete = true;
+            Item::Constraint { name, range, value } => {
+                model.constraints.push((name, range, value));
             }
             Item::Output {
                 name,
@@ -207,6 +210,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
     model.register(bag);
     model.sizes(bag);
     model.outputs(bag);
+    model.constraint_names(bag);
     if incomplete {
         // What seems to be missing may be what could not be read.
         return model;
@@ -508,6 +512,25 @@ impl Model {
                         taken,
                     },
                 );
+            }
+            names.push(name);
+        }
+    }
+
+    /// Names of constraints stand in no formula, but in results beside outputs.
+    fn constraint_names(&self, bag: &mut Bag) {
+        let mut names: Vec<&str> = Vec::new();
+        for (Spanned { node: name, span }, ..) in &self.constraints {
+            let taken = if names.contains(&name.as_str()) {
+                Some(Role::Constraint)
+            } else {
+                let mut outputs = self.outputs.iter();
+                let output = outputs.any(|(output, _)| output.node == *name);
+                output.then_some(Role::Output)
+            };
+            if let Some(taken) = taken {
+                let name = name.clone();
+                bag.push(*span, Kind::NameClash { name, taken });
             }
             names.push(name);
         }

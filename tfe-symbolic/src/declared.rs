@@ -74,6 +74,44 @@ impl fmt::Display for Parameter {
     }
 }
 
+/// A constraint: one scalar equation.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Constraint {
+    /// Its name; with its place where a declaration makes several, `rod[2]`.
+    pub name: String,
+    /// What kind of equation it is.
+    pub kind: ConstraintKind,
+    /// What vanishes: φ(q, t), or ψ(q, v, t) = A(q, t) v + a(q, t). In Hamiltonian models v stands for the velocities too.
+    pub value: ExprId,
+}
+
+/// What kind of equation a constraint is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConstraintKind {
+    /// φ(q, t) = 0
+    Holonomic {
+        /// φ is a polynomial of at most second degree in the coordinates.
+        quadratic: bool,
+    },
+    /// A(q, t) v + a(q, t) = 0
+    Velocity {
+        /// It was found to be the time derivative of some φ(q, t).
+        integrable: bool,
+    },
+}
+
+/// `holonomic, quadratic`
+impl fmt::Display for ConstraintKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Holonomic { quadratic: true } => "holonomic, quadratic",
+            Self::Holonomic { quadratic: false } => "holonomic",
+            Self::Velocity { integrable: true } => "velocity, integrable",
+            Self::Velocity { integrable: false } => "velocity",
+        })
+    }
+}
+
 /// A request for a stepper specialised to the model and one element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Solver {
@@ -134,6 +172,8 @@ pub struct Declared {
     pub dissipation: Option<ExprId>,
     /// The generalized forces; several on one coordinate add up.
     pub forces: Vec<Force>,
+    /// The constraints, in order.
+    pub constraints: Vec<Constraint>,
     /// The observables by name.
     pub observables: Vec<(String, ExprId)>,
     /// The parameters by which derivatives are wanted, in the order of `sensitivity(…)`.

@@ -11,8 +11,9 @@ use std::collections::BTreeMap;
 
 use crate::arrange::arrange;
 use crate::constant::Constant;
+use crate::constraint;
 use crate::count::Counts;
-use crate::declared::{Declared, Force, Form, Parameter};
+use crate::declared::{Constraint, Declared, Force, Form, Parameter};
 use crate::differentiate::{Forward, gradient};
 use crate::entry::{Array, Entry, Place, blocks, for_each_sink};
 use crate::factor::take_out_factors;
@@ -38,6 +39,8 @@ pub struct Model {
     pub dissipation: Option<ExprId>,
     /// The generalized forces.
     pub forces: Vec<Force>,
+    /// The constraints, free of sums over ranges.
+    pub constraints: Vec<Constraint>,
     /// The observables by name.
     pub observables: Vec<(String, ExprId)>,
     /// The parameters by which derivatives are wanted.
@@ -53,6 +56,7 @@ impl From<&Declared> for Model {
             energy: declared.energy,
             dissipation: declared.dissipation,
             forces: declared.forces.clone(),
+            constraints: declared.constraints.clone(),
             observables: declared.observables.clone(),
             sensitivities: declared.sensitivities.clone(),
         }
@@ -104,6 +108,7 @@ impl Derivation {
             energy,
             dissipation,
             forces,
+            constraints,
             observables,
             sensitivities,
         } = model;
@@ -122,7 +127,8 @@ impl Derivation {
         for (number, (_, value)) in observables.iter().enumerate() {
             deriver.push(&[], Place::scalar(Array::Observable(number)), *value);
         }
-        let entries = deriver.entries;
+        let mut entries = deriver.entries;
+        entries.extend(constraint::entries(&mut graph, &constraints));
         let structure = Structure::of(&graph, form, &dof, &entries);
         Self {
             graph,

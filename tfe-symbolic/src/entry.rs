@@ -21,6 +21,14 @@ pub(crate) enum Array {
     ForceZ,
     ForceQ,
     Observable(usize),
+    Phi(usize),
+    Row(usize),
+    Drift(usize),
+    PsiQ(usize),
+    RowRate(usize),
+    Bend,
+    RateQ,
+    RateV,
 }
 
 /// One entry of an array of results; vectors and numbers leave indices unused.
@@ -40,6 +48,11 @@ impl Array {
             Self::ZZ => request.mass || request.second,
             Self::ZQ | Self::QQ | Self::ForceZ | Self::ForceQ => request.second,
             Self::Observable(_) => request.observables,
+            Self::Phi(_) => request.constraint_values,
+            Self::Row(_) | Self::Drift(_) => request.constraint_rows,
+            Self::PsiQ(_) | Self::RowRate(_) | Self::Bend | Self::RateQ | Self::RateV => {
+                request.constraint_second
+            }
         }
     }
 }
@@ -72,6 +85,14 @@ impl Place {
             Array::ForceZ => Output::ForceZ(row, column),
             Array::ForceQ => Output::ForceQ(row, column),
             Array::Observable(number) => Output::Observable(number),
+            Array::Phi(number) => Output::Phi(number),
+            Array::Row(number) => Output::Row(number, row),
+            Array::Drift(number) => Output::Drift(number),
+            Array::PsiQ(number) => Output::PsiQ(number, row),
+            Array::RowRate(number) => Output::RowRate(number, row),
+            Array::Bend => Output::Bend(row, column),
+            Array::RateQ => Output::RateQ(row, column),
+            Array::RateV => Output::RateV(row, column),
         }
     }
 

@@ -37,6 +37,8 @@ pub enum Input {
     Velocity(Affine),
     /// Its momentum (models declared by a Hamiltonian).
     Momentum(Affine),
+    /// The multiplier of the constraint of this number.
+    Multiplier(usize),
     /// A scalar field of the struct.
     Parameter(String),
     /// An element of an array field of the struct.
@@ -146,6 +148,7 @@ impl fmt::Display for Input {
             Self::Coordinate(index) => write!(f, "q[{index}]"),
             Self::Velocity(index) => write!(f, "v[{index}]"),
             Self::Momentum(index) => write!(f, "p[{index}]"),
+            Self::Multiplier(number) => write!(f, "mu[{number}]"),
             Self::Parameter(name) => f.write_str(name),
             Self::ParameterElement(name, index) => write!(f, "{name}[{index}]"),
             Self::Integer(value) => write!(f, "({value})"),

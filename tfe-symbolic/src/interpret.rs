@@ -14,17 +14,19 @@ pub struct Environment {
     pub time: f64,
     /// q
     pub q: Vec<f64>,
-    /// Velocities of a Lagrangian, momenta of a Hamiltonian
+    /// Velocities of a Lagrangian, momenta of a Hamiltonian; for constraints, velocities
     pub z: Vec<f64>,
     /// Scalar fields by name
     pub parameters: BTreeMap<String, f64>,
     /// Array fields by name
     pub arrays: BTreeMap<String, Vec<f64>>,
+    /// The multipliers of the constraints
+    pub mu: Vec<f64>,
     /// Const parameters and lengths by name
     pub sizes: BTreeMap<String, i64>,
 }
 
-/// What a kernel computes. Entries that a program does not write are zero.
+/// What a kernel computes. Entries that a program does not write are zero. There are as many constraints as multipliers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Results {
     /// L or H
@@ -47,6 +49,22 @@ pub struct Results {
     pub force_q: Vec<Vec<f64>>,
     /// The observables by number
     pub observables: Vec<f64>,
+    /// φ of constraints, by number
+    pub phi: Vec<f64>,
+    /// A, a row for each constraint
+    pub rows: Vec<Vec<f64>>,
+    /// a of constraints
+    pub drift: Vec<f64>,
+    /// ∂ψ/∂q, a row for each constraint
+    pub psi_q: Vec<Vec<f64>>,
+    /// Ȧ, a row for each constraint
+    pub row_rates: Vec<Vec<f64>>,
+    /// ∂(Aᵀμ)/∂q
+    pub bend: Vec<Vec<f64>>,
+    /// ∂(Ȧᵀμ)/∂q
+    pub rate_q: Vec<Vec<f64>>,
+    /// ∂(Ȧᵀμ)/∂v
+    pub rate_v: Vec<Vec<f64>>,
 }
 
 /// Why a program cannot run.
@@ -99,6 +117,8 @@ impl std::error::Error for InterpretError {}
 pub fn interpret(program: &Program, environment: &Environment) -> Result<Results, InterpretError> {
     let n = environment.q.len();
     let block = || vec![vec![0.0; n]; n];
+    let constraints = environment.mu.len();
+    let rows = || vec![vec![0.0; n]; constraints];
     let results = Results {
         value: 0.0,
         z: vec![0.0; n],
@@ -110,6 +130,14 @@ pub fn interpret(program: &Program, environment: &Environment) -> Result<Results
         force_z: block(),
         force_q: block(),
         observables: Vec::new(),
+        phi: vec![0.0; constraints],
+        rows: rows(),
+        drift: vec![0.0; constraints],
+        psi_q: rows(),
+        row_rates: rows(),
+        bend: block(),
+        rate_q: block(),
+        rate_v: block(),
     };
     let temporaries = vec![None; program.temporaries as usize];
     let mut machine = Machine {
@@ -232,6 +260,10 @@ impl Machine<'_> {
             Input::Velocity(index) | Input::Momentum(index) => {
                 self.element("z", &environment.z, index)
             }
+            Input::Multiplier(number) => {
+                let number = i64::try_from(*number).map_err(|_| InterpretError::Overflow)?;
+                self.element("mu", &environment.mu, &Affine::constant(number))
+            }
             Input::Parameter(name) => environment
                 .parameters
                 .get(name)
@@ -296,10 +328,15 @@ impl Machine<'_> {
             Output::ByZ(a) | Output::ByQ(a) | Output::Force(a) => self.index(a)?,
             Output::ZZ(a, _) | Output::ZQ(a, _) | Output::QQ(a, _) => self.index(a)?,
             Output::ForceZ(a, _) | Output::ForceQ(a, _) => self.index(a)?,
+            Output::Bend(a, _) | Output::RateQ(a, _) | Output::RateV(a, _) => self.index(a)?,
+            Output::Phi(k) | Output::Drift(k) => number(*k)?,
+            Output::Row(k, _) | Output::PsiQ(k, _) | Output::RowRate(k, _) => number(*k)?,
         };
         let column = match output {
             Output::ZZ(_, b) | Output::ZQ(_, b) | Output::QQ(_, b) => self.index(b)?,
             Output::ForceZ(_, b) | Output::ForceQ(_, b) => self.index(b)?,
+            Output::Bend(_, b) | Output::RateQ(_, b) | Output::RateV(_, b) => self.index(b)?,
+            Output::Row(_, b) | Output::PsiQ(_, b) | Output::RowRate(_, b) => self.index(b)?,
             _ => 0,
         };
         let results = &mut self.results;
@@ -319,11 +356,24 @@ impl Machine<'_> {
             Output::QQ(..) => entry(entry(&mut results.qq, row)?, column),
             Output::ForceZ(..) => entry(entry(&mut results.force_z, row)?, column),
             Output::ForceQ(..) => entry(entry(&mut results.force_q, row)?, column),
+            Output::Phi(_) => entry(&mut results.phi, row),
+            Output::Row(..) => entry(entry(&mut results.rows, row)?, column),
+            Output::Drift(_) => entry(&mut results.drift, row),
+            Output::PsiQ(..) => entry(entry(&mut results.psi_q, row)?, column),
+            Output::RowRate(..) => entry(entry(&mut results.row_rates, row)?, column),
+            Output::Bend(..) => entry(entry(&mut results.bend, row)?, column),
+            Output::RateQ(..) => entry(entry(&mut results.rate_q, row)?, column),
+            Output::RateV(..) => entry(entry(&mut results.rate_v, row)?, column),
         }
     }
 
     fn clear(&mut self, output: &Output) {
         let results = &mut self.results;
+        let row = |rows: &mut Vec<Vec<f64>>, number: usize| {
+            if let Some(row) = rows.get_mut(number) {
+                row.fill(0.0);
+            }
+        };
         match output {
             Output::Value => results.value = 0.0,
             Output::Observable(_) => results.observables.fill(0.0),
@@ -335,8 +385,20 @@ impl Machine<'_> {
             Output::QQ(..) => results.qq.iter_mut().for_each(|row| row.fill(0.0)),
             Output::ForceZ(..) => results.force_z.iter_mut().for_each(|row| row.fill(0.0)),
             Output::ForceQ(..) => results.force_q.iter_mut().for_each(|row| row.fill(0.0)),
+            Output::Phi(_) => results.phi.fill(0.0),
+            Output::Drift(_) => results.drift.fill(0.0),
+            Output::Row(number, _) => row(&mut results.rows, *number),
+            Output::PsiQ(number, _) => row(&mut results.psi_q, *number),
+            Output::RowRate(number, _) => row(&mut results.row_rates, *number),
+            Output::Bend(..) => results.bend.iter_mut().for_each(|row| row.fill(0.0)),
+            Output::RateQ(..) => results.rate_q.iter_mut().for_each(|row| row.fill(0.0)),
+            Output::RateV(..) => results.rate_v.iter_mut().for_each(|row| row.fill(0.0)),
         }
     }
+}
+
+fn number(number: usize) -> Result<i64, InterpretError> {
+    i64::try_from(number).map_err(|_| InterpretError::Overflow)
 }
 
 fn entry<T>(array: &mut [T], index: i64) -> Result<&mut T, InterpretError> {

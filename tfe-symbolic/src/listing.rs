@@ -57,7 +57,8 @@ fn list(statements: &[Statement], depth: usize, f: &mut fmt::Formatter<'_>) -> f
     Ok(())
 }
 
-/// The name of an array of results: E is the energy function, z the velocity or the momentum, Q the generalized force.
+/// The name of an array of results: E is the energy function, z the velocity or the momentum, Q the generalized force, A and a belong to
+/// constraints.
 fn array(output: &Output) -> &'static str {
     match output {
         Output::Value => "E",
@@ -70,6 +71,14 @@ fn array(output: &Output) -> &'static str {
         Output::ForceZ(..) => "Q_z",
         Output::ForceQ(..) => "Q_q",
         Output::Observable(_) => "output",
+        Output::Phi(_) => "phi",
+        Output::Row(..) => "A",
+        Output::Drift(_) => "a",
+        Output::PsiQ(..) => "psi_q",
+        Output::RowRate(..) => "A_rate",
+        Output::Bend(..) => "bend",
+        Output::RateQ(..) => "rate_q",
+        Output::RateV(..) => "rate_v",
     }
 }
 
@@ -83,10 +92,18 @@ impl fmt::Display for Output {
             | Self::ZQ(a, b)
             | Self::QQ(a, b)
             | Self::ForceZ(a, b)
-            | Self::ForceQ(a, b) => {
+            | Self::ForceQ(a, b)
+            | Self::Bend(a, b)
+            | Self::RateQ(a, b)
+            | Self::RateV(a, b) => {
                 write!(f, "[{a}, {b}]")
             }
-            Self::Observable(number) => write!(f, "[{number}]"),
+            Self::Row(number, a) | Self::PsiQ(number, a) | Self::RowRate(number, a) => {
+                write!(f, "[{number}, {a}]")
+            }
+            Self::Observable(number) | Self::Phi(number) | Self::Drift(number) => {
+                write!(f, "[{number}]")
+            }
         }
     }
 }

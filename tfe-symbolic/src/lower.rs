@@ -7,6 +7,7 @@
 //! Forces and observables may use loops anywhere.
 
 mod affine;
+mod constraints;
 mod forces;
 mod names;
 mod rates;
@@ -64,12 +65,14 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
             observables.push((name.node.clone(), value));
         }
     }
-    let sensitivities = lowerer.sensitivities();
+    let constraints = lowerer.constraints();
+    lowerer.check_solvers(&constraints);
+    let sensitivities = lowerer.sensitivities(&constraints);
     // Mistakes in a `let` that nothing uses are mistakes all the same.
     for at in 0..model.lets.len() {
         lowerer.named(at);
     }
-    lowerer.check_usage(form, energy);
+    lowerer.check_usage(form, energy, &constraints);
     let used_fields = lowerer.used_fields();
     let graph = lowerer.graph;
     let arrays = |slots: &[crate::check::Slots]| {
@@ -90,6 +93,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         energy: energy?,
         dissipation,
         forces,
+        constraints,
         observables,
         sensitivities,
         solvers: model.solvers.clone(),

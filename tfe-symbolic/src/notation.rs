@@ -6,7 +6,7 @@ use crate::check::Model;
 /// The formulas of a model as the user wrote them: `L = ½ m l² θ̇² + m g l cos θ`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Notation {
-    /// One formula a line: `let`s, energy, dissipation, forces.
+    /// One formula a line: `let`s, energy, dissipation, forces, constraints.
     pub formulas: Vec<String>,
 }
 
@@ -25,6 +25,14 @@ impl Notation {
         }
         for (target, value) in &model.forces {
             formulas.push(format!("Q({}) = {}", formula(target), formula(value)));
+        }
+        for (name, range, value) in &model.constraints {
+            let range = range.as_ref().map(|range| {
+                let (start, end) = (formula(&range.start), formula(&range.end));
+                format!(" for {} = {start}..{end}", symbol(&range.variable.node))
+            });
+            let (name, range) = (symbol(&name.node), range.unwrap_or_default());
+            formulas.push(format!("0 = {}      ({name}{range})", formula(value)));
         }
         Self { formulas }
     }

@@ -80,6 +80,22 @@ pub enum Output {
     ForceQ(Affine, Affine),
     /// The observable of this number
     Observable(usize),
+    /// φ of the constraint of this number
+    Phi(usize),
+    /// A, one entry of the row of a constraint
+    Row(usize, Affine),
+    /// a of a constraint
+    Drift(usize),
+    /// ∂ψ/∂q with ψ = A v + a, one entry of the row of a constraint
+    PsiQ(usize, Affine),
+    /// Ȧ, one entry of the row of a constraint
+    RowRate(usize, Affine),
+    /// ∂(Aᵀμ)/∂q
+    Bend(Affine, Affine),
+    /// ∂(Ȧᵀμ)/∂q
+    RateQ(Affine, Affine),
+    /// ∂(Ȧᵀμ)/∂v
+    RateV(Affine, Affine),
 }
 
 /// One step of a program.
@@ -153,6 +169,12 @@ pub struct Request {
     pub second: bool,
     /// The observables
     pub observables: bool,
+    /// φ of the holonomic constraints
+    pub constraint_values: bool,
+    /// A and a of the constraints
+    pub constraint_rows: bool,
+    /// The derivatives of the constraints, with velocities and multipliers
+    pub constraint_second: bool,
 }
 
 /// By what the first derivatives and forces are differentiated once more, at fixed (q, z).

@@ -24,7 +24,7 @@ pub struct Structure {
     pub form: Form,
     /// The number of coordinates.
     pub dof: Affine,
-    /// The time appears in the energy function or in a force.
+    /// The time appears in the energy function, in a force or in a constraint.
     pub time_dependent: bool,
     /// There are forces or dissipation.
     pub forced: bool,
@@ -32,13 +32,13 @@ pub struct Structure {
     pub quadratic_in_z: bool,
     /// ∂²/∂z∂z depends on parameters only.
     pub constant_mass: bool,
-    /// All second derivatives and derivatives of forces depend on parameters and time only.
+    /// All second derivatives and derivatives of forces depend on parameters and time only, and there are no constraints.
     pub linear: bool,
     /// ∂²/∂z∂q vanishes.
     pub separable: bool,
     /// ∂Q/∂q is symmetric and ∂Q/∂z vanishes: the forces have a potential at every time.
     pub symmetric_forces: bool,
-    /// Coordinates that the energy function does not depend on; empty where indices are not literal.
+    /// Coordinates that the energy function does not depend on and no constraint acts on; empty where indices are not literal.
     pub cyclic: Vec<usize>,
     /// Pattern of ∂²/∂z∂z
     pub zz: Pattern,
@@ -70,7 +70,10 @@ impl Dependence {
                     Input::Time => found.time = true,
                     Input::Coordinate(_) => found.q = true,
                     Input::Velocity(_) | Input::Momentum(_) => found.z = true,
-                    Input::Parameter(_) | Input::ParameterElement(..) | Input::Integer(_) => {}
+                    Input::Multiplier(_)
+                    | Input::Parameter(_)
+                    | Input::ParameterElement(..)
+                    | Input::Integer(_) => {}
                 }
             }
         }
@@ -93,6 +96,7 @@ impl Structure {
                 .map(|entry| entry.value);
             Dependence::of(graph, values)
         };
+        let (constraints, constraints_vary) = constraints(graph, entries);
         let mass = depends(&[Array::ZZ]);
         let tangent = depends(&[
             Array::ZZ,
@@ -105,11 +109,11 @@ impl Structure {
         Self {
             form,
             dof: dof.clone(),
-            time_dependent: depends(&[Array::Value, Array::Force]).time,
+            time_dependent: depends(&[Array::Value, Array::Force]).time || constraints_vary,
             forced: of(Array::Force).next().is_some(),
             quadratic_in_z: !mass.z,
             constant_mass: !(mass.z || mass.q || mass.time),
-            linear: !(tangent.z || tangent.q),
+            linear: !(tangent.z || tangent.q || constraints),
             separable: of(Array::ZQ).next().is_none(),
             symmetric_forces: of(Array::ForceZ).next().is_none() && is_symmetric(entries),
             cyclic: cyclic(dof, entries),
@@ -120,6 +124,19 @@ impl Structure {
             force_q: pattern(Array::ForceQ),
         }
     }
+}
+
+/// Whether there are constraints, and whether they depend on the time.
+fn constraints(graph: &Graph, entries: &[Entry]) -> (bool, bool) {
+    let rows = entries.iter().filter(|entry| {
+        matches!(
+            entry.place.array,
+            Array::Phi(_) | Array::Row(_) | Array::Drift(_)
+        )
+    });
+    let values: Vec<ExprId> = rows.map(|entry| entry.value).collect();
+    let time = Dependence::of(graph, values.iter().copied()).time;
+    (!values.is_empty(), time)
 }
 
 /// Whether every entry of ∂Q/∂q has its mirror image.
@@ -152,7 +169,7 @@ fn cyclic(dof: &Affine, entries: &[Entry]) -> Vec<usize> {
     let mut rows = BTreeSet::new();
     for entry in entries
         .iter()
-        .filter(|entry| entry.place.array == Array::ByQ)
+        .filter(|entry| matches!(entry.place.array, Array::ByQ | Array::Row(_)))
     {
         match entry.place.row.as_constant() {
             Some(row) => rows.insert(row),

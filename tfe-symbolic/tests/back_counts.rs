@@ -14,6 +14,9 @@ const ALL: Request = Request {
     mass: true,
     second: true,
     observables: false,
+    constraint_values: false,
+    constraint_rows: false,
+    constraint_second: false,
 };
 
 fn counts(text: &str) -> Counts {

@@ -17,6 +17,9 @@ const ALL: Request = Request {
     mass: true,
     second: true,
     observables: true,
+    constraint_values: false,
+    constraint_rows: false,
+    constraint_second: false,
 };
 
 /// A random expression in q0, q1, v0, v1.
@@ -186,6 +189,7 @@ fn model(graph: Graph, energy: ExprId) -> Model {
         energy,
         dissipation: None,
         forces: Vec::new(),
+        constraints: Vec::new(),
         observables: Vec::new(),
         sensitivities: Vec::new(),
     }

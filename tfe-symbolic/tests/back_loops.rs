@@ -12,6 +12,9 @@ const ALL: Request = Request {
     mass: true,
     second: true,
     observables: true,
+    constraint_values: false,
+    constraint_rows: false,
+    constraint_second: false,
 };
 
 /// A family of N coordinates, and those of the scalar parameters m, k, a, c that the text uses.

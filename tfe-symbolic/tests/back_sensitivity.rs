@@ -39,6 +39,7 @@ fn derivation(text: &str) -> Derivation {
 fn environment(m: &[f64]) -> Environment {
     let n = m.len();
     Environment {
+        mu: Vec::new(),
         time: 0.4,
         q: (0..n).map(|i| (1.7 * i as f64 + 0.3).sin()).collect(),
         z: (0..n).map(|i| (0.9 * i as f64 - 0.2).cos()).collect(),

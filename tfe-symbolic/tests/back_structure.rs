@@ -158,6 +158,9 @@ fn programs_do_not_change_from_run_to_run() {
         mass: true,
         second: true,
         observables: true,
+        constraint_values: false,
+        constraint_rows: false,
+        constraint_second: false,
     };
     let programs: Vec<String> = (0..5)
         .map(|_| derivation(text).program(all).to_string())

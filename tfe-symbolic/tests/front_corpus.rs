@@ -140,6 +140,14 @@ fn shown(model: &Declared) -> String {
         }
         out.push('\n');
     }
+    for constraint in &model.constraints {
+        let value = graph.display(constraint.value);
+        let _ = writeln!(
+            out,
+            "0 = {value} ({}: {})",
+            constraint.name, constraint.kind
+        );
+    }
     for (name, value) in &model.observables {
         let _ = writeln!(out, "{name} = {}", graph.display(*value));
     }

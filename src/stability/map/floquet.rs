@@ -98,9 +98,9 @@ impl<'a, const N: usize> Monodromy<'a, N> {
         let element = tables.view().element;
         Self {
             tables,
-            numbers: vec![0.0; numbers_len(element, M::FORM, N)],
-            pivots: vec![0; pivots_len(element, M::FORM, N)],
-            extra: vec![0.0; transition_len(element, M::FORM, N)],
+            numbers: vec![0.0; numbers_len(element, M::FORM, N, M::CONSTRAINTS.len())],
+            pivots: vec![0; pivots_len(element, M::FORM, N, M::CONSTRAINTS.len())],
+            extra: vec![0.0; transition_len(element, M::FORM, N, M::CONSTRAINTS.len())],
             factor: vec![0.0; 4 * N * N],
             product: vec![0.0; 4 * N * N],
             column: vec![0.0; 2 * N],

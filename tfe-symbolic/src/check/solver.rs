@@ -66,6 +66,8 @@ impl Model {
                 nodes,
                 rule,
             });
+            self.solver_elements
+                .push((element.to_string(), element.span));
         }
         self.solver_spans.push(element.span);
     }

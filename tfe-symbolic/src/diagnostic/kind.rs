@@ -132,8 +132,42 @@ kinds! {
         /// The field.
         length: String,
     },
-    /// `constraint(...)`
-    Constraints,
+    /// A constraint in which velocities stand other than linearly.
+    ConstraintNotAffine {
+        /// The constraint.
+        name: String,
+    },
+    /// A constraint that holds neither coordinates nor velocities.
+    ConstraintWithoutCoordinate {
+        /// The constraint.
+        name: String,
+    },
+    /// A constraint that says what another one says.
+    RepeatedConstraint {
+        /// The constraint.
+        name: String,
+        /// The one before it.
+        other: String,
+    },
+    /// A momentum in a constraint.
+    MomentumInConstraint,
+    /// `constraint(rod[i in 0..n])`
+    ConstraintRange {
+        /// The range as written.
+        range: String,
+    },
+    /// A family of constraints over a very long range.
+    TooManyConstraints {
+        /// How many are allowed.
+        limit: usize,
+    },
+    /// A sum in a constraint that cannot be written out.
+    SumInConstraint {
+        /// The constraint.
+        name: String,
+        /// The longest sum that is written out.
+        limit: usize,
+    },
     /// `output(x[i in a..b])`
     OutputFamily,
     /// Neither a Lagrangian nor a Hamiltonian.
@@ -224,6 +258,13 @@ kinds! {
     RepeatedParameter {
         /// The parameter.
         name: String,
+    },
+    /// A parameter in `sensitivity(...)` that a constraint holds.
+    ParameterOfConstraint {
+        /// The parameter.
+        name: String,
+        /// The constraint.
+        constraint: String,
     },
     // ---- names ----
     /// A name that nothing declares.
@@ -402,6 +443,15 @@ kinds! {
         /// The const parameter.
         length: String,
     },
+    /// `solver(...)` with an element that does not admit the constraints of the model.
+    SolverOfConstraints {
+        /// The element as written.
+        element: String,
+        /// Its nodes.
+        nodes: u32,
+        /// It admits holonomic ones.
+        velocity: bool,
+    },
 }
 
 /// What a name stands for.
@@ -421,6 +471,8 @@ pub enum Role {
     Index,
     /// An output.
     Output,
+    /// A constraint.
+    Constraint,
     /// A solver.
     Solver,
     /// The struct itself.
@@ -439,6 +491,7 @@ impl fmt::Display for Role {
             Self::Let => "a `let`",
             Self::Index => "the index of a sum around it",
             Self::Output => "an output",
+            Self::Constraint => "a constraint",
             Self::Solver => "a solver",
             Self::Struct => "the struct",
             Self::Method => "a method of every model",

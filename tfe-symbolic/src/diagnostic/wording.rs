@@ -44,7 +44,25 @@ impl Kind {
             Self::RunTimeLength { .. } => {
                 "coordinate arrays of a length known at run time only are not supported yet".into()
             }
-            Self::Constraints => "constraints are not supported yet".into(),
+            Self::ConstraintNotAffine { name } => {
+                format!("constraint `{name}` is not affine in the velocities")
+            }
+            Self::ConstraintWithoutCoordinate { name } => {
+                format!("constraint `{name}` holds no coordinate")
+            }
+            Self::RepeatedConstraint { name, other } => {
+                format!("constraint `{name}` repeats `{other}`")
+            }
+            Self::MomentumInConstraint => "momenta cannot be used in a constraint".into(),
+            Self::ConstraintRange { range } => {
+                format!("a family of constraints needs a range known here, found `{range}`")
+            }
+            Self::TooManyConstraints { limit } => {
+                format!("a family of constraints has more than {limit} members")
+            }
+            Self::SumInConstraint { name, .. } => {
+                format!("constraint `{name}` holds a sum that cannot be written out")
+            }
             Self::OutputFamily => "outputs over a range are not supported yet".into(),
             Self::NoEnergy => "the model has neither a Lagrangian nor a Hamiltonian".into(),
             Self::TwoEnergies => "the model has both a Lagrangian and a Hamiltonian".into(),
@@ -91,6 +109,9 @@ impl Kind {
             }
             Self::RepeatedParameter { name } => {
                 format!("`sensitivity` names `{name}` more than once")
+            }
+            Self::ParameterOfConstraint { name, constraint } => {
+                format!("cannot differentiate by `{name}`, which constraint `{constraint}` holds")
             }
             Self::UnknownSymbol { name, .. } => format!("unknown name `{name}`"),
             Self::UnknownFunction { name, .. } => format!("unknown function `{name}`"),
@@ -181,6 +202,12 @@ impl Kind {
             Self::SolverOfFamily { length } => {
                 format!("a solver needs sizes known here, but `{length}` is generic")
             }
+            Self::SolverOfConstraints {
+                element, velocity, ..
+            } => {
+                let kind = if *velocity { "velocity " } else { "" };
+                format!("element `{element}` does not admit {kind}constraints")
+            }
         }
     }
 
@@ -259,9 +286,29 @@ impl Kind {
                 "use a const parameter, as in `struct Model<const N: usize>` with `{name}[N]`, \
                  instead of the field `{length}`"
             ),
-            Self::Constraints => {
-                "choose coordinates that satisfy them, or add a stiff potential".into()
+            Self::ConstraintNotAffine { .. } => {
+                "write a condition on positions, or one in which velocities stand linearly, such \
+                 as `dot(x)*sin(phi) - dot(y)*cos(phi)`"
+                    .into()
             }
+            Self::ConstraintWithoutCoordinate { .. } => {
+                "write what must vanish, such as `x^2 + y^2 - l^2`".into()
+            }
+            Self::RepeatedConstraint { name, .. } => format!("remove `{name}`"),
+            Self::MomentumInConstraint => "write the velocity instead, such as `dot(x)`".into(),
+            Self::ConstraintRange { .. } => {
+                "write the constraints out, or give the array and the range literal lengths".into()
+            }
+            Self::TooManyConstraints { .. } => "split the family into several shorter ones".into(),
+            Self::SumInConstraint { limit, .. } => {
+                format!("make the length a number of at most {limit}, or write the sum out")
+            }
+            Self::ParameterOfConstraint { .. } => {
+                "remove it from `sensitivity`: derivatives of constraints by parameters are not \
+                 available"
+                    .into()
+            }
+            Self::SolverOfConstraints { nodes, .. } => format!("use `Mixed::<{nodes}>`"),
             Self::OutputFamily => "declare one `output` an element".into(),
             Self::NoEnergy => "add `lagrangian = …` or `hamiltonian = …`".into(),
             Self::TwoEnergies => "keep one of them".into(),

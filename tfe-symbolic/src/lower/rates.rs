@@ -68,7 +68,10 @@ impl Lowerer<'_> {
                 trouble.momentum = true;
                 None
             }
-            Input::Parameter(_) | Input::ParameterElement(..) | Input::Integer(_) => None,
+            Input::Multiplier(_)
+            | Input::Parameter(_)
+            | Input::ParameterElement(..)
+            | Input::Integer(_) => None,
         });
         let kind = match trouble {
             Trouble {

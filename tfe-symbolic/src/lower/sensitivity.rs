@@ -6,12 +6,12 @@ use super::Lowerer;
 use crate::ast::{Expr, ExprKind};
 use crate::check::Symbol;
 use crate::context::{FieldKind, Length};
-use crate::declared::Parameter;
+use crate::declared::{Constraint, Parameter};
 use crate::diagnostic::{Kind, Span, nearest};
 use crate::input::{Affine, IndexSymbol};
 
 impl Lowerer<'_> {
-    pub(super) fn sensitivities(&mut self) -> Vec<Parameter> {
+    pub(super) fn sensitivities(&mut self, constraints: &[Constraint]) -> Vec<Parameter> {
         let model = self.model;
         let mut parameters: Vec<Parameter> = Vec::new();
         for expr in &model.sensitivities {
@@ -21,6 +21,12 @@ impl Lowerer<'_> {
             if parameters.contains(&parameter) {
                 let name = parameter.to_string();
                 self.report(expr.span, Kind::RepeatedParameter { name });
+            } else if let Some(constraint) = self.constraint_with(&parameter, constraints) {
+                let kind = Kind::ParameterOfConstraint {
+                    name: parameter.to_string(),
+                    constraint: constraint.name.clone(),
+                };
+                self.report(expr.span, kind);
             } else {
                 parameters.push(parameter);
             }

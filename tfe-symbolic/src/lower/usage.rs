@@ -2,7 +2,7 @@
 
 use super::Lowerer;
 use crate::context::FieldKind;
-use crate::declared::Form;
+use crate::declared::{Constraint, Form};
 use crate::diagnostic::{Kind, Span};
 use crate::differentiate::derivative;
 use crate::graph::ExprId;
@@ -40,7 +40,12 @@ impl Coverage {
 }
 
 impl Lowerer<'_> {
-    pub(super) fn check_usage(&mut self, form: Form, energy: Option<ExprId>) {
+    pub(super) fn check_usage(
+        &mut self,
+        form: Form,
+        energy: Option<ExprId>,
+        constraints: &[Constraint],
+    ) {
         if self.model.incomplete {
             return;
         }
@@ -48,7 +53,7 @@ impl Lowerer<'_> {
         if let Some(energy) = energy
             && !self.model.coordinates.is_empty()
         {
-            self.check_energy(form, energy);
+            self.check_energy(form, energy, constraints);
         }
     }
 
@@ -84,7 +89,7 @@ impl Lowerer<'_> {
         }
     }
 
-    fn check_energy(&mut self, form: Form, energy: ExprId) {
+    fn check_energy(&mut self, form: Form, energy: ExprId, constraints: &[Constraint]) {
         let inputs = self.graph.inputs_of(energy);
         let model = self.model;
         let state = |input: &Input| {
@@ -126,6 +131,14 @@ impl Lowerer<'_> {
             Input::Velocity(at) | Input::Momentum(at) => Some(at),
             _ => None,
         });
+        let inputs: Vec<Input> = constraints
+            .iter()
+            .flat_map(|constraint| self.graph.inputs_of(constraint.value))
+            .collect();
+        let constrained = Coverage::of(self, &inputs, |input| match input {
+            Input::Coordinate(at) | Input::Velocity(at) => Some(at),
+            _ => None,
+        });
         for (number, slots) in model.coordinates.iter().enumerate() {
             if wrong[number] {
                 continue;
@@ -133,6 +146,10 @@ impl Lowerer<'_> {
             let length = slots.length.as_ref().and_then(Affine::as_constant);
             for at in 0..length.map_or(1, |length| length as usize) {
                 let flat = slots.first + at;
+                // A constraint may determine what the Lagrangian leaves open.
+                if form == Form::Lagrangian && !inputs.is_empty() && constrained.has(flat) {
+                    continue;
+                }
                 let element = |name: &str| match length {
                     Some(_) => format!("{name}[{at}]"),
                     None => name.to_owned(),

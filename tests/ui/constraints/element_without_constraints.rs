@@ -1,0 +1,13 @@
+//! Not every element takes constraints.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    constraint(rod) = x^2 + y^2 - 1,
+    solver(Fast, Radau::<3>),
+)]
+struct Model { m: f64, g: f64 }
+
+fn main() {}

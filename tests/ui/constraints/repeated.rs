@@ -1,0 +1,13 @@
+//! The same constraint with another sign and factor.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    constraint(rod) = x^2 + y^2 - l^2,
+    constraint(bar) = l^2/2 - (x^2 + y^2)/2,
+)]
+struct Model { m: f64, g: f64, l: f64 }
+
+fn main() {}

@@ -1,0 +1,345 @@
+/// # Derived model
+/// ```text
+/// L = ½ m (ẋ² + ẏ²) + ½ j φ̇² + m g sin α x
+/// 0 = ẋ sin φ − ẏ cos φ      (blade)
+/// coordinates: x, y, φ      parameters: m, j, g, α
+/// operations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other
+/// operations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other
+/// operations, gradient and second derivatives: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other
+/// declared by             Lagrangian, 3 coordinates
+/// depends on time         no
+/// forces                  no
+/// linear                  no
+/// quadratic in v          yes
+/// constant L_vv           yes
+/// separable (L_vq = 0)    yes
+/// cyclic coordinates      q[2]
+/// pattern L_vv            (0,0) (1,1) (2,2)
+/// pattern L_vq            zero
+/// pattern L_qq            zero
+/// constraints             blade (velocity)
+/// ```
+struct KnifeEdge {
+    m: f64,
+    j: f64,
+    g: f64,
+    alpha: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<3> for KnifeEdge {
+        const FORM: __tfe::Form = __tfe::Form::Lagrangian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: false,
+            forced: false,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: false,
+            separable: true,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 3], z: &[R; 3]) -> R {
+            let alpha = R::from_f64(self.alpha);
+            let g = R::from_f64(self.g);
+            let j = R::from_f64(self.j);
+            let m = R::from_f64(self.m);
+            let t0 = z[0] * z[0];
+            let t1 = z[1] * z[1];
+            let t2 = t0 + t1;
+            let t3 = m * t2;
+            let t4 = z[2] * z[2];
+            let t5 = j * t4;
+            let t6 = t3 + t5;
+            let t7 = R::from_f64(0.5) * t6;
+            let t8 = alpha.sin();
+            let t9 = m * q[0];
+            let t10 = g * t9;
+            let t11 = t8 * t10;
+            t7 + t11
+        }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 3],
+            z: &[R; 3],
+            first: &mut __tfe::First<R, 3>,
+        ) {
+            let alpha = R::from_f64(self.alpha);
+            let g = R::from_f64(self.g);
+            let j = R::from_f64(self.j);
+            let m = R::from_f64(self.m);
+            first.z[0] = m * z[0];
+            first.z[1] = m * z[1];
+            first.z[2] = j * z[2];
+            let t0 = alpha.sin();
+            let t1 = m * g;
+            first.q[0] = t0 * t1;
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 3],
+            z: &[R; 3],
+            first: &mut __tfe::First<R, 3>,
+            zz: &mut [[R; 3]; 3],
+        ) {
+            let alpha = R::from_f64(self.alpha);
+            let g = R::from_f64(self.g);
+            let j = R::from_f64(self.j);
+            let m = R::from_f64(self.m);
+            first.z[0] = m * z[0];
+            first.z[1] = m * z[1];
+            first.z[2] = j * z[2];
+            let t0 = alpha.sin();
+            let t1 = m * g;
+            first.q[0] = t0 * t1;
+            zz[0][0] = m;
+            zz[1][1] = m;
+            zz[2][2] = j;
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 3],
+            z: &[R; 3],
+            first: &mut __tfe::First<R, 3>,
+            second: &mut __tfe::Second<R, 3>,
+        ) {
+            let alpha = R::from_f64(self.alpha);
+            let g = R::from_f64(self.g);
+            let j = R::from_f64(self.j);
+            let m = R::from_f64(self.m);
+            first.z[0] = m * z[0];
+            first.z[1] = m * z[1];
+            first.z[2] = j * z[2];
+            let t0 = alpha.sin();
+            let t1 = m * g;
+            first.q[0] = t0 * t1;
+            second.zz[0][0] = m;
+            second.zz[1][1] = m;
+            second.zz[2][2] = j;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                1 => __tfe::CoordinateName::single("y"),
+                2 => __tfe::CoordinateName::single("phi"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const CONSTRAINTS: &'static [__tfe::Constraint] = &[
+            __tfe::Constraint {
+                name: "blade",
+                kind: __tfe::ConstraintKind::Velocity {
+                    integrable: false,
+                },
+            },
+        ];
+        fn constraint_rows<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 3],
+            rows: &mut [[R; 3]],
+            drift: &mut [R],
+        ) {
+            let Some(rows) = rows.first_chunk_mut::<1>() else {
+                return;
+            };
+            let (sin_phi, cos_phi) = q[2].sin_cos();
+            rows[0][0] = sin_phi;
+            rows[0][1] = -cos_phi;
+        }
+        fn constraint_second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 3],
+            v: &[R; 3],
+            mu: &[R],
+            second: &mut __tfe::ConstraintSecond<'_, R, 3>,
+        ) {
+            let Some(mu) = mu.first_chunk::<1>() else {
+                return;
+            };
+            let Some(psi_q) = second.psi_q.first_chunk_mut::<1>() else {
+                return;
+            };
+            let Some(row_rates) = second.row_rates.first_chunk_mut::<1>() else {
+                return;
+            };
+            let (sin_phi, cos_phi) = q[2].sin_cos();
+            let t0 = v[1] * sin_phi;
+            let t1 = v[0] * cos_phi;
+            psi_q[0][2] = t0 + t1;
+            let t2 = v[2] * cos_phi;
+            row_rates[0][0] = t2;
+            let t3 = v[2] * sin_phi;
+            row_rates[0][1] = t3;
+            let t4 = cos_phi * mu[0];
+            second.bend[0][2] = t4;
+            let t5 = sin_phi * mu[0];
+            second.bend[1][2] = t5;
+            let t6 = t3 * mu[0];
+            second.rate_q[0][2] = -t6;
+            second.rate_q[1][2] = t2 * mu[0];
+            second.rate_v[0][2] = t4;
+            second.rate_v[1][2] = t5;
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl KnifeEdge {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    fn state(&self, q: [f64; 3], v: [f64; 3]) -> ::tfe::__private::State<3> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "KnifeEdge",
+            form: ::tfe::__private::Form::Lagrangian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: false,
+                forced: false,
+                quadratic_in_z: true,
+                constant_mass: true,
+                linear: false,
+                separable: true,
+            },
+            cyclic: &["phi"],
+            value: ::tfe::__private::Operations {
+                additions: 3,
+                multiplications: 9,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 0,
+                multiplications: 5,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 0,
+                multiplications: 5,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            page: "L = ½ m (x\u{307}² + y\u{307}²) + ½ j φ\u{307}² + m g sin α x\n0 = x\u{307} sin φ − y\u{307} cos φ      (blade)\ncoordinates: x, y, φ      parameters: m, j, g, α\noperations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 3 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      q[2]\npattern L_vv            (0,0) (1,1) (2,2)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             blade (velocity)",
+        }
+    }
+}
+/// Steps [`KnifeEdge`] with one element, `Mixed::<3>`: no generics, no allocation, tables and sizes constant.
+struct Fast {
+    model: KnifeEdge,
+    start: f64,
+    step: f64,
+    steps: u64,
+    memory: ::tfe::__private::Memory<3>,
+    numbers: [f64; ::tfe::__private::numbers_len(
+        Fast::ELEMENT,
+        ::tfe::__private::Form::Lagrangian,
+        3,
+        1,
+    )],
+    pivots: [usize; ::tfe::__private::pivots_len(
+        Fast::ELEMENT,
+        ::tfe::__private::Form::Lagrangian,
+        3,
+        1,
+    )],
+}
+#[automatically_derived]
+#[allow(dead_code)]
+impl Fast {
+    const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::mixed(3);
+    const TABLES: ::tfe::__private::Scheme<
+        { Fast::ELEMENT.points() },
+        { Fast::ELEMENT.unknowns() },
+    > = ::tfe::__private::Scheme::new(Fast::ELEMENT);
+    /// The size of the stepper, all its memory included.
+    const BYTES: usize = ::core::mem::size_of::<Self>();
+    /// A stepper of length `h` that begins at time zero. It keeps a copy of the parameters.
+    fn new(model: &KnifeEdge, h: f64) -> Self {
+        Self {
+            model: KnifeEdge {
+                m: ::core::clone::Clone::clone(&model.m),
+                j: ::core::clone::Clone::clone(&model.j),
+                g: ::core::clone::Clone::clone(&model.g),
+                alpha: ::core::clone::Clone::clone(&model.alpha),
+            },
+            start: 0.0,
+            step: h,
+            steps: 0,
+            memory: ::tfe::__private::Memory::new(),
+            numbers: [0.0; ::tfe::__private::numbers_len(
+                Fast::ELEMENT,
+                ::tfe::__private::Form::Lagrangian,
+                3,
+                1,
+            )],
+            pivots: [0; ::tfe::__private::pivots_len(
+                Fast::ELEMENT,
+                ::tfe::__private::Form::Lagrangian,
+                3,
+                1,
+            )],
+        }
+    }
+    /// The time of the next step's start.
+    fn time(&self) -> f64 {
+        self.start + self.steps as f64 * self.step
+    }
+    /// Makes the next step start at `time`.
+    fn set_time(&mut self, time: f64) {
+        self.start = time;
+        self.steps = 0;
+    }
+    /// What the steps so far have cost.
+    fn statistics(&self) -> &::tfe::__private::Statistics {
+        self.memory.statistics()
+    }
+    /// Moves `state` over one element.
+    ///
+    /// # Errors
+    /// Says why the element could not be solved; `state` is unchanged then.
+    fn advance(
+        &mut self,
+        state: &mut ::tfe::__private::State<3>,
+    ) -> ::core::result::Result<(), ::tfe::__private::StepError> {
+        let method = ::tfe::__private::Method {
+            model: &self.model,
+            tables: &Self::TABLES,
+            control: ::core::default::Default::default(),
+        };
+        let workspace = ::tfe::__private::Workspace {
+            numbers: &mut self.numbers,
+            pivots: &mut self.pivots,
+        };
+        let start = self.start + self.steps as f64 * self.step;
+        let interval = ::tfe::__private::Interval {
+            start,
+            length: self.step,
+            impulses: &[],
+        };
+        method.advance(&mut self.memory, workspace, interval, state)?;
+        self.steps += 1;
+        ::core::result::Result::Ok(())
+    }
+}
+#[automatically_derived]
+impl ::core::fmt::Debug for Fast {
+    fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
+        f.debug_struct("Fast")
+            .field("time", &self.time())
+            .field("step", &self.step)
+            .field("statistics", self.memory.statistics())
+            .finish_non_exhaustive()
+    }
+}

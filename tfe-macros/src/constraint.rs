@@ -1,0 +1,169 @@
+//! The constraints of a model: their names and kinds, and their kernels.
+
+use crate::emit::{self, Emitter};
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+use tfe_symbolic::declared::{Constraint, ConstraintKind, Declared};
+use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::program::{Output, Program, Request, Statement};
+
+/// What an implementation of `Model` holds of constraints: nothing where there are none.
+pub(crate) fn members(
+    declared: &Declared,
+    derivation: &Derivation,
+    coordinates: &[String],
+) -> TokenStream {
+    if declared.constraints.is_empty() {
+        return TokenStream::new();
+    }
+    let kernels = Kernels {
+        derivation,
+        coordinates,
+        dof: emit::index(&declared.dof),
+        count: Literal::usize_unsuffixed(declared.constraints.len()),
+    };
+    let constraints = declared.constraints.iter().map(constant);
+    let (values, rows, second) = (kernels.values(), kernels.rows(), kernels.second());
+    quote! {
+        const CONSTRAINTS: &'static [__tfe::Constraint] = &[#(#constraints),*];
+
+        #values
+        #rows
+        #second
+    }
+}
+
+fn constant(constraint: &Constraint) -> TokenStream {
+    let name = &constraint.name;
+    let kind = match constraint.kind {
+        ConstraintKind::Holonomic { quadratic } => quote!(Holonomic { quadratic: #quadratic }),
+        ConstraintKind::Velocity { integrable } => quote!(Velocity { integrable: #integrable }),
+    };
+    quote!(__tfe::Constraint { name: #name, kind: __tfe::ConstraintKind::#kind })
+}
+
+struct Kernels<'a> {
+    derivation: &'a Derivation,
+    coordinates: &'a [String],
+    dof: TokenStream,
+    count: Literal,
+}
+
+impl Kernels<'_> {
+    fn emitted(&self, program: &Program) -> TokenStream {
+        Emitter::new(self.coordinates, quote!(second.))
+            .with_velocity()
+            .body(program)
+            .statements
+    }
+
+    /// The first elements of a slice as an array: one look at the length instead of one an index, and none that can panic.
+    fn chunk(&self, name: &TokenStream, slice: &TokenStream) -> TokenStream {
+        let count = &self.count;
+        quote! {
+            let Some(#name) = #slice.first_chunk_mut::<#count>() else {
+                return;
+            };
+        }
+    }
+
+    /// `constraint_values`, where a constraint is holonomic.
+    fn values(&self) -> TokenStream {
+        let program = self.derivation.program(Request {
+            constraint_values: true,
+            ..Request::default()
+        });
+        if program.statements.is_empty() {
+            return TokenStream::new();
+        }
+        let dof = &self.dof;
+        let (values, body) = (quote!(values), self.emitted(&program));
+        let values = self.chunk(&values, &values);
+        quote! {
+            fn constraint_values<R: __tfe::Real>(&self, t: R, q: &[R; #dof], values: &mut [R]) {
+                #values
+                #body
+            }
+        }
+    }
+
+    fn rows(&self) -> TokenStream {
+        let program = self.derivation.program(Request {
+            constraint_rows: true,
+            ..Request::default()
+        });
+        let dof = &self.dof;
+        let body = self.emitted(&program);
+        let (rows, drift) = (quote!(rows), quote!(drift));
+        let rows = writes(&program, |output| matches!(output, Output::Row(..)))
+            .then(|| self.chunk(&rows, &rows));
+        let drift = writes(&program, |output| matches!(output, Output::Drift(_)))
+            .then(|| self.chunk(&drift, &drift));
+        quote! {
+            fn constraint_rows<R: __tfe::Real>(
+                &self,
+                t: R,
+                q: &[R; #dof],
+                rows: &mut [[R; #dof]],
+                drift: &mut [R],
+            ) {
+                #rows
+                #drift
+                #body
+            }
+        }
+    }
+
+    /// `constraint_second`, unless all constraints are affine with constant coefficients.
+    fn second(&self) -> TokenStream {
+        let program = self.derivation.program(Request {
+            constraint_second: true,
+            ..Request::default()
+        });
+        if program.statements.is_empty() {
+            return TokenStream::new();
+        }
+        let (dof, count) = (&self.dof, &self.count);
+        let body = self.emitted(&program);
+        let bends = writes(&program, |output| {
+            matches!(
+                output,
+                Output::Bend(..) | Output::RateQ(..) | Output::RateV(..)
+            )
+        });
+        let mu = bends.then(|| {
+            quote! {
+                let Some(mu) = mu.first_chunk::<#count>() else {
+                    return;
+                };
+            }
+        });
+        let psi_q = writes(&program, |output| matches!(output, Output::PsiQ(..)))
+            .then(|| self.chunk(&quote!(psi_q), &quote!(second.psi_q)));
+        let row_rates = writes(&program, |output| matches!(output, Output::RowRate(..)))
+            .then(|| self.chunk(&quote!(row_rates), &quote!(second.row_rates)));
+        quote! {
+            fn constraint_second<R: __tfe::Real>(
+                &self,
+                t: R,
+                q: &[R; #dof],
+                v: &[R; #dof],
+                mu: &[R],
+                second: &mut __tfe::ConstraintSecond<'_, R, #dof>,
+            ) {
+                #mu
+                #psi_q
+                #row_rates
+                #body
+            }
+        }
+    }
+}
+
+/// Whether a program writes a result of this kind. Constraints hold no loops.
+fn writes(program: &Program, kind: fn(&Output) -> bool) -> bool {
+    program.statements.iter().any(|statement| match statement {
+        Statement::Store { output, .. } | Statement::Clear { output } => kind(output),
+        _ => false,
+    })
+}

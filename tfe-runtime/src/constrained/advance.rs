@@ -1,0 +1,212 @@
+//! Steps of constrained models.
+
+use crate::constrained::element::ConstrainedForm;
+use crate::constrained::layout::Layout;
+use crate::constrained::node::{Bordered, solve_velocity};
+use crate::constrained::rows::Rows;
+use crate::constrained::{START_TOLERANCE, refused, relative_residual};
+use crate::equations::Span;
+use crate::error::{ConstraintError, StepError};
+use crate::legendre::largest;
+use crate::legendre::velocity as free_velocity;
+use crate::model::{Model, State};
+use crate::newton::{Solve, newton};
+use crate::scheme::{SchemeRef, Tables};
+use crate::step::{Interval, Last, Memory, Method, set_kicks, total};
+use crate::velocity_form::VelocityForm;
+use crate::workspace::{Parts, Scratch, Workspace};
+
+/// Moves `state` over one element; as [`Method::advance`].
+pub(crate) fn advance<M, T, const N: usize>(
+    method: &Method<'_, M, T>,
+    memory: &mut Memory<N>,
+    workspace: Workspace<'_>,
+    interval: Interval<'_, N>,
+    state: &mut State<N>,
+) -> Result<(), StepError>
+where
+    M: Model<N>,
+    T: Tables,
+{
+    let scheme = method.tables.view();
+    let element = scheme.element;
+    if let Some(constraint) = refused::<M, N>(&element) {
+        return Err(ConstraintError::Element {
+            element,
+            constraint,
+        }
+        .into());
+    }
+    if matches!(method.control.solve, Solve::FixedPoint) {
+        return Err(ConstraintError::NeedsNewton.into());
+    }
+    let Interval {
+        start: t,
+        length: h,
+        impulses,
+    } = interval;
+    let count = M::CONSTRAINTS.len();
+    let mut parts = Parts::of(workspace, &element, M::FORM, count)?;
+    let warm = method.prepare(memory, &mut parts, h, state)?;
+    set_kicks(&scheme, &interval, parts.kicks);
+    let kicks: &[[f64; N]] = parts.kicks;
+    let layout = Layout::new(&element, N, count);
+    let mut rows = Rows::at_start(parts.rows, method.model, t, &state.q);
+    if !warm {
+        parts.active.fill(0);
+    }
+    rows.choose::<M>(parts.active);
+    // A failure leaves nothing to continue from.
+    memory.last = None;
+    let low = if warm { memory.low } else { State::ZERO };
+    let cold = |unknowns: &mut [f64],
+                tangent: &mut [f64],
+                step: &mut [f64],
+                pivots: &mut [usize],
+                rows: &Rows<'_, N>| {
+        let mut bordered = Bordered {
+            matrix: tangent,
+            vector: step,
+            pivots,
+        };
+        let at = (&state.q, &state.p);
+        let v = solve_velocity(
+            method.model,
+            t,
+            at,
+            &[0.0; N],
+            rows,
+            parts.active,
+            &mut bordered,
+        )?;
+        constant(&layout, &v, unknowns);
+        Ok::<_, StepError>(v)
+    };
+    if warm {
+        let rates = layout.rates();
+        let end: [f64; N] = end_velocity(&scheme, parts.unknowns[..rates].as_chunks().0);
+        parts.unknowns[layout.end(0)..layout.node(0)].copy_from_slice(&end);
+    } else {
+        let v = cold(
+            parts.unknowns,
+            parts.tangent,
+            parts.step,
+            parts.tangent_pivots,
+            &rows,
+        )?;
+        check_start(method.model, t, h, state, &v, &rows)?;
+    }
+    let mut scratch = Scratch {
+        unknowns: parts.unknowns,
+        step: parts.step,
+        tangent: parts.tangent,
+        pivots: parts.tangent_pivots,
+    };
+    let mut form = ConstrainedForm {
+        inner: VelocityForm {
+            model: method.model,
+            scheme,
+            span: Span {
+                t,
+                h,
+                start: state,
+                low: &low,
+                kicks,
+                damping: 0.0,
+            },
+            forces: parts.forces,
+            momenta: parts.momenta,
+            masses: parts.masses,
+            mass_pivots: parts.mass_pivots,
+            constant_mass: &mut memory.mass,
+            statistics: &mut memory.statistics,
+        },
+        layout,
+        rows,
+        active: parts.active,
+        impulse: total(impulses),
+    };
+    let first = newton(&mut form, &method.control, &mut scratch, false, false);
+    if let Err(error) = first {
+        if !warm {
+            return Err(error);
+        }
+        // The continued polynomial may be a worse start than none.
+        form.rows.evaluate(method.model, t, &state.q);
+        cold(
+            scratch.unknowns,
+            scratch.tangent,
+            scratch.step,
+            scratch.pivots,
+            &form.rows,
+        )?;
+        newton(&mut form, &method.control, &mut scratch, false, false)?;
+    }
+    let (end, end_low) = form.end_state(scratch.unknowns)?;
+    if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
+        return Err(StepError::NonFinite);
+    }
+    form.check_end(scratch.unknowns)?;
+    memory.last = Some(Last {
+        t,
+        h,
+        start: *state,
+        start_low: low,
+        end,
+    });
+    memory.low = end_low;
+    memory.statistics.steps += 1;
+    *state = end;
+    Ok(())
+}
+
+/// A constant velocity, and no reactions.
+fn constant<const N: usize>(layout: &Layout, v: &[f64; N], unknowns: &mut [f64]) {
+    unknowns.fill(0.0);
+    unknowns[..layout.rates()].as_chunks_mut().0.fill(*v);
+    unknowns[layout.end(0)..layout.node(0)].copy_from_slice(v);
+}
+
+/// The polynomial of the rates at the end of the element.
+fn end_velocity<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [f64; N] {
+    let mut v = [0.0; N];
+    // Every Legendre polynomial is one at the end.
+    for weights in scheme.rate.chunks_exact(rates.len()) {
+        for (weight, rate) in weights.iter().zip(rates) {
+            for a in 0..N {
+                v[a] += weight * rate[a];
+            }
+        }
+    }
+    v
+}
+
+/// Refuses a start that is not on the constraints.
+fn check_start<M, const N: usize>(
+    model: &M,
+    t: f64,
+    h: f64,
+    state: &State<N>,
+    v: &[f64; N],
+    rows: &Rows<'_, N>,
+) -> Result<(), StepError>
+where
+    M: Model<N>,
+{
+    // The velocity that the momentum would have without constraints; a singular mass matrix leaves it open, then the constraints decide.
+    let v = free_velocity(model, t, &state.q, &state.p, v).unwrap_or(*v);
+    for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+        let (position, velocity) = relative_residual(rows, c, &state.q, &v, h);
+        for (residual, is_position) in [(position, true), (velocity, false)] {
+            if !(residual <= START_TOLERANCE) {
+                return Err(ConstraintError::Start {
+                    constraint: constraint.name,
+                    position: is_position,
+                    residual,
+                }
+                .into());
+            }
+        }
+    }
+    Ok(())
+}

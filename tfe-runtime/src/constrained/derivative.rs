@@ -1,0 +1,374 @@
+//! The equations of a constrained element, differentiated: by its start, and by what moves or stretches it (T-78).
+
+use crate::condense::{Direction, System};
+use crate::constrained::element::{ConstrainedForm, Derivatives};
+use crate::error::{ConstraintError, StepError};
+use crate::model::Model;
+#[cfg(feature = "alloc")]
+use crate::{
+    constrained::element::slopes,
+    dual::{Dual, duals},
+    legendre::conjugate,
+    lu::Block,
+    model::{ConstraintSecond, First, Form},
+};
+#[cfg(feature = "alloc")]
+use alloc::{vec, vec::Vec};
+
+/// Solves for the interior as a function of the start and of directions, and writes the derivatives of the end, 2N rows with the columns of the
+/// sides, ordered (p, q). With `newton_step` the last column is the Newton step of the interior itself.
+pub(crate) fn linearise<M, const N: usize>(
+    form: &mut ConstrainedForm<'_, M, N>,
+    x: &[f64],
+    directions: &[Direction],
+    newton_step: bool,
+    system: System<'_>,
+    ends: &mut [f64],
+) -> Result<(), StepError>
+where
+    M: Model<N>,
+{
+    let layout = form.layout;
+    let size = layout.size();
+    let columns = system.sides.len() / size;
+    // The first N columns of the sides serve as memory for the derivatives by the coordinates until they are spread out.
+    let (by_start, _) = system.sides.split_at_mut(size * N);
+    form.evaluate(
+        x,
+        system.residual,
+        Some(Derivatives {
+            tangent: system.tangent,
+            by_start,
+        }),
+    )?;
+    for row in (0..size).rev() {
+        let mut by_start = [0.0; N];
+        by_start.copy_from_slice(&system.sides[row * N..(row + 1) * N]);
+        let side = &mut system.sides[row * columns..(row + 1) * columns];
+        side.fill(0.0);
+        for b in 0..N {
+            side[N + b] = -by_start[b];
+        }
+    }
+    for a in 0..N {
+        for i in 0..form.inner.scheme.unknowns() {
+            system.sides[(i * N + a) * columns + a] = 1.0;
+        }
+        system.sides[layout.end(a) * columns + a] = 1.0;
+    }
+    let end = form.end(x, true)?;
+    let scheme = form.inner.scheme;
+    let h = form.inner.span.h;
+    let rates = x[..layout.rates()].as_chunks::<N>().0;
+    ends.fill(0.0);
+    for (k, direction) in directions.iter().enumerate() {
+        if direction.parameter.is_some() {
+            return Err(ConstraintError::Parameter.into());
+        }
+        let column = 2 * N + k;
+        let momentum = along(form, x, direction, |row, value| {
+            system.sides[row * columns + column] = -value;
+        })?;
+        for a in 0..N {
+            ends[a * columns + column] = momentum[a];
+            let mut rate = 0.0;
+            for (weight, row) in scheme.advance.iter().zip(rates) {
+                rate += weight * row[a];
+            }
+            ends[(N + a) * columns + column] = direction.length * rate;
+        }
+    }
+    if newton_step {
+        for (row, residual) in system.residual.iter().enumerate() {
+            system.sides[(row + 1) * columns - 1] = -residual;
+        }
+    }
+    let sides = system.solve()?.sides;
+    for a in 0..N {
+        for (u, weight) in scheme.advance.iter().enumerate() {
+            for k in 0..columns {
+                ends[(N + a) * columns + k] += h * weight * sides[(u * N + a) * columns + k];
+            }
+        }
+        ends[(N + a) * columns + N + a] += 1.0;
+    }
+    // δp₁ = L_vv δv₁ + L_vq δq₁ + what the directions change at fixed unknowns, where δq₁ of the directions is in the latter already.
+    let (momenta, coordinates) = ends.split_at_mut(N * columns);
+    for a in 0..N {
+        for b in 0..N {
+            let (mass, mixed) = (end.second.zz[a][b], end.second.zq[a][b]);
+            let velocity = &sides[layout.end(b) * columns..][..columns];
+            for k in 0..columns {
+                momenta[a * columns + k] +=
+                    mass * velocity[k] + mixed * coordinates[b * columns + k];
+            }
+        }
+    }
+    for (k, direction) in directions.iter().enumerate() {
+        let column = 2 * N + k;
+        for a in 0..N {
+            for b in 0..N {
+                let mut rate = 0.0;
+                for (weight, row) in scheme.advance.iter().zip(rates) {
+                    rate += weight * row[b];
+                }
+                momenta[a * columns + column] -= end.second.zq[a][b] * direction.length * rate;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "alloc"))]
+fn along<M, const N: usize>(
+    _: &mut ConstrainedForm<'_, M, N>,
+    _: &[f64],
+    _: &Direction,
+    _: impl FnMut(usize, f64),
+) -> Result<[f64; N], StepError>
+where
+    M: Model<N>,
+{
+    // Assembled problems are solved where there is an allocator.
+    Err(StepError::NonFinite)
+}
+
+/// The derivative of the residual along a direction at fixed unknowns and start, row by row, and that of the momentum at the end.
+#[cfg(feature = "alloc")]
+fn along<M, const N: usize>(
+    form: &mut ConstrainedForm<'_, M, N>,
+    x: &[f64],
+    direction: &Direction,
+    mut write: impl FnMut(usize, f64),
+) -> Result<[f64; N], StepError>
+where
+    M: Model<N>,
+{
+    let layout = form.layout;
+    let (scheme, h) = (form.inner.scheme, form.inner.span.h);
+    let (points, unknowns) = (scheme.points(), scheme.unknowns());
+    let rates = x[..layout.rates()].as_chunks::<N>().0;
+    let stretch = direction.length / h;
+    let mut rows = DualRows::<N>::new(M::CONSTRAINTS.len());
+    let mut residual = vec![0.0; layout.size()];
+    let mut end_force = [0.0; N];
+    for l in 0..points {
+        let (t, q, v) = form.inner.place(l, rates);
+        let node = scheme.nodes[l];
+        let weights = &scheme.position[l * unknowns..(l + 1) * unknowns];
+        let (time, q_dual) = moving(direction, node, t, &q, weights, rates);
+        let guess = form.inner.momenta[l];
+        let (mut momentum, mut force) = explicit(form.inner.model, time, &q_dual, &v, &guess)?;
+        for a in 0..N {
+            force[a] += direction.damping * v[a];
+        }
+        rows.evaluate(form.inner.model, time, &q_dual, &v);
+        let slopes = slopes(node, layout.degree());
+        for holonomic in [true, false] {
+            form.set_mu(l, x, &slopes, holonomic);
+            for (c, mu) in form.rows.mu.iter().enumerate() {
+                for a in 0..N {
+                    let (row, rate) = (rows.rows[c][a], rows.rates[c][a]);
+                    if holonomic {
+                        force[a] -= row.slope * mu;
+                    } else {
+                        // μ is h times the unknown.
+                        momentum[a] += (row.slope + row.value * stretch) * mu;
+                        force[a] += (rate.slope + rate.value * stretch) * mu;
+                    }
+                }
+            }
+        }
+        for a in 0..N {
+            let impulse = direction.length * form.inner.forces[l][a] + h * force[a];
+            end_force[a] += scheme.weights[l] * impulse;
+            for i in 0..unknowns {
+                residual[i * N + a] += scheme.momentum[i * points + l] * momentum[a]
+                    - scheme.force[i * points + l] * impulse;
+            }
+        }
+        for (c, holonomic) in form.active() {
+            if holonomic {
+                for j in 1..layout.degree() {
+                    residual[layout.inside(j, c)] +=
+                        scheme.weights[l] * slopes[j] * rows.value_over(c, h, stretch);
+                }
+            } else {
+                residual[layout.inside(l, c)] = rows.psi_slope(c, &v);
+            }
+        }
+    }
+    let span = form.inner.span;
+    let still = duals(&span.start.q, &[0.0; N]);
+    let start = Dual::new(span.t, direction.time);
+    rows.evaluate(form.inner.model, start, &still, &[0.0; N]);
+    form.set_node_mu(x, true);
+    let kick = rows.stretched(form.rows.mu, stretch);
+    for row in residual[..layout.rates()].as_chunks_mut::<N>().0 {
+        for a in 0..N {
+            row[a] -= kick[a];
+        }
+    }
+    let (t, q, v) = form.end_place(x);
+    let (time, q_dual) = moving(direction, 1.0, t, &q, scheme.advance, rates);
+    let (momentum, _) = explicit(form.inner.model, time, &q_dual, &v, &span.start.p)?;
+    rows.evaluate(form.inner.model, time, &q_dual, &v);
+    form.set_node_mu(x, false);
+    let reaction = rows.stretched(form.rows.mu, stretch);
+    for a in 0..N {
+        residual[layout.end(a)] = momentum[a] + reaction[a] - kick[a] - end_force[a];
+    }
+    for (c, holonomic) in form.active() {
+        residual[layout.node(c)] = rows.psi_slope(c, &v);
+        if holonomic {
+            residual[layout.inside(0, c)] = rows.value_over(c, h, stretch);
+        }
+    }
+    for (row, value) in residual.into_iter().enumerate() {
+        write(row, value);
+    }
+    Ok(momentum)
+}
+
+/// A point of the element that moves in time, and in space because the element is stretched.
+#[cfg(feature = "alloc")]
+fn moving<const N: usize>(
+    direction: &Direction,
+    node: f64,
+    t: f64,
+    q: &[f64; N],
+    weights: &[f64],
+    rates: &[[f64; N]],
+) -> (Dual, [Dual; N]) {
+    let mut slope = [0.0; N];
+    for (weight, rate) in weights.iter().zip(rates) {
+        for a in 0..N {
+            slope[a] += direction.length * weight * rate[a];
+        }
+    }
+    let time = Dual::new(t, direction.time + node * direction.length);
+    (time, duals(q, &slope))
+}
+
+/// The derivatives of L_v and L_q + Q along moving time and coordinates, at constant velocity.
+#[cfg(feature = "alloc")]
+pub(crate) fn explicit<M, const N: usize>(
+    model: &M,
+    t: Dual,
+    q: &[Dual; N],
+    v: &[f64; N],
+    guess: &[f64; N],
+) -> Result<([f64; N], [f64; N]), StepError>
+where
+    M: Model<N>,
+{
+    let mut first = First::zero();
+    let (mut momentum, mut force) = ([0.0; N], [0.0; N]);
+    match M::FORM {
+        Form::Lagrangian => {
+            model.first(t, q, &duals(v, &[0.0; N]), &mut first);
+            for a in 0..N {
+                momentum[a] = first.z[a].slope;
+                force[a] = first.q[a].slope + first.force[a].slope;
+            }
+        }
+        // At constant v the momentum moves: H_pp δp = −δH_p.
+        Form::Hamiltonian => {
+            let mut place = [0.0; N];
+            for a in 0..N {
+                place[a] = q[a].value;
+            }
+            let p = conjugate(model, t.value, &place, v, guess)?;
+            model.first(t, q, &duals(&p, &[0.0; N]), &mut first);
+            let (mut plain, mut zz) = (First::ZERO, [[0.0; N]; N]);
+            model.first_and_mass(t.value, &place, &p, &mut plain, &mut zz);
+            for a in 0..N {
+                momentum[a] = -first.z[a].slope;
+            }
+            let block = Block::of(&zz).map_err(|singular| {
+                StepError::Legendre(crate::error::LegendreError::Singular {
+                    coordinate: singular.column,
+                })
+            })?;
+            block.solve(&mut momentum);
+            let mut first = First::zero();
+            model.first(t, q, &duals(&p, &momentum), &mut first);
+            for a in 0..N {
+                force[a] = first.force[a].slope - first.q[a].slope;
+            }
+        }
+    }
+    Ok((momentum, force))
+}
+
+/// Constraints at a moving point.
+#[cfg(feature = "alloc")]
+pub(crate) struct DualRows<const N: usize> {
+    rows: Vec<[Dual; N]>,
+    rates: Vec<[Dual; N]>,
+    psi_q: Vec<[Dual; N]>,
+    drift: Vec<Dual>,
+    values: Vec<Dual>,
+    mu: Vec<Dual>,
+}
+
+#[cfg(feature = "alloc")]
+impl<const N: usize> DualRows<N> {
+    pub(crate) fn new(count: usize) -> Self {
+        let matrix = vec![[Dual::ZERO; N]; count];
+        let vector = vec![Dual::ZERO; count];
+        Self {
+            rows: matrix.clone(),
+            rates: matrix.clone(),
+            psi_q: matrix,
+            drift: vector.clone(),
+            values: vector.clone(),
+            mu: vector,
+        }
+    }
+
+    pub(crate) fn evaluate<M: Model<N>>(
+        &mut self,
+        model: &M,
+        t: Dual,
+        q: &[Dual; N],
+        v: &[f64; N],
+    ) {
+        model.constraint_rows(t, q, &mut self.rows, &mut self.drift);
+        model.constraint_values(t, q, &mut self.values);
+        let zero = [[Dual::ZERO; N]; N];
+        let mut second = ConstraintSecond {
+            psi_q: &mut self.psi_q,
+            row_rates: &mut self.rates,
+            bend: zero,
+            rate_q: zero,
+            rate_v: zero,
+        };
+        model.constraint_second(t, q, &duals(v, &[0.0; N]), &self.mu, &mut second);
+    }
+
+    /// d(A v + a), v constant.
+    pub(crate) fn psi_slope(&self, c: usize, v: &[f64; N]) -> f64 {
+        let mut sum = self.drift[c].slope;
+        for a in 0..N {
+            sum += self.rows[c][a].slope * v[a];
+        }
+        sum
+    }
+
+    /// d(φ / h)
+    fn value_over(&self, c: usize, h: f64, stretch: f64) -> f64 {
+        (self.values[c].slope - self.values[c].value * stretch) / h
+    }
+
+    /// d(Aᵀμ), where μ is h times unknowns.
+    fn stretched(&self, mu: &[f64], stretch: f64) -> [f64; N] {
+        let mut sum = [0.0; N];
+        for (row, mu) in self.rows.iter().zip(mu) {
+            for a in 0..N {
+                sum[a] += (row[a].slope + row[a].value * stretch) * mu;
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,573 @@
+//! The equations of an element with constraints (T-72, T-73): positions by the variational rows, velocities by the symmetric ones.
+//!
+//! ```text
+//! rows     Σ_l P_il (L_v + A_Sᵀ μ)_l − h Σ_l G_il (L_q + Q + Ȧ_Sᵀ μ − A_Vᵀ μ̇)_l = p₀ + A₀,Sᵀ ν_S − A₀,Vᵀ μ₀
+//! V        φ(q₁, t₁) = 0 ,   Σ_l b_l P_j′(2c_l − 1) φ(q_l, t_l) = 0 ,   j = 1 … s − 1
+//! S        A v + a = 0 at the stages
+//! end      L_v(v₁, q₁, t₁) + A₁,Vᵀ ν_V − A₁,Sᵀ ν_S = p*₁ ,   A₁ v₁ + a₁ = 0
+//! ```
+//!
+//! with μ̇_l = Σ_j m_j P_j′(2c_l − 1). The element itself is that of [`VelocityForm`]; constraints only add to momenta and forces at its points.
+//! Rows that depend on others are replaced by μ = 0.
+
+use crate::constrained::layout::Layout;
+use crate::constrained::rows::{Bend, Rows};
+use crate::constrained::{START_TOLERANCE, relative_residual};
+use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
+use crate::error::{ConstraintError, StepError};
+use crate::legendre::{conjugate, lagrangian_view_from};
+use crate::model::{First, Form, Model, Second, State};
+use crate::scheme::MAX_RATES;
+use crate::statistics::Statistics;
+use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm};
+
+pub(crate) struct ConstrainedForm<'a, M, const N: usize> {
+    /// The element; its `momenta` become L_v at the points, its `forces` all forces there.
+    pub(crate) inner: VelocityForm<'a, M, N>,
+    pub(crate) layout: Layout,
+    pub(crate) rows: Rows<'a, N>,
+    /// One for each constraint that counts.
+    pub(crate) active: &'a [usize],
+    /// What impulses give to the momentum at the end.
+    pub(crate) impulse: [f64; N],
+}
+
+/// The end of the element, as far as the unknowns say.
+pub(crate) struct End<const N: usize> {
+    pub(crate) t: f64,
+    pub(crate) q: [f64; N],
+    pub(crate) v: [f64; N],
+    pub(crate) p: [f64; N],
+    pub(crate) second: Second<f64, N>,
+}
+
+/// Where the derivatives of the residual are written.
+pub(crate) struct Derivatives<'a> {
+    /// By the unknowns.
+    pub(crate) tangent: &'a mut [f64],
+    /// By the coordinates at the start, N columns; empty where nobody asks.
+    pub(crate) by_start: &'a mut [f64],
+}
+
+/// P_j′(2c − 1), j = 0 … s − 1.
+pub(crate) fn slopes(node: f64, degree: usize) -> [f64; MAX_RATES] {
+    let x = 2.0 * node - 1.0;
+    let (mut values, mut slopes) = ([1.0, x], [0.0; MAX_RATES]);
+    for j in 1..degree.min(MAX_RATES) {
+        let before = if j >= 2 { slopes[j - 2] } else { 0.0 };
+        slopes[j] = before + (2 * j - 1) as f64 * values[0];
+        let next = ((2 * j + 1) as f64 * x * values[1] - j as f64 * values[0]) / (j + 1) as f64;
+        values = [values[1], next];
+    }
+    slopes
+}
+
+impl<M, const N: usize> ConstrainedForm<'_, M, N>
+where
+    M: Model<N>,
+{
+    /// The constraints that count, with their kinds: true for holonomic ones.
+    pub(crate) fn active(&self) -> impl Iterator<Item = (usize, bool)> + use<'_, M, N> {
+        let marked = M::CONSTRAINTS.iter().zip(self.active).enumerate();
+        marked
+            .filter(|(_, (_, active))| **active != 0)
+            .map(|(c, (constraint, _))| (c, constraint.kind.is_holonomic()))
+    }
+
+    fn has(&self, holonomic: bool) -> bool {
+        self.active().any(|(_, kind)| kind == holonomic)
+    }
+
+    /// Sets the multipliers at a point for one kind of constraint, others to zero.
+    pub(crate) fn set_mu(&mut self, l: usize, x: &[f64], slopes: &[f64], holonomic: bool) {
+        self.rows.mu.fill(0.0);
+        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+            if self.active[c] == 0 || constraint.kind.is_holonomic() != holonomic {
+                continue;
+            }
+            self.rows.mu[c] = if holonomic {
+                let coefficients = (1..self.layout.degree()).map(|j| x[self.layout.inside(j, c)]);
+                coefficients.zip(&slopes[1..]).map(|(m, p)| m * p).sum()
+            } else {
+                self.inner.span.h * x[self.layout.inside(l, c)]
+            };
+        }
+    }
+
+    /// Sets the multipliers of the node at the end, or those with which the start momentum is changed.
+    pub(crate) fn set_node_mu(&mut self, x: &[f64], at_start: bool) {
+        let h = self.inner.span.h;
+        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+            let node = h * x[self.layout.node(c)];
+            self.rows.mu[c] = match (
+                self.active[c] != 0,
+                constraint.kind.is_holonomic(),
+                at_start,
+            ) {
+                (false, _, _) => 0.0,
+                (true, true, true) => -h * x[self.layout.inside(0, c)],
+                (true, true, false) | (true, false, true) => node,
+                (true, false, false) => -node,
+            };
+        }
+    }
+
+    /// Σ rows_c μ_c
+    pub(crate) fn transposed(rows: &[[f64; N]], mu: &[f64]) -> [f64; N] {
+        let mut sum = [0.0; N];
+        for (row, mu) in rows.iter().zip(mu) {
+            if *mu != 0.0 {
+                for a in 0..N {
+                    sum[a] += row[a] * mu;
+                }
+            }
+        }
+        sum
+    }
+
+    /// Time, coordinates and velocity at the end.
+    pub(crate) fn end_place(&self, x: &[f64]) -> (f64, [f64; N], [f64; N]) {
+        let span = &self.inner.span;
+        let scheme = &self.inner.scheme;
+        let rates = x[..self.layout.rates()].as_chunks::<N>().0;
+        let rate = weighted(scheme.advance, scheme.advance_low, rates);
+        let q = moved(&span.start.q, &span.low.q, span.h, &rate);
+        let mut v = [0.0; N];
+        v.copy_from_slice(&x[self.layout.end(0)..self.layout.node(0)]);
+        (span.t + span.h, q, v)
+    }
+
+    /// L_v at the end, and on demand second derivatives.
+    pub(crate) fn end(&self, x: &[f64], with_second: bool) -> Result<End<N>, StepError> {
+        let (t, q, v) = self.end_place(x);
+        let model = self.inner.model;
+        let guess = &self.inner.span.start.p;
+        let mut second = Second::ZERO;
+        let p = match (M::FORM, with_second) {
+            (Form::Lagrangian, false) => {
+                let mut first = First::ZERO;
+                model.first(t, &q, &v, &mut first);
+                first.z
+            }
+            (Form::Lagrangian, true) => {
+                let mut first = First::ZERO;
+                model.second(t, &q, &v, &mut first, &mut second);
+                first.z
+            }
+            (Form::Hamiltonian, false) => conjugate(model, t, &q, &v, guess)?,
+            (Form::Hamiltonian, true) => {
+                let view = lagrangian_view_from(model, t, &q, &v, guess)?;
+                second = view.second;
+                view.p
+            }
+        };
+        Ok(End { t, q, v, p, second })
+    }
+
+    /// The state at the end and what rounding took from it.
+    pub(crate) fn end_state(&self, x: &[f64]) -> Result<(State<N>, State<N>), StepError> {
+        let end = self.end(x, false)?;
+        let span = &self.inner.span;
+        let rates = x[..self.layout.rates()].as_chunks::<N>().0;
+        let rate = weighted(
+            self.inner.scheme.advance,
+            self.inner.scheme.advance_low,
+            rates,
+        );
+        let mut low = State::ZERO;
+        for a in 0..N {
+            let increment = span.h * rate[a] + span.low.q[a];
+            let part = end.q[a] - span.start.q[a];
+            low.q[a] = (span.start.q[a] - (end.q[a] - part)) + (increment - part);
+        }
+        Ok((State { q: end.q, p: end.p }, low))
+    }
+
+    /// Whether all constraints hold at the end, those that were left out as dependent too.
+    pub(crate) fn check_end(&mut self, x: &[f64]) -> Result<(), StepError> {
+        let (t, q, v) = self.end_place(x);
+        self.rows.evaluate(self.inner.model, t, &q);
+        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+            let (position, velocity) = relative_residual(&self.rows, c, &q, &v, self.inner.span.h);
+            for residual in [position, velocity] {
+                if !(residual <= START_TOLERANCE) {
+                    return Err(ConstraintError::Dependent {
+                        constraint: constraint.name,
+                        residual,
+                    }
+                    .into());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the multiplier columns and the rows of constraints at a point.
+    fn add_point(&self, l: usize, slopes: &[f64], tangent: &mut [f64]) {
+        let (scheme, h, size) = (&self.inner.scheme, self.inner.span.h, self.layout.size());
+        let (points, unknowns) = (scheme.points(), scheme.unknowns());
+        let (weight, position) = (
+            scheme.weights[l],
+            &scheme.position[l * unknowns..][..unknowns],
+        );
+        for (c, holonomic) in self.active() {
+            let (row, rate) = (&self.rows.rows[c], &self.rows.rates[c]);
+            if holonomic {
+                for j in 1..self.layout.degree() {
+                    let at = self.layout.inside(j, c);
+                    for a in 0..N {
+                        let force = h * slopes[j] * row[a];
+                        for i in 0..unknowns {
+                            tangent[(i * N + a) * size + at] +=
+                                scheme.force[i * points + l] * force;
+                        }
+                        tangent[self.layout.end(a) * size + at] += weight * force;
+                        for (u, position) in position.iter().enumerate() {
+                            tangent[at * size + u * N + a] +=
+                                weight * slopes[j] * position * row[a];
+                        }
+                    }
+                }
+            } else {
+                let at = self.layout.inside(l, c);
+                for a in 0..N {
+                    tangent[(l * N + a) * size + at] += h * row[a];
+                    for i in 0..unknowns {
+                        let factor = h * h * scheme.force[i * points + l];
+                        tangent[(i * N + a) * size + at] -= factor * rate[a];
+                    }
+                    tangent[self.layout.end(a) * size + at] -= h * h * weight * rate[a];
+                    for (u, position) in position.iter().enumerate() {
+                        tangent[at * size + u * N + a] += h * position * self.rows.psi_q[c][a];
+                    }
+                    tangent[at * size + l * N + a] += row[a];
+                }
+            }
+        }
+    }
+
+    /// Adds what start and end give to the tangent; the rows are those of the end.
+    fn add_ends(&self, end: &End<N>, bend: &Bend<N>, tangent: &mut [f64]) {
+        let (scheme, h, size) = (&self.inner.scheme, self.inner.span.h, self.layout.size());
+        let layout = &self.layout;
+        for a in 0..N {
+            let row = &mut tangent[layout.end(a) * size..][..size];
+            for b in 0..N {
+                row[layout.end(b)] += end.second.zz[a][b];
+                let by_q = h * (end.second.zq[a][b] + bend.bend[a][b]);
+                for (u, advance) in scheme.advance.iter().enumerate() {
+                    row[u * N + b] += advance * by_q;
+                }
+            }
+        }
+        for (c, holonomic) in self.active() {
+            let (start, row) = (&self.rows.start[c], &self.rows.rows[c]);
+            let node = layout.node(c);
+            let (first, sign) = if holonomic {
+                (layout.inside(0, c), 1.0)
+            } else {
+                (node, -1.0)
+            };
+            for a in 0..N {
+                for i in 0..scheme.unknowns() {
+                    tangent[(i * N + a) * size + first] += sign * h * start[a];
+                }
+                let end_row = layout.end(a) * size;
+                tangent[end_row + first] += sign * h * start[a];
+                tangent[end_row + node] += sign * h * row[a];
+                tangent[node * size + layout.end(a)] += row[a];
+                for (u, advance) in scheme.advance.iter().enumerate() {
+                    let column = u * N + a;
+                    tangent[node * size + column] += h * advance * self.rows.psi_q[c][a];
+                    if holonomic {
+                        tangent[first * size + column] += advance * row[a];
+                    }
+                }
+            }
+        }
+    }
+
+    /// The residual at x, and on demand its derivative.
+    pub(crate) fn evaluate(
+        &mut self,
+        x: &[f64],
+        residual: &mut [f64],
+        mut derivatives: Option<Derivatives<'_>>,
+    ) -> Result<(), StepError> {
+        let layout = self.layout;
+        let (scheme, h) = (self.inner.scheme, self.inner.span.h);
+        let (points, unknowns) = (scheme.points(), scheme.unknowns());
+        let rates = x[..layout.rates()].as_chunks::<N>().0;
+        let velocities = self.has(false);
+        let positions = self.has(true) && layout.degree() > 1;
+        residual.fill(0.0);
+        if let Some(derivatives) = &mut derivatives {
+            derivatives.tangent.fill(0.0);
+            derivatives.by_start.fill(0.0);
+        }
+        let mut point = PointDerivatives {
+            p: [0.0; N],
+            force: [0.0; N],
+            second: Second::ZERO,
+        };
+        for l in 0..points {
+            let (t, q, v) = self.inner.place(l, rates);
+            if derivatives.is_some() {
+                self.inner.derivatives(l, rates, &mut point)?;
+            } else {
+                self.inner.values(l, rates, &mut point)?;
+            }
+            self.inner.momenta[l] = point.p;
+            let mut by = PointTangent::of(h, &point.second);
+            self.rows.evaluate(self.inner.model, t, &q);
+            let slopes = slopes(scheme.nodes[l], layout.degree());
+            if velocities {
+                self.set_mu(l, x, &slopes, false);
+                let bend = self.rows.differentiate(self.inner.model, t, &q, &v);
+                let momentum = Self::transposed(self.rows.rows, self.rows.mu);
+                let force = Self::transposed(self.rows.rates, self.rows.mu);
+                for a in 0..N {
+                    point.p[a] += momentum[a];
+                    point.force[a] += force[a];
+                    for b in 0..N {
+                        by.momentum_q[a][b] += h * bend.bend[a][b];
+                        by.force_q[a][b] += h * bend.rate_q[a][b];
+                        by.force_v[a][b] += bend.rate_v[a][b];
+                    }
+                }
+            }
+            if positions {
+                self.set_mu(l, x, &slopes, true);
+                let force = Self::transposed(self.rows.rows, self.rows.mu);
+                for a in 0..N {
+                    point.force[a] -= force[a];
+                }
+                if derivatives.is_some() {
+                    let bend = self.rows.differentiate(self.inner.model, t, &q, &v);
+                    for a in 0..N {
+                        for b in 0..N {
+                            by.force_q[a][b] -= h * bend.bend[a][b];
+                        }
+                    }
+                }
+            }
+            self.inner.forces[l] = point.force;
+            for i in 0..unknowns {
+                let weight = scheme.momentum[i * points + l];
+                for a in 0..N {
+                    residual[i * N + a] += weight * point.p[a];
+                }
+            }
+            for (c, holonomic) in self.active() {
+                if holonomic {
+                    for j in 1..layout.degree() {
+                        residual[layout.inside(j, c)] +=
+                            scheme.weights[l] * slopes[j] * self.rows.values[c] / h;
+                    }
+                } else {
+                    residual[layout.inside(l, c)] = self.rows.psi(c, &v);
+                }
+            }
+            if let Some(Derivatives { tangent, by_start }) = &mut derivatives {
+                self.add_element(l, &by, tangent);
+                self.add_point(l, &slopes, tangent);
+                if !by_start.is_empty() {
+                    self.add_start(l, &by, &slopes, by_start);
+                }
+            }
+        }
+        let rows = residual[..layout.rates()].as_chunks_mut::<N>().0;
+        self.inner.subtract_impulse(rows);
+        self.set_node_mu(x, true);
+        let kick = Self::transposed(self.rows.start, self.rows.mu);
+        for row in rows {
+            for a in 0..N {
+                row[a] -= kick[a];
+            }
+        }
+        if let Some(Derivatives { by_start, .. }) = &mut derivatives
+            && !by_start.is_empty()
+        {
+            let Span { t, start, .. } = self.inner.span;
+            let bend = self
+                .rows
+                .differentiate(self.inner.model, t, &start.q, &[0.0; N]);
+            for row in (0..unknowns * N).chain(layout.end(0)..layout.node(0)) {
+                let a = if row < layout.rates() {
+                    row % N
+                } else {
+                    row - layout.end(0)
+                };
+                for b in 0..N {
+                    by_start[row * N + b] -= bend.bend[a][b];
+                }
+            }
+        }
+        let end = self.end(x, derivatives.is_some())?;
+        self.rows.evaluate(self.inner.model, end.t, &end.q);
+        self.set_node_mu(x, false);
+        let reaction = Self::transposed(self.rows.rows, self.rows.mu);
+        let force = weighted(scheme.weights, scheme.weights_low, self.inner.forces);
+        let span = &self.inner.span;
+        for a in 0..N {
+            let impulse = h * force[a] + (span.low.p[a] + self.impulse[a] + kick[a]);
+            residual[layout.end(a)] = (end.p[a] - span.start.p[a]) + (reaction[a] - impulse);
+        }
+        for (c, holonomic) in self.active() {
+            residual[layout.node(c)] = self.rows.psi(c, &end.v);
+            if holonomic {
+                residual[layout.inside(0, c)] = self.rows.values[c] / h;
+            }
+        }
+        if let Some(Derivatives { tangent, by_start }) = &mut derivatives {
+            let bend = self
+                .rows
+                .differentiate(self.inner.model, end.t, &end.q, &end.v);
+            self.add_ends(&end, &bend, tangent);
+            if !by_start.is_empty() {
+                self.add_end_by_start(&end, &bend, by_start);
+            }
+        }
+        self.hold_dependent(x, residual, derivatives);
+        self.inner.statistics.residual_evaluations += 1;
+        Ok(())
+    }
+
+    /// Adds what momentum and forces at a point give to the tangent.
+    fn add_element(&self, l: usize, by: &PointTangent<N>, tangent: &mut [f64]) {
+        let (scheme, h, size) = (&self.inner.scheme, self.inner.span.h, self.layout.size());
+        let (points, rates) = (scheme.points(), self.layout.rates());
+        for (i, rows) in tangent[..rates * size]
+            .chunks_exact_mut(N * size)
+            .enumerate()
+        {
+            let momentum = scheme.momentum[i * points + l];
+            let force = -h * scheme.force[i * points + l];
+            for (a, row) in rows.chunks_exact_mut(size).enumerate() {
+                self.inner
+                    .add_row(l, by, a, momentum, force, &mut row[..rates]);
+            }
+        }
+        for a in 0..N {
+            let row = &mut tangent[self.layout.end(a) * size..][..rates];
+            self.inner
+                .add_row(l, by, a, 0.0, -h * scheme.weights[l], row);
+        }
+    }
+
+    /// Adds what a point gives to the derivative by the coordinates at the start.
+    fn add_start(&self, l: usize, by: &PointTangent<N>, slopes: &[f64], by_start: &mut [f64]) {
+        let (scheme, h) = (&self.inner.scheme, self.inner.span.h);
+        let (points, weight) = (scheme.points(), scheme.weights[l]);
+        for a in 0..N {
+            for i in 0..scheme.unknowns() {
+                let momentum = scheme.momentum[i * points + l] / h;
+                let force = scheme.force[i * points + l];
+                let row = &mut by_start[(i * N + a) * N..][..N];
+                for b in 0..N {
+                    row[b] += momentum * by.momentum_q[a][b] - force * by.force_q[a][b];
+                }
+            }
+            let row = &mut by_start[self.layout.end(a) * N..][..N];
+            for b in 0..N {
+                row[b] -= weight * by.force_q[a][b];
+            }
+        }
+        for (c, holonomic) in self.active() {
+            for b in 0..N {
+                if holonomic {
+                    for j in 1..self.layout.degree() {
+                        by_start[self.layout.inside(j, c) * N + b] +=
+                            weight * slopes[j] * self.rows.rows[c][b] / h;
+                    }
+                } else {
+                    by_start[self.layout.inside(l, c) * N + b] = self.rows.psi_q[c][b];
+                }
+            }
+        }
+    }
+
+    /// Adds what the end gives to the derivative by the coordinates at the start.
+    fn add_end_by_start(&self, end: &End<N>, bend: &Bend<N>, by_start: &mut [f64]) {
+        let layout = &self.layout;
+        for b in 0..N {
+            for a in 0..N {
+                by_start[layout.end(a) * N + b] += end.second.zq[a][b] + bend.bend[a][b];
+            }
+            for (c, holonomic) in self.active() {
+                by_start[layout.node(c) * N + b] = self.rows.psi_q[c][b];
+                if holonomic {
+                    by_start[layout.inside(0, c) * N + b] =
+                        self.rows.rows[c][b] / self.inner.span.h;
+                }
+            }
+        }
+    }
+    /// The equations of constraints that do not count: their multipliers vanish.
+    fn hold_dependent(
+        &self,
+        x: &[f64],
+        residual: &mut [f64],
+        mut derivatives: Option<Derivatives<'_>>,
+    ) {
+        let size = self.layout.size();
+        for (c, _) in self
+            .active
+            .iter()
+            .enumerate()
+            .filter(|(_, mark)| **mark == 0)
+        {
+            let inside = (0..self.layout.degree()).map(|j| self.layout.inside(j, c));
+            for at in inside.chain([self.layout.node(c)]) {
+                residual[at] = x[at];
+                if let Some(derivatives) = &mut derivatives {
+                    derivatives.tangent[at * size + at] = 1.0;
+                }
+            }
+        }
+    }
+}
+
+impl<M, const N: usize> Equations for ConstrainedForm<'_, M, N>
+where
+    M: Model<N>,
+{
+    fn sweep(&mut self, _: &[f64], _: &mut [f64], _: bool) -> Result<(), StepError> {
+        Err(ConstraintError::NeedsNewton.into())
+    }
+
+    fn residual(&mut self, x: &[f64], residual: &mut [f64]) -> Result<(), StepError> {
+        self.evaluate(x, residual, None)
+    }
+
+    fn tangent(
+        &mut self,
+        x: &[f64],
+        residual: &mut [f64],
+        tangent: &mut [f64],
+    ) -> Result<(), StepError> {
+        let by_start = &mut [];
+        self.evaluate(x, residual, Some(Derivatives { tangent, by_start }))
+    }
+
+    fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
+        let (rates, end) = (self.layout.rates(), self.layout.end(0)..self.layout.node(0));
+        let inner = self.inner.measure(&x[..rates], &step[..rates]);
+        let end = 0.25 * relative(1.0, &[], &x[end.clone()], &step[end]);
+        let relative = if end.is_nan() {
+            end
+        } else {
+            inner.relative.max(end)
+        };
+        Increment { relative, ..inner }
+    }
+
+    fn finish(&mut self, _: &[f64], _: &mut [f64]) -> Result<(), StepError> {
+        // The end follows from the unknowns alone.
+        Ok(())
+    }
+
+    fn statistics(&mut self) -> &mut Statistics {
+        self.inner.statistics
+    }
+}

@@ -1,0 +1,149 @@
+//! What constraints say at one instant of a motion: reactions, and the gradients that span what they allow.
+
+use crate::constrained::derivative::{DualRows, explicit};
+use crate::constrained::rows::{Rows, dot, rows_len};
+use crate::dual::{Dual, duals};
+use crate::error::{ConstraintError, StepError};
+use crate::legendre::lagrangian_view_from;
+use crate::lu;
+use crate::model::{Model, Second, State};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// The derivatives of the constraints at a state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gradients<const N: usize> {
+    /// A, a row for each constraint.
+    pub rows: Vec<[f64; N]>,
+    /// ∂(A v + a)/∂q, a row for each constraint.
+    pub psi_q: Vec<[f64; N]>,
+    /// Which constraints are independent.
+    pub independent: Vec<bool>,
+    /// L_vv, L_vq and the others.
+    pub second: Second<f64, N>,
+}
+
+/// The derivatives of the constraints at positions and velocities.
+///
+/// # Errors
+/// [`StepError`] if a Hamiltonian model has no momentum for the velocity.
+pub fn gradients<M, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+    v: &[f64; N],
+) -> Result<Gradients<N>, StepError>
+where
+    M: Model<N>,
+{
+    let count = M::CONSTRAINTS.len();
+    let mut memory = vec![0.0; rows_len(N, count)];
+    let mut rows = Rows::of(&mut memory, count);
+    rows.evaluate(model, t, &state.q);
+    let mut active = vec![0; count];
+    rows.choose::<M>(&mut active);
+    rows.differentiate(model, t, &state.q, v);
+    Ok(Gradients {
+        rows: rows.rows.to_vec(),
+        psi_q: rows.psi_q.to_vec(),
+        independent: active.into_iter().map(|mark| mark != 0).collect(),
+        second: lagrangian_view_from(model, t, &state.q, v, &state.p)?.second,
+    })
+}
+
+/// The reactions λ of the constraints, one for each: the forces on the coordinates are Aᵀλ (T-77).
+///
+/// ```text
+/// L_vv a + L_vq v + L_vt = L_q + Q + Aᵀλ ,     A a + d(A v + a)/dt|_v = 0
+/// ```
+///
+/// Of dependent constraints any reactions with the same Aᵀλ would do; these have the least Σ λ².
+///
+/// # Errors
+/// [`StepError`] if the kinetic energy is singular for motions that the constraints allow, or a value is not finite.
+pub fn reactions<M, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+    v: &[f64; N],
+) -> Result<Vec<f64>, StepError>
+where
+    M: Model<N>,
+{
+    let Gradients {
+        rows,
+        independent,
+        second,
+        ..
+    } = gradients(model, t, state, v)?;
+    let view = lagrangian_view_from(model, t, &state.q, v, &state.p)?;
+    let moving = duals(&state.q, v);
+    let (momentum, _) = explicit(model, Dual::new(t, 1.0), &moving, v, &state.p)?;
+    let mut along = DualRows::<N>::new(rows.len());
+    along.evaluate(model, Dual::new(t, 1.0), &moving, v);
+    let chosen: Vec<usize> = (0..rows.len()).filter(|c| independent[*c]).collect();
+    let size = N + chosen.len();
+    let (mut matrix, mut vector) = (vec![0.0; size * size], vec![0.0; size]);
+    for a in 0..N {
+        matrix[a * size..a * size + N].copy_from_slice(&second.zz[a]);
+        vector[a] = view.first.q[a] + view.first.force[a] - momentum[a];
+    }
+    for (k, c) in chosen.iter().enumerate() {
+        for a in 0..N {
+            matrix[(N + k) * size + a] = rows[*c][a];
+            matrix[a * size + N + k] = -rows[*c][a];
+        }
+        vector[N + k] = -along.psi_slope(*c, v);
+    }
+    let mut pivots = vec![0; size];
+    lu::factor(size, &mut matrix, &mut pivots).map_err(|_| ConstraintError::SingularMass)?;
+    lu::solve(size, &matrix, &pivots, &mut vector);
+    if !vector.iter().all(|value| value.is_finite()) {
+        return Err(StepError::NonFinite);
+    }
+    Ok(spread(&rows, &chosen, &vector[N..]))
+}
+
+/// The multipliers of all rows with the least Σ λ² that give the same Aᵀλ as those of the independent ones.
+fn spread<const N: usize>(rows: &[[f64; N]], chosen: &[usize], multipliers: &[f64]) -> Vec<f64> {
+    let rank = chosen.len();
+    let mut all = vec![0.0; rows.len()];
+    if rank == rows.len() {
+        all.copy_from_slice(multipliers);
+        return all;
+    }
+    let mut pivots = vec![0; rank];
+    let mut gram: Vec<f64> = chosen
+        .iter()
+        .flat_map(|a| chosen.iter().map(|b| dot(&rows[*a], &rows[*b])))
+        .collect();
+    if lu::factor(rank, &mut gram, &mut pivots).is_err() {
+        return vec![f64::NAN; rows.len()];
+    }
+    // Every row is a combination of the independent ones, A = C A_i; then λ = C (CᵀC)⁻¹ λ_i.
+    let combinations: Vec<Vec<f64>> = rows
+        .iter()
+        .map(|row| {
+            let mut side: Vec<f64> = chosen.iter().map(|c| dot(row, &rows[*c])).collect();
+            lu::solve(rank, &gram, &pivots, &mut side);
+            side
+        })
+        .collect();
+    let mut normal = vec![0.0; rank * rank];
+    for combination in &combinations {
+        for a in 0..rank {
+            for b in 0..rank {
+                normal[a * rank + b] += combination[a] * combination[b];
+            }
+        }
+    }
+    let mut weights = multipliers.to_vec();
+    if lu::factor(rank, &mut normal, &mut pivots).is_err() {
+        return vec![f64::NAN; rows.len()];
+    }
+    lu::solve(rank, &normal, &pivots, &mut weights);
+    for (value, combination) in all.iter_mut().zip(&combinations) {
+        *value = combination.iter().zip(&weights).map(|(c, w)| c * w).sum();
+    }
+    all
+}

@@ -1,0 +1,146 @@
+//! Where the unknowns of a constrained element are.
+
+use crate::element::{Element, Family, Rule};
+
+use crate::model::{ConstraintKind, Model};
+
+/// The unknowns, and in the same order the equations: rates, multipliers inside, velocity at the end, multipliers of the nodes.
+///
+/// With s = n − 1, N coordinates and m constraints they are (s + 1)(N + m) numbers. All multipliers are divided by h, so that they have the
+/// size of reactions.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    unknowns: usize,
+    degree: usize,
+    coordinates: usize,
+    constraints: usize,
+}
+
+impl Layout {
+    pub(crate) const fn new(element: &Element, coordinates: usize, constraints: usize) -> Self {
+        Self {
+            unknowns: element.unknowns(),
+            degree: element.degree(),
+            coordinates,
+            constraints,
+        }
+    }
+
+    /// How many there are.
+    pub(crate) const fn size(&self) -> usize {
+        self.node(self.constraints)
+    }
+
+    /// Where the rates end.
+    pub(crate) const fn rates(&self) -> usize {
+        self.unknowns * self.coordinates
+    }
+
+    /// The multiplier number j < s of a constraint: for holonomic ones the start's for j = 0 and the coefficient of P_j′ for others,
+    /// for those of velocities the one of stage j.
+    pub(crate) const fn inside(&self, j: usize, constraint: usize) -> usize {
+        self.rates() + j * self.constraints + constraint
+    }
+
+    /// The velocity at the end.
+    pub(crate) const fn end(&self, coordinate: usize) -> usize {
+        self.rates() + self.degree * self.constraints + coordinate
+    }
+
+    /// The multiplier of a constraint at the end; for those of velocities the one of the start, which is its negative.
+    pub(crate) const fn node(&self, constraint: usize) -> usize {
+        self.end(self.coordinates) + constraint
+    }
+
+    /// Sets the multipliers to those of constant reactions λ, μ = −λ t: zero where these are not known.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn guess<M, const N: usize>(
+        &self,
+        nodes: &[f64],
+        reactions: Option<&[f64]>,
+        unknowns: &mut [f64],
+    ) where
+        M: Model<N>,
+    {
+        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+            let lambda = reactions.map_or(0.0, |reactions| reactions[c]);
+            let lambda = if lambda.is_finite() { lambda } else { 0.0 };
+            for j in 0..self.degree {
+                unknowns[self.inside(j, c)] = match (constraint.kind.is_holonomic(), j) {
+                    (false, _) => -lambda * (nodes[j] - 0.5),
+                    // One point alone sees no rate of μ: half of the impulse acts at either end.
+                    (true, 0) if self.degree == 1 => -0.5 * lambda,
+                    (true, 1) => -lambda,
+                    (true, _) => 0.0,
+                };
+            }
+            unknowns[self.node(c)] = match (constraint.kind.is_holonomic(), self.degree) {
+                (false, _) => 0.5 * lambda,
+                (true, 1) => -0.5 * lambda,
+                (true, _) => 0.0,
+            };
+        }
+    }
+
+    /// s
+    pub(crate) const fn degree(&self) -> usize {
+        self.degree
+    }
+}
+
+/// Whether an element can hold such constraints (T-75): the multipliers need spaces that fit the trial functions.
+pub(crate) const fn admits(element: &Element, kind: ConstraintKind) -> bool {
+    let gauss = match element.rule() {
+        Rule::Default => matches!(element.family(), Family::Mixed),
+        Rule::Gauss(points) => points == element.degree(),
+        Rule::Lobatto(_) => false,
+    };
+    match element.family() {
+        Family::Mixed => gauss,
+        Family::Primal => gauss || kind.is_holonomic(),
+        Family::EnergyConserving | Family::Radau => false,
+    }
+}
+
+/// The first constraint of a model that the element cannot hold.
+pub(crate) fn refused<M, const N: usize>(element: &Element) -> Option<&'static str>
+where
+    M: Model<N>,
+{
+    M::CONSTRAINTS
+        .iter()
+        .find(|constraint| !admits(element, constraint.kind))
+        .map(|constraint| constraint.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknowns_follow_one_another() {
+        let layout = Layout::new(&Element::mixed(4), 3, 2);
+        assert_eq!(layout.rates(), 9);
+        assert_eq!(layout.inside(2, 1) + 1, layout.end(0));
+        assert_eq!(layout.end(2) + 1, layout.node(0));
+        assert_eq!(layout.size(), 4 * (3 + 2));
+    }
+
+    #[test]
+    fn who_admits_what() {
+        let rod = ConstraintKind::Holonomic { quadratic: true };
+        let blade = ConstraintKind::Velocity { integrable: false };
+        for (element, holonomic, velocity) in [
+            (Element::mixed(4), true, true),
+            (Element::mixed(4).quadrature(5), false, false),
+            (Element::primal(4), true, false),
+            (Element::primal(4).reduced(), true, true),
+            (Element::primal(4).lobatto(), true, false),
+            (Element::radau(4), false, false),
+            (Element::energy_conserving(4), false, false),
+        ] {
+            assert_eq!(admits(&element, rod), holonomic, "{element}");
+            assert_eq!(admits(&element, blade), velocity, "{element}");
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! Constraints at one instant: the velocity of a momentum, independent rows, residuals.
+
+use crate::constrained::rows::Rows;
+use crate::error::{ConstraintError, LegendreError, StepError};
+use crate::legendre::lagrangian_view_from;
+use crate::lu;
+use crate::model::{First, Form, Model};
+
+/// The most iterations of Newton's method; one is enough where the kinetic energy is quadratic.
+const MOST: u32 = 50;
+
+/// Memory of [`solve_velocity`]: (N + m)² numbers, N + m of them, and as many indices.
+pub(crate) struct Bordered<'a> {
+    pub(crate) matrix: &'a mut [f64],
+    pub(crate) vector: &'a mut [f64],
+    pub(crate) pivots: &'a mut [usize],
+}
+
+/// The velocity that belongs to a momentum under constraints, T-74:
+///
+/// ```text
+/// L_v(q, v, t) + Aᵀν = p ,     A v + a = 0 .
+/// ```
+///
+/// `rows` hold A and a at (t, q); only marked constraints count. The mass matrix may be singular where constraints hold the motion.
+pub(crate) fn solve_velocity<M, const N: usize>(
+    model: &M,
+    t: f64,
+    (q, p): (&[f64; N], &[f64; N]),
+    guess: &[f64; N],
+    rows: &Rows<'_, N>,
+    active: &[usize],
+    memory: &mut Bordered<'_>,
+) -> Result<[f64; N], StepError>
+where
+    M: Model<N>,
+{
+    let size = N + active.len();
+    let matrix = &mut memory.matrix[..size * size];
+    let vector = &mut memory.vector[..size];
+    let pivots = &mut memory.pivots[..size];
+    let (mut v, mut momentum) = (*guess, *p);
+    let mut last = f64::INFINITY;
+    for _ in 0..MOST {
+        matrix.fill(0.0);
+        let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
+        match M::FORM {
+            Form::Lagrangian => model.first_and_mass(t, q, &v, &mut first, &mut zz),
+            Form::Hamiltonian => {
+                let view = lagrangian_view_from(model, t, q, &v, &momentum)?;
+                (first, zz, momentum) = (view.first, view.second.zz, view.p);
+                first.z = view.p;
+            }
+        }
+        for a in 0..N {
+            vector[a] = p[a] - first.z[a];
+            matrix[a * size..a * size + N].copy_from_slice(&zz[a]);
+        }
+        for (c, mark) in active.iter().enumerate() {
+            let row = N + c;
+            if *mark == 0 {
+                (matrix[row * size + row], vector[row]) = (1.0, 0.0);
+                continue;
+            }
+            vector[row] = -rows.psi(c, &v);
+            for a in 0..N {
+                matrix[row * size + a] = rows.rows[c][a];
+                matrix[a * size + row] = rows.rows[c][a];
+            }
+        }
+        lu::factor(size, matrix, pivots).map_err(|_| ConstraintError::SingularMass)?;
+        // The multiplier is solved for anew each time: it enters linearly.
+        lu::solve(size, matrix, pivots, vector);
+        let (mut step, mut scale) = (0.0_f64, 0.0_f64);
+        for a in 0..N {
+            v[a] += vector[a];
+            step = step.max(vector[a].abs());
+            scale = scale.max(v[a].abs());
+        }
+        if !v.iter().all(|v| v.is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        let settled = step <= 4.0 * f64::EPSILON * scale || (step >= last && step <= 1e-10 * scale);
+        if settled || (M::FACTS.quadratic_in_z && last.is_finite()) {
+            return Ok(v);
+        }
+        last = step;
+    }
+    Err(LegendreError::Stalled {
+        iterations: MOST,
+        residual: last,
+    }
+    .into())
+}
+
+#[cfg(feature = "alloc")]
+pub use heap::{Residual, independent, residuals, velocity, velocity_for};
+
+#[cfg(feature = "alloc")]
+mod heap {
+    use super::{Bordered, solve_velocity};
+    use crate::constrained::relative_residual;
+    use crate::constrained::rows::{Rows, rows_len};
+    use crate::error::StepError;
+    use crate::model::Model;
+    use alloc::vec;
+    use alloc::vec::Vec;
+
+    /// By how much a state violates one constraint.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Residual {
+        /// Its name.
+        pub constraint: &'static str,
+        /// φ; zero for a constraint on velocities.
+        pub position: f64,
+        /// A v + a
+        pub velocity: f64,
+        /// The distance |φ| / |A| relative to the positions.
+        pub relative_position: f64,
+        /// |A v + a| / |A| relative to the velocities.
+        pub relative_velocity: f64,
+    }
+
+    impl Residual {
+        /// The larger one of the relative residuals; NaN if one is.
+        #[must_use]
+        pub fn relative(&self) -> f64 {
+            let (position, velocity) = (self.relative_position, self.relative_velocity);
+            if position.is_nan() || velocity.is_nan() {
+                f64::NAN
+            } else {
+                position.max(velocity)
+            }
+        }
+    }
+
+    /// By how much positions and velocities violate the constraints of a model, one entry for each.
+    ///
+    /// Velocities are small or large beside those that matter in a time of length `h`, such as a step.
+    #[must_use]
+    pub fn residuals<M, const N: usize>(
+        model: &M,
+        t: f64,
+        q: &[f64; N],
+        v: &[f64; N],
+        h: f64,
+    ) -> Vec<Residual>
+    where
+        M: Model<N>,
+    {
+        let count = M::CONSTRAINTS.len();
+        let mut memory = vec![0.0; rows_len(N, count)];
+        let mut rows = Rows::of(&mut memory, count);
+        rows.evaluate(model, t, q);
+        let of = |(c, constraint): (usize, &crate::model::Constraint)| {
+            let (relative_position, relative_velocity) = relative_residual(&rows, c, q, v, h);
+            Residual {
+                constraint: constraint.name,
+                position: rows.values[c],
+                velocity: rows.psi(c, v),
+                relative_position,
+                relative_velocity,
+            }
+        };
+        M::CONSTRAINTS.iter().enumerate().map(of).collect()
+    }
+
+    /// Which constraints are independent at a position: the others follow from them there.
+    #[must_use]
+    pub fn independent<M, const N: usize>(model: &M, t: f64, q: &[f64; N]) -> Vec<bool>
+    where
+        M: Model<N>,
+    {
+        let count = M::CONSTRAINTS.len();
+        let mut memory = vec![0.0; rows_len(N, count)];
+        let mut rows = Rows::of(&mut memory, count);
+        rows.evaluate(model, t, q);
+        let mut active = vec![0; count];
+        rows.choose::<M>(&mut active);
+        active.into_iter().map(|mark| mark != 0).collect()
+    }
+
+    /// The velocity that belongs to a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, the Legendre transform.
+    ///
+    /// # Errors
+    /// [`StepError`] if there is none: the kinetic energy is singular for motions that the constraints allow.
+    pub fn velocity<M, const N: usize>(
+        model: &M,
+        t: f64,
+        q: &[f64; N],
+        p: &[f64; N],
+        guess: &[f64; N],
+    ) -> Result<[f64; N], StepError>
+    where
+        M: Model<N>,
+    {
+        if M::CONSTRAINTS.is_empty() {
+            return Ok(crate::legendre::velocity(model, t, q, p, guess)?);
+        }
+        let count = M::CONSTRAINTS.len();
+        let size = N + count;
+        let mut numbers = vec![0.0; rows_len(N, count)];
+        let mut rows = Rows::of(&mut numbers, count);
+        rows.evaluate(model, t, q);
+        let mut active = vec![0; count];
+        rows.choose::<M>(&mut active);
+        let mut memory = Bordered {
+            matrix: &mut vec![0.0; size * size],
+            vector: &mut vec![0.0; size],
+            pivots: &mut vec![0; size],
+        };
+        solve_velocity(model, t, (q, p), guess, &rows, &active, &mut memory)
+    }
+
+    /// The velocity nearest to `v`, in the metric of the kinetic energy, that the constraints allow: that of the momentum L_v(q, v, t).
+    ///
+    /// # Errors
+    /// As for [`velocity`].
+    pub fn velocity_for<M, const N: usize>(
+        model: &M,
+        t: f64,
+        q: &[f64; N],
+        v: &[f64; N],
+    ) -> Result<[f64; N], StepError>
+    where
+        M: Model<N>,
+    {
+        let p = crate::legendre::momentum(model, t, q, v)?;
+        velocity(model, t, q, &p, v)
+    }
+}
