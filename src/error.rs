@@ -1,8 +1,10 @@
 //! What can go wrong in a run, where and why.
 
+use crate::constraints::write_residuals;
 use crate::motion::Motion;
 use std::error::Error;
 use std::fmt;
+use tfe_runtime::constrained::Residual;
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{ElementError, StepError};
 
@@ -39,6 +41,13 @@ pub enum RunErrorKind {
         q: f64,
         /// Its momentum.
         p: f64,
+    },
+    /// The start is not on the constraints.
+    Inconsistent {
+        /// Its time.
+        time: f64,
+        /// By how much it violates each of them.
+        residuals: Vec<Residual>,
     },
     /// An impulse acts at a time outside the span, or is not finite.
     Impulse {
@@ -117,6 +126,14 @@ impl fmt::Display for RunErrorKind {
                 write!(
                     f,
                     "the start is not finite: coordinate {coordinate} is {q}, its momentum {p}"
+                )
+            }
+            Self::Inconsistent { time, residuals } => {
+                write!(f, "the start at t = {time} violates constraints:")?;
+                write_residuals(f, residuals)?;
+                write!(
+                    f,
+                    "; `consistent_state` finds the nearest start that does not"
                 )
             }
             Self::Impulse { time } => {

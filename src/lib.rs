@@ -6,6 +6,7 @@ mod assembly;
 pub mod boundary;
 #[cfg(feature = "charts")]
 pub mod charts;
+pub mod constraints;
 pub mod continuation;
 mod csv;
 pub mod error;
@@ -18,6 +19,9 @@ pub mod stability;
 
 pub use assembly::{AssemblyError, MeshError};
 pub use boundary::{BoundaryMotion, BoundaryValue};
+pub use constraints::{
+    Consistent, ConsistentError, ConsistentState, ConstraintResidual, Reactions,
+};
 pub use continuation::{Branch, Continuation};
 pub use error::{AtError, RunError, RunErrorKind};
 pub use linearised::Linearised;
@@ -35,8 +39,8 @@ pub use tfe_runtime::{
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
     pub use crate::{
-        BoundaryValue, Continuation, Element, EnergyConserving, Mixed, Model, Motion, Node,
-        PeriodicOrbit, Primal, Radau, Simulation, Solve, State, dynamics, stability,
+        BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Mixed, Model,
+        Motion, Node, PeriodicOrbit, Primal, Radau, Simulation, Solve, State, dynamics, stability,
     };
 }
 

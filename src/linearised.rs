@@ -1,8 +1,10 @@
 //! A motion with its linearisation: the transition matrix of every element.
 
+use crate::constraints::reduced;
 use crate::motion::Motion;
 use crate::periodic_schur::{self, Multiplier, PeriodicSchurError};
 use nalgebra::DMatrix;
+use tfe_runtime::{Model, State, StepError};
 
 /// A motion together with the transition matrices of its elements, from
 /// [`Simulation::run_linearised`](crate::Simulation::run_linearised).
@@ -41,13 +43,33 @@ use nalgebra::DMatrix;
 pub struct Linearised<const N: usize> {
     motion: Motion<N>,
     transitions: Vec<DMatrix<f64>>,
+    /// The same on the motions that constraints allow, for models that have any.
+    reduced: Option<Result<Vec<DMatrix<f64>>, StepError>>,
 }
 
 impl<const N: usize> Linearised<N> {
-    pub(crate) fn new(motion: Motion<N>, transitions: Vec<DMatrix<f64>>) -> Self {
+    /// With the start of every element if the model has constraints.
+    pub(crate) fn new<M: Model<N>>(
+        model: &M,
+        motion: Motion<N>,
+        transitions: Vec<DMatrix<f64>>,
+        starts: &[(f64, State<N>)],
+    ) -> Self {
+        let reduced = (!starts.is_empty()).then(|| {
+            let entries: Vec<f64> = transitions
+                .iter()
+                .flat_map(|matrix| matrix.transpose().iter().copied().collect::<Vec<_>>())
+                .collect();
+            let (size, entries) = reduced(model, starts.iter().copied(), &entries)?;
+            let matrices = entries.chunks_exact((size * size).max(1));
+            Ok(matrices
+                .map(|entries| DMatrix::from_row_slice(size, size, entries))
+                .collect())
+        });
         Self {
             motion,
             transitions,
+            reduced,
         }
     }
 
@@ -61,6 +83,14 @@ impl<const N: usize> Linearised<N> {
     /// One for every element, also where [`record_every`](crate::Simulation::record_every) keeps only some of the nodes.
     pub fn transitions(&self) -> &[DMatrix<f64>] {
         &self.transitions
+    }
+
+    /// The transition matrices of a model with constraints on the motions that these allow, each in the orthonormal bases
+    /// [`tangent_basis`](crate::constraints::tangent_basis) at the two nodes of its element (the last one back to that of the start, where a periodic
+    /// motion ends): no direction that violates a constraint, and no zero eigenvalue for it. `None` for models without constraints, and where there is
+    /// no basis.
+    pub fn on_constraints(&self) -> Option<&[DMatrix<f64>]> {
+        self.reduced.as_ref()?.as_deref().ok()
     }
 
     /// The motion and the transition matrices, by value.
@@ -87,6 +117,8 @@ impl<const N: usize> Linearised<N> {
     /// Over one period of a periodic motion they are its Floquet multipliers. Over a span that ends elsewhere they depend on the
     /// coordinates and have no such meaning.
     ///
+    /// Of a model with constraints they are those of the motions that these allow, from [`on_constraints`](Self::on_constraints).
+    ///
     /// # Errors
     /// [`PeriodicSchurError`] if a matrix is not finite or the iteration does not converge.
     ///
@@ -105,6 +137,9 @@ impl<const N: usize> Linearised<N> {
     /// # }
     /// ```
     pub fn multipliers(&self) -> Result<Vec<Multiplier>, PeriodicSchurError> {
+        if let Some(Ok(reduced)) = &self.reduced {
+            return periodic_schur::multipliers(reduced);
+        }
         if self.transitions.is_empty() {
             return periodic_schur::multipliers(&[DMatrix::identity(2 * N, 2 * N)]);
         }

@@ -1,5 +1,6 @@
 //! The result of a run: nodes, dense output, energy, observables, statistics.
 
+use crate::constraints::{ConstraintResidual, Reactions, velocity_at};
 use crate::csv;
 use crate::error::AtError;
 use crate::simulation::Warning;
@@ -7,7 +8,7 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 use tfe_runtime::step::DenseElement;
-use tfe_runtime::{CoordinateName, Model, State, Statistics, legendre};
+use tfe_runtime::{CoordinateName, Model, State, Statistics, constrained, legendre};
 
 /// A state with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,6 +74,8 @@ pub struct Motion<const N: usize> {
     velocities: Vec<[f64; N]>,
     energies: Vec<f64>,
     outputs: Outputs,
+    reactions: Reactions,
+    residual: ConstraintResidual,
     elements: Vec<DenseElement<N>>,
     statistics: Statistics,
     warnings: Vec<Warning>,
@@ -90,6 +93,15 @@ impl<const N: usize> Motion<N> {
                 names: M::OBSERVABLES,
                 values: Vec::new(),
             },
+            reactions: Reactions {
+                names: M::CONSTRAINTS.iter().map(|one| one.name).collect(),
+                values: Vec::new(),
+            },
+            residual: ConstraintResidual {
+                position: 0.0,
+                velocity: 0.0,
+                rank: M::CONSTRAINTS.len(),
+            },
             elements: Vec::new(),
             statistics: Statistics::default(),
             warnings: Vec::new(),
@@ -103,14 +115,16 @@ impl<const N: usize> Motion<N> {
     /// recorded as NaN: the state itself is good, and its momentum may well belong to no velocity (a singular mass matrix).
     pub(crate) fn record<M: Model<N>>(&mut self, model: &M, t: f64, state: &State<N>) {
         let guess = self.velocities.last().copied().unwrap_or([0.0; N]);
-        let velocity =
-            legendre::velocity(model, t, &state.q, &state.p, &guess).unwrap_or([f64::NAN; N]);
+        let velocity = velocity_at(model, t, state, &guess).unwrap_or([f64::NAN; N]);
         let energy = legendre::energy_at(model, t, &state.q, &state.p, &velocity);
         self.nodes.push(Node {
             t,
             q: state.q,
             p: state.p,
         });
+        if !M::CONSTRAINTS.is_empty() {
+            self.record_constraints(model, t, state, &velocity);
+        }
         self.velocities.push(velocity);
         self.energies.push(energy);
         if !M::OBSERVABLES.is_empty() {
@@ -125,6 +139,31 @@ impl<const N: usize> Motion<N> {
                 .resize(start + M::OBSERVABLES.len(), 0.0);
             model.observables(t, &state.q, z, &mut self.outputs.values[start..]);
         }
+    }
+
+    fn record_constraints<M: Model<N>>(
+        &mut self,
+        model: &M,
+        t: f64,
+        state: &State<N>,
+        velocity: &[f64; N],
+    ) {
+        let reactions = constrained::reactions(model, t, state, velocity);
+        let reactions = reactions.unwrap_or_else(|_| vec![f64::NAN; M::CONSTRAINTS.len()]);
+        self.reactions.values.extend(reactions);
+        let largest = |so_far: &mut f64, value: f64| {
+            // `f64::max` would drop a NaN.
+            if !(value.abs() <= *so_far) {
+                *so_far = value.abs();
+            }
+        };
+        for one in constrained::residuals(model, t, &state.q, velocity, 1.0) {
+            largest(&mut self.residual.position, one.position);
+            largest(&mut self.residual.velocity, one.velocity);
+        }
+        let independent = constrained::independent(model, t, &state.q);
+        let rank = independent.into_iter().filter(|one| *one).count();
+        self.residual.rank = self.residual.rank.min(rank);
     }
 
     pub(crate) fn keep_element(&mut self, element: DenseElement<N>) {
@@ -235,7 +274,17 @@ impl<const N: usize> Motion<N> {
         &self.outputs
     }
 
-    /// Writes the recorded nodes as CSV: time, coordinates, velocities, momenta, energy, observables, with a header line. Numbers are
+    /// The reactions of the constraints at the recorded nodes; NaN where the kinetic energy is singular for motions that the constraints allow.
+    pub fn reactions(&self) -> &Reactions {
+        &self.reactions
+    }
+
+    /// What the recorded nodes leave of the constraints.
+    pub fn constraint_residual(&self) -> ConstraintResidual {
+        self.residual
+    }
+
+    /// Writes the recorded nodes as CSV: time, coordinates, velocities, momenta, energy, observables, reactions, with a header line. Numbers are
     /// written so that they read back exactly.
     ///
     /// # Errors
@@ -247,11 +296,18 @@ impl<const N: usize> Motion<N> {
         header.extend(self.names.iter().map(|name| format!("p_{name}")));
         header.push("energy".to_owned());
         header.extend(self.outputs.names.iter().map(|name| (*name).to_owned()));
+        header.extend(
+            self.reactions
+                .names
+                .iter()
+                .map(|name| format!("lambda_{name}")),
+        );
         let rows = self.nodes.iter().enumerate().map(|(k, node)| {
             let mut row = vec![node.t];
             row.extend(node.q.iter().chain(&self.velocities[k]).chain(&node.p));
             row.push(self.energies[k]);
             row.extend(self.outputs.row(k).unwrap_or_default());
+            row.extend(self.reactions.row(k).unwrap_or_default());
             row
         });
         csv::write(path.as_ref(), &header, rows)

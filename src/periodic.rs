@@ -15,13 +15,14 @@ pub(crate) mod problem;
 pub use orbit::{Exponent, Orbit, Verdict};
 
 use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh, MeshError};
+use crate::constraints::velocity_at;
 use crate::error::RunErrorKind;
 use crate::motion::Motion;
 use crate::periodic_schur::PeriodicSchurError;
 use crate::simulation::Simulation;
 use problem::{Global, Periodic};
 use std::fmt;
-use tfe_runtime::{Element, LegendreError, Mixed, Model, State, legendre};
+use tfe_runtime::{Element, LegendreError, Mixed, Model, State, StepError, legendre};
 
 /// Which of the orbits of an autonomous model is meant: they differ in where the time begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -359,7 +360,7 @@ pub(crate) fn along_motion<M: Model<N>, const N: usize>(
     t: f64,
 ) -> ([f64; N], [f64; N]) {
     let node = motion.at(t).unwrap_or(*motion.last());
-    let velocity = legendre::velocity(model, t, &node.q, &node.p, &[0.0; N]);
+    let velocity = velocity_at(model, t, &node.state(), &[0.0; N]);
     (node.q, velocity.unwrap_or([0.0; N]))
 }
 
@@ -392,6 +393,8 @@ pub enum OrbitError {
         /// The γ that would be needed.
         unfolding: f64,
     },
+    /// The constraints do not span the same motions at all nodes, or the model has no velocity at one.
+    Constraints(StepError),
     /// The multipliers could not be computed.
     Multipliers(PeriodicSchurError),
 }
@@ -435,6 +438,7 @@ impl fmt::Display for OrbitError {
                 "no orbit of this period near the guess: only an additional force {unfolding:.1e} v closes it; \
                  if the model has an isolated orbit, give `.unknown_period(guess)`"
             ),
+            Self::Constraints(error) => write!(f, "the constraints: {error}"),
             Self::Multipliers(error) => write!(f, "the multipliers: {error}"),
         }
     }

@@ -3,12 +3,14 @@
 mod mesh;
 mod watch;
 
+use crate::constraints::velocity_at;
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
 use crate::motion::{Motion, Node};
 use mesh::Mesh;
 use nalgebra::DMatrix;
 use std::ops::Range;
+use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::step::{Control, Impulse, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
@@ -165,7 +167,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # }
     /// ```
     pub fn run(&self, start: State<N>, span: Range<f64>) -> Result<Motion<N>, RunError<N>> {
-        self.drive(start, &span, |_| Ok(()))
+        self.drive(start, &span, |_, _, _| Ok(()))
     }
 
     /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion.
@@ -183,12 +185,16 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ) -> Result<Linearised<N>, RunError<N>> {
         let mut transitions = Vec::new();
         let mut entries = vec![0.0; 4 * N * N];
-        let motion = self.drive(start, &span, |stepper| {
+        let mut starts = Vec::new();
+        let motion = self.drive(start, &span, |stepper, t, before| {
             stepper.transition(&mut entries)?;
             transitions.push(DMatrix::from_row_slice(2 * N, 2 * N, &entries));
+            if !M::CONSTRAINTS.is_empty() {
+                starts.push((t, *before));
+            }
             Ok(())
         })?;
-        Ok(Linearised::new(motion, transitions))
+        Ok(Linearised::new(self.model, motion, transitions, &starts))
     }
 
     /// Runs over the span and shows every finished element to `finished`.
@@ -196,7 +202,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         &self,
         start: State<N>,
         span: &Range<f64>,
-        mut finished: impl FnMut(&mut Stepper<'m, M, N>) -> Result<(), TransitionError>,
+        mut finished: impl FnMut(&mut Stepper<'m, M, N>, f64, &State<N>) -> Result<(), TransitionError>,
     ) -> Result<Motion<N>, RunError<N>> {
         let mut motion = Motion::from_start(self.model, span.start, &start);
         let (mesh, mut stepper) = match self.prepare(&start, span) {
@@ -221,7 +227,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             // Before the matrix, which needs the same memory.
             let dense = (self.record_every == 1 && step.is_ok()).then(|| stepper.dense(t, next));
             let step = step.and_then(|()| {
-                finished(&mut stepper).map_err(|source| RunErrorKind::Transition {
+                finished(&mut stepper, t, &before).map_err(|source| RunErrorKind::Transition {
                     element,
                     time: t,
                     step: h,
@@ -260,6 +266,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ) -> Result<(Mesh<N>, Stepper<'m, M, N>), RunErrorKind> {
         check_start(start)?;
         let mesh = self.mesh(span)?;
+        if let Some((_, _, h)) = mesh.elements().next() {
+            check_constraints(self.model, span.start, h, start)?;
+        }
         let stepper = Stepper::new(self.model, self.element, self.control);
         Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
     }
@@ -287,6 +296,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
         let step = self.step.unwrap_or(f64::NAN);
         let stepper = check_start(&start).and_then(|()| {
+            check_constraints(self.model, t0, step, &start)?;
             if !(step.is_finite() && step != 0.0) {
                 return Err(RunErrorKind::Step { step });
             }
@@ -327,6 +337,29 @@ fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErrorKind> {
         }
     }
     Ok(())
+}
+
+/// Refuses a start that is not on the constraints.
+fn check_constraints<M: Model<N>, const N: usize>(
+    model: &M,
+    time: f64,
+    h: f64,
+    start: &State<N>,
+) -> Result<(), RunErrorKind> {
+    if M::CONSTRAINTS.is_empty() {
+        return Ok(());
+    }
+    let Ok(v) = velocity_at(model, time, start, &[0.0; N]) else {
+        // The first element says why.
+        return Ok(());
+    };
+    let residuals = constrained::residuals(model, time, &start.q, &v, h);
+    let holds = |one: &Residual| one.relative() <= constrained::START_TOLERANCE;
+    if residuals.iter().all(holds) {
+        Ok(())
+    } else {
+        Err(RunErrorKind::Inconsistent { time, residuals })
+    }
 }
 
 /// The endless sequence of states of [`Simulation::steps`].

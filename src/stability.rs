@@ -14,6 +14,7 @@ pub use map::{FloquetError, MapError, MapPlan, PointError, PointFailure, Stabili
 pub use modes::{Mode, ModeError, ModeKind, modes};
 pub use tfe_runtime::transition::TransitionError;
 
+use crate::constraints::tangent_basis;
 use nalgebra::{Complex, DMatrix};
 use std::ops::Range;
 use tfe_runtime::{Element, Model, State, transition};
@@ -55,6 +56,53 @@ pub fn transition_matrix<M: Model<N>, const N: usize>(
     let mut entries = vec![0.0; 4 * N * N];
     transition::of_step(model, element.into(), state, t, h, &mut entries)?;
     Ok(DMatrix::from_row_slice(2 * N, 2 * N, &entries))
+}
+
+/// The transition matrix of one element on the motions that the constraints of the model allow: in the orthonormal bases
+/// [`tangent_basis`](crate::constraints::tangent_basis) B₀ and B₁ at the two ends of the element,
+///
+/// ```text
+/// B₁ᵀ A B₀                                                                (theory.md (T-78))
+/// ```
+///
+/// No direction violates a constraint and no eigenvalue is zero because of one. About an equilibrium, and wherever B₁ = B₀, its eigenvalues are those of
+/// the motion itself; elsewhere multiply matrices along the motion, as [`Linearised::multipliers`](crate::Linearised::multipliers) does.
+///
+/// # Shapes
+/// 2N − 2h − n rows and columns with h independent holonomic constraints and n others.
+/// # Errors
+/// As for [`transition_matrix`], and where the model has no velocity at an end.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - y, constraint(rod) = x^2 + y^2 - 1)]
+/// struct Pendulum {}
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let hanging = Pendulum {}.state([0.0, -1.0], [0.0, 0.0]);
+/// let a = stability::on_constraints(&Pendulum {}, Mixed::<6>, &hanging, 0.0, 0.1)?;
+/// // One oscillation of frequency one: eigenvalues e^±0.1i.
+/// assert_eq!(a.shape(), (2, 2));
+/// assert!((a.trace() - 2.0 * 0.1_f64.cos()).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
+pub fn on_constraints<M: Model<N>, const N: usize>(
+    model: &M,
+    element: impl Into<Element>,
+    state: &State<N>,
+    t: f64,
+    h: f64,
+) -> Result<DMatrix<f64>, TransitionError> {
+    let mut entries = vec![0.0; 4 * N * N];
+    let end = transition::of_step(model, element.into(), state, t, h, &mut entries)?;
+    let ambient = DMatrix::from_row_slice(2 * N, 2 * N, &entries);
+    let (before, after) = (
+        tangent_basis(model, t, state)?,
+        tangent_basis(model, t + h, &end)?,
+    );
+    Ok(after.tr_mul(&(ambient * before)))
 }
 
 /// Every interval of step size in which a motion about an equilibrium grows, however right the model: ascending, apart from each other.

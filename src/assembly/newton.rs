@@ -426,8 +426,24 @@ impl<const N: usize> Assembly<N> {
             size = size.max((correction / problem.scale(k)).abs());
             sum += 0.0 * correction;
         }
+        if !P::Model::CONSTRAINTS.is_empty() {
+            // Nodes at rest do not feel the reactions, but the matrices do.
+            size = size.max(REACTIONS * self.interior_size(iterate));
+        }
         // Maxima ignore what is not a number; the sum does not.
         size + sum
+    }
+
+    /// The largest correction of interior unknowns beside the largest of them.
+    fn interior_size(&self, iterate: &Iterate<N>) -> f64 {
+        let mut corrected = iterate.clone();
+        self.correct(&mut corrected, 1.0);
+        let (mut value, mut change) = (0.0_f64, 0.0_f64);
+        for (new, old) in corrected.interiors.iter().zip(&iterate.interiors) {
+            value = value.max(new.abs());
+            change = change.max((new - old).abs());
+        }
+        if change == 0.0 { 0.0 } else { change / value }
     }
 
     /// Adds a fraction of the correction.
@@ -518,6 +534,9 @@ impl<const N: usize> Assembly<N> {
 fn inner(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
+
+/// How much a relative correction of reactions counts beside one of the nodes: they carry the rounding of positions over h².
+const REACTIONS: f64 = 1e-3;
 
 /// Corrections below this one that no longer fall are round-off: a step from here would square them.
 const ROUND_OFF: f64 = 1e-9;

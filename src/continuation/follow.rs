@@ -461,7 +461,7 @@ fn solved<M: Model<N> + Clone, const N: usize>(
     iterations: u32,
 ) -> Result<Solved<M, N>, OrbitError> {
     let transitions = assembly.transitions().to_vec();
-    let floquet = multipliers_of::<N>(&transitions)?;
+    let floquet = multipliers_of(&problem.orbit, &iterate.nodes, &transitions)?;
     let trivial = trivial_of(&floquet, problem.orbit.trivial());
     let slope = tangent.globals.last().copied().unwrap_or(f64::NAN);
     // With the parameter given instead of the arc length the determinant is dλ/ds times as large.

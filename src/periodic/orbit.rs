@@ -3,6 +3,7 @@
 use super::OrbitError;
 use super::problem::Periodic;
 use crate::assembly::{Assembly, Iterate, Solution};
+use crate::constraints::reduced;
 use crate::motion::{Motion, Node};
 use crate::periodic_schur::{self, Multiplier};
 use nalgebra::{Complex, DMatrix};
@@ -92,7 +93,7 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
         unfolding: Option<f64>,
     ) -> Result<Self, OrbitError> {
         let transitions = assembly.transitions().to_vec();
-        let floquet = multipliers_of::<N>(&transitions)?;
+        let floquet = multipliers_of(problem, &iterate.nodes, &transitions)?;
         let solution = Solution {
             model: problem.model,
             element,
@@ -298,12 +299,22 @@ impl<M: Model<N>, const N: usize> fmt::Display for Orbit<'_, M, N> {
     }
 }
 
-/// The multipliers of a chain of matrices, the largest first.
-pub(crate) fn multipliers_of<const N: usize>(
+/// The multipliers of a chain of matrices, the largest first; with constraints, those of the motions that these allow.
+pub(crate) fn multipliers_of<M: Model<N>, const N: usize>(
+    problem: &Periodic<'_, M, N>,
+    nodes: &[State<N>],
     transitions: &[f64],
 ) -> Result<Vec<Multiplier>, OrbitError> {
-    let mut floquet =
-        periodic_schur::multipliers_of(2 * N, transitions).map_err(OrbitError::Multipliers)?;
+    let floquet = if M::CONSTRAINTS.is_empty() {
+        periodic_schur::multipliers_of(2 * N, transitions)
+    } else {
+        let times = problem.mesh.times(problem.start, problem.period);
+        let nodes = times.zip(nodes.iter().copied());
+        let (size, reduced) =
+            reduced(problem.model, nodes, transitions).map_err(OrbitError::Constraints)?;
+        periodic_schur::multipliers_of(size, &reduced)
+    };
+    let mut floquet = floquet.map_err(OrbitError::Multipliers)?;
     floquet.sort_by(|a, b| {
         let by_modulus = b.log_modulus.total_cmp(&a.log_modulus);
         by_modulus.then(b.argument.total_cmp(&a.argument))

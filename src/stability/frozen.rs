@@ -47,6 +47,10 @@ pub(crate) struct Frozen<const N: usize> {
 impl<const N: usize> Frozen<N> {
     /// The model as it is at `state`; none where it has no velocity there, or an entry is not finite.
     pub(crate) fn at<M: Model<N>>(model: &M, t: f64, state: &State<N>) -> Option<Self> {
+        if !M::CONSTRAINTS.is_empty() {
+            // Frozen second derivatives say nothing about motions that constraints hold.
+            return None;
+        }
         let view = legendre::hamiltonian_view(model, t, &state.q, &state.p).ok()?;
         let Second {
             zz,

@@ -1,0 +1,144 @@
+//! Orbits of constrained models against those of their twins in minimal coordinates.
+
+use std::f64::consts::TAU;
+use tfe::prelude::*;
+
+const OMEGA: f64 = 2.3;
+
+/// A pendulum whose pivot moves up and down, with air drag and a driving torque; φ from the downward vertical.
+#[dynamics(
+    coordinates(phi),
+    let x = sin(phi),
+    let y = a*cos(omega*t) - cos(phi),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
+    force(phi) = f*cos(omega*t) - c*dot(phi),
+)]
+#[derive(Clone)]
+struct Angle {
+    g: f64,
+    a: f64,
+    omega: f64,
+    f: f64,
+    c: f64,
+}
+
+/// The same as a mass on a rod. The torque acts as the force f cos ωt and −c φ̇ across the rod.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
+    let pivot = a*cos(omega*t),
+    let rate = (pivot - y)*dot(x) + x*(dot(y) - dot(pivot)),
+    force(x) = (pivot - y)*(f*cos(omega*t) - c*rate),
+    force(y) = x*(f*cos(omega*t) - c*rate),
+    constraint(rod) = x^2 + (y - pivot)^2 - 1,
+)]
+#[derive(Clone)]
+struct Rod {
+    g: f64,
+    a: f64,
+    omega: f64,
+    f: f64,
+    c: f64,
+}
+
+fn twins(a: f64, f: f64, c: f64) -> (Angle, Rod) {
+    let (g, omega) = (1.0, OMEGA);
+    (Angle { g, a, omega, f, c }, Rod { g, a, omega, f, c })
+}
+
+/// Position and velocity of the mass.
+fn mass(model: &Angle, t: f64, phi: f64, rate: f64) -> ([f64; 2], [f64; 2]) {
+    let pivot = model.a * (model.omega * t).cos();
+    let speed = -model.a * model.omega * (model.omega * t).sin();
+    (
+        [phi.sin(), pivot - phi.cos()],
+        [phi.cos() * rate, speed + phi.sin() * rate],
+    )
+}
+
+/// Multipliers of both, each from 40 elements of six nodes; they are the same to 1e-9.
+#[test]
+fn forced_orbits_have_the_multipliers_of_their_twins() {
+    for (a, f, c) in [(0.1, 0.2, 0.1), (0.3, 0.0, 0.0), (0.0, 0.8, 0.05)] {
+        let (angle, rod) = twins(a, f, c);
+        // The linear response as a guess.
+        let amplitude = f / (1.0 - OMEGA * OMEGA);
+        let curve = |t: f64| {
+            let (sin, cos) = (OMEGA * t).sin_cos();
+            (amplitude * cos, -amplitude * OMEGA * sin)
+        };
+        let minimal = PeriodicOrbit::of(&angle)
+            .element(Mixed::<6>)
+            .elements(40)
+            .period(TAU / OMEGA)
+            .guess(|t| {
+                let (phi, rate) = curve(t);
+                ([phi], [rate])
+            })
+            .solve()
+            .unwrap();
+        let cartesian = PeriodicOrbit::of(&rod)
+            .element(Mixed::<6>)
+            .elements(40)
+            .period(TAU / OMEGA)
+            .guess(|t| {
+                let (phi, rate) = curve(t);
+                mass(&angle, t, phi, rate)
+            })
+            .solve()
+            .unwrap();
+        let (expected, found) = (minimal.multipliers(), cartesian.multipliers());
+        assert_eq!(found.len(), 2, "no spurious multipliers");
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).norm() < 1e-9, "{found} {expected}");
+        }
+        let residual = cartesian.motion().constraint_residual();
+        assert!(residual.position < 1e-13, "{residual:?}");
+    }
+}
+
+/// The free pendulum.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
+    constraint(rod) = x^2 + y^2 - 1,
+)]
+#[derive(Clone)]
+struct Free {
+    g: f64,
+}
+
+/// A conservative swing: the period follows from the energy, and both trivial multipliers are one.
+#[test]
+fn a_free_swing() {
+    let (angle, rod) = (twins(0.0, 0.0, 0.0).0, Free { g: 1.0 });
+    let amplitude = 1.2_f64;
+    // 4 K(sin(0.6)) by the arithmetic-geometric mean.
+    let (mut x, mut y) = (1.0, 0.6_f64.cos());
+    for _ in 0..8 {
+        (x, y) = (0.5 * (x + y), (x * y).sqrt());
+    }
+    let period = TAU / x;
+    let orbit = PeriodicOrbit::of(&rod)
+        .element(Mixed::<6>)
+        .elements(30)
+        .period(period)
+        .guess(|t| {
+            let (sin, cos) = (TAU * t / period).sin_cos();
+            mass(&angle, t, amplitude * cos, -amplitude * TAU / period * sin)
+        })
+        .solve()
+        .unwrap();
+    let motion = orbit.motion();
+    let highest = motion
+        .states()
+        .iter()
+        .map(|node| node.q[1])
+        .fold(-1.0, f64::max);
+    assert!((highest + amplitude.cos()).abs() < 1e-6, "{highest}");
+    assert_eq!(orbit.multipliers().len(), 2);
+    for multiplier in orbit.multipliers() {
+        // Double and defective: the square root of the error.
+        assert!((multiplier - 1.0).norm() < 1e-5, "{multiplier}");
+    }
+}
