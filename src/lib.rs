@@ -33,14 +33,15 @@ pub use tfe_macros::dynamics;
 pub use tfe_runtime as runtime;
 pub use tfe_runtime::{
     Element, EnergyConserving, Family, Mixed, Model, Primal, Radau, Rule, Solve, State, Statistics,
-    StepError, Structure,
+    StepError, Structure, ThreeField,
 };
 
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
     pub use crate::{
         BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Mixed, Model,
-        Motion, Node, PeriodicOrbit, Primal, Radau, Simulation, Solve, State, dynamics, stability,
+        Motion, Node, PeriodicOrbit, Primal, Radau, Simulation, Solve, State, ThreeField, dynamics,
+        stability,
     };
 }
 

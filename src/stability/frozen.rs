@@ -20,8 +20,9 @@ use tfe_runtime::{
 pub(crate) fn is_a_stable(element: Element) -> bool {
     match (element.family(), element.rule()) {
         (Family::Mixed | Family::EnergyConserving | Family::Radau, _) => true,
-        (Family::Primal, Rule::Gauss(points)) => points == element.degree(),
-        (Family::Primal, Rule::Default | Rule::Lobatto(_)) => false,
+        (Family::ThreeField, Rule::Default) => true,
+        (Family::Primal | Family::ThreeField, Rule::Gauss(points)) => points == element.degree(),
+        (Family::Primal, Rule::Default) | (_, Rule::Lobatto(_)) => false,
     }
 }
 

@@ -123,6 +123,7 @@ fn element(solver: &Solver, path: &TokenStream) -> TokenStream {
     let constructor = match solver.family {
         Family::Primal => quote!(primal),
         Family::Mixed => quote!(mixed),
+        Family::ThreeField => quote!(three_field),
         Family::EnergyConserving => quote!(energy_conserving),
         Family::Radau => quote!(radau),
     };
@@ -142,6 +143,7 @@ fn described(solver: &Solver) -> String {
     let family = match solver.family {
         Family::Primal => "Primal",
         Family::Mixed => "Mixed",
+        Family::ThreeField => "ThreeField",
         Family::EnergyConserving => "EnergyConserving",
         Family::Radau => "Radau",
     };

@@ -11,6 +11,7 @@ use crate::quadrature::{MAX_POINTS, Quadrature};
 /// |---|---|---|---|
 /// | `Primal` | q of degree s, v = dq/dt | the same | p on both sides |
 /// | `Mixed` | (p, q) of degree s − 1 | degree s, continuous | both sides |
+/// | `ThreeField` | q of degree s, v and p of degree s − 1 | the same | p on both sides |
 /// | `EnergyConserving` | (p, q) of degree s, continuous | degree s − 1 | none |
 /// | `Radau` | (p, q) of degree s − 1 | degree s − 1 | left side |
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -19,6 +20,8 @@ pub enum Family {
     Primal,
     /// Two-field form.
     Mixed,
+    /// Three-field form: coordinates, velocities and momenta are unknowns of their own.
+    ThreeField,
     /// The spaces of the two-field form exchanged.
     EnergyConserving,
     /// Two-field form with a jump on the left side only.
@@ -28,8 +31,8 @@ pub enum Family {
 /// Where the forces of an element are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rule {
-    /// What suits the family: `Primal` n Gauss points, `Mixed` n − 1 Gauss points,
-    /// `EnergyConserving` 2n Gauss points, `Radau` n − 1 right Radau points.
+    /// What suits the family: `Primal` n Gauss points, `Mixed` and `ThreeField`
+    /// n − 1 Gauss points, `EnergyConserving` 2n Gauss points, `Radau` n − 1 right Radau points.
     Default,
     /// So many Gauss points.
     Gauss(usize),
@@ -84,6 +87,16 @@ impl Element {
     #[must_use]
     pub const fn mixed(nodes: usize) -> Self {
         Self::new(Family::Mixed, nodes)
+    }
+
+    /// Three-field form, the counterpart of Hu and Washizu's in statics (theory.md (T-3), the paper's (6)).
+    ///
+    /// Velocities are unknowns whatever the model was declared by, and no mass matrix is inverted, so that it may be singular where
+    /// constraints hold the motion. With n − 1 Gauss points (the default) it is the mixed form where the Legendre transform exists, with any
+    /// rule the primal form of that rule, because the velocity that it finds is the rate of the coordinates.
+    #[must_use]
+    pub const fn three_field(nodes: usize) -> Self {
+        Self::new(Family::ThreeField, nodes)
     }
 
     /// Continuous trial, discontinuous test: keeps the energy as far as the rule integrates it.
@@ -152,7 +165,7 @@ impl Element {
         match (self.rule, self.family) {
             (Rule::Gauss(points) | Rule::Lobatto(points), _) => points,
             (Rule::Default, Family::Primal) => self.nodes,
-            (Rule::Default, Family::Mixed | Family::Radau) => self.degree(),
+            (Rule::Default, Family::Mixed | Family::ThreeField | Family::Radau) => self.degree(),
             (Rule::Default, Family::EnergyConserving) => self.nodes.saturating_mul(2),
         }
     }
@@ -161,21 +174,26 @@ impl Element {
     #[must_use]
     pub const fn unknowns(&self) -> usize {
         match self.family {
-            Family::Primal => self.degree(),
+            Family::Primal | Family::ThreeField => self.degree(),
             _ => self.points(),
         }
     }
 
     /// Whether the element is a Runge–Kutta method with its points as stages.
     ///
-    /// True for all but primal elements with another rule than n − 1 Gauss points.
+    /// True for all but primal and three-field elements with another rule than n − 1 Gauss points.
     #[must_use]
     pub const fn is_collocated(&self) -> bool {
         match (self.family, self.rule) {
-            (Family::Primal, Rule::Gauss(points)) => points == self.degree(),
-            (Family::Primal, _) => false,
+            (Family::Primal | Family::ThreeField, Rule::Gauss(points)) => points == self.degree(),
+            (Family::Primal, _) | (Family::ThreeField, Rule::Lobatto(_)) => false,
             _ => true,
         }
+    }
+
+    /// Whether a Hamiltonian model runs in phase space; else its velocities are the unknowns.
+    pub(crate) const fn has_phase_form(&self) -> bool {
+        self.is_collocated() && !matches!(self.family, Family::ThreeField)
     }
 
     /// The rule itself.
@@ -244,6 +262,7 @@ impl fmt::Display for Element {
         let family = match self.family {
             Family::Primal => "Primal",
             Family::Mixed => "Mixed",
+            Family::ThreeField => "ThreeField",
             Family::EnergyConserving => "EnergyConserving",
             Family::Radau => "Radau",
         };
@@ -349,6 +368,8 @@ markers! {
     Primal, primal;
     /// Two-field form: N nodes, N − 1 Gauss points.
     Mixed, mixed;
+    /// Three-field form: velocities are unknowns of their own.
+    ThreeField, three_field;
     /// Continuous trial and discontinuous test functions.
     EnergyConserving, energy_conserving;
     /// One-sided jump: L-stable, dissipative.
@@ -365,6 +386,7 @@ mod tests {
             for element in [
                 Element::primal(nodes),
                 Element::mixed(nodes),
+                Element::three_field(nodes),
                 Element::energy_conserving(nodes),
                 Element::radau(nodes),
             ] {

@@ -46,7 +46,9 @@ mod velocity_form;
 pub mod weak_form;
 pub mod workspace;
 
-pub use element::{Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule};
+pub use element::{
+    Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule, ThreeField,
+};
 pub use error::{ConstraintError, LegendreError, StepError};
 pub use model::{
     By, Constraint, ConstraintKind, ConstraintSecond, CoordinateName, Facts, First, Form, Model,
@@ -60,7 +62,7 @@ pub use structure::{Operations, Structure};
 /// What generated code refers to. Not part of the public interface.
 #[doc(hidden)]
 pub mod __private {
-    pub use crate::element::{Element, EnergyConserving, Mixed, Primal, Radau, Rule};
+    pub use crate::element::{Element, EnergyConserving, Mixed, Primal, Radau, Rule, ThreeField};
     pub use crate::error::StepError;
     pub use crate::model::{
         By, Constraint, ConstraintKind, ConstraintSecond, CoordinateName, Facts, First, Form,

@@ -320,7 +320,9 @@ pub(crate) fn is_phase<M, const N: usize>(scheme: &SchemeRef<'_>) -> bool
 where
     M: Model<N>,
 {
-    matches!(M::FORM, Form::Hamiltonian) && scheme.collocated && M::CONSTRAINTS.is_empty()
+    matches!(M::FORM, Form::Hamiltonian)
+        && scheme.element.has_phase_form()
+        && M::CONSTRAINTS.is_empty()
 }
 
 /// ω_i(τ*) J for every row.

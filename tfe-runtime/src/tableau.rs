@@ -43,7 +43,7 @@ impl Target<'_> {
         }
         project(&rule, s, self.force_rate);
         match element.family() {
-            Family::Primal => self.primal(element, &rule),
+            Family::Primal | Family::ThreeField => self.primal(element, &rule),
             _ => self.two_field(element, &rule),
         }
     }
@@ -220,7 +220,9 @@ impl WeakForm {
             Family::Mixed => (s, s + 1, true, true),
             Family::Radau => (s, s, true, false),
             // A primal element is no two-field form; its q alone is continuous like this.
-            Family::EnergyConserving | Family::Primal => (s + 1, s, false, false),
+            Family::EnergyConserving | Family::Primal | Family::ThreeField => {
+                (s + 1, s, false, false)
+            }
         };
         Self {
             trials,

@@ -21,7 +21,7 @@ pub struct Workspace<'a> {
 /// How many numbers of a rate are unknown at one place: N velocities, or N forces and N velocities.
 pub(crate) const fn width(element: &Element, form: Form, coordinates: usize) -> usize {
     match form {
-        Form::Hamiltonian if element.is_collocated() => 2 * coordinates,
+        Form::Hamiltonian if element.has_phase_form() => 2 * coordinates,
         _ => coordinates,
     }
 }

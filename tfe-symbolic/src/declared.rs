@@ -132,6 +132,8 @@ pub enum Family {
     Primal,
     /// Two-field form.
     Mixed,
+    /// Three-field form.
+    ThreeField,
     /// Continuous trial, discontinuous test functions.
     EnergyConserving,
     /// One-sided jump.

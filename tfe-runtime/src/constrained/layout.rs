@@ -91,13 +91,13 @@ impl Layout {
 /// Whether an element can hold such constraints (T-75): the multipliers need spaces that fit the trial functions.
 pub(crate) const fn admits(element: &Element, kind: ConstraintKind) -> bool {
     let gauss = match element.rule() {
-        Rule::Default => matches!(element.family(), Family::Mixed),
+        Rule::Default => matches!(element.family(), Family::Mixed | Family::ThreeField),
         Rule::Gauss(points) => points == element.degree(),
         Rule::Lobatto(_) => false,
     };
     match element.family() {
         Family::Mixed => gauss,
-        Family::Primal => gauss || kind.is_holonomic(),
+        Family::Primal | Family::ThreeField => gauss || kind.is_holonomic(),
         Family::EnergyConserving | Family::Radau => false,
     }
 }
@@ -136,6 +136,8 @@ mod tests {
             (Element::primal(4), true, false),
             (Element::primal(4).reduced(), true, true),
             (Element::primal(4).lobatto(), true, false),
+            (Element::three_field(4), true, true),
+            (Element::three_field(4).quadrature(5), true, false),
             (Element::radau(4), false, false),
             (Element::energy_conserving(4), false, false),
         ] {

@@ -7,7 +7,7 @@ use crate::declared::{Family, Rule, Solver};
 use crate::diagnostic::{Bag, Kind, Role, nearest};
 
 /// The elements a solver can be specialised for.
-pub const ELEMENTS: &[&str] = &["Primal", "Mixed", "EnergyConserving", "Radau"];
+pub const ELEMENTS: &[&str] = &["Primal", "Mixed", "ThreeField", "EnergyConserving", "Radau"];
 /// The rules of quadrature.
 pub const RULES: &[&str] = &["reduced", "lobatto", "quadrature"];
 /// The most points a rule can have.
@@ -42,6 +42,7 @@ impl Model {
         let family = match syntax.family.node.as_str() {
             "Primal" => Some(Family::Primal),
             "Mixed" => Some(Family::Mixed),
+            "ThreeField" => Some(Family::ThreeField),
             "EnergyConserving" => Some(Family::EnergyConserving),
             "Radau" => Some(Family::Radau),
             unknown => {

@@ -228,7 +228,8 @@ impl Lowerer<'_> {
                 let kind = Kind::SolverOfConstraints {
                     element: element.clone(),
                     nodes: solver.nodes,
-                    velocity: velocity && solver.family == Family::Primal,
+                    velocity: velocity
+                        && matches!(solver.family, Family::Primal | Family::ThreeField),
                 };
                 self.report(*span, kind);
             }
@@ -266,6 +267,7 @@ fn admits(solver: &Solver, velocity: bool) -> bool {
     let reduced = points == Some(solver.nodes - 1);
     match solver.family {
         Family::Mixed => reduced || solver.rule == Rule::Default,
+        Family::ThreeField => reduced || solver.rule == Rule::Default || !velocity,
         Family::Primal => reduced || !velocity,
         Family::EnergyConserving | Family::Radau => false,
     }
