@@ -299,7 +299,7 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
     if M::CONSTRAINTS.is_empty() {
         return Ok(DMatrix::identity(2 * N, 2 * N));
     }
-    let v = velocity_at(model, t, state, &[0.0; N])?;
+    let v = constrained::velocity(model, t, &state.q, &state.p, &[0.0; N])?;
     let gradients = constrained::gradients(model, t, state, &v)?;
     // The gradients as columns, in (q, v); their complement is what they allow.
     let mut columns: Vec<DVector<f64>> = Vec::new();
@@ -334,17 +334,6 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
         }
     });
     Ok((to_momenta * complement).qr().q())
-}
-
-/// The velocity of a state: the momentum's own where the mass matrix is regular, else the one that the constraints leave.
-pub(crate) fn velocity_at<M: Model<N>, const N: usize>(
-    model: &M,
-    t: f64,
-    state: &State<N>,
-    guess: &[f64; N],
-) -> Result<[f64; N], StepError> {
-    legendre::velocity(model, t, &state.q, &state.p, guess)
-        .or_else(|_| constrained::velocity(model, t, &state.q, &state.p, guess))
 }
 
 /// The transition matrices of a chain on the motions that the constraints allow at its nodes: `size` rows and columns each, one after the other.

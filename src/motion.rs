@@ -1,6 +1,6 @@
 //! The result of a run: nodes, dense output, energy, observables, statistics.
 
-use crate::constraints::{ConstraintResidual, Reactions, velocity_at};
+use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv;
 use crate::error::AtError;
 use crate::simulation::Warning;
@@ -115,7 +115,8 @@ impl<const N: usize> Motion<N> {
     /// recorded as NaN: the state itself is good, and its momentum may well belong to no velocity (a singular mass matrix).
     pub(crate) fn record<M: Model<N>>(&mut self, model: &M, t: f64, state: &State<N>) {
         let guess = self.velocities.last().copied().unwrap_or([0.0; N]);
-        let velocity = velocity_at(model, t, state, &guess).unwrap_or([f64::NAN; N]);
+        let velocity =
+            constrained::velocity_of(model, t, &state.q, &state.p, &guess).unwrap_or([f64::NAN; N]);
         let energy = legendre::energy_at(model, t, &state.q, &state.p, &velocity);
         self.nodes.push(Node {
             t,

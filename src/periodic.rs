@@ -15,14 +15,13 @@ pub(crate) mod problem;
 pub use orbit::{Exponent, Orbit, Verdict};
 
 use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh, MeshError};
-use crate::constraints::velocity_at;
 use crate::error::RunErrorKind;
 use crate::motion::Motion;
 use crate::periodic_schur::PeriodicSchurError;
 use crate::simulation::Simulation;
 use problem::{Global, Periodic};
 use std::fmt;
-use tfe_runtime::{Element, LegendreError, Mixed, Model, State, StepError, legendre};
+use tfe_runtime::{Element, LegendreError, Mixed, Model, State, StepError, constrained, legendre};
 
 /// Which of the orbits of an autonomous model is meant: they differ in where the time begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -360,7 +359,7 @@ pub(crate) fn along_motion<M: Model<N>, const N: usize>(
     t: f64,
 ) -> ([f64; N], [f64; N]) {
     let node = motion.at(t).unwrap_or(*motion.last());
-    let velocity = velocity_at(model, t, &node.state(), &[0.0; N]);
+    let velocity = constrained::velocity(model, t, &node.q, &node.p, &[0.0; N]);
     (node.q, velocity.unwrap_or([0.0; N]))
 }
 

@@ -3,7 +3,6 @@
 mod mesh;
 mod watch;
 
-use crate::constraints::velocity_at;
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
 use crate::motion::{Motion, Node};
@@ -349,7 +348,8 @@ fn check_constraints<M: Model<N>, const N: usize>(
     if M::CONSTRAINTS.is_empty() {
         return Ok(());
     }
-    let Ok(v) = velocity_at(model, time, start, &[0.0; N]) else {
+    let v = constrained::velocity_of(model, time, &start.q, &start.p, &[0.0; N]);
+    let Ok(v) = v else {
         // The first element says why.
         return Ok(());
     };

@@ -15,7 +15,7 @@ pub(crate) mod rows;
 #[cfg(feature = "alloc")]
 pub use instant::{Gradients, gradients, reactions};
 #[cfg(feature = "alloc")]
-pub use node::{Residual, independent, residuals, velocity, velocity_for};
+pub use node::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
 
 pub(crate) use advance::advance;
 pub(crate) use derivative::linearise;

@@ -2,13 +2,12 @@
 
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
-use crate::constrained::node::{Bordered, solve_velocity};
+use crate::constrained::node::{Bordered, own_velocity, solve_velocity};
 use crate::constrained::rows::Rows;
 use crate::constrained::{START_TOLERANCE, refused, relative_residual};
 use crate::equations::Span;
 use crate::error::{ConstraintError, StepError};
 use crate::legendre::largest;
-use crate::legendre::velocity as free_velocity;
 use crate::model::{Model, State};
 use crate::newton::{Solve, newton};
 use crate::scheme::{SchemeRef, Tables};
@@ -193,8 +192,7 @@ fn check_start<M, const N: usize>(
 where
     M: Model<N>,
 {
-    // The velocity that the momentum would have without constraints; a singular mass matrix leaves it open, then the constraints decide.
-    let v = free_velocity(model, t, &state.q, &state.p, v).unwrap_or(*v);
+    let v = own_velocity(model, t, &state.q, &state.p, v);
     for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
         let (position, velocity) = relative_residual(rows, c, &state.q, &v, h);
         for (residual, is_position) in [(position, true), (velocity, false)] {

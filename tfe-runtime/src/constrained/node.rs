@@ -2,7 +2,7 @@
 
 use crate::constrained::rows::Rows;
 use crate::error::{ConstraintError, LegendreError, StepError};
-use crate::legendre::lagrangian_view_from;
+use crate::legendre::{lagrangian_view_from, velocity as free_velocity};
 use crate::lu;
 use crate::model::{First, Form, Model};
 
@@ -93,8 +93,44 @@ where
     .into())
 }
 
+/// A mass matrix with a relative pivot below this one leaves the velocity of a momentum to the constraints.
+const SINGULAR: f64 = 1e-10;
+
+/// The velocity that a momentum has without regard to the constraints, `v` being the one with it: the same if the state is consistent.
+///
+/// Where the mass matrix is singular up to rounding, as for quaternions, the momentum alone has no velocity: then it is `v`.
+pub(crate) fn own_velocity<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    p: &[f64; N],
+    v: &[f64; N],
+) -> [f64; N]
+where
+    M: Model<N>,
+{
+    if matches!(M::FORM, Form::Lagrangian) {
+        let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
+        model.first_and_mass(t, q, v, &mut first, &mut zz);
+        let mut pivots = [0; N];
+        // Columns carry the units of their coordinate: a pivot is small only beside its column.
+        let mut scales = [0.0_f64; N];
+        for row in &zz {
+            for (scale, entry) in scales.iter_mut().zip(row) {
+                *scale = scale.max(entry.abs());
+            }
+        }
+        let regular = lu::factor(N, zz.as_flattened_mut(), &mut pivots).is_ok()
+            && (0..N).all(|a| zz[a][a].abs() > SINGULAR * scales[a]);
+        if !regular {
+            return *v;
+        }
+    }
+    free_velocity(model, t, q, p, v).unwrap_or(*v)
+}
+
 #[cfg(feature = "alloc")]
-pub use heap::{Residual, independent, residuals, velocity, velocity_for};
+pub use heap::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
 
 #[cfg(feature = "alloc")]
 mod heap {
@@ -210,6 +246,29 @@ mod heap {
             pivots: &mut vec![0; size],
         };
         solve_velocity(model, t, (q, p), guess, &rows, &active, &mut memory)
+    }
+
+    /// The velocity of a state as its momentum has it, whether or not it fulfils the constraints; where the mass matrix is singular, the one that the constraints
+    /// leave.
+    ///
+    /// # Errors
+    /// As for [`velocity`].
+    pub fn velocity_of<M, const N: usize>(
+        model: &M,
+        t: f64,
+        q: &[f64; N],
+        p: &[f64; N],
+        guess: &[f64; N],
+    ) -> Result<[f64; N], StepError>
+    where
+        M: Model<N>,
+    {
+        let v = velocity(model, t, q, p, guess)?;
+        Ok(if M::CONSTRAINTS.is_empty() {
+            v
+        } else {
+            super::own_velocity(model, t, q, p, &v)
+        })
     }
 
     /// The velocity nearest to `v`, in the metric of the kinetic energy, that the constraints allow: that of the momentum L_v(q, v, t).

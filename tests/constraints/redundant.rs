@@ -1,0 +1,226 @@
+//! Constraints of which some follow from others: the rank is said, the motion is the same.
+
+use crate::common::distance;
+use crate::models::RodPendulum;
+use crate::runs::{differences, run};
+use tfe::prelude::*;
+
+/// The rod said twice, once by its square and once by its length.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    constraint(rod) = (x^2 + y^2 - l^2)/2,
+    constraint(length) = sqrt(x^2 + y^2) - l,
+)]
+struct TwiceHeld {
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
+/// A blade held by its constraint and by a multiple of it that depends on the heading.
+#[dynamics(
+    coordinates(x, y, phi),
+    lagrangian = (dot(x)^2 + dot(y)^2 + dot(phi)^2)/2 + gs*x,
+    constraint(blade) = dot(x)*sin(phi) - dot(y)*cos(phi),
+    constraint(again) = (2 + cos(phi))*(dot(x)*sin(phi) - dot(y)*cos(phi)),
+)]
+struct TwoBlades {
+    gs: f64,
+}
+
+#[test]
+fn two_equations_for_one_rod() {
+    let (one, two) = (
+        RodPendulum::UNIT,
+        TwiceHeld {
+            m: 1.0,
+            l: 1.0,
+            g: 9.81,
+        },
+    );
+    for nodes in 2..=5 {
+        let element = Element::mixed(nodes);
+        let (a, b) = (
+            run(&one, element, 0.02, one.horizontal(), 5.0),
+            run(&two, element, 0.02, one.horizontal(), 5.0),
+        );
+        assert_eq!(a.constraint_residual().rank, 1);
+        assert_eq!(b.constraint_residual().rank, 1);
+        assert!(b.constraint_residual().position < 1e-12);
+        if nodes >= 4 {
+            // The two equations differ off the circle, within elements: the discrete motions agree to the accuracy of both.
+            let (q, p) = differences(&a, &b);
+            let error = if nodes == 4 { 1e-7 } else { 1e-10 };
+            assert!(q < error && p < 5.0 * error, "{nodes}: {q:e}, {p:e}");
+        }
+        // A sum of the shares, each times the length of its row (both 1 at l = 1), is the pull; of least norm: equal shares.
+        let (rod, first, second) = (
+            a.reactions().column("rod").expect("declared"),
+            b.reactions().column("rod").expect("declared"),
+            b.reactions().column("length").expect("declared"),
+        );
+        let k = rod.len() - 1;
+        let (q, v) = (b.last().q, b.velocities()[k]);
+        let pull = 9.81 * q[1] - v[0] * v[0] - v[1] * v[1];
+        assert!((first[k] + second[k] - pull).abs() < 1e-11);
+        assert!((first[k] - second[k]).abs() < 1e-11, "of least norm");
+    }
+}
+
+#[test]
+fn two_equations_for_one_blade() {
+    let gs = 9.81 / 2.0;
+    let two = TwoBlades { gs };
+    let w = 1.3;
+    let start = two.state([0.0; 3], [0.0, 0.0, w]);
+    let motion = run(&two, Mixed::<6>, 0.05, start, 5.0);
+    assert_eq!(motion.constraint_residual().rank, 1);
+    let end = motion.last();
+    let expected = [
+        gs / (2.0 * w * w) * (w * end.t).sin().powi(2),
+        gs / (2.0 * w * w) * (w * end.t - (2.0 * w * end.t).sin() / 2.0),
+        w * end.t,
+    ];
+    assert!(distance(&end.q, &expected) < 1e-10, "{end:?}");
+}
+
+/// A four-bar linkage of three bodies in space: unit quaternions, ball joints at four points, and at each of them two conditions more that make
+/// it a hinge across the plane. 23 equations for 21 coordinates and one degree of freedom: three follow from the others.
+#[dynamics(
+    coordinates(r1[3], e1[4], r2[3], e2[4], r3[3], e3[4]),
+    let w1 = body_rate(e1),
+    let w2 = body_rate(e2),
+    let w3 = body_rate(e3),
+    let h1 = rotate(e1, [l1/2, 0, 0]),
+    let h2 = rotate(e2, [l2/2, 0, 0]),
+    let h3 = rotate(e3, [l3/2, 0, 0]),
+    let n1 = rotate(e1, [0, 0, 1]),
+    let n3 = rotate(e3, [0, 0, 1]),
+    lagrangian = m1/2*inner(dot(r1), dot(r1)) + m2/2*inner(dot(r2), dot(r2)) + m3/2*inner(dot(r3), dot(r3))
+        + m1*l1^2/24*(w1[0]^2/50 + w1[1]^2 + w1[2]^2) + m2*l2^2/24*(w2[0]^2/50 + w2[1]^2 + w2[2]^2)
+        + m3*l3^2/24*(w3[0]^2/50 + w3[1]^2 + w3[2]^2) - g*(m1*r1[1] + m2*r2[1] + m3*r3[1]),
+    constraint(unit1) = inner(e1, e1) - 1,
+    constraint(unit2) = inner(e2, e2) - 1,
+    constraint(unit3) = inner(e3, e3) - 1,
+    constraint(a) = r1 - h1,
+    constraint(b) = r1 + h1 - r2 + h2,
+    constraint(c) = r2 + h2 - r3 - h3,
+    constraint(d) = r3 - h3 - [ground, 0, 0],
+    constraint(hinge_a1) = n1[0],
+    constraint(hinge_a2) = n1[1],
+    constraint(hinge_b1) = inner(n1, rotate(e2, [1, 0, 0])),
+    constraint(hinge_b2) = inner(n1, rotate(e2, [0, 1, 0])),
+    constraint(hinge_c1) = inner(n3, rotate(e2, [1, 0, 0])),
+    constraint(hinge_c2) = inner(n3, rotate(e2, [0, 1, 0])),
+    constraint(hinge_d1) = n3[0],
+    constraint(hinge_d2) = n3[1],
+)]
+struct SpatialFourBar {
+    l1: f64,
+    l2: f64,
+    l3: f64,
+    ground: f64,
+    m1: f64,
+    m2: f64,
+    m3: f64,
+    g: f64,
+}
+
+/// The same in the plane: three angles, two equations.
+#[dynamics(
+    coordinates(a1, a2, a3),
+    let x1 = l1/2*cos(a1), let y1 = l1/2*sin(a1),
+    let x2 = l1*cos(a1) + l2/2*cos(a2), let y2 = l1*sin(a1) + l2/2*sin(a2),
+    let x3 = ground + l3/2*cos(a3), let y3 = l3/2*sin(a3),
+    lagrangian = m1/2*(dot(x1)^2 + dot(y1)^2) + m2/2*(dot(x2)^2 + dot(y2)^2) + m3/2*(dot(x3)^2 + dot(y3)^2)
+        + m1*l1^2/24*dot(a1)^2 + m2*l2^2/24*dot(a2)^2 + m3*l3^2/24*dot(a3)^2 - g*(m1*y1 + m2*y2 + m3*y3),
+    constraint(loop_x) = l1*cos(a1) + l2*cos(a2) - ground - l3*cos(a3),
+    constraint(loop_y) = l1*sin(a1) + l2*sin(a2) - l3*sin(a3),
+)]
+struct PlanarFourBar {
+    l1: f64,
+    l2: f64,
+    l3: f64,
+    ground: f64,
+    m1: f64,
+    m2: f64,
+    m3: f64,
+    g: f64,
+}
+
+#[test]
+fn a_four_bar_linkage_in_space() {
+    // Crank up at (0, ½), coupler from there to (1, 0.9), rocker from (1.2, 0).
+    let (l1, l2, l3, ground) = (0.5, 1.0_f64.hypot(0.4), 0.2_f64.hypot(0.9), 1.2);
+    let (m1, m2, m3, g) = (0.5, 1.0, 0.8, 9.81);
+    let planar = PlanarFourBar {
+        l1,
+        l2,
+        l3,
+        ground,
+        m1,
+        m2,
+        m3,
+        g,
+    };
+    let spatial = SpatialFourBar {
+        l1,
+        l2,
+        l3,
+        ground,
+        m1,
+        m2,
+        m3,
+        g,
+    };
+    let angles = [
+        std::f64::consts::FRAC_PI_2,
+        0.4_f64.atan2(1.0),
+        0.9_f64.atan2(-0.2),
+    ];
+    // The tip of the coupler moves with both: w₂ = −0.2 w₃ and −½ w₁ − 0.4 w₂ = −0.9 w₃.
+    let w1 = 4.0;
+    let w3 = 0.5 * w1 / 0.98;
+    let rates = [w1, -0.2 * w3, w3];
+    let middles = [[0.0, 0.25], [0.5, 0.7], [1.1, 0.45]];
+    // The middle of a rod on the ground moves about its foot; the coupler's about the tip of the crank.
+    let speeds = [
+        [-0.25 * w1, 0.0],
+        [-0.5 * w1 - 0.2 * rates[1], 0.5 * rates[1]],
+        [-0.45 * w3, -0.1 * w3],
+    ];
+    let (mut q, mut v) = ([0.0; 21], [0.0; 21]);
+    for body in 0..3 {
+        let (half, at) = (angles[body] / 2.0, 7 * body);
+        q[at..at + 2].copy_from_slice(&middles[body]);
+        v[at..at + 2].copy_from_slice(&speeds[body]);
+        (q[at + 3], q[at + 6]) = (half.cos(), half.sin());
+        v[at + 3] = -0.5 * rates[body] * half.sin();
+        v[at + 6] = 0.5 * rates[body] * half.cos();
+    }
+    let flat = run(&planar, Mixed::<6>, 0.01, planar.state(angles, rates), 0.5);
+    let motion = run(&spatial, Mixed::<5>, 0.01, spatial.state(q, v), 0.5);
+    assert_eq!(motion.reactions().names().len(), 23);
+    assert_eq!(motion.constraint_residual().rank, 20);
+    assert!(motion.constraint_residual().position < 1e-13);
+    assert!(motion.constraint_residual().velocity < 1e-12);
+    for (k, (a, b)) in motion.states().iter().zip(flat.states()).enumerate() {
+        for body in 0..3 {
+            let (half, at) = (b.q[body] / 2.0, 7 * body);
+            // Order 8 at 0.01.
+            assert!(
+                (a.q[at + 3] - half.cos()).abs() < 1e-9
+                    && (a.q[at + 6] - half.sin()).abs() < 1e-9
+                    && a.q[at + 2].abs() < 1e-12,
+                "t = {}, body {body}: {:?}",
+                b.t,
+                &a.q[at..at + 7]
+            );
+        }
+        let reactions = motion.reactions().row(k).expect("recorded");
+        assert!(reactions.iter().all(|r| r.is_finite()));
+    }
+    // It moved: the crank fell by more than a radian.
+    assert!((flat.last().q[0] - angles[0]).abs() > 1.0);
+}

@@ -1,0 +1,40 @@
+//! Runs that must not fail, and their errors.
+
+use crate::common::distance;
+use tfe::prelude::*;
+
+/// The motion from `start` over `0..time`.
+#[track_caller]
+pub fn run<M: Model<N>, const N: usize>(
+    model: &M,
+    element: impl Into<Element>,
+    step: f64,
+    start: State<N>,
+    time: f64,
+) -> Motion<N> {
+    let element = element.into();
+    Simulation::new(model)
+        .element(element)
+        .step(step)
+        .run(start, 0.0..time)
+        .unwrap_or_else(|error| panic!("{element}, h = {step}: {error}"))
+}
+
+/// The velocities at the last node.
+pub fn last_velocities<const N: usize>(motion: &Motion<N>) -> [f64; N] {
+    *motion
+        .velocities()
+        .last()
+        .expect("a motion has its start at least")
+}
+
+/// The largest difference of coordinates and of momenta at nodes of equal number.
+pub fn differences<const N: usize>(one: &Motion<N>, other: &Motion<N>) -> (f64, f64) {
+    assert_eq!(one.states().len(), other.states().len());
+    one.states()
+        .iter()
+        .zip(other.states())
+        .fold((0.0, 0.0), |(q, p): (f64, f64), (a, b)| {
+            (q.max(distance(&a.q, &b.q)), p.max(distance(&a.p, &b.p)))
+        })
+}
