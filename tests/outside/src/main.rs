@@ -65,7 +65,54 @@ struct Projectile {
     g: f64,
 }
 
+#[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y, constraint(rod) = x^2 + y^2 - l^2)]
+struct RodPendulum {
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
+#[dynamics(coordinates(x, y, phi), lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(phi)^2 + m*g*sin(alpha)*x,
+           constraint(blade) = dot(x)*sin(phi) - dot(y)*cos(phi))]
+struct KnifeEdge {
+    m: f64,
+    j: f64,
+    g: f64,
+    alpha: f64,
+}
+
+/// Constraints of both kinds.
+fn constrained() -> Result<(), Box<dyn std::error::Error>> {
+    let pendulum = RodPendulum {
+        m: 1.0,
+        l: 1.0,
+        g: 9.81,
+    };
+    let start = pendulum.consistent_state([1.0, 0.01], [0.0, 0.0])?;
+    assert!(start.position < 0.02 && start.rank == 1);
+    let motion = Simulation::new(&pendulum)
+        .step(0.01)
+        .run(start.state, 0.0..10.0)?;
+    assert!(motion.constraint_residual().position < 1e-14);
+    assert!(motion.reactions().column("rod").is_some());
+    let edge = KnifeEdge {
+        m: 1.0,
+        j: 1.0,
+        g: 9.81,
+        alpha: 0.5,
+    };
+    let motion = Simulation::new(&edge)
+        .element(ThreeField::<4>)
+        .step(0.01)
+        .run(edge.state([0.0; 3], [0.0, 0.0, 1.3]), 0.0..1.0)?;
+    let drive = 9.81 * 0.5_f64.sin();
+    let exact = drive / (2.0 * 1.3 * 1.3) * 1.3_f64.sin().powi(2);
+    assert!((motion.last().q[0] - exact).abs() < 1e-9);
+    Ok(())
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    constrained()?;
     let pendulum = DoublePendulum {
         m1: 1.0,
         m2: 1.0,
