@@ -202,7 +202,8 @@ impl<const N: usize> Motion<N> {
     /// The state at a time between the nodes, from the element's own polynomial.
     ///
     /// The polynomial starts at one node and ends at the next, so the result is continuous; between nodes its error is of order hⁿ for an
-    /// element of n nodes, while the nodes themselves are accurate to the order of the element.
+    /// element of n nodes, while the nodes themselves are accurate to the order of the element. So it is with constraints: at nodes they hold to round-off,
+    /// between them to the order hⁿ; [`consistent_state_at`](crate::ConsistentState::consistent_state_at) projects such a state where that matters.
     ///
     /// # Errors
     /// [`AtError::Outside`] beyond the span, [`AtError::NotRecorded`] where `record_every` left the element out.

@@ -158,10 +158,15 @@ pub fn unstable_intervals<M: Model<N>, const N: usize>(
     steps: Range<f64>,
 ) -> Result<Vec<UnstableInterval>, IntervalError<TransitionError>> {
     let element = element.into();
-    unstable_intervals_of(
-        |h| transition_matrix(model, element, equilibrium, 0.0, h),
-        steps,
-    )
+    let matrix = |h| {
+        if M::CONSTRAINTS.is_empty() {
+            transition_matrix(model, element, equilibrium, 0.0, h)
+        } else {
+            // The zeros of directions that are no motions are no modes either.
+            on_constraints(model, element, equilibrium, 0.0, h)
+        }
+    };
+    unstable_intervals_of(matrix, steps)
 }
 
 /// The largest modulus of an eigenvalue of a square matrix, max |λ|; zero for an empty one.

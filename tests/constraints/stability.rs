@@ -48,6 +48,32 @@ fn the_hanging_rod() {
     }
 }
 
+/// The steps at which an element fails are those of the oscillator: zeros of directions that are no motions do not count.
+#[test]
+fn unstable_steps_of_the_hanging_rod() {
+    let rod = RodPendulum {
+        m: 0.8,
+        l: 9.81,
+        g: 9.81,
+    };
+    let down = rod.state([0.0, -rod.l], [0.0, 0.0]);
+    let gaps = |element: Element| {
+        stability::unstable_intervals(&rod, element, &down, 0.0..9.0).expect("a smooth model")
+    };
+    let primal = gaps(Primal::<3>.into());
+    assert_eq!(primal.len(), 2, "{primal:?}");
+    assert!((primal[0].start - 10.0_f64.sqrt()).abs() < 1e-10);
+    assert!((primal[0].end - 12.0_f64.sqrt()).abs() < 1e-10);
+    assert!((primal[1].start - 60.0_f64.sqrt()).abs() < 1e-10);
+    assert!(gaps(Mixed::<3>.into()).is_empty());
+    // With two nodes the pull acts in impulses: leapfrog's limit.
+    let two = gaps(Mixed::<2>.into());
+    assert!(
+        two.len() == 1 && (two[0].start - 2.0).abs() < 1e-10,
+        "{two:?}"
+    );
+}
+
 /// A thin disk of radius r that rolls on a plane: contact point, heading, lean, roll. The contact runs along the heading at r dψ/dt.
 #[dynamics(
     coordinates(x, y, phi, theta, psi),

@@ -11,6 +11,7 @@ mod instant;
 pub(crate) mod layout;
 mod node;
 pub(crate) mod rows;
+mod tangent;
 
 #[cfg(feature = "alloc")]
 pub use instant::{Gradients, gradients, reactions};
