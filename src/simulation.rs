@@ -166,7 +166,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # }
     /// ```
     pub fn run(&self, start: State<N>, span: Range<f64>) -> Result<Motion<N>, RunError<N>> {
-        self.drive(start, &span, |_, _, _| Ok(()))
+        self.drive(start, &span, self.record_every != 1, |_, _, _| Ok(()))
     }
 
     /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion.
@@ -185,7 +185,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let mut transitions = Vec::new();
         let mut entries = vec![0.0; 4 * N * N];
         let mut starts = Vec::new();
-        let motion = self.drive(start, &span, |stepper, t, before| {
+        let motion = self.drive(start, &span, false, |stepper, t, before| {
             stepper.transition(&mut entries)?;
             transitions.push(DMatrix::from_row_slice(2 * N, 2 * N, &entries));
             if !M::CONSTRAINTS.is_empty() {
@@ -201,6 +201,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         &self,
         start: State<N>,
         span: &Range<f64>,
+        ends_only: bool,
         mut finished: impl FnMut(&mut Stepper<'m, M, N>, f64, &State<N>) -> Result<(), TransitionError>,
     ) -> Result<Motion<N>, RunError<N>> {
         let mut motion = Motion::from_start(self.model, span.start, &start);
@@ -208,6 +209,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             Ok(prepared) => prepared,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
+        if ends_only {
+            stepper = stepper.ends_only();
+        }
         let mut watch = Watch::new(self.element);
         let mut state = start;
         let mut bar = progress::Bar::new(self.progress, mesh.steps());
@@ -305,7 +309,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                     end: f64::INFINITY,
                 });
             }
-            Stepper::new(self.model, self.element, self.control).map_err(RunErrorKind::Element)
+            Stepper::new(self.model, self.element, self.control)
+                .map(Stepper::ends_only)
+                .map_err(RunErrorKind::Element)
         });
         let (stepper, failure) = match stepper {
             Ok(stepper) => (Some(stepper), None),

@@ -31,6 +31,8 @@ pub mod lu;
 pub mod model;
 mod newton;
 mod phase_form;
+#[cfg(feature = "alloc")]
+mod propagator;
 pub mod quadrature;
 pub mod real;
 pub mod scheme;

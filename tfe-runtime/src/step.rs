@@ -432,7 +432,7 @@ pub(crate) fn end_of<const N: usize>(
 }
 
 /// a + b, rounded, and what rounding took.
-fn sum(a: f64, b: f64) -> (f64, f64) {
+pub(crate) fn sum(a: f64, b: f64) -> (f64, f64) {
     let high = a + b;
     let part = high - a;
     (high, (a - (high - part)) + (b - part))

@@ -7,10 +7,11 @@ use crate::dense::DenseElement;
 use crate::element::{Element, ElementError};
 use crate::error::StepError;
 use crate::model::{Model, State};
-use crate::newton::Control;
+use crate::newton::{Control, Solve};
+use crate::propagator::Propagator;
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
-use crate::step::{Impulse, Interval, Memory, Method, is_phase};
+use crate::step::{Impulse, Interval, Last, Memory, Method, is_phase, sum};
 use crate::transition::TransitionError;
 use crate::workspace::{Workspace, interior_len, numbers_len, pivots_len, transition_len, width};
 
@@ -66,6 +67,14 @@ pub struct Stepper<'m, M, const N: usize> {
     numbers: Vec<f64>,
     pivots: Vec<usize>,
     impulses: Vec<Impulse<N>>,
+    /// Nobody asks for the inside of every element.
+    ends_only: bool,
+    /// Of a linear model, once it has paid.
+    propagator: Option<Propagator<N>>,
+    /// Steps of one length so far.
+    alike: (f64, usize),
+    /// The workspace does not hold the last step: the propagator took it.
+    skipped: bool,
 }
 
 // Not derived: the model is borrowed, it need not be `Clone`.
@@ -79,6 +88,10 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             numbers: self.numbers.clone(),
             pivots: self.pivots.clone(),
             impulses: self.impulses.clone(),
+            ends_only: self.ends_only,
+            propagator: self.propagator.clone(),
+            alike: self.alike,
+            skipped: self.skipped,
         }
     }
 }
@@ -103,7 +116,23 @@ where
             numbers: vec![0.0; numbers],
             pivots: vec![0; pivots],
             impulses: Vec::new(),
+            ends_only: false,
+            propagator: None,
+            alike: (0.0, 0),
+            skipped: false,
         })
+    }
+
+    /// Says that [`dense`](Self::dense) and [`transition`](Self::transition) will be asked for now and then only.
+    ///
+    /// Linear models with constant coefficients then step by a matrix, y₁ = y₀ + D y₀ + c, made after 2N + 1 steps of one length: a product of a
+    /// 2N × 2N matrix and a vector a step. Afterwards the inside of an element costs a step of its own.
+    #[must_use]
+    pub fn ends_only(self) -> Self {
+        Self {
+            ends_only: true,
+            ..self
+        }
     }
 
     /// Moves `state` from t to t + h. The first iterate continues the last step if `state` is
@@ -120,6 +149,10 @@ where
     ) -> Result<(), StepError> {
         self.impulses.clear();
         self.impulses.extend_from_slice(impulses);
+        if self.is_propagated() && impulses.is_empty() && self.propagate(t, h, state) {
+            return Ok(());
+        }
+        self.skipped = false;
         let interval = Interval {
             start: t,
             length: h,
@@ -137,6 +170,112 @@ where
         method.advance(&mut self.memory, workspace, interval, state)
     }
 
+    /// Whether all steps of one length have the same matrix.
+    fn is_propagated(&self) -> bool {
+        self.ends_only
+            && M::FACTS.linear
+            && !M::FACTS.time_dependent
+            && M::CONSTRAINTS.is_empty()
+            && !matches!(self.control.solve, Solve::FixedPoint)
+    }
+
+    /// Moves `state` by the matrix of a linear model; false where an ordinary step is to be done.
+    ///
+    /// The matrix costs 2N + 1 steps: it is made after as many of the same length.
+    fn propagate(&mut self, t: f64, h: f64, state: &mut State<N>) -> bool {
+        self.alike = if self.alike.0 == h {
+            (h, self.alike.1.saturating_add(1))
+        } else {
+            (h, 1)
+        };
+        if self.alike.1 <= 2 * N + 1 {
+            return false;
+        }
+        if !self.propagator.as_ref().is_some_and(|one| one.is_of(h)) {
+            let Ok(made) = Propagator::of(h, |start| self.increment(h, start)) else {
+                return false;
+            };
+            self.propagator = Some(made);
+        }
+        let Some(propagator) = &self.propagator else {
+            return false;
+        };
+        let start_low = match self.memory.last {
+            Some(last) if last.end == *state => self.memory.low,
+            _ => State::ZERO,
+        };
+        let increment = propagator.increment(state);
+        let (mut end, mut low) = (State::ZERO, State::ZERO);
+        for a in 0..N {
+            (end.q[a], low.q[a]) = sum(state.q[a], increment.q[a] + start_low.q[a]);
+            (end.p[a], low.p[a]) = sum(state.p[a], increment.p[a] + start_low.p[a]);
+        }
+        let mut zero = 0.0;
+        for a in 0..N {
+            zero += 0.0 * end.q[a] + 0.0 * end.p[a];
+        }
+        if zero != 0.0 {
+            // Infinities and what is no number give no zero. The ordinary step says why.
+            return false;
+        }
+        self.memory.last = Some(Last {
+            t,
+            h,
+            start: *state,
+            start_low,
+            end,
+        });
+        self.memory.low = low;
+        self.memory.statistics.steps += 1;
+        self.skipped = true;
+        *state = end;
+        true
+    }
+
+    /// By how much an ordinary step moves a state, rounding included.
+    fn increment(&self, h: f64, start: &State<N>) -> Result<State<N>, StepError> {
+        let mut memory = Memory::new();
+        let mut end = *start;
+        let (mut numbers, mut pivots) = (self.numbers.clone(), self.pivots.clone());
+        self.ordinary(&mut memory, (&mut numbers, &mut pivots), (0.0, h), &mut end)?;
+        for a in 0..N {
+            end.p[a] = (end.p[a] - start.p[a]) + memory.low.p[a];
+            end.q[a] = (end.q[a] - start.q[a]) + memory.low.q[a];
+        }
+        Ok(end)
+    }
+
+    fn ordinary(
+        &self,
+        memory: &mut Memory<N>,
+        (numbers, pivots): (&mut [f64], &mut [usize]),
+        (start, length): (f64, f64),
+        state: &mut State<N>,
+    ) -> Result<(), StepError> {
+        let method = Method {
+            model: self.model,
+            tables: &self.table,
+            control: self.control,
+        };
+        let interval = Interval {
+            start,
+            length,
+            impulses: &[],
+        };
+        method.advance(memory, Workspace { numbers, pivots }, interval, state)
+    }
+
+    /// The workspace of the last step, where the propagator went past it.
+    fn retrace(&self) -> Option<Vec<f64>> {
+        let last = self.memory.last.filter(|_| self.skipped)?;
+        let (mut numbers, mut pivots) = (self.numbers.clone(), self.pivots.clone());
+        let mut state = last.start;
+        let (mut memory, place) = (Memory::new(), (last.t, last.h));
+        self.ordinary(&mut memory, (&mut numbers, &mut pivots), place, &mut state)
+            .ok()
+            .map(|()| numbers)
+    }
+
     /// The polynomial of the last step, from time `start` to time `end`.
     ///
     /// Before the first step, and after a failed one, it is the constant zero.
@@ -146,27 +285,27 @@ where
         let Some(last) = self.memory.last else {
             return DenseElement::constant(start, end, State::ZERO);
         };
+        let retraced = self.retrace();
+        let numbers = retraced.as_ref().unwrap_or(&self.numbers);
         if !M::CONSTRAINTS.is_empty() {
             let m = interior_len(&scheme.element, M::FORM, N, M::CONSTRAINTS.len());
             let points = scheme.points() * N;
-            let momenta = &self.numbers[3 * m + points..3 * m + 2 * points];
-            let rates = &self.numbers[..scheme.unknowns() * N];
+            let momenta = &numbers[3 * m + points..3 * m + 2 * points];
+            let rates = &numbers[..scheme.unknowns() * N];
             let (rates, momenta) = (rates.as_chunks().0, momenta.as_chunks().0);
             let ends = (&last.start, &last.end);
             return DenseElement::constrained(&scheme, (start, end), last.h, ends, rates, momenta);
         }
         // The workspace begins with the unknowns, their start and the increments.
         let m = scheme.unknowns() * width(&scheme.element, M::FORM, N);
-        let unknowns = self.numbers[..m].as_chunks().0;
+        let unknowns = numbers[..m].as_chunks().0;
         let (rates, forces) = if is_phase::<M, N>(&scheme) {
             let (pi, kappa) = unknowns.split_at(scheme.points());
             (kappa, pi)
         } else {
             (
                 unknowns,
-                self.numbers[3 * m..3 * m + scheme.points() * N]
-                    .as_chunks()
-                    .0,
+                numbers[3 * m..3 * m + scheme.points() * N].as_chunks().0,
             )
         };
         let interval = Interval {
@@ -186,6 +325,10 @@ where
         let element = self.table.view().element;
         let length = transition_len(element, M::FORM, N, M::CONSTRAINTS.len());
         let mut extra = vec![0.0; length];
+        if let Some(numbers) = self.retrace() {
+            self.numbers = numbers;
+            self.skipped = false;
+        }
         let workspace = Workspace {
             numbers: &mut self.numbers,
             pivots: &mut self.pivots,

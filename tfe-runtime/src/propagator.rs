@@ -1,0 +1,87 @@
+//! Steps of linear models with constant coefficients: the same matrix every time.
+//!
+//! A step of length h is affine, y₁ = y₀ + D y₀ + c with y = (p, q). D is kept instead of A = 1 + D: its entries are small with h, so that their
+//! rounding is as well, and the sum is compensated as that of any other step.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::model::State;
+
+/// A start so far away that constant forces take no digits from what it does. A power of two.
+const FAR: f64 = (1_u64 << 40) as f64;
+
+/// The increment of a step as a function of its start.
+#[derive(Clone, Debug)]
+pub(crate) struct Propagator<const N: usize> {
+    /// The length of the step.
+    h: f64,
+    /// D by columns, 2N of 2N numbers, and c as the last column.
+    columns: Vec<f64>,
+}
+
+impl<const N: usize> Propagator<N> {
+    /// From the increments of steps: `step` gives that of a start.
+    pub(crate) fn of<E>(
+        h: f64,
+        mut step: impl FnMut(&State<N>) -> Result<State<N>, E>,
+    ) -> Result<Self, E> {
+        let mut columns = vec![0.0; 2 * N * (2 * N + 1)];
+        let constant = step(&State::ZERO)?;
+        let (matrix, last) = columns.split_at_mut(4 * N * N);
+        last[..N].copy_from_slice(&constant.p);
+        last[N..].copy_from_slice(&constant.q);
+        for (k, column) in matrix.chunks_exact_mut((2 * N).max(1)).enumerate() {
+            let mut start = State::ZERO;
+            if k < N {
+                start.p[k] = FAR;
+            } else {
+                start.q[k - N] = FAR;
+            }
+            let increment = step(&start)?;
+            for a in 0..N {
+                column[a] = (increment.p[a] - constant.p[a]) / FAR;
+                column[N + a] = (increment.q[a] - constant.q[a]) / FAR;
+            }
+        }
+        Ok(Self { h, columns })
+    }
+
+    /// Whether it is of this length.
+    pub(crate) fn is_of(&self, h: f64) -> bool {
+        self.h == h
+    }
+
+    /// D y + c
+    pub(crate) fn increment(&self, state: &State<N>) -> State<N> {
+        let mut sum = State::ZERO;
+        let (matrix, last) = self.columns.split_at(4 * N * N);
+        sum.p.copy_from_slice(&last[..N]);
+        sum.q.copy_from_slice(&last[N..]);
+        let (momenta, coordinates) = matrix.split_at(2 * N * N);
+        add(momenta, &state.p, &mut sum);
+        add(coordinates, &state.q, &mut sum);
+        sum
+    }
+}
+
+/// Adds columns times factors, four at a time: each partial sum is loaded once for four products.
+fn add<const N: usize>(columns: &[f64], factors: &[f64; N], sum: &mut State<N>) {
+    let halves = columns.as_chunks::<N>().0;
+    let (fours, rest) = halves.as_chunks::<8>();
+    let (by_four, by_one) = factors.as_chunks::<4>();
+    for ([p0, q0, p1, q1, p2, q2, p3, q3], f) in fours.iter().zip(by_four) {
+        for a in 0..N {
+            sum.p[a] += (p0[a] * f[0] + p1[a] * f[1]) + (p2[a] * f[2] + p3[a] * f[3]);
+        }
+        for a in 0..N {
+            sum.q[a] += (q0[a] * f[0] + q1[a] * f[1]) + (q2[a] * f[2] + q3[a] * f[3]);
+        }
+    }
+    for ([by_p, by_q], factor) in rest.as_chunks::<2>().0.iter().zip(by_one) {
+        for a in 0..N {
+            sum.p[a] += by_p[a] * factor;
+            sum.q[a] += by_q[a] * factor;
+        }
+    }
+}
