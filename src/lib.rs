@@ -9,6 +9,7 @@ pub mod charts;
 pub mod constraints;
 pub mod continuation;
 mod csv;
+pub mod ensemble;
 pub mod error;
 pub mod linearised;
 pub mod motion;
@@ -23,6 +24,7 @@ pub use constraints::{
     Consistent, ConsistentError, ConsistentState, ConstraintResidual, Reactions,
 };
 pub use continuation::{Branch, Continuation};
+pub use ensemble::Ensemble;
 pub use error::{AtError, RunError, RunErrorKind};
 pub use linearised::Linearised;
 pub use motion::{Motion, Node, Outputs};
@@ -39,9 +41,9 @@ pub use tfe_runtime::{
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
     pub use crate::{
-        BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Mixed, Model,
-        Motion, Node, PeriodicOrbit, Primal, Radau, Simulation, Solve, State, ThreeField, dynamics,
-        stability,
+        BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Ensemble, Mixed,
+        Model, Motion, Node, PeriodicOrbit, Primal, Radau, Simulation, Solve, State, ThreeField,
+        dynamics, stability,
     };
 }
 

@@ -1,6 +1,6 @@
 //! Runs: a model, an element, a step, a span.
 
-mod mesh;
+pub(crate) mod mesh;
 mod watch;
 
 use crate::error::{RunError, RunErrorKind};
@@ -335,7 +335,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 }
 
 /// Refuses start values that are not finite.
-fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErrorKind> {
+pub(crate) fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErrorKind> {
     for (coordinate, (&q, &p)) in state.q.iter().zip(&state.p).enumerate() {
         if !(q.is_finite() && p.is_finite()) {
             return Err(RunErrorKind::Start { coordinate, q, p });
@@ -345,7 +345,7 @@ fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErrorKind> {
 }
 
 /// Refuses a start that is not on the constraints.
-fn check_constraints<M: Model<N>, const N: usize>(
+pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
     model: &M,
     time: f64,
     h: f64,

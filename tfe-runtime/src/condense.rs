@@ -50,6 +50,7 @@ pub(crate) struct EndForces<'a, const N: usize> {
 
 impl<'a, const N: usize> EndForces<'a, N> {
     /// The numbers that it needs for so many interior unknowns and directions.
+    #[cfg(feature = "alloc")]
     pub(crate) const fn length(interior: usize, directions: usize) -> usize {
         N * (interior + N + directions)
     }

@@ -15,6 +15,8 @@
 extern crate alloc;
 
 pub mod basis;
+#[cfg(feature = "alloc")]
+pub mod bundle;
 mod condense;
 #[cfg(feature = "alloc")]
 pub mod condenser;
@@ -22,6 +24,7 @@ pub mod constrained;
 #[cfg(feature = "alloc")]
 mod dense;
 mod double_double;
+#[cfg(feature = "alloc")]
 mod dual;
 pub mod element;
 mod equations;
@@ -43,6 +46,7 @@ mod stepper;
 pub mod structure;
 mod tableau;
 pub mod transition;
+mod trigonometry;
 mod velocity_form;
 #[cfg(feature = "alloc")]
 pub mod weak_form;

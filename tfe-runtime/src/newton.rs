@@ -47,10 +47,10 @@ const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
 const ROUGH_ROUND_OFF: f64 = 1e-10;
 
 /// Fixed-point iterations that cost as much as Newton's way.
-const PATIENCE: u32 = 24;
+pub(crate) const PATIENCE: u32 = 24;
 
 /// Judges a sequence of increments.
-struct Monitor {
+pub(crate) struct Monitor {
     tolerance: f64,
     last: f64,
     rate: f64,
@@ -60,7 +60,7 @@ struct Monitor {
     idle: u32,
 }
 
-enum Verdict {
+pub(crate) enum Verdict {
     Converged,
     GoOn,
 }
@@ -69,7 +69,7 @@ enum Verdict {
 const IDLE: u32 = 6;
 
 impl Monitor {
-    fn new(tolerance: f64) -> Self {
+    pub(crate) fn new(tolerance: f64) -> Self {
         Self {
             tolerance,
             last: f64::INFINITY,
@@ -82,7 +82,7 @@ impl Monitor {
 
     /// # Errors
     /// [`StepError::NonFinite`].
-    fn judge(&mut self, increment: Increment) -> Result<Verdict, StepError> {
+    pub(crate) fn judge(&mut self, increment: Increment) -> Result<Verdict, StepError> {
         let size = increment.relative;
         if !size.is_finite() {
             return Err(StepError::NonFinite);
@@ -121,7 +121,7 @@ impl Monitor {
     }
 
     /// Whether so many more iterations would not do, at the present rate.
-    fn is_hopeless(&self, remaining: u32) -> bool {
+    pub(crate) fn is_hopeless(&self, remaining: u32) -> bool {
         let target = self.tolerance.max(64.0 * f64::EPSILON);
         if self.last <= target {
             return false;

@@ -355,7 +355,7 @@ pub(crate) fn total<const N: usize>(impulses: &[Impulse<N>]) -> [f64; N] {
 }
 
 /// Old unknown rates to new ones: the polynomial of the last element, continued (T-65).
-fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix: &mut [f64]) {
+pub(crate) fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix: &mut [f64]) {
     let (unknowns, rates) = (scheme.unknowns(), scheme.rates());
     for (node, row) in scheme
         .unknown_nodes
@@ -378,8 +378,12 @@ fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix: &mut [f64]) {
 }
 
 /// Constant velocity; zero where the momentum belongs to none.
-fn cold_velocity<M, const N: usize>(model: &M, t: f64, state: &State<N>, unknowns: &mut [f64])
-where
+pub(crate) fn cold_velocity<M, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+    unknowns: &mut [f64],
+) where
     M: Model<N>,
 {
     let v = velocity(model, t, &state.q, &state.p, &[0.0; N]).unwrap_or([0.0; N]);
@@ -387,7 +391,7 @@ where
 }
 
 /// The rates at the start.
-fn cold_phase<M, const N: usize>(
+pub(crate) fn cold_phase<M, const N: usize>(
     model: &M,
     scheme: &SchemeRef<'_>,
     t: f64,

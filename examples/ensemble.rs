@@ -1,0 +1,107 @@
+//! Thousands of starts: one by one, eight side by side in lanes, and on all processors.
+//!
+//! A pendulum from rest at 4096 angles, declared by L and by H, Hénon and Heiles' stars on 4096 orbits (M. Hénon, C. Heiles, The applicability of
+//! the third integral of motion, Astronomical Journal 69 (1964) 73–79) and a double pendulum, whose mass matrix changes. All units are natural ones.
+//! Times are the smallest of seven, all kinds taken in turn in one run; ratios depend on the processor, and on what else it does.
+
+use std::error::Error;
+use std::time::{Duration, Instant};
+use tfe::prelude::*;
+
+#[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + cos(theta))]
+struct Pendulum;
+
+#[dynamics(coordinates(theta), momenta(p), hamiltonian = p^2/2 - cos(theta))]
+struct PendulumH;
+
+#[dynamics(
+    coordinates(x, y), momenta(px, py),
+    hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + x^2*y - y^3/3,
+)]
+struct HenonHeiles;
+
+#[dynamics(
+    coordinates(theta1, theta2),
+    lagrangian = dot(theta1)^2 + dot(theta2)^2/2 + dot(theta1)*dot(theta2)*cos(theta1 - theta2)
+               + 2*cos(theta1) + cos(theta2),
+)]
+struct DoublePendulum;
+
+const STARTS: usize = 4096;
+const STEP: f64 = 0.1;
+const END: f64 = 5.0;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    println!("ns a step, and how many times faster than the column before");
+    println!(
+        "{:<18} {:>10} {:>10} {:>6} {:>10} {:>6} {:>11}",
+        "model", "one by one", "in lanes", "", "all cores", "", "difference"
+    );
+    let angles = starts(|f| Pendulum.state([2.5 * f], [0.0]));
+    compare("pendulum by L", &Pendulum, &angles)?;
+    compare("pendulum by H", &PendulumH, &angles)?;
+    let orbits = starts(|f| HenonHeiles.state([0.3 * f, 0.1], [0.2, 0.1]));
+    compare("Hénon–Heiles", &HenonHeiles, &orbits)?;
+    let angles = starts(|f| DoublePendulum.state([0.5 * f, 0.1], [0.0, 0.1]));
+    compare("double pendulum", &DoublePendulum, &angles)
+}
+
+fn starts<const N: usize>(start: impl Fn(f64) -> State<N>) -> Vec<State<N>> {
+    (0..STARTS)
+        .map(|k| start(k as f64 / STARTS as f64))
+        .collect()
+}
+
+fn compare<M, const N: usize>(
+    name: &str,
+    model: &M,
+    starts: &[State<N>],
+) -> Result<(), Box<dyn Error>>
+where
+    M: Model<N> + Sync,
+{
+    let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let ensemble = Ensemble::new(model).element(Mixed::<6>).step(STEP);
+    let simulation = Simulation::new(model).element(Mixed::<6>).step(STEP);
+    // The ends alone, as from an ensemble.
+    let simulation = simulation.record_every(usize::MAX);
+    let mut best = [Duration::MAX; 3];
+    let mut difference = 0.0_f64;
+    for _ in 0..7 {
+        let clock = Instant::now();
+        let mut single = Vec::with_capacity(STARTS);
+        for start in starts {
+            single.push(*simulation.run(*start, 0.0..END)?.last());
+        }
+        best[0] = best[0].min(clock.elapsed());
+
+        let clock = Instant::now();
+        let in_lanes = one_core.install(|| ensemble.run(starts, 0.0..END))?;
+        best[1] = best[1].min(clock.elapsed());
+
+        let clock = Instant::now();
+        let on_all = ensemble.run(starts, 0.0..END)?;
+        best[2] = best[2].min(clock.elapsed());
+
+        assert_eq!(in_lanes, on_all, "processors must not matter");
+        for (end, single) in in_lanes.iter().zip(&single) {
+            let end = end.as_ref().map_err(Clone::clone)?;
+            for a in 0..N {
+                difference = difference.max((end.q[a] - single.q[a]).abs());
+                difference = difference.max((end.p[a] - single.p[a]).abs());
+            }
+        }
+    }
+    let [one, lanes, all] = best.map(|time| time.as_secs_f64());
+    let per_step = 1e9 / (STARTS as f64 * (END / STEP).round());
+    println!(
+        "{name:<18} {:>10.0} {:>10.0} {:>6.2} {:>10.0} {:>6.2} {difference:>11.0e}",
+        one * per_step,
+        lanes * per_step,
+        one / lanes,
+        all * per_step,
+        lanes / all
+    );
+    assert!(difference <= 1e-13, "lanes must follow single runs");
+    Ok(())
+}

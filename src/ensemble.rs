@@ -1,0 +1,431 @@
+//! Ensembles: the same run from many starts, or with many parameter sets.
+
+mod ends;
+mod error;
+mod progress;
+
+pub use ends::{Ends, Failure};
+pub use error::EnsembleError;
+
+use crate::error::RunErrorKind;
+use crate::motion::Node;
+use crate::simulation::mesh::Mesh;
+use crate::simulation::{check_constraints, check_start};
+use progress::Progress;
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+use tfe_runtime::bundle::Bundle;
+use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
+
+/// How many trajectories are stepped side by side.
+const WIDTH: usize = 8;
+
+/// Many runs that differ in their starts, or in their parameters, of which only the ends are wanted.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + cos(theta))]
+/// struct Pendulum {}
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let pendulum = Pendulum {};
+/// let starts: Vec<_> = (0..100).map(|k| pendulum.state([0.03 * f64::from(k)], [0.0])).collect();
+/// let ends = Ensemble::new(&pendulum).element(Mixed::<6>).step(0.1).run(&starts, 0.0..10.0)?;
+/// assert_eq!((ends.nodes().count(), ends.failures().count()), (100, 0));
+/// // The last one, from the highest start, is the slowest.
+/// if let Ok(end) = &ends[99] {
+///     println!("{:.6} after {}", end.q[0], ends.statistics());
+/// }
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # How it runs
+/// With the feature `parallel` trajectories are shared among all processors. With one model, on each of them eight run side by side
+/// in vector instructions ([`Bundle`]), if the element is a Runge–Kutta method in the form at hand (two-field elements are) and the model has no
+/// constraints; all others run one after the other. So do parameter sets ([`of_models`](Self::of_models)): kernels read the parameters of one
+/// model, which no two lanes share.
+///
+/// Results depend neither on the number of processors nor on the order or number of the other starts, not by one bit. From a
+/// [`Simulation`](crate::Simulation) of one start they differ by rounding.
+///
+/// Defaults are those of `Simulation`: `Mixed::<4>` (order 6), a thousandth of the span as step, iteration to round-off.
+#[derive(Debug)]
+pub struct Ensemble<'m, M, const N: usize> {
+    models: Models<'m, M>,
+    element: Element,
+    step: Option<f64>,
+    control: Control,
+    breaks: Vec<f64>,
+    progress: bool,
+}
+
+#[derive(Debug)]
+enum Models<'m, M> {
+    One(&'m M),
+    Many(&'m [M]),
+}
+
+// Not derived: the models are borrowed, they need not be `Clone`.
+impl<M> Clone for Models<'_, M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Models<'_, M> {}
+
+impl<M, const N: usize> Clone for Ensemble<'_, M, N> {
+    fn clone(&self) -> Self {
+        Self {
+            breaks: self.breaks.clone(),
+            ..*self
+        }
+    }
+}
+
+impl<'m, M, const N: usize> Ensemble<'m, M, N>
+where
+    M: Model<N> + Sync,
+{
+    /// Runs of one model from many starts.
+    pub fn new(model: &'m M) -> Self {
+        Self::with(Models::One(model))
+    }
+
+    /// Runs of many models of one kind: parameter sets, with one start for each or one for all.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k/2*x^2)]
+    /// struct Oscillator { k: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let oscillators: Vec<_> = (1..=10).map(|k| Oscillator { k: f64::from(k) }).collect();
+    /// let start = oscillators[0].state([1.0], [0.0]); // all have the same momentum, zero
+    /// let ends = Ensemble::of_models(&oscillators).step(0.01).run(&[start], 0.0..1.0)?;
+    /// for (oscillator, end) in oscillators.iter().zip(ends.iter()) {
+    ///     let expected = oscillator.k.sqrt().cos();
+    ///     assert!((end.as_ref().unwrap().q[0] - expected).abs() < 1e-12);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn of_models(models: &'m [M]) -> Self {
+        Self::with(Models::Many(models))
+    }
+
+    fn with(models: Models<'m, M>) -> Self {
+        Self {
+            models,
+            element: Element::from(Mixed::<4>),
+            step: None,
+            control: Control::default(),
+            breaks: Vec::new(),
+            progress: false,
+        }
+    }
+
+    /// The element: `Mixed::<6>`, `Radau::<3>`, `Element::mixed(n)`, …
+    #[must_use]
+    pub fn element(mut self, element: impl Into<Element>) -> Self {
+        self.element = element.into();
+        self
+    }
+
+    /// The step h, in the units of time. Where the span is no whole number of steps the last one is shorter.
+    #[must_use]
+    pub fn step(mut self, step: f64) -> Self {
+        self.step = Some(step);
+        self
+    }
+
+    /// When the iteration inside an element is done: the relative size of the last increment. The default iterates to round-off.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.control.tolerance = tolerance;
+        self
+    }
+
+    /// The most iterations an element may take before its run stops with an error.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: u32) -> Self {
+        self.control.max_iterations = iterations;
+        self
+    }
+
+    /// How the element's equations are solved; `Solve::Auto` by default. `Solve::Newton` runs one trajectory after the other.
+    #[must_use]
+    pub fn solver(mut self, solve: Solve) -> Self {
+        self.control.solve = solve;
+        self
+    }
+
+    /// Makes an element end at `time`: where a force jumps, an element across the jump would lose its order.
+    #[must_use]
+    pub fn break_at(mut self, time: f64) -> Self {
+        self.breaks.push(time);
+        self
+    }
+
+    /// Shows the progress on standard error, once a second.
+    #[must_use]
+    pub fn progress(mut self) -> Self {
+        self.progress = true;
+        self
+    }
+
+    /// Runs all trajectories over the span, backwards where it ends before it starts. Each result is the node at the end, or why its run
+    /// stopped; a failure stops no other run.
+    ///
+    /// # Errors
+    /// [`EnsembleError`] where nothing can run: the element does not exist, step or span are not finite, the number of starts is not that of
+    /// models. A bad start is a failure of its own run only.
+    pub fn run(&self, starts: &[State<N>], span: Range<f64>) -> Result<Ends<N>, EnsembleError> {
+        let count = self.count(starts)?;
+        let results = Mutex::new(vec![None; count]);
+        let statistics = self.for_each(starts, span, |index, result| {
+            // A panic elsewhere leaves the list as good as it was.
+            let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(place) = results.get_mut(index) {
+                *place = Some(result);
+            }
+        })?;
+        let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(Ends::new(
+            results.into_iter().flatten().collect(),
+            statistics,
+        ))
+    }
+
+    /// Runs all trajectories and hands over each result, with the index of its run, as soon as it is known: in no particular order, and with
+    /// the feature `parallel` from several threads. For results that are too many to keep, or to be seen while others still run.
+    ///
+    /// Returns what all runs together have cost.
+    ///
+    /// # Errors
+    /// As from [`run`](Self::run).
+    ///
+    /// ```
+    /// # use tfe::prelude::*;
+    /// use std::sync::atomic::{AtomicUsize, Ordering};
+    ///
+    /// # #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + cos(theta))]
+    /// # struct Pendulum {}
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let pendulum = Pendulum {};
+    /// let starts: Vec<_> = (0..40).map(|k| pendulum.state([0.0], [0.1 * f64::from(k)])).collect();
+    /// let turned_over = AtomicUsize::new(0);
+    /// Ensemble::new(&pendulum).step(0.1).for_each(&starts, 0.0..20.0, |_, end| {
+    ///     if end.is_ok_and(|end| end.q[0].abs() > std::f64::consts::PI) {
+    ///         turned_over.fetch_add(1, Ordering::Relaxed);
+    ///     }
+    /// })?;
+    /// // Those with more than the energy of the upper rest: velocities above 2.
+    /// assert_eq!(turned_over.into_inner(), 19);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn for_each<F>(
+        &self,
+        starts: &[State<N>],
+        span: Range<f64>,
+        finished: F,
+    ) -> Result<Statistics, EnsembleError>
+    where
+        F: Fn(usize, Result<Node<N>, RunErrorKind>) + Send + Sync,
+    {
+        let count = self.count(starts)?;
+        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        let mesh = Mesh::new(&span, step, &self.breaks, &[])?;
+        self.element.validate().map_err(RunErrorKind::Element)?;
+        let plan = Plan {
+            element: self.element,
+            control: self.control,
+            span,
+            mesh,
+        };
+        let progress = Progress::new(self.progress, count);
+        let statistics = match self.models {
+            Models::One(model)
+                if Bundle::<M, N, WIDTH>::uses_lanes(&self.element, &self.control) =>
+            {
+                summed(count.div_ceil(WIDTH), |batch| {
+                    let from = batch * WIDTH;
+                    let starts = &starts[from..(from + WIDTH).min(count)];
+                    let statistics = plan.run_together(model, starts, |lane, result| {
+                        finished(from + lane, result);
+                    });
+                    progress.advance(starts.len());
+                    statistics
+                })
+            }
+            models => summed(count, |index| {
+                let model = match models {
+                    Models::One(model) => model,
+                    Models::Many(models) => &models[index],
+                };
+                let start = if starts.len() == 1 {
+                    &starts[0]
+                } else {
+                    &starts[index]
+                };
+                let (result, statistics) = plan.run_alone(model, start);
+                finished(index, result);
+                progress.advance(1);
+                statistics
+            }),
+        };
+        Ok(statistics)
+    }
+
+    /// How many runs there are.
+    fn count(&self, starts: &[State<N>]) -> Result<usize, EnsembleError> {
+        match self.models {
+            Models::Many(models) if starts.len() != 1 && starts.len() != models.len() => {
+                Err(EnsembleError::Starts {
+                    models: models.len(),
+                    starts: starts.len(),
+                })
+            }
+            Models::Many(models) => Ok(models.len()),
+            Models::One(_) => Ok(starts.len()),
+        }
+    }
+}
+
+/// The sum of what all batches have cost.
+#[cfg(feature = "parallel")]
+fn summed(batches: usize, batch: impl Fn(usize) -> Statistics + Send + Sync) -> Statistics {
+    use rayon::iter::{IntoParallelIterator, ParallelIterator};
+    (0..batches)
+        .into_par_iter()
+        .map(batch)
+        .reduce(Statistics::default, merged)
+}
+
+#[cfg(not(feature = "parallel"))]
+fn summed(batches: usize, batch: impl Fn(usize) -> Statistics + Send + Sync) -> Statistics {
+    (0..batches).map(batch).fold(Statistics::default(), merged)
+}
+
+fn merged(mut sum: Statistics, other: Statistics) -> Statistics {
+    sum.merge(&other);
+    sum
+}
+
+/// What all runs have in common.
+struct Plan<const N: usize> {
+    element: Element,
+    control: Control,
+    span: Range<f64>,
+    mesh: Mesh<N>,
+}
+
+impl<const N: usize> Plan<N> {
+    fn end(&self, state: &State<N>) -> Node<N> {
+        Node {
+            t: self.span.end,
+            q: state.q,
+            p: state.p,
+        }
+    }
+
+    /// Up to [`WIDTH`] runs in lanes.
+    fn run_together<M>(
+        &self,
+        model: &M,
+        starts: &[State<N>],
+        finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
+    ) -> Statistics
+    where
+        M: Model<N>,
+    {
+        let mut bundle = match Bundle::<M, N, WIDTH>::new(model, self.element, self.control) {
+            Ok(bundle) => bundle,
+            Err(error) => {
+                for lane in 0..starts.len() {
+                    finished(lane, Err(RunErrorKind::Element(error)));
+                }
+                return Statistics::default();
+            }
+        };
+        bundle.start(starts);
+        let mut failures: [Option<RunErrorKind>; WIDTH] = [const { None }; WIDTH];
+        for (start, failure) in starts.iter().zip(&mut failures) {
+            *failure = check_start(start).err();
+        }
+        for (element, (time, _, step)) in self.mesh.elements().enumerate() {
+            if !bundle.advance(time, step) {
+                continue;
+            }
+            for (lane, failure) in failures.iter_mut().enumerate().take(starts.len()) {
+                if let (Err(source), None) = (bundle.state(lane), &failure) {
+                    *failure = Some(RunErrorKind::Solve {
+                        element,
+                        time,
+                        step,
+                        source,
+                    });
+                }
+            }
+            if failures[..starts.len()].iter().all(Option::is_some) {
+                break;
+            }
+        }
+        for (lane, failure) in failures.into_iter().enumerate().take(starts.len()) {
+            let result = match (failure, bundle.state(lane)) {
+                (None, Ok(state)) => Ok(self.end(&state)),
+                (Some(failure), _) => Err(failure),
+                // Only a bad start fails outside a step, and it has been found.
+                (None, Err(source)) => Err(RunErrorKind::Solve {
+                    element: 0,
+                    time: self.span.start,
+                    step: 0.0,
+                    source,
+                }),
+            };
+            finished(lane, result);
+        }
+        bundle.statistics()
+    }
+
+    /// One run by itself.
+    fn run_alone<M>(
+        &self,
+        model: &M,
+        start: &State<N>,
+    ) -> (Result<Node<N>, RunErrorKind>, Statistics)
+    where
+        M: Model<N>,
+    {
+        let first = self.mesh.elements().next();
+        let checked = check_start(start).and_then(|()| match first {
+            Some((t, _, h)) => check_constraints(model, t, h, start),
+            None => Ok(()),
+        });
+        let stepper = checked.and_then(|()| {
+            Stepper::new(model, self.element, self.control).map_err(RunErrorKind::Element)
+        });
+        let mut stepper = match stepper {
+            Ok(stepper) => stepper,
+            Err(kind) => return (Err(kind), Statistics::default()),
+        };
+        let mut state = *start;
+        for (element, (time, _, step)) in self.mesh.elements().enumerate() {
+            if let Err(source) = stepper.advance(time, step, &mut state, &[]) {
+                let kind = RunErrorKind::Solve {
+                    element,
+                    time,
+                    step,
+                    source,
+                };
+                return (Err(kind), *stepper.statistics());
+            }
+        }
+        (Ok(self.end(&state)), *stepper.statistics())
+    }
+}

@@ -1,0 +1,109 @@
+//! What an ensemble came to.
+
+use crate::error::RunErrorKind;
+use crate::motion::Node;
+use std::ops::Index;
+use tfe_runtime::Statistics;
+
+/// The results of an [`Ensemble`](crate::Ensemble), in the order of its starts.
+///
+/// `ends[k]` is the result of run k: the node at the end of the span, or why the run stopped before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ends<const N: usize> {
+    results: Vec<Result<Node<N>, RunErrorKind>>,
+    statistics: Statistics,
+}
+
+/// A run that stopped before its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Failure<'a> {
+    /// Which run, from 0.
+    pub index: usize,
+    /// Where and why.
+    pub kind: &'a RunErrorKind,
+}
+
+impl<const N: usize> Ends<N> {
+    pub(super) fn new(results: Vec<Result<Node<N>, RunErrorKind>>, statistics: Statistics) -> Self {
+        Self {
+            results,
+            statistics,
+        }
+    }
+
+    /// The number of runs.
+    pub fn len(&self) -> usize {
+        self.results.len()
+    }
+
+    /// Whether there were no starts.
+    pub fn is_empty(&self) -> bool {
+        self.results.is_empty()
+    }
+
+    /// The result of run `index`; `None` beyond the last.
+    pub fn get(&self, index: usize) -> Option<&Result<Node<N>, RunErrorKind>> {
+        self.results.get(index)
+    }
+
+    /// All results, in order.
+    pub fn iter(&self) -> std::slice::Iter<'_, Result<Node<N>, RunErrorKind>> {
+        self.results.iter()
+    }
+
+    /// The ends of all runs that came to theirs, in order.
+    pub fn nodes(&self) -> impl Iterator<Item = &Node<N>> {
+        self.results
+            .iter()
+            .filter_map(|result| result.as_ref().ok())
+    }
+
+    /// The runs that did not, in order.
+    pub fn failures(&self) -> impl Iterator<Item = Failure<'_>> {
+        self.results
+            .iter()
+            .enumerate()
+            .filter_map(|(index, result)| {
+                let kind = result.as_ref().err()?;
+                Some(Failure { index, kind })
+            })
+    }
+
+    /// What all runs together have cost.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// All results by value, in order.
+    pub fn into_results(self) -> Vec<Result<Node<N>, RunErrorKind>> {
+        self.results
+    }
+}
+
+impl<const N: usize> Index<usize> for Ends<N> {
+    type Output = Result<Node<N>, RunErrorKind>;
+
+    /// # Panics
+    /// Beyond the last run; [`Ends::get`] does not.
+    fn index(&self, index: usize) -> &Self::Output {
+        &self.results[index]
+    }
+}
+
+impl<'a, const N: usize> IntoIterator for &'a Ends<N> {
+    type Item = &'a Result<Node<N>, RunErrorKind>;
+    type IntoIter = std::slice::Iter<'a, Result<Node<N>, RunErrorKind>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl<const N: usize> IntoIterator for Ends<N> {
+    type Item = Result<Node<N>, RunErrorKind>;
+    type IntoIter = std::vec::IntoIter<Result<Node<N>, RunErrorKind>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.results.into_iter()
+    }
+}

@@ -1,0 +1,48 @@
+//! Why an ensemble could not run at all.
+
+use crate::error::RunErrorKind;
+use std::error::Error;
+use std::fmt;
+
+/// Why no run of an [`Ensemble`](crate::Ensemble) could begin.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum EnsembleError {
+    /// The element does not exist, or step or span are none.
+    Run(RunErrorKind),
+    /// There is neither one start for all models nor one for each.
+    Starts {
+        /// How many models there are.
+        models: usize,
+        /// How many starts.
+        starts: usize,
+    },
+}
+
+impl From<RunErrorKind> for EnsembleError {
+    fn from(kind: RunErrorKind) -> Self {
+        Self::Run(kind)
+    }
+}
+
+impl fmt::Display for EnsembleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Run(kind) => kind.fmt(f),
+            Self::Starts { models, starts } => write!(
+                f,
+                "{models} models have {starts} starts, but each needs one, or all together one"
+            ),
+        }
+    }
+}
+
+impl Error for EnsembleError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            // Its text is the source's own.
+            Self::Run(kind) => kind.source(),
+            Self::Starts { .. } => None,
+        }
+    }
+}
