@@ -17,6 +17,7 @@ pub mod periodic;
 pub mod periodic_schur;
 pub mod simulation;
 pub mod stability;
+pub mod work_precision;
 
 pub use assembly::{AssemblyError, MeshError};
 pub use boundary::{BoundaryMotion, BoundaryValue};
@@ -37,13 +38,14 @@ pub use tfe_runtime::{
     Element, EnergyConserving, Family, Mixed, Model, Primal, Radau, Rule, Solve, State, Statistics,
     StepError, Structure, ThreeField,
 };
+pub use work_precision::WorkPrecision;
 
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
     pub use crate::{
         BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Ensemble, Mixed,
         Model, Motion, Node, PeriodicOrbit, Primal, Radau, Simulation, Solve, State, ThreeField,
-        dynamics, stability,
+        WorkPrecision, dynamics, stability,
     };
 }
 

@@ -1,0 +1,82 @@
+//! Gravity.
+
+use crate::Outcome;
+use crate::runs::Scene;
+use tfe::prelude::*;
+
+#[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2)/2 - 1/sqrt(x^2 + y^2))]
+struct Kepler {}
+
+/// Eccentricity 0.6, from the pericentre, three times around. The end by 32 digits of arithmetic.
+pub fn kepler() -> Outcome {
+    let start = State {
+        q: [0.4, 0.0],
+        p: [0.0, 2.0],
+    };
+    let problem = WorkPrecision::new(&Kepler {}, start, 0.0..20.0)
+        .steps([0.5, 0.25, 0.1, 0.05, 0.025, 0.01])
+        .reference_end(
+            [-0.770_075_578_411_240_4, 0.788_344_816_994_424_4],
+            [-0.894_183_731_988_691_5, -0.123_461_764_158_440_96],
+        );
+    Ok(Scene::measure("Kepler, e = 0.6", problem)?)
+}
+
+/// Bodies that attract each other: `x`, `y`, `z` of each.
+#[dynamics(
+    coordinates(x[6], y[6], z[6]),
+    lagrangian = sum(i in 0..6, m[i]/2*(dot(x[i])^2 + dot(y[i])^2 + dot(z[i])^2))
+        + sum(i in 1..6, sum(j in 0..i, g*m[i]*m[j]/sqrt((x[i] - x[j])^2 + (y[i] - y[j])^2 + (z[i] - z[j])^2))),
+)]
+struct Bodies {
+    g: f64,
+    m: [f64; 6],
+}
+
+/// Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune, Pluto: mass (of the Sun's), position (astronomical units), velocity (a day).
+/// [Hairer, Lubich, Wanner, Geometric Numerical Integration, I.2.4]
+const BODIES: [(f64, [f64; 3], [f64; 3]); 6] = [
+    (1.000_005_976_82, [0.0; 3], [0.0; 3]),
+    (
+        0.000_954_786_104_043,
+        [-3.502_365_3, -3.816_984_7, -1.550_796_3],
+        [0.005_654_29, -0.004_124_90, -0.001_905_89],
+    ),
+    (
+        0.000_285_583_733_151,
+        [9.075_531_4, -3.045_835_3, -1.648_370_8],
+        [0.001_683_18, 0.004_835_25, 0.001_924_62],
+    ),
+    (
+        0.000_043_727_316_454_6,
+        [8.310_142_0, -16.290_108_6, -7.252_127_8],
+        [0.003_541_78, 0.001_371_02, 0.000_550_29],
+    ),
+    (
+        0.000_051_775_913_844_9,
+        [11.470_766_6, -25.729_482_9, -10.816_945_6],
+        [0.002_889_30, 0.001_145_27, 0.000_396_77],
+    ),
+    (
+        1.0 / 1.3e8,
+        [-15.538_735_7, -25.222_559_4, -3.190_238_2],
+        [0.002_767_25, -0.001_707_02, -0.001_365_04],
+    ),
+];
+
+/// 27 years, two and a half of Jupiter's.
+pub fn solar_system() -> Outcome {
+    let model = Bodies {
+        g: 2.959_122_082_86e-4,
+        m: BODIES.map(|(mass, _, _)| mass),
+    };
+    let (mut q, mut v) = ([0.0; 18], [0.0; 18]);
+    for (i, (_, position, velocity)) in BODIES.iter().enumerate() {
+        for k in 0..3 {
+            (q[6 * k + i], v[6 * k + i]) = (position[k], velocity[k]);
+        }
+    }
+    let problem = WorkPrecision::new(&model, model.state(q, v), 0.0..10_000.0)
+        .steps([800.0, 400.0, 200.0, 100.0, 50.0]);
+    Ok(Scene::measure("Outer solar system", problem)?)
+}

@@ -1,0 +1,316 @@
+//! Accuracy against cost: which element, with which step, reaches an error in the least time.
+
+mod error;
+mod fit;
+mod grid;
+mod measure;
+mod measurements;
+mod output;
+mod point;
+mod reference;
+
+use grid::Grid;
+use measure::Measure;
+use reference::Source;
+use std::fmt;
+use std::io::Write;
+use std::ops::Range;
+use std::time::{Duration, Instant};
+use tfe_runtime::step::Control;
+use tfe_runtime::{Element, Model, Solve, State};
+
+use crate::simulation::Simulation;
+
+pub use error::{SaveError, WorkPrecisionError};
+pub use fit::Slope;
+pub use measurements::{Curve, Measurements};
+pub use point::{Cost, Measured, Point};
+pub use reference::Reference;
+
+/// Runs one model with several elements and steps, and measures what each run costs and how far off it ends.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(theta), lagrangian = m/2*l^2*dot(theta)^2 + m*g*l*cos(theta))]
+/// struct Pendulum { m: f64, l: f64, g: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let pendulum = Pendulum { m: 1.0, l: 1.0, g: 9.81 };
+/// let start = pendulum.state([1.5], [0.0]);
+/// let measured = WorkPrecision::new(&pendulum, start, 0.0..2.0)
+///     .element(Primal::<3>).element(Mixed::<3>).element(Mixed::<6>)
+///     .steps([0.1, 0.05, 0.02, 0.01])
+///     .run()?;
+/// for curve in measured.curves() {
+///     if let Some(slope) = curve.slope() {
+///         println!("{}: error ~ h^{:.2}", curve.element(), slope.exponent);
+///     }
+/// }
+/// # let folder = std::env::temp_dir().join(format!("tfe-work-precision-{}", std::process::id()));
+/// # std::fs::create_dir_all(&folder)?;
+/// # /*
+/// measured.save("work_precision.svg")?; // or .csv, .html
+/// # */
+/// # measured.save(folder.join("work_precision.csv"))?;
+/// # std::fs::remove_dir_all(&folder)?;
+/// # assert!((measured.curves()[1].slope().unwrap().exponent - 4.0).abs() < 0.3);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// Errors are those of the state, coordinates and momenta apart, relative to the largest state of the reference:
+///
+/// ```text
+/// error_q = |q − q_ref| / max |q_ref| ,   error_p = |p − p_ref| / max |p_ref|      (Euclidean norms; absolute where all q_ref are zero)
+/// ```
+///
+/// Times are those of the steps alone, on one processor, the best of several repetitions where a run is short. What they are compared
+/// with is [`reference`](Self::reference), or else a run with `Mixed::<8>` whose step is halved until it no longer changes.
+pub struct WorkPrecision<'m, M, const N: usize> {
+    model: &'m M,
+    start: State<N>,
+    span: Range<f64>,
+    title: String,
+    elements: Vec<Element>,
+    solvers: Vec<Solve>,
+    steps: Vec<f64>,
+    control: Control,
+    source: Source<'m, N>,
+    uncertainty: Option<f64>,
+    repeat_for: Duration,
+    cost: Cost,
+    progress: bool,
+}
+
+impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
+    /// Runs of `model` from `start` over the span, backwards where it ends before it starts; no element and no step so far.
+    pub fn new(model: &'m M, start: State<N>, span: Range<f64>) -> Self {
+        Self {
+            model,
+            start,
+            span,
+            title: "Work and precision".to_owned(),
+            elements: Vec::new(),
+            solvers: Vec::new(),
+            steps: Vec::new(),
+            control: Control::default(),
+            source: Source::Computed,
+            uncertainty: None,
+            repeat_for: Duration::from_millis(20),
+            cost: Cost::Time,
+            progress: false,
+        }
+    }
+
+    /// Adds an element: a curve for each solver.
+    #[must_use]
+    pub fn element(mut self, element: impl Into<Element>) -> Self {
+        self.elements.push(element.into());
+        self
+    }
+
+    /// Adds several elements.
+    #[must_use]
+    pub fn elements(mut self, elements: impl IntoIterator<Item = Element>) -> Self {
+        self.elements.extend(elements);
+        self
+    }
+
+    /// Adds steps, in the units of time, in any order. Where the span is no whole number of steps the last one is shorter.
+    #[must_use]
+    pub fn steps(mut self, steps: impl IntoIterator<Item = f64>) -> Self {
+        self.steps.extend(steps);
+        self
+    }
+
+    /// Adds a way of solving the equations of an element; `Solve::Auto` alone where none is added.
+    #[must_use]
+    pub fn solver(mut self, solve: Solve) -> Self {
+        self.solvers.push(solve);
+        self
+    }
+
+    /// When the iteration inside an element is done, as in [`Simulation::tolerance`]. It limits the accuracy as well as the cost.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.control.tolerance = tolerance;
+        self
+    }
+
+    /// The most iterations an element may take before its run counts as failed.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: u32) -> Self {
+        self.control.max_iterations = iterations;
+        self
+    }
+
+    /// What runs are compared with: the exact (q, p) at any time of the span. Its uncertainty counts as one rounding, unless
+    /// [`reference_uncertainty`](Self::reference_uncertainty) says more.
+    #[must_use]
+    pub fn reference(mut self, exact: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
+        self.source = Source::Function(Box::new(exact));
+        self
+    }
+
+    /// What runs are compared with: the exact state at the end of the span, and nothing between.
+    #[must_use]
+    pub fn reference_end(mut self, q: [f64; N], p: [f64; N]) -> Self {
+        self.source = Source::End(State { q, p });
+        self
+    }
+
+    /// The relative error of the reference that was given. Of a computed reference it is the least that is believed.
+    #[must_use]
+    pub fn reference_uncertainty(mut self, uncertainty: f64) -> Self {
+        self.uncertainty = Some(uncertainty);
+        self
+    }
+
+    /// For how long a run is repeated, for its best time: 20 ms by default. One that takes longer is done once.
+    #[must_use]
+    pub fn repeat_for(mut self, duration: Duration) -> Self {
+        self.repeat_for = duration;
+        self
+    }
+
+    /// What charts show to the right, and what the front is of: the time, by default.
+    #[must_use]
+    pub fn against(mut self, cost: Cost) -> Self {
+        self.cost = cost;
+        self
+    }
+
+    /// The title of charts.
+    #[must_use]
+    pub fn title(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// Says on standard error which curves are done.
+    #[must_use]
+    pub fn progress(mut self) -> Self {
+        self.progress = true;
+        self
+    }
+
+    /// Makes all runs, one after the other so that none disturbs the time of another.
+    ///
+    /// A run that fails is kept as a point without figures, with its error ([`Point::outcome`]); the others are made all the same.
+    ///
+    /// # Errors
+    /// [`WorkPrecisionError`] where elements, steps, span, start or reference allow no run at all.
+    pub fn run(&self) -> Result<Measurements, WorkPrecisionError> {
+        let grids = self.grids()?;
+        self.check_start(&grids)?;
+        self.report(format_args!("reference …"));
+        let reference = self.source.find(
+            self.model,
+            (self.span.start, self.start),
+            &grids,
+            self.uncertainty,
+        )?;
+        self.report(format_args!("reference: {}", reference.summary()));
+        let measure = Measure {
+            model: self.model,
+            start: self.start,
+            reference: &reference,
+            repeat_for: self.repeat_for,
+        };
+        let solvers = match self.solvers.as_slice() {
+            [] => &[Solve::Auto],
+            some => some,
+        };
+        let mut curves = Vec::new();
+        for &element in &self.elements {
+            for &solve in solvers {
+                let clock = Instant::now();
+                let control = Control {
+                    solve,
+                    ..self.control
+                };
+                let point = |grid: &Grid| Point {
+                    element,
+                    solve,
+                    step: grid.step(),
+                    outcome: measure.run(element, control, grid),
+                };
+                let curve = Curve::new(grids.iter().map(point).collect(), reference.uncertainty());
+                self.report(format_args!(
+                    "{element} ({solve:?}): {} of {} runs done in {:.2} s",
+                    curve.measured().count(),
+                    curve.points().len(),
+                    clock.elapsed().as_secs_f64()
+                ));
+                curves.push(curve);
+            }
+        }
+        Ok(Measurements {
+            title: self.title.clone(),
+            constrained: !M::CONSTRAINTS.is_empty(),
+            curves,
+            reference: reference.into_summary(),
+            cost: self.cost,
+        })
+    }
+
+    /// The steps of every run, the longest first.
+    fn grids(&self) -> Result<Vec<Grid>, WorkPrecisionError> {
+        if self.elements.is_empty() {
+            return Err(WorkPrecisionError::NoElements);
+        }
+        for element in &self.elements {
+            element.validate().map_err(WorkPrecisionError::Element)?;
+        }
+        if self.steps.is_empty() {
+            return Err(WorkPrecisionError::NoSteps);
+        }
+        let grids = self.steps.iter().map(|step| Grid::new(&self.span, *step));
+        let mut grids = grids.collect::<Result<Vec<_>, _>>()?;
+        grids.sort_by(|a, b| b.step().total_cmp(&a.step()));
+        Ok(grids)
+    }
+
+    /// Refuses a start from which no simulation begins.
+    fn check_start(&self, grids: &[Grid]) -> Result<(), WorkPrecisionError> {
+        use crate::error::RunErrorKind;
+        let Some(grid) = grids.last() else {
+            return Err(WorkPrecisionError::NoSteps);
+        };
+        // One step, of which only the checks before it count.
+        let (_, next, h) = grid.element(0);
+        let simulation = Simulation::new(self.model).step(h);
+        match simulation.run(self.start, self.span.start..next) {
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    RunErrorKind::Start { .. } | RunErrorKind::Inconsistent { .. }
+                ) =>
+            {
+                Err(WorkPrecisionError::Start(error.kind().clone()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn report(&self, line: fmt::Arguments<'_>) {
+        if self.progress {
+            // Progress that cannot be shown is no reason to stop.
+            let _ = writeln!(std::io::stderr(), "{line}");
+        }
+    }
+}
+
+impl<M, const N: usize> fmt::Debug for WorkPrecision<'_, M, N> {
+    /// What is to be run; models and functions may have nothing to show.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("WorkPrecision")
+            .field("title", &self.title)
+            .field("span", &self.span)
+            .field("elements", &self.elements)
+            .field("solvers", &self.solvers)
+            .field("steps", &self.steps)
+            .finish_non_exhaustive()
+    }
+}

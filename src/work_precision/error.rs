@@ -1,0 +1,159 @@
+//! What can go wrong before the first run, and after the last.
+
+#[cfg(feature = "charts")]
+use crate::charts::ChartError;
+use crate::error::RunErrorKind;
+use std::error::Error;
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+use tfe_runtime::ElementError;
+
+/// Why nothing could be measured.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum WorkPrecisionError {
+    /// No element was given.
+    NoElements,
+    /// No step was given.
+    NoSteps,
+    /// An element does not exist (number of nodes, quadrature).
+    Element(ElementError),
+    /// The span is empty, or its ends are not finite.
+    Span {
+        /// The start asked for.
+        start: f64,
+        /// The end asked for.
+        end: f64,
+    },
+    /// A step is zero, infinite or not a number.
+    Step {
+        /// The step asked for.
+        step: f64,
+    },
+    /// The span holds more steps than can be counted.
+    TooManySteps {
+        /// Length of the span.
+        span: f64,
+        /// The step asked for.
+        step: f64,
+    },
+    /// No run begins at this start.
+    Start(RunErrorKind),
+    /// The run that others should be compared with stopped, however short its steps.
+    ReferenceRun(RunErrorKind),
+    /// The reference that was given is not finite.
+    ReferenceValue {
+        /// At which time.
+        time: f64,
+    },
+}
+
+impl fmt::Display for WorkPrecisionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoElements => {
+                f.write_str("there is no element to measure; add some with `.element(…)`")
+            }
+            Self::NoSteps => {
+                f.write_str("there is no step to measure; add some with `.steps([…])`")
+            }
+            Self::Element(error) => error.fmt(f),
+            Self::Span { start, end } => write!(
+                f,
+                "the span {start}..{end} is empty or has an end that is not finite"
+            ),
+            Self::Step { step } => {
+                write!(f, "a step is {step}, but it must be finite and not zero")
+            }
+            Self::TooManySteps { span, step } => {
+                write!(f, "a span of {span} holds too many steps of {step}")
+            }
+            Self::Start(kind) => kind.fmt(f),
+            Self::ReferenceRun(kind) => write!(
+                f,
+                "there is nothing to compare with: the reference run failed, {kind}; give a `.reference(…)`"
+            ),
+            Self::ReferenceValue { time } => {
+                write!(f, "the reference at t = {time} is not finite")
+            }
+        }
+    }
+}
+
+impl Error for WorkPrecisionError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Element(error) => Some(error),
+            Self::Start(kind) | Self::ReferenceRun(kind) => Some(kind),
+            _ => None,
+        }
+    }
+}
+
+/// Why measurements could not be written.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum SaveError {
+    /// The file could not be written.
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// What the file system said.
+        source: io::Error,
+    },
+    /// The ending of the file name is none that can be written.
+    UnknownEnding {
+        /// Which file.
+        path: PathBuf,
+        /// The endings that can be.
+        known: &'static [&'static str],
+    },
+    /// Pictures and pages need the feature `charts`.
+    NoCharts {
+        /// Which file.
+        path: PathBuf,
+    },
+    /// The picture could not be made.
+    #[cfg(feature = "charts")]
+    Chart(ChartError),
+}
+
+impl fmt::Display for SaveError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io { path, source } => write!(f, "cannot write {}: {source}", path.display()),
+            Self::UnknownEnding { path, known } => write!(
+                f,
+                "cannot tell what to write into {}: its name should end in {}",
+                path.display(),
+                known.join(" or ")
+            ),
+            Self::NoCharts { path } => write!(
+                f,
+                "{} would be a picture, and this program was built without the feature `charts`",
+                path.display()
+            ),
+            #[cfg(feature = "charts")]
+            Self::Chart(error) => error.fmt(f),
+        }
+    }
+}
+
+impl Error for SaveError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Io { source, .. } => Some(source),
+            #[cfg(feature = "charts")]
+            Self::Chart(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(feature = "charts")]
+impl From<ChartError> for SaveError {
+    fn from(error: ChartError) -> Self {
+        Self::Chart(error)
+    }
+}

@@ -1,0 +1,176 @@
+//! The nodes of one run.
+
+use super::WorkPrecisionError;
+use std::ops::Range;
+
+/// A span in equal steps; the last one may be shorter.
+#[derive(Clone, Debug)]
+pub(super) struct Grid {
+    start: f64,
+    end: f64,
+    /// As it was asked for, positive.
+    step: f64,
+    /// The length of all elements but perhaps the last, signed.
+    length: f64,
+    steps: usize,
+    /// Whether the last step is as long as the others.
+    whole: bool,
+}
+
+/// A node at which a run is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Look {
+    pub(super) node: usize,
+    /// Whether the state is compared with the reference there, not only the energy with that of the start.
+    pub(super) compare: bool,
+}
+
+/// At how many nodes, equally spaced as far as the steps allow, runs are compared with the reference.
+const COMPARED: usize = 10;
+/// At how many nodes the energy is evaluated, at most: a fraction of the run that does not count.
+const LOOKS: usize = 1000;
+/// A count of steps beyond this is a mistake in units rather than a run.
+const MOST_STEPS: f64 = 1e15;
+
+impl Grid {
+    pub(super) fn new(span: &Range<f64>, step: f64) -> Result<Self, WorkPrecisionError> {
+        let Range { start, end } = *span;
+        if !(start.is_finite() && end.is_finite() && start != end && (end - start).is_finite()) {
+            return Err(WorkPrecisionError::Span { start, end });
+        }
+        if !(step.is_finite() && step != 0.0) {
+            return Err(WorkPrecisionError::Step { step });
+        }
+        let ratio = (end - start).abs() / step.abs();
+        if !(ratio <= MOST_STEPS) {
+            return Err(WorkPrecisionError::TooManySteps {
+                span: end - start,
+                step,
+            });
+        }
+        // 10 / 0.01 is 1000 steps although the quotient may be 1000.0000000000001.
+        let nearest = ratio.round();
+        let whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0);
+        let steps = if whole { nearest } else { ratio.ceil() }.max(1.0);
+        let length = if whole || steps == 1.0 {
+            (end - start) / steps
+        } else {
+            step.abs().copysign(end - start)
+        };
+        Ok(Self {
+            start,
+            end,
+            step: step.abs(),
+            length,
+            steps: steps as usize,
+            whole: whole || steps == 1.0,
+        })
+    }
+
+    /// The step that was asked for, without its sign.
+    pub(super) fn step(&self) -> f64 {
+        self.step
+    }
+
+    pub(super) fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// The time of the k-th node: a product, not a sum, and the end of the span exactly.
+    pub(super) fn node(&self, k: usize) -> f64 {
+        if k >= self.steps {
+            self.end
+        } else {
+            self.start + k as f64 * self.length
+        }
+    }
+
+    /// Start, end and length of the k-th element.
+    pub(super) fn element(&self, k: usize) -> (f64, f64, f64) {
+        let (t, next) = (self.node(k), self.node(k + 1));
+        let h = if self.whole || k + 1 < self.steps {
+            self.length
+        } else {
+            next - t
+        };
+        (t, next, h)
+    }
+
+    /// Where the run is looked at, in the order of time; the last look is at the end.
+    pub(super) fn looks(&self) -> Vec<Look> {
+        let stride = self.steps.div_ceil(LOOKS);
+        let mut looks: Vec<Look> = (1..)
+            .map(|k| k * stride)
+            .take_while(|node| *node < self.steps)
+            .map(|node| Look {
+                node,
+                compare: false,
+            })
+            .collect();
+        // In f64, because products of counts may overflow.
+        let part = |k: usize| self.steps as f64 * (k as f64 / COMPARED as f64);
+        let compared = (1..COMPARED).map(|k| part(k).round() as usize);
+        looks.extend(
+            compared
+                .filter(|node| (1..self.steps).contains(node))
+                .chain([self.steps])
+                .map(|node| Look {
+                    node,
+                    compare: true,
+                }),
+        );
+        looks.sort_by_key(|look| (look.node, !look.compare));
+        looks.dedup_by_key(|look| look.node);
+        looks
+    }
+
+    /// The times at which it is compared with the reference.
+    pub(super) fn compared(&self) -> impl Iterator<Item = f64> + '_ {
+        let looks = self.looks().into_iter();
+        looks
+            .filter(|look| look.compare)
+            .map(|look| self.node(look.node))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn looks_end_at_the_end_and_are_few() {
+        for step in [7.0, 10.0, 3.0, 0.1, 1e-4] {
+            let grid = Grid::new(&(0.0..10.0), step).unwrap();
+            let looks = grid.looks();
+            assert!(looks.len() <= LOOKS + COMPARED);
+            assert!(looks.windows(2).all(|pair| pair[0].node < pair[1].node));
+            let last = looks.last().unwrap();
+            assert!(last.compare && last.node == grid.steps());
+            assert_eq!(grid.compared().last(), Some(10.0));
+        }
+        let grid = Grid::new(&(0.0..10.0), 0.1).unwrap();
+        assert_eq!(grid.compared().count(), COMPARED);
+    }
+
+    #[test]
+    fn lengths_add_up_forwards_and_backwards() {
+        for (span, step) in [(0.0..1.0, 0.3), (1.0..-2.0, 0.7), (0.0..1.0, 5.0)] {
+            let grid = Grid::new(&span, step).unwrap();
+            let sum: f64 = (0..grid.steps()).map(|k| grid.element(k).2).sum();
+            // A rounding for each of at most five additions.
+            assert!((sum - (span.end - span.start)).abs() < 5.0 * 3.0 * f64::EPSILON);
+            assert_eq!(grid.node(grid.steps()), span.end);
+        }
+    }
+
+    #[test]
+    fn what_is_no_grid() {
+        use WorkPrecisionError::{Span, Step, TooManySteps};
+        let of = |span, step| Grid::new(&span, step).unwrap_err();
+        assert!(matches!(of(0.0..0.0, 0.1), Span { .. }));
+        assert!(matches!(of(0.0..f64::NAN, 0.1), Span { .. }));
+        assert!(matches!(of(0.0..1.0, 0.0), Step { .. }));
+        assert!(matches!(of(0.0..1.0, f64::INFINITY), Step { .. }));
+        assert!(matches!(of(0.0..1e300, 1e-300), TooManySteps { .. }));
+    }
+}

@@ -1,0 +1,166 @@
+//! One run, timed and looked at.
+
+use super::grid::Grid;
+use super::point::Measured;
+use super::reference::Known;
+use crate::error::RunErrorKind;
+use std::hint::black_box;
+use std::ops::Range;
+use std::time::{Duration, Instant};
+use tfe_runtime::constrained;
+use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::{Element, Model, State, legendre};
+
+/// The most repetitions of a run: the best of a hundred is not much above the best of a thousand.
+const MOST_REPETITIONS: u32 = 100;
+
+/// What all runs have in common.
+pub(super) struct Measure<'a, M, const N: usize> {
+    pub(super) model: &'a M,
+    pub(super) start: State<N>,
+    pub(super) reference: &'a Known<N>,
+    pub(super) repeat_for: Duration,
+}
+
+impl<M: Model<N>, const N: usize> Measure<'_, M, N> {
+    /// Makes the run, with the clock stopped while it is looked at, then again without looking.
+    pub(super) fn run(
+        &self,
+        element: Element,
+        control: Control,
+        grid: &Grid,
+    ) -> Result<Measured, RunErrorKind> {
+        let stepper = || Stepper::new(self.model, element, control).map_err(RunErrorKind::Element);
+        let mut first = stepper()?;
+        let mut observer = Observer::new(self, grid.node(0));
+        let (mut state, mut from, mut best) = (self.start, 0, Duration::ZERO);
+        for look in grid.looks() {
+            best += advance(&mut first, grid, from..look.node, &mut state)?;
+            from = look.node;
+            observer.look(grid.node(look.node), &state, look.compare);
+        }
+        let (mut total, mut repetitions) = (best, 1);
+        while total < self.repeat_for && repetitions < MOST_REPETITIONS {
+            let mut state = self.start;
+            let time = advance(&mut stepper()?, grid, 0..grid.steps(), &mut state)?;
+            total += time;
+            best = best.min(time);
+            repetitions += 1;
+        }
+        let mut measured = observer.measured;
+        measured.seconds = best.as_secs_f64();
+        measured.repetitions = repetitions;
+        measured.statistics = *first.statistics();
+        measured.at_reference_floor = measured.error() <= self.reference.uncertainty();
+        Ok(measured)
+    }
+}
+
+/// Moves `state` over some elements of the grid, and says how long that took.
+pub(super) fn advance<M: Model<N>, const N: usize>(
+    stepper: &mut Stepper<'_, M, N>,
+    grid: &Grid,
+    elements: Range<usize>,
+    state: &mut State<N>,
+) -> Result<Duration, RunErrorKind> {
+    let clock = Instant::now();
+    for k in elements {
+        let (t, _, h) = grid.element(k);
+        stepper
+            .advance(t, h, state, &[])
+            .map_err(|source| RunErrorKind::Solve {
+                element: k,
+                time: t,
+                step: h,
+                source,
+            })?;
+    }
+    black_box(&state);
+    Ok(clock.elapsed())
+}
+
+/// What is seen of a run at its nodes.
+struct Observer<'a, M, const N: usize> {
+    model: &'a M,
+    reference: &'a Known<N>,
+    start_energy: f64,
+    velocity: [f64; N],
+    measured: Measured,
+}
+
+impl<'a, M: Model<N>, const N: usize> Observer<'a, M, N> {
+    fn new(measure: &Measure<'a, M, N>, time: f64) -> Self {
+        let mut observer = Self {
+            model: measure.model,
+            reference: measure.reference,
+            start_energy: 0.0,
+            velocity: [0.0; N],
+            measured: Measured {
+                error_q: 0.0,
+                error_p: 0.0,
+                max_error_q: 0.0,
+                max_error_p: 0.0,
+                energy_error: 0.0,
+                constraint_position: 0.0,
+                constraint_velocity: 0.0,
+                seconds: 0.0,
+                repetitions: 0,
+                statistics: tfe_runtime::Statistics::NONE,
+                at_reference_floor: false,
+            },
+        };
+        observer.start_energy = observer.energy(time, &measure.start);
+        observer.look_at_constraints(time, &measure.start);
+        observer
+    }
+
+    fn look(&mut self, time: f64, state: &State<N>, compare: bool) {
+        let energy = self.energy(time, state);
+        let scale = if self.start_energy == 0.0 {
+            1.0
+        } else {
+            self.start_energy.abs()
+        };
+        let change = (energy - self.start_energy).abs() / scale;
+        largest(&mut self.measured.energy_error, change);
+        self.look_at_constraints(time, state);
+        if compare && let Some((q, p)) = self.reference.errors(time, state) {
+            (self.measured.error_q, self.measured.error_p) = (q, p);
+            largest(&mut self.measured.max_error_q, q);
+            largest(&mut self.measured.max_error_p, p);
+        }
+    }
+
+    /// The energy; NaN where the momentum belongs to no velocity. Keeps the velocity.
+    fn energy(&mut self, time: f64, state: &State<N>) -> f64 {
+        let velocity =
+            constrained::velocity_of(self.model, time, &state.q, &state.p, &self.velocity);
+        match velocity {
+            Ok(velocity) => {
+                self.velocity = velocity;
+                legendre::energy_at(self.model, time, &state.q, &state.p, &velocity)
+            }
+            Err(_) => {
+                self.velocity = [0.0; N];
+                f64::NAN
+            }
+        }
+    }
+
+    fn look_at_constraints(&mut self, time: f64, state: &State<N>) {
+        if M::CONSTRAINTS.is_empty() {
+            return;
+        }
+        for one in constrained::residuals(self.model, time, &state.q, &self.velocity, 1.0) {
+            largest(&mut self.measured.constraint_position, one.position.abs());
+            largest(&mut self.measured.constraint_velocity, one.velocity.abs());
+        }
+    }
+}
+
+/// Keeps the larger one; `f64::max` would drop a NaN.
+fn largest(so_far: &mut f64, value: f64) {
+    if !(value <= *so_far) {
+        *so_far = value;
+    }
+}

@@ -1,0 +1,206 @@
+//! All runs of a comparison.
+
+use super::fit::{self, Slope};
+use super::point::{Cost, Measured, Point};
+use super::reference::Reference;
+use tfe_runtime::{Element, Solve};
+
+/// The runs with one element and one solver, the longest step first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    points: Vec<Point>,
+    uncertainty: f64,
+    element: Element,
+    solve: Solve,
+}
+
+impl Curve {
+    /// From at least one point.
+    pub(super) fn new(points: Vec<Point>, uncertainty: f64) -> Self {
+        let (element, solve) = points.first().map_or_else(
+            || (Element::mixed(2), Solve::Auto),
+            |point| (point.element, point.solve),
+        );
+        Self {
+            points,
+            uncertainty,
+            element,
+            solve,
+        }
+    }
+
+    /// The element.
+    pub fn element(&self) -> Element {
+        self.element
+    }
+
+    /// How its equations were solved.
+    pub fn solve(&self) -> Solve {
+        self.solve
+    }
+
+    /// All runs, those that failed included, the longest step first.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// The runs that reached their end: step and what was measured.
+    pub fn measured(&self) -> impl Iterator<Item = (f64, &Measured)> {
+        let points = self.points.iter();
+        points.filter_map(|point| Some((point.step, point.measured()?)))
+    }
+
+    /// How many runs failed.
+    pub fn failed(&self) -> usize {
+        self.points.len() - self.measured().count()
+    }
+
+    /// By which power of the step the error at the end falls, the larger one of coordinates and momenta; `None` where fewer than two
+    /// points are a power.
+    pub fn slope(&self) -> Option<Slope> {
+        self.slope_of(Measured::error)
+    }
+
+    /// The same of the coordinates alone.
+    pub fn slope_q(&self) -> Option<Slope> {
+        self.slope_of(|measured| measured.error_q)
+    }
+
+    /// The same of the momenta alone.
+    pub fn slope_p(&self) -> Option<Slope> {
+        self.slope_of(|measured| measured.error_p)
+    }
+
+    /// The error that shorter steps do not improve, if the steps are short enough to show it.
+    pub fn floor(&self) -> Option<f64> {
+        fit::floor(&self.errors(Measured::error))
+    }
+
+    /// The fastest run with an error of at most `error`. Below the uncertainty of the reference there is none.
+    pub fn fastest(&self, error: f64) -> Option<&Point> {
+        cheapest(self.points.iter(), error, self.uncertainty, Cost::Time)
+    }
+
+    fn slope_of(&self, error: impl Fn(&Measured) -> f64) -> Option<Slope> {
+        fit::slope(&self.errors(error), self.uncertainty)
+    }
+
+    fn errors(&self, error: impl Fn(&Measured) -> f64) -> Vec<(f64, f64)> {
+        let errors = self.measured();
+        errors.map(|(step, one)| (step, error(one))).collect()
+    }
+}
+
+/// What a [`WorkPrecision`](super::WorkPrecision) measured: curves of points, the reference, and the points that no other beats.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measurements {
+    pub(super) title: String,
+    pub(super) constrained: bool,
+    pub(super) curves: Vec<Curve>,
+    pub(super) reference: Reference,
+    pub(super) cost: Cost,
+}
+
+impl Measurements {
+    /// One curve for every element and solver, in the order in which they were asked for.
+    pub fn curves(&self) -> &[Curve] {
+        &self.curves
+    }
+
+    /// All runs, those that failed included, curve by curve.
+    pub fn points(&self) -> impl Iterator<Item = &Point> {
+        self.curves.iter().flat_map(|curve| &curve.points)
+    }
+
+    /// The runs that failed.
+    pub fn failures(&self) -> impl Iterator<Item = &Point> {
+        self.points().filter(|point| point.outcome.is_err())
+    }
+
+    /// What errors were measured against.
+    pub fn reference(&self) -> &Reference {
+        &self.reference
+    }
+
+    /// With another cost to the right of charts, and in the front.
+    #[must_use]
+    pub fn against(mut self, cost: Cost) -> Self {
+        self.cost = cost;
+        self
+    }
+
+    /// With another title.
+    #[must_use]
+    pub fn title(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// Some of the curves, for a chart of their own.
+    #[must_use]
+    pub fn only(&self, wanted: impl Fn(&Curve) -> bool) -> Self {
+        let curves = self.curves.iter().filter(|curve| wanted(curve));
+        Self {
+            curves: curves.cloned().collect(),
+            title: self.title.clone(),
+            ..*self
+        }
+    }
+
+    /// The Pareto front: the runs for which no other has both a smaller error and a smaller cost, the cheapest first.
+    ///
+    /// An error below the uncertainty of the reference counts as that uncertainty.
+    pub fn front(&self) -> Vec<&Point> {
+        // (cost, error, point), where both can be compared.
+        let known = |point| {
+            let (cost, error) = self.place(point)?;
+            (cost.is_finite() && error.is_finite()).then_some((cost, error, point))
+        };
+        let mut all: Vec<(f64, f64, &Point)> = self.points().filter_map(known).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut least = f64::INFINITY;
+        all.retain(|(_, error, _)| {
+            let is_better = *error < least;
+            least = least.min(*error);
+            is_better
+        });
+        all.into_iter().map(|(_, _, point)| point).collect()
+    }
+
+    /// The cheapest run with an error of at most `error`. Below the uncertainty of the reference there is none: no run can be told to
+    /// be that good.
+    pub fn fastest(&self, error: f64) -> Option<&Point> {
+        let uncertainty = self.reference.uncertainty();
+        cheapest(self.points(), error, uncertainty, self.cost)
+    }
+
+    /// Cost and error of a point, for the front.
+    pub(super) fn place(&self, point: &Point) -> Option<(f64, f64)> {
+        let error = point.error()?;
+        let uncertainty = self.reference.uncertainty();
+        let error = if error < uncertainty {
+            uncertainty
+        } else {
+            error
+        };
+        Some((point.cost(self.cost)?, error))
+    }
+}
+
+fn cheapest<'p>(
+    points: impl Iterator<Item = &'p Point>,
+    error: f64,
+    uncertainty: f64,
+    cost: Cost,
+) -> Option<&'p Point> {
+    if error < uncertainty {
+        return None;
+    }
+    let costs = points.filter_map(|point| {
+        let found = point.error().is_some_and(|one| one <= error);
+        Some((point.cost(cost).filter(|_| found)?, point))
+    });
+    costs
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, point)| point)
+}

@@ -1,0 +1,132 @@
+//! Measurements as files.
+
+use super::error::SaveError;
+use super::measurements::Measurements;
+use super::point::{Measured, Point};
+use std::fs;
+use std::path::Path;
+
+#[cfg(feature = "charts")]
+mod pictures;
+
+/// The columns of the table.
+const HEADER: &str = "element,nodes,points,order,solver,step,error_q,error_p,max_error_q,max_error_p,energy_error,\
+constraint_position,constraint_velocity,seconds,repetitions,steps,iterations,fixed_point_iterations,newton_iterations,\
+residual_evaluations,tangent_evaluations,factorizations,at_reference_floor,on_front,failure\n";
+
+impl Measurements {
+    /// Writes a chart into a file `.svg` (error against cost, both logarithmic), all figures into a file `.csv`, chart and table into a
+    /// page `.html`.
+    ///
+    /// # Errors
+    /// [`SaveError::UnknownEnding`]; [`SaveError::Io`]; [`SaveError::NoCharts`] for pictures without the feature `charts`;
+    /// [`SaveError::Chart`] where there is nothing to draw.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), SaveError> {
+        const KNOWN: &[&str] = &[".svg", ".csv", ".html"];
+        let path = path.as_ref();
+        let ending = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
+        let ending = ending.as_ref().and_then(|ending| ending.to_str());
+        match ending {
+            Some("csv") => fs::write(path, self.to_csv()).map_err(|source| SaveError::Io {
+                path: path.to_owned(),
+                source,
+            }),
+            #[cfg(feature = "charts")]
+            Some("svg") => Ok(self.chart().save(path)?),
+            #[cfg(feature = "charts")]
+            Some("html" | "htm") => {
+                let page = crate::charts::Page::new(&self.title).section(self.section()?);
+                Ok(page.save(path)?)
+            }
+            #[cfg(not(feature = "charts"))]
+            Some("svg" | "html" | "htm") => Err(SaveError::NoCharts {
+                path: path.to_owned(),
+            }),
+            _ => Err(SaveError::UnknownEnding {
+                path: path.to_owned(),
+                known: KNOWN,
+            }),
+        }
+    }
+
+    /// All points as text: a header, then a line for each, those that failed with their error in the last column. Numbers read back
+    /// exactly; what is not finite, or was not measured, is an empty field.
+    pub fn to_csv(&self) -> String {
+        let front = self.front();
+        let mut text = String::from(HEADER);
+        for point in self.points() {
+            let on_front = front.iter().any(|other| std::ptr::eq(*other, point));
+            text += &line(point, on_front);
+        }
+        text
+    }
+}
+
+fn line(point: &Point, on_front: bool) -> String {
+    let element = point.element;
+    let mut fields = vec![
+        element.to_string(),
+        element.nodes().to_string(),
+        element.points().to_string(),
+        element.order().to_string(),
+        format!("{:?}", point.solve),
+        number(point.step),
+    ];
+    match &point.outcome {
+        Ok(measured) => {
+            fields.extend(figures(measured));
+            fields.extend([
+                measured.at_reference_floor.to_string(),
+                on_front.to_string(),
+                String::new(),
+            ]);
+        }
+        Err(kind) => {
+            let empty = HEADER.split(',').count() - fields.len() - 1;
+            fields.extend(vec![String::new(); empty]);
+            fields.push(quoted(&kind.to_string()));
+        }
+    }
+    fields.join(",") + "\n"
+}
+
+fn figures(measured: &Measured) -> Vec<String> {
+    let statistics = &measured.statistics;
+    let numbers = [
+        measured.error_q,
+        measured.error_p,
+        measured.max_error_q,
+        measured.max_error_p,
+        measured.energy_error,
+        measured.constraint_position,
+        measured.constraint_velocity,
+        measured.seconds,
+    ];
+    let counts = [
+        u64::from(measured.repetitions),
+        statistics.steps,
+        statistics.iterations,
+        statistics.fixed_point_iterations,
+        statistics.newton_iterations,
+        statistics.residual_evaluations,
+        statistics.tangent_evaluations,
+        statistics.factorizations,
+    ];
+    let mut fields: Vec<_> = numbers.into_iter().map(number).collect();
+    fields.extend(counts.iter().map(ToString::to_string));
+    fields
+}
+
+/// In the shortest form that reads back exactly.
+fn number(value: f64) -> String {
+    if value.is_finite() {
+        format!("{value:?}")
+    } else {
+        String::new()
+    }
+}
+
+/// A text that may hold commas.
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\"").replace('\n', " "))
+}

@@ -1,0 +1,152 @@
+//! Charts and sections of pages.
+
+use crate::charts::{Axis, Chart, ChartError, Scale, Section, Style};
+use crate::work_precision::point::Measured;
+use crate::work_precision::{Curve, Measurements, Point};
+
+/// Errors of zero are drawn here: half a rounding.
+const LEAST: f64 = 0.5 * f64::EPSILON;
+
+impl Measurements {
+    /// Error at the end (the larger one of coordinates and momenta) against cost, both logarithmic: a line for every curve, the front in
+    /// dashes. Runs that failed are counted in the legend; errors above ten are cut off.
+    pub fn chart(&self) -> Chart {
+        let logarithmic = |label: &str| Axis::new(label).scale(Scale::Logarithmic);
+        let mut chart = Chart::new(&self.title)
+            .x(logarithmic(self.cost.label()))
+            .y(self.errors(logarithmic("relative error at the end")))
+            .size(900, 560);
+        for curve in &self.curves {
+            let place = |one: &Measured| (one.cost(self.cost), one.error().max(LEAST));
+            let points = curve.measured().map(|(_, one)| place(one));
+            chart = chart.series(self.name(curve), Style::LineWithMarkers, points);
+        }
+        let front = self.steps_of_front();
+        if front.len() > 1 {
+            chart = chart.series(
+                "least cost for an error",
+                Style::Reference,
+                front.iter().copied(),
+            );
+        }
+        let uncertainty = self.reference.uncertainty();
+        let costs = self.points().filter_map(|point| point.cost(self.cost));
+        let (least, most) = costs.fold((f64::INFINITY, 0.0_f64), |(least, most), cost| {
+            (least.min(cost), most.max(cost))
+        });
+        let seen = self.points().any(|point| {
+            let error = point.error();
+            error.is_some_and(|error| error <= 100.0 * uncertainty)
+        });
+        if seen && least < most {
+            let ends = [(least, uncertainty), (most, uncertainty)];
+            chart = chart.series("uncertainty of reference", Style::Reference, ends);
+        }
+        chart
+    }
+
+    /// The axis of errors. Runs that blew up without failing would press all others into a line.
+    fn errors(&self, axis: Axis) -> Axis {
+        const LOST: f64 = 10.0;
+        let errors = || self.points().filter_map(Point::error);
+        if !errors().any(|error| error > LOST) {
+            return axis;
+        }
+        let least = errors().fold(LOST, f64::min).max(LEAST);
+        axis.range(0.5 * least.min(0.1 * LOST)..LOST)
+    }
+
+    /// A section of a page: how it was measured, the chart, a table of the curves.
+    ///
+    /// # Errors
+    /// [`ChartError::NoData`] where no run reached its end.
+    pub fn section(&self) -> Result<Section, ChartError> {
+        let failed = self.failures().count();
+        let mut text = format!(
+            "Errors at the end of the run are relative to the largest state, the larger one of coordinates and momenta. Reference: {}. \
+             Times are of the steps alone, on one processor, the best of several runs.",
+            self.reference
+        );
+        if failed > 0 {
+            text += &format!(" {failed} runs failed and are not drawn.");
+        }
+        Ok(Section::new(&self.title)
+            .paragraph(text)
+            .figure(self.chart().to_svg()?, &self.title)
+            .table(
+                [
+                    "element",
+                    "solver",
+                    "order",
+                    "slope of q",
+                    "slope of p",
+                    "floor",
+                    "least error",
+                    "energy",
+                    "constraints",
+                    "failed",
+                ],
+                self.curves.iter().map(|curve| self.row(curve)),
+            ))
+    }
+
+    fn row(&self, curve: &Curve) -> [String; 10] {
+        let dash = || "—".to_owned();
+        let slope = |slope: Option<crate::work_precision::Slope>| {
+            slope.map_or_else(dash, |slope| format!("{:.2}", slope.exponent))
+        };
+        let least = |of: fn(&Measured) -> f64| {
+            let values = curve.measured().map(|(_, one)| of(one));
+            values
+                .reduce(f64::min)
+                .map_or_else(dash, |value| format!("{value:.1e}"))
+        };
+        [
+            curve.element().to_string(),
+            format!("{:?}", curve.solve()),
+            curve.element().order().to_string(),
+            slope(curve.slope_q()),
+            slope(curve.slope_p()),
+            curve
+                .floor()
+                .map_or_else(dash, |floor| format!("{floor:.1e}")),
+            least(Measured::error),
+            least(|one| one.energy_error),
+            if self.constrained {
+                least(|one| one.constraint_position.max(one.constraint_velocity))
+            } else {
+                dash()
+            },
+            curve.failed().to_string(),
+        ]
+    }
+
+    /// The name of a curve in the legend.
+    fn name(&self, curve: &Curve) -> String {
+        let mut name = curve.element().to_string();
+        let first = self.curves.first().map(Curve::solve);
+        if self.curves.iter().any(|other| Some(other.solve()) != first) {
+            name += &format!(", {:?}", curve.solve());
+        }
+        match curve.failed() {
+            0 => name,
+            failed => format!("{name}, {failed} failed"),
+        }
+    }
+
+    /// The front as steps: at every cost the least error so far.
+    fn steps_of_front(&self) -> Vec<(f64, f64)> {
+        let mut line = Vec::new();
+        let mut last = None;
+        for point in self.front() {
+            let Some((cost, _)) = self.place(point) else {
+                continue;
+            };
+            let error = point.error().unwrap_or(LEAST).max(LEAST);
+            line.extend(last.map(|last| (cost, last)));
+            line.push((cost, error));
+            last = Some(error);
+        }
+        line
+    }
+}

@@ -1,0 +1,324 @@
+//! What runs are compared with.
+
+use super::WorkPrecisionError;
+use super::grid::Grid;
+use crate::error::RunErrorKind;
+use std::fmt;
+use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::{Element, Mixed, Model, State};
+
+/// How the reference was found, and how well it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Reference {
+    /// It was given.
+    Given {
+        /// Its relative error, as it was given; else one rounding.
+        uncertainty: f64,
+    },
+    /// A run with a fine step, checked against one of twice the step.
+    Computed {
+        /// The element.
+        element: Element,
+        /// The longest step of the finer run: others are shorter, to meet the nodes of all runs.
+        step: f64,
+        /// The largest difference of both runs at the end, relative to the scale of errors: what two different sums of roundings, or two
+        /// different steps, disagree on.
+        uncertainty: f64,
+    },
+}
+
+impl Reference {
+    /// The relative error of the reference at the end of the span: smaller errors of runs mean nothing.
+    pub fn uncertainty(&self) -> f64 {
+        match self {
+            Self::Given { uncertainty } | Self::Computed { uncertainty, .. } => *uncertainty,
+        }
+    }
+}
+
+impl fmt::Display for Reference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Given { uncertainty } => {
+                write!(f, "given values, known to {uncertainty:.1e}")
+            }
+            Self::Computed {
+                element,
+                step,
+                uncertainty,
+            } => write!(
+                f,
+                "`{element}` with steps of at most {step}, known to {uncertainty:.1e} (the difference from twice the step)"
+            ),
+        }
+    }
+}
+
+/// Exact (q, p) at a time.
+type Function<'m, const N: usize> = dyn Fn(f64) -> ([f64; N], [f64; N]) + 'm;
+
+/// Where the reference comes from.
+pub(super) enum Source<'m, const N: usize> {
+    Computed,
+    End(State<N>),
+    Function(Box<Function<'m, N>>),
+}
+
+/// The reference at all times at which runs are compared with it.
+pub(super) struct Known<const N: usize> {
+    /// In the order of time.
+    states: Vec<(f64, State<N>)>,
+    scale: Scale,
+    summary: Reference,
+}
+
+/// The largest |q| and |p| of a motion.
+#[derive(Clone, Copy, Debug)]
+struct Scale {
+    q: f64,
+    p: f64,
+}
+
+impl Scale {
+    fn of<'s, const N: usize>(states: impl Iterator<Item = &'s State<N>>) -> Self {
+        let mut scale = Self { q: 0.0, p: 0.0 };
+        for state in states {
+            scale.q = scale.q.max(norm(&state.q));
+            scale.p = scale.p.max(norm(&state.p));
+        }
+        let or_one = |value: f64| if value > 0.0 { value } else { 1.0 };
+        Self {
+            q: or_one(scale.q),
+            p: or_one(scale.p),
+        }
+    }
+
+    /// The relative distances of coordinates and of momenta.
+    fn distances<const N: usize>(self, a: &State<N>, b: &State<N>) -> (f64, f64) {
+        let difference = |a: &[f64; N], b: &[f64; N]| {
+            let mut difference = *a;
+            for (difference, b) in difference.iter_mut().zip(b) {
+                *difference -= b;
+            }
+            norm(&difference)
+        };
+        (
+            difference(&a.q, &b.q) / self.q,
+            difference(&a.p, &b.p) / self.p,
+        )
+    }
+}
+
+fn norm(values: &[f64]) -> f64 {
+    // Scaled, so that squares neither overflow nor vanish.
+    let largest = values.iter().fold(0.0, |so_far: f64, value| {
+        if value.abs() <= so_far {
+            so_far
+        } else {
+            value.abs()
+        }
+    });
+    if !(largest > 0.0 && largest.is_finite()) {
+        return largest;
+    }
+    let squares = values.iter().map(|value| (value / largest).powi(2));
+    largest * squares.sum::<f64>().sqrt()
+}
+
+/// Times closer than this, relative to their size, are one: a step between them would be rounding.
+const SAME: f64 = 8.0 * f64::EPSILON;
+
+impl<const N: usize> Known<N> {
+    /// The relative error at the end that even the exact motion would seem to have.
+    pub(super) fn uncertainty(&self) -> f64 {
+        self.summary.uncertainty()
+    }
+
+    pub(super) fn summary(&self) -> &Reference {
+        &self.summary
+    }
+
+    pub(super) fn into_summary(self) -> Reference {
+        self.summary
+    }
+
+    /// The relative errors of q and p, if there is a reference at this time.
+    pub(super) fn errors(&self, time: f64, state: &State<N>) -> Option<(f64, f64)> {
+        let distance = |known: &f64| (known - time).abs();
+        let nearest = self
+            .states
+            .iter()
+            .min_by(|a, b| distance(&a.0).total_cmp(&distance(&b.0)))?;
+        let (known, reference) = nearest;
+        (distance(known) <= SAME * time.abs().max(known.abs()))
+            .then(|| self.scale.distances(state, reference))
+    }
+}
+
+impl<const N: usize> Source<'_, N> {
+    /// The reference at all times at which the grids are looked at.
+    pub(super) fn find<M: Model<N>>(
+        &self,
+        model: &M,
+        start: (f64, State<N>),
+        grids: &[Grid],
+        uncertainty: Option<f64>,
+    ) -> Result<Known<N>, WorkPrecisionError> {
+        let believed = uncertainty.unwrap_or(0.0).abs().max(f64::EPSILON);
+        let times = times(grids);
+        let states = match self {
+            Self::Computed => return computed(model, start, grids, &times, believed),
+            Self::End(state) => {
+                let end = times.last().copied();
+                end.map(|time| (time, *state)).into_iter().collect()
+            }
+            Self::Function(exact) => {
+                let state = |time: f64| {
+                    let (q, p) = exact(time);
+                    (time, State { q, p })
+                };
+                times.into_iter().map(state).collect::<Vec<_>>()
+            }
+        };
+        for (time, state) in &states {
+            if !state
+                .q
+                .iter()
+                .chain(&state.p)
+                .all(|value| value.is_finite())
+            {
+                return Err(WorkPrecisionError::ReferenceValue { time: *time });
+            }
+        }
+        Ok(Known {
+            scale: Scale::of(states.iter().map(|(_, state)| state).chain([&start.1])),
+            states,
+            summary: Reference::Given {
+                uncertainty: believed,
+            },
+        })
+    }
+}
+
+/// The times at which any of the grids is compared, in the order in which a run meets them.
+fn times(grids: &[Grid]) -> Vec<f64> {
+    let mut times: Vec<f64> = grids.iter().flat_map(Grid::compared).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|a, b| (*a - *b).abs() <= SAME * a.abs().max(b.abs()));
+    if let Some(grid) = grids.first() {
+        let end = grid.node(grid.steps());
+        if end < grid.node(0) {
+            times.reverse();
+        }
+        // Of times that are the same, the end is the one that stays.
+        if let Some(last) = times.last_mut() {
+            *last = end;
+        }
+    }
+    times
+}
+
+/// A run with half the step, and half of that, until it no longer changes.
+fn computed<M: Model<N>, const N: usize>(
+    model: &M,
+    start: (f64, State<N>),
+    grids: &[Grid],
+    times: &[f64],
+    believed: f64,
+) -> Result<Known<N>, WorkPrecisionError> {
+    /// Below it, a difference that no longer falls is one of roundings; above it, the motion is not resolved yet.
+    const RESOLVED: f64 = 1e-6;
+    /// Of steps so different that this is not enough, the longest are not worth a comparison.
+    const MOST_HALVINGS: u32 = 24;
+    let element = Element::from(Mixed::<8>);
+    let steps = || grids.iter().map(Grid::step);
+    let longest = steps().fold(0.0, f64::max);
+    let shortest = steps().fold(f64::INFINITY, f64::min);
+    let least = (shortest / 4.0).min(longest / 64.0);
+    let (mut last, mut failure) = (None, None);
+    let mut best: Option<Known<N>> = None;
+    for halvings in 0..MOST_HALVINGS {
+        let step = longest * 0.5_f64.powi(halvings as i32);
+        if step < least {
+            break;
+        }
+        match run(model, element, start, times, (longest, halvings)) {
+            Err(kind) => failure = Some(kind),
+            Ok(states) => {
+                let scale = Scale::of(states.iter().chain([&start.1]));
+                if let Some(coarse) = last.replace(states.clone()) {
+                    let uncertainty = difference(scale, &coarse, &states);
+                    let before = best.as_ref().map(Known::uncertainty);
+                    if before.is_none_or(|before| uncertainty < before) {
+                        best = Some(Known {
+                            states: times.iter().copied().zip(states).collect(),
+                            scale,
+                            summary: Reference::Computed {
+                                element,
+                                step,
+                                uncertainty: uncertainty.max(believed),
+                            },
+                        });
+                    }
+                    let settled = before
+                        .is_some_and(|before| before < RESOLVED && uncertainty > before / 4.0);
+                    if settled || uncertainty <= believed {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+    match (best, failure) {
+        (Some(known), _) => Ok(known),
+        (None, Some(kind)) => Err(WorkPrecisionError::ReferenceRun(kind)),
+        // Two runs end the loop at the earliest, and one of them failed if there was nothing to compare.
+        (None, None) => Err(WorkPrecisionError::NoSteps),
+    }
+}
+
+/// The larger relative difference of two runs at the end.
+fn difference<const N: usize>(scale: Scale, a: &[State<N>], b: &[State<N>]) -> f64 {
+    match (a.last(), b.last()) {
+        (Some(a), Some(b)) => {
+            let (q, p) = scale.distances(a, b);
+            q.max(p)
+        }
+        _ => f64::INFINITY,
+    }
+}
+
+/// The states at all times, with steps of this size at most, cut in half so many times. Every step is: where the times leave only short
+/// steps, a run with a shorter limit would be the same run, and prove nothing.
+fn run<M: Model<N>, const N: usize>(
+    model: &M,
+    element: Element,
+    (mut t, mut state): (f64, State<N>),
+    times: &[f64],
+    (step, halvings): (f64, u32),
+) -> Result<Vec<State<N>>, RunErrorKind> {
+    let stepper = Stepper::new(model, element, Control::default());
+    let mut stepper = stepper.map_err(RunErrorKind::Element)?;
+    let mut states = Vec::with_capacity(times.len());
+    let mut done = 0;
+    for &time in times {
+        let count = ((time - t).abs() / step).ceil().max(1.0) as usize;
+        let count = count.saturating_mul(1 << halvings);
+        let h = (time - t) / count as f64;
+        for k in 0..count {
+            let time = t + k as f64 * h;
+            let advanced = stepper.advance(time, h, &mut state, &[]);
+            advanced.map_err(|source| RunErrorKind::Solve {
+                element: done,
+                time,
+                step: h,
+                source,
+            })?;
+            done += 1;
+        }
+        t = time;
+        states.push(state);
+    }
+    Ok(states)
+}

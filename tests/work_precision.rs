@@ -1,0 +1,430 @@
+//! Accuracy against cost: slopes, floors, failures, fronts, files.
+
+mod common;
+
+use common::{list, number, reference, word};
+use std::time::Duration;
+use tfe::RunErrorKind;
+use tfe::prelude::*;
+use tfe::work_precision::{
+    Cost, Curve, Measurements, Point, Reference, SaveError, WorkPrecisionError,
+};
+
+/// H = p²/2 − cos q
+#[dynamics(coordinates(q), momenta(p), hamiltonian = p^2/2 - cos(q))]
+struct Pendulum {}
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k/4*x^4)]
+struct Quartic {
+    k: f64,
+}
+
+#[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y, constraint(rod) = x^2 + y^2 - l^2)]
+struct RodPendulum {
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
+/// The start of the table's pendulum, and its state at t = 10, known to 32 digits.
+const START: State<1> = State { q: [2.0], p: [0.0] };
+
+fn end_of_table() -> State<1> {
+    let table = reference("trajectories");
+    let cases = list(&table["cases"]);
+    let case = cases
+        .iter()
+        .find(|case| word(&case["name"]) == "pendulum_unit");
+    let states = list(&case.expect("the table has this pendulum")["states"]);
+    let state = states.iter().find(|state| number(&state["t"]) == 10.0);
+    let state = list(&state.expect("the table has t = 10")["state"]);
+    State {
+        q: [number(&state[0])],
+        p: [number(&state[1])],
+    }
+}
+
+fn pendulum(model: &Pendulum) -> WorkPrecision<'_, Pendulum, 1> {
+    // Counts and errors are tested, not times.
+    WorkPrecision::new(model, START, 0.0..10.0).repeat_for(Duration::ZERO)
+}
+
+fn halved(from: f64, count: i32) -> impl Iterator<Item = f64> {
+    (0..count).map(move |k| from * 0.5_f64.powi(k))
+}
+
+/// One pendulum, two elements of order 4 and one of order 10.
+fn measured() -> Measurements {
+    let model = Pendulum {};
+    let problem = pendulum(&model)
+        .element(Primal::<3>)
+        .element(Mixed::<3>)
+        .element(Mixed::<6>);
+    problem.steps(halved(0.4, 7)).run().unwrap()
+}
+
+#[test]
+fn slopes_are_the_orders() {
+    let measured = measured();
+    for curve in &measured.curves()[..2] {
+        assert_eq!(curve.element().order(), 4);
+        for slope in [curve.slope_q(), curve.slope_p(), curve.slope()] {
+            let slope = slope.unwrap();
+            assert!((slope.exponent - 4.0).abs() < 0.3, "{slope:?}");
+            assert!(slope.points >= 3, "{slope:?}");
+        }
+        // The shortest step, 0.00625, is still far from round-off.
+        assert_eq!(curve.floor(), None);
+    }
+    let model = Pendulum {};
+    let problem = pendulum(&model).element(Mixed::<4>);
+    let measured = problem.steps(halved(0.4, 5)).run().unwrap();
+    let steep = measured.curves()[0].slope().unwrap();
+    assert!((steep.exponent - 6.0).abs() < 0.3, "{steep:?}");
+    assert!(steep.points >= 3, "{steep:?}");
+}
+
+#[test]
+fn high_orders_end_at_a_floor_of_round_off() {
+    let floor = measured().curves()[2].floor().unwrap();
+    // Some roundings of 1600 steps at most.
+    assert!(floor < 1e-13, "{floor:e}");
+}
+
+#[test]
+fn the_computed_reference_is_that_of_the_table() {
+    let model = Pendulum {};
+    let end = end_of_table();
+    let problem = || pendulum(&model).element(Mixed::<6>).steps([0.5, 0.2]);
+    let computed = problem().run().unwrap();
+    let Reference::Computed { uncertainty, .. } = *computed.reference() else {
+        panic!("{:?}", computed.reference());
+    };
+    assert!(
+        (f64::EPSILON..1e-13).contains(&uncertainty),
+        "{uncertainty:e}"
+    );
+    let given = problem().reference_end(end.q, end.p).run().unwrap();
+    assert!(matches!(given.reference(), Reference::Given { .. }));
+    for (a, b) in computed.points().zip(given.points()) {
+        let (a, b) = (a.measured().unwrap(), b.measured().unwrap());
+        // The scales differ: the largest state of ten, or of start and end. Both momenta are within a factor two.
+        assert!((a.error_q - b.error_q).abs() < 1e-13 + 0.2 * b.error_q);
+        assert!(a.error_p < 2.0 * b.error_p && b.error_p < 2.0 * a.error_p);
+    }
+}
+
+#[test]
+fn a_reference_is_checked_by_steps_that_differ() {
+    // Nodes to compare at every 0.01: of steps 0.1, 0.05 and 0.025 none would fit between them, and three equal runs prove nothing.
+    let model = Quartic { k: 1e6 };
+    let measured = WorkPrecision::new(&model, model.state([1.0], [0.0]), 0.0..0.1)
+        .element(Mixed::<6>)
+        .steps([0.1, 1e-4])
+        .repeat_for(Duration::ZERO)
+        .run()
+        .unwrap();
+    let Reference::Computed { step, .. } = *measured.reference() else {
+        panic!("{:?}", measured.reference());
+    };
+    // A period is 0.0074.
+    assert!(step < 0.007, "{step}");
+    let fine = measured.points().last().and_then(Point::error);
+    assert!(fine.unwrap() < 1e-8, "{measured:?}");
+}
+
+#[test]
+fn errors_against_a_function_are_relative_and_include_those_on_the_way() {
+    // x'' = −x from (1, 0).
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
+    struct Oscillator {}
+    let model = Oscillator {};
+    let measured = WorkPrecision::new(&model, model.state([1.0], [0.0]), 0.0..3.0)
+        .element(Mixed::<2>)
+        .steps([0.1])
+        .reference(|t: f64| ([t.cos()], [-t.sin()]))
+        .repeat_for(Duration::ZERO)
+        .run()
+        .unwrap();
+    let point = measured.points().next().unwrap().measured().unwrap();
+    // The midpoint rule is a rotation by 2 atan(h/2) a step: behind by h²/12 · t, here 0.0025 at the end.
+    let behind = 3.0 - 30.0 * 2.0 * 0.05_f64.atan();
+    // |q_ref| is one at the start, |p_ref| largest at t = 1.5 among the times compared.
+    let scale = 1.5_f64.sin();
+    let (q, p) = (
+        (3.0 - behind).cos() - 3.0_f64.cos(),
+        (3.0 - behind).sin() - 3.0_f64.sin(),
+    );
+    assert!((point.error_q - q.abs()).abs() < 1e-13);
+    assert!((point.error_p - p.abs() / scale).abs() < 1e-13);
+    // Behind by the same fraction, the coordinate is off most where it moves fastest.
+    assert!(point.max_error_q > 2.0 * point.error_q);
+    assert!(point.energy_error < 1e-13);
+    assert_eq!((point.statistics.steps, point.repetitions), (30, 1));
+}
+
+#[test]
+fn runs_that_fail_are_kept_and_the_others_made() {
+    let model = Quartic { k: 1e6 };
+    let measured = WorkPrecision::new(&model, model.state([1.0], [0.0]), 0.0..0.1)
+        .element(Mixed::<3>)
+        .steps([0.05, 1e-4])
+        .solver(Solve::FixedPoint)
+        .solver(Solve::Newton)
+        .run()
+        .unwrap();
+    assert_eq!(measured.curves().len(), 2);
+    let fixed_point = &measured.curves()[0];
+    assert_eq!(
+        (fixed_point.solve(), fixed_point.failed()),
+        (Solve::FixedPoint, 1)
+    );
+    let [failed, good] = fixed_point.points() else {
+        panic!("{:?}", fixed_point.points());
+    };
+    assert!(matches!(
+        failed.outcome,
+        Err(RunErrorKind::Solve { element: 0, .. })
+    ));
+    assert_eq!((failed.step, failed.error()), (0.05, None));
+    // ω = 847 at this amplitude: an error of order 4 is below (hω)⁴ ωt = 4e-3.
+    assert!(good.error().unwrap() < 4e-3, "{measured:?}");
+    assert_eq!(
+        measured.failures().count(),
+        measured.curves().iter().map(Curve::failed).sum::<usize>()
+    );
+    let csv = measured.to_csv();
+    let failure = csv
+        .lines()
+        .find(|line| line.contains("FixedPoint,0.05,"))
+        .unwrap();
+    assert!(failure.contains("element 0 (t = 0"), "{failure}");
+}
+
+#[test]
+fn a_front_is_a_front() {
+    let measured = measured();
+    for cost in [Cost::Time, Cost::Evaluations, Cost::Iterations, Cost::Steps] {
+        let measured = measured.clone().against(cost);
+        let front = measured.front();
+        assert!(!front.is_empty());
+        let place = |point: &Point| {
+            let error = point
+                .error()
+                .unwrap()
+                .max(measured.reference().uncertainty());
+            (point.cost(cost).unwrap(), error)
+        };
+        for pair in front.windows(2) {
+            let (a, b) = (place(pair[0]), place(pair[1]));
+            assert!(a.0 <= b.0 && a.1 > b.1, "{a:?} {b:?}");
+        }
+        for point in measured.points() {
+            let (cost, error) = place(point);
+            let beaten = front.iter().any(|one| {
+                let (least, best) = place(one);
+                least <= cost && best <= error
+            });
+            assert!(beaten, "{cost} {error}");
+        }
+    }
+    // Of order 4 and of order 10 with as many steps, the second reaches 1e-10 first.
+    let best = measured
+        .against(Cost::Steps)
+        .fastest(1e-10)
+        .cloned()
+        .unwrap();
+    assert_eq!(best.element, Element::mixed(6));
+}
+
+#[test]
+fn points_at_the_floor_of_the_reference_are_marked() {
+    let model = Pendulum {};
+    let end = end_of_table();
+    let measured = pendulum(&model)
+        .element(Mixed::<3>)
+        .steps(halved(0.4, 8))
+        .reference_end(end.q, end.p)
+        .reference_uncertainty(1e-6)
+        .run()
+        .unwrap();
+    let curve = &measured.curves()[0];
+    let marked: Vec<_> = curve
+        .measured()
+        .map(|(_, one)| one.at_reference_floor)
+        .collect();
+    assert!(!marked[0] && marked[7], "{marked:?}");
+    for (_, one) in curve.measured() {
+        assert_eq!(one.at_reference_floor, one.error() <= 1e-6);
+    }
+    // Below what the reference knows nothing is promised.
+    assert!(curve.fastest(1e-7).is_none() && measured.fastest(1e-7).is_none());
+    assert!(curve.fastest(1e-5).is_some());
+}
+
+#[test]
+fn constrained_models_have_their_residual() {
+    let model = RodPendulum {
+        m: 1.0,
+        l: 1.0,
+        g: 9.81,
+    };
+    let start = model
+        .consistent_state([1.0, 0.0], [0.0, 0.0])
+        .unwrap()
+        .state;
+    let measured = WorkPrecision::new(&model, start, 0.0..1.0)
+        .element(Mixed::<3>)
+        .element(Mixed::<4>)
+        .steps([0.1, 0.05, 0.025])
+        .repeat_for(Duration::ZERO)
+        .run()
+        .unwrap();
+    for point in measured.points() {
+        let one = point.measured().unwrap();
+        // Solved to round-off: lengths are of one, velocities below five.
+        assert!((0.0..1e-12).contains(&one.constraint_position), "{one:?}");
+        assert!((0.0..1e-11).contains(&one.constraint_velocity), "{one:?}");
+        assert!(one.constraint_position + one.constraint_velocity > 0.0);
+    }
+    let slope = measured.curves()[0].slope().unwrap();
+    assert!(slope.exponent > 3.0, "{slope:?}");
+    let off = State {
+        q: [1.1, 0.0],
+        p: [0.0, 0.0],
+    };
+    let problem = WorkPrecision::new(&model, off, 0.0..1.0)
+        .element(Mixed::<3>)
+        .steps([0.1]);
+    assert!(matches!(
+        problem.run(),
+        Err(WorkPrecisionError::Start(RunErrorKind::Inconsistent { .. }))
+    ));
+}
+
+#[test]
+fn what_cannot_be_measured_is_said() {
+    use WorkPrecisionError as E;
+    let model = Pendulum {};
+    let of = |span, elements: &[Element], steps: &[f64]| {
+        let problem = WorkPrecision::new(&model, START, span);
+        let problem = problem.elements(elements.iter().copied());
+        problem.steps(steps.iter().copied()).run().unwrap_err()
+    };
+    let mixed = &[Element::mixed(3)];
+    assert_eq!(of(0.0..1.0, &[], &[0.1]), E::NoElements);
+    assert_eq!(of(0.0..1.0, mixed, &[]), E::NoSteps);
+    assert!(matches!(
+        of(0.0..1.0, &[Element::mixed(1)], &[0.1]),
+        E::Element(_)
+    ));
+    assert!(matches!(of(1.0..1.0, mixed, &[0.1]), E::Span { .. }));
+    assert!(matches!(of(0.0..f64::NAN, mixed, &[0.1]), E::Span { .. }));
+    assert!(matches!(of(0.0..1.0, mixed, &[0.1, 0.0]), E::Step { .. }));
+    assert!(matches!(
+        of(0.0..1e300, mixed, &[1e-300]),
+        E::TooManySteps { .. }
+    ));
+    let lost = State {
+        q: [f64::NAN],
+        p: [0.0],
+    };
+    let problem = WorkPrecision::new(&model, lost, 0.0..1.0)
+        .element(Mixed::<3>)
+        .steps([0.1]);
+    assert!(matches!(
+        problem.run(),
+        Err(E::Start(RunErrorKind::Start { .. }))
+    ));
+    let problem = pendulum(&model).element(Mixed::<3>).steps([0.1]);
+    let problem = problem.reference(|_| ([f64::NAN], [0.0]));
+    let error = problem.run().unwrap_err();
+    assert!(matches!(error, E::ReferenceValue { .. }));
+    assert!(error.to_string().contains("not finite"));
+}
+
+#[test]
+fn files_by_their_ending() {
+    let folder = std::env::temp_dir().join(format!("tfe-work-precision-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let measured = measured();
+    let path = folder.join("table.csv");
+    measured.save(&path).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    let column = |name: &str| header.iter().position(|one| *one == name).unwrap();
+    let front = measured.front();
+    let mut count = 0;
+    for (line, point) in lines.zip(measured.points()) {
+        let one = point.measured().unwrap();
+        let read = |name: &str| line[column(name)].parse::<f64>().unwrap();
+        assert_eq!(line.len(), header.len());
+        assert_eq!(line[column("element")], point.element.to_string());
+        for (name, value) in [
+            ("step", point.step),
+            ("error_q", one.error_q),
+            ("error_p", one.error_p),
+            ("energy_error", one.energy_error),
+            ("seconds", one.seconds),
+            (
+                "residual_evaluations",
+                one.statistics.residual_evaluations as f64,
+            ),
+        ] {
+            assert_eq!(read(name), value, "{name}");
+        }
+        let on_front = front.contains(&point);
+        assert_eq!(line[column("on_front")], on_front.to_string());
+        count += 1;
+    }
+    assert_eq!(count, 21);
+
+    let svg = measured.save(folder.join("chart.svg"));
+    let html = measured.save(folder.join("page.html"));
+    if cfg!(feature = "charts") {
+        svg.unwrap();
+        html.unwrap();
+        let svg = std::fs::read_to_string(folder.join("chart.svg")).unwrap();
+        assert!(svg.contains("Mixed::&lt;6&gt;") && svg.contains("time of the run"));
+        let html = std::fs::read_to_string(folder.join("page.html")).unwrap();
+        assert!(html.contains("<svg") && html.contains("slope of q"));
+    } else {
+        assert!(matches!(svg, Err(SaveError::NoCharts { .. })));
+        assert!(matches!(html, Err(SaveError::NoCharts { .. })));
+    }
+    assert!(matches!(
+        measured.save(folder.join("chart.pdf")),
+        Err(SaveError::UnknownEnding { .. })
+    ));
+    assert!(matches!(
+        measured.save(folder.join("no/such/folder.csv")),
+        Err(SaveError::Io { .. })
+    ));
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn backwards_and_with_a_shorter_last_step() {
+    let model = Pendulum {};
+    let end = end_of_table();
+    let measured = WorkPrecision::new(&model, end, 10.0..0.0)
+        .element(Mixed::<4>)
+        .steps([0.3, 0.07])
+        .reference_end(START.q, START.p)
+        .repeat_for(Duration::ZERO)
+        .run()
+        .unwrap();
+    let errors: Vec<_> = measured.points().filter_map(Point::error).collect();
+    assert_eq!(errors.len(), 2);
+    // Order 6: the quotient of the steps to that power is 6000.
+    assert!(
+        errors[0] < 1e-3 && errors[1] < errors[0] / 1000.0,
+        "{errors:?}"
+    );
+    let steps: Vec<_> = measured
+        .points()
+        .map(|point| point.cost(Cost::Steps))
+        .collect();
+    assert_eq!(steps, [Some(34.0), Some(143.0)]);
+}
