@@ -59,7 +59,7 @@ pub fn transition_matrix<M: Model<N>, const N: usize>(
 }
 
 /// The transition matrix of one element on the motions that the constraints of the model allow: in the orthonormal bases
-/// [`tangent_basis`](crate::constraints::tangent_basis) B₀ and B₁ at the two ends of the element,
+/// [`tangent_basis`] B₀ and B₁ at the two ends of the element,
 ///
 /// ```text
 /// B₁ᵀ A B₀                                                                (theory.md (T-78))

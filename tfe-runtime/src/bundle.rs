@@ -1,6 +1,6 @@
 //! Several trajectories of one model side by side: every kernel call serves W of them.
 //!
-//! The trajectories of a [`Bundle`] take the same steps at the same times. Their states lie in [`Lanes`], and the fixed-point iteration of an
+//! The trajectories of a [`Bundle`] take the same steps at the same times. Their states lie in [`Lanes`](crate::Lanes), and the fixed-point iteration of an
 //! element runs for all of them at once, each lane judged by the stopping rule of a [`Stepper`]. A lane that has converged is held while
 //! others go on, so that what a trajectory does never depends, not by one bit, on which others are beside it. A lane whose iteration does not
 //! contract takes this step and some that follow with a stepper of its own, by Newton's method; one that fails there is out.
