@@ -188,11 +188,9 @@ fn consistent<M: Model<N>, const N: usize>(
     v: [f64; N],
 ) -> Result<Consistent<N>, ConsistentError> {
     let mut q = given;
-    let mut last = f64::INFINITY;
-    for iteration in 0..=MOST {
-        let Some(step) = step_to_constraints::<M, N>(model, t, &given, &q) else {
-            break;
-        };
+    let (mut last, mut iterations) = (f64::INFINITY, 0);
+    while let Some(step) = step_to_constraints::<M, N>(model, t, &given, &q) {
+        iterations += 1;
         for a in 0..N {
             q[a] += step[a];
         }
@@ -204,8 +202,11 @@ fn consistent<M: Model<N>, const N: usize>(
         if settled {
             break;
         }
-        if iteration == MOST {
-            return Err(unreached(model, t, &q, iteration));
+        if iterations == MOST {
+            return Err(ConsistentError::Unreached {
+                residuals: constrained::residuals(model, t, &q, &[0.0; N], 1.0),
+                iterations,
+            });
         }
         last = size;
     }
@@ -217,7 +218,7 @@ fn consistent<M: Model<N>, const N: usize>(
     {
         return Err(ConsistentError::Unreached {
             residuals,
-            iterations: MOST,
+            iterations,
         });
     }
     let distance = |a: &[f64; N], b: &[f64; N]| {
@@ -232,18 +233,6 @@ fn consistent<M: Model<N>, const N: usize>(
         velocity: distance(&velocities, &v),
         rank: independent.into_iter().filter(|one| *one).count(),
     })
-}
-
-fn unreached<M: Model<N>, const N: usize>(
-    model: &M,
-    t: f64,
-    q: &[f64; N],
-    iterations: u32,
-) -> ConsistentError {
-    ConsistentError::Unreached {
-        residuals: constrained::residuals(model, t, q, &[0.0; N], 1.0),
-        iterations,
-    }
 }
 
 /// One step of the projection: to the tangents of the constraints, and along them towards the given position. None without holonomic ones.

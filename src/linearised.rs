@@ -137,8 +137,10 @@ impl<const N: usize> Linearised<N> {
     /// # }
     /// ```
     pub fn multipliers(&self) -> Result<Vec<Multiplier>, PeriodicSchurError> {
-        if let Some(Ok(reduced)) = &self.reduced {
-            return periodic_schur::multipliers(reduced);
+        match &self.reduced {
+            Some(Ok(reduced)) => return periodic_schur::multipliers(reduced),
+            Some(Err(error)) => return Err(PeriodicSchurError::Constraints(*error)),
+            None => {}
         }
         if self.transitions.is_empty() {
             return periodic_schur::multipliers(&[DMatrix::identity(2 * N, 2 * N)]);

@@ -152,15 +152,10 @@ impl<const N: usize> Motion<N> {
         let reactions = constrained::reactions(model, t, state, velocity);
         let reactions = reactions.unwrap_or_else(|_| vec![f64::NAN; M::CONSTRAINTS.len()]);
         self.reactions.values.extend(reactions);
-        let largest = |so_far: &mut f64, value: f64| {
-            // `f64::max` would drop a NaN.
-            if !(value.abs() <= *so_far) {
-                *so_far = value.abs();
-            }
-        };
         for one in constrained::residuals(model, t, &state.q, velocity, 1.0) {
-            largest(&mut self.residual.position, one.position);
-            largest(&mut self.residual.velocity, one.velocity);
+            let largest = &mut self.residual;
+            largest.position = larger(largest.position, one.position.abs());
+            largest.velocity = larger(largest.velocity, one.velocity.abs());
         }
         let independent = constrained::independent(model, t, &state.q);
         let rank = independent.into_iter().filter(|one| *one).count();
@@ -248,15 +243,8 @@ impl<const N: usize> Motion<N> {
             return 0.0;
         };
         let scale = if start == 0.0 { 1.0 } else { start.abs() };
-        let mut largest = 0.0_f64;
-        for energy in &self.energies {
-            let change = (energy - start).abs() / scale;
-            // `f64::max` would drop a NaN.
-            if !(change <= largest) {
-                largest = change;
-            }
-        }
-        largest
+        let changes = self.energies.iter().map(|energy| (energy - start).abs());
+        changes.map(|change| change / scale).fold(0.0, larger)
     }
 
     /// What the run cost.
@@ -316,6 +304,11 @@ impl<const N: usize> Motion<N> {
     }
 }
 
+/// The larger one; NaN if one is, which `f64::max` would drop.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a >= b { a } else { b }
+}
+
 impl<const N: usize> fmt::Debug for Motion<N> {
     /// The extent of the motion, not its thousands of numbers.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -326,5 +319,16 @@ impl<const N: usize> fmt::Debug for Motion<N> {
             .field("statistics", &self.statistics)
             .field("warnings", &self.warnings)
             .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::larger;
+
+    #[test]
+    fn a_nan_stays_whatever_follows() {
+        assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, larger).is_nan());
+        assert_eq!([1.0, 3.0, 2.0].into_iter().fold(0.0, larger), 3.0);
     }
 }

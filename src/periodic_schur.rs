@@ -55,6 +55,7 @@ use nalgebra::{Complex, DMatrix};
 use std::error::Error;
 use std::f64::consts::PI;
 use std::fmt;
+use tfe_runtime::StepError;
 
 /// An eigenvalue of a product, as modulus and argument.
 ///
@@ -111,6 +112,8 @@ impl Multiplier {
 pub enum PeriodicSchurError {
     /// There is no factor, hence no size.
     Empty,
+    /// The constraints of the model do not span the same motions at all nodes, or it has no velocity at one: there are no factors on them.
+    Constraints(StepError),
     /// A slice does not hold a whole number of factors.
     Length {
         /// The number of rows of a factor.
@@ -156,6 +159,7 @@ impl fmt::Display for PeriodicSchurError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Empty => write!(f, "the product has no factor"),
+            Self::Constraints(source) => write!(f, "the constraints: {source}"),
             Self::Length { order, found } => {
                 write!(
                     f,
