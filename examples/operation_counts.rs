@@ -3,6 +3,9 @@
 //! L, its gradient and the upper half of its Hessian together, in x = (q, q̇), all constants numbers: additions and subtractions /
 //! multiplications / divisions / sine or cosine evaluations. Negations are not counted. A sine and a cosine of one argument are one evaluation
 //! of the pair here, two in the published columns. Weights: addition 1, multiplication 1, division 6, a sine–cosine pair 25.
+//!
+//! Sine and cosine of a difference of angles follow from those of the angles, with four products and two sums: that is why the links need
+//! more products here, and far fewer evaluations.
 
 use std::error::Error;
 use tfe_symbolic::compile::declare;
@@ -10,7 +13,8 @@ use tfe_symbolic::context::Context;
 use tfe_symbolic::derivation::Derivation;
 use tfe_symbolic::program::Request;
 
-/// A model: its name, its declaration, and the counts of SymPy's cse with basic optimisations, CasADi's SX with cse, SymForce's cse.
+/// A model: its name, its declaration, and the counts of SymPy's cse (the better of with and without basic optimisations), CasADi's SX with
+/// cse, SymForce's cse.
 pub struct Model {
     /// What it is called.
     pub name: &'static str,
@@ -32,20 +36,20 @@ pub const MODELS: [Model; 5] = [
         declaration: "coordinates(q[3]), lagrangian = sum(i in 0..3, (3 - i)/2*dot(q[i])^2) \
             + sum(i in 0..2, sum(j in i+1..3, (3 - j)*dot(q[i])*dot(q[j])*cos(q[i] - q[j]))) \
             + sum(i in 0..3, 9.81*(3 - i)*cos(q[i]))",
-        published: [[29, 47, 0, 12], [33, 36, 0, 12], [32, 39, 0, 12]],
+        published: [[29, 39, 0, 12], [33, 36, 0, 12], [32, 39, 0, 12]],
     },
     Model {
         name: "five links",
         declaration: "coordinates(q[5]), lagrangian = sum(i in 0..5, (5 - i)/2*dot(q[i])^2) \
             + sum(i in 0..4, sum(j in i+1..5, (5 - j)*dot(q[i])*dot(q[j])*cos(q[i] - q[j]))) \
             + sum(i in 0..5, 9.81*(5 - i)*cos(q[i]))",
-        published: [[94, 120, 0, 30], [107, 109, 0, 30], [104, 105, 0, 30]],
+        published: [[94, 105, 0, 30], [107, 109, 0, 30], [104, 105, 0, 30]],
     },
     Model {
         name: "heavy top",
         declaration: "coordinates(phi, theta, psi), lagrangian = 1/2*(dot(theta)^2 + (dot(phi)*sin(theta))^2) \
             + 0.5/2*(dot(psi) + dot(phi)*cos(theta))^2 - 2*cos(theta)",
-        published: [[11, 31, 0, 2], [14, 33, 0, 2], [12, 31, 0, 2]],
+        published: [[12, 28, 0, 2], [14, 33, 0, 2], [12, 31, 0, 2]],
     },
     Model {
         name: "6-DOF body",
@@ -91,6 +95,14 @@ pub fn weighted(counts: [usize; 4]) -> f64 {
     additions + multiplications + 6.0 * divisions + 12.5 * evaluations
 }
 
+/// The smallest weighted sum that any of the other tools reaches.
+pub fn least_published(model: &Model) -> f64 {
+    model
+        .published
+        .iter()
+        .fold(f64::INFINITY, |least, counts| least.min(weighted(*counts)))
+}
+
 #[allow(dead_code)] // the test that pins the counts includes this file
 fn main() -> Result<(), Box<dyn Error>> {
     let show = |c: [usize; 4]| format!("{}/{}/{}/{} ({:.0})", c[0], c[1], c[2], c[3], weighted(c));
@@ -106,13 +118,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             model.name,
             show(here)
         );
-        for published in &model.published[1..] {
-            assert!(
-                weighted(here) <= weighted(*published),
-                "{} needs more than a published count",
-                model.name
-            );
-        }
+        assert!(
+            weighted(here) < least_published(model),
+            "{} needs more than a published count",
+            model.name
+        );
     }
     Ok(())
 }

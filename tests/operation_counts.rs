@@ -3,30 +3,32 @@
 #[path = "../examples/operation_counts.rs"]
 mod example;
 
-use example::{MODELS, counted, weighted};
+use example::{MODELS, counted, least_published, weighted};
 
 /// Additions, multiplications, divisions, sine and cosine evaluations.
 const PINNED: [[usize; 4]; 5] = [
-    [10, 14, 0, 6],
-    [29, 33, 0, 12],
-    [94, 94, 0, 30],
-    [11, 24, 0, 2],
-    [34, 70, 0, 4],
+    [11, 18, 0, 4],
+    [32, 45, 0, 6],
+    [104, 134, 0, 10],
+    [11, 23, 0, 2],
+    [33, 68, 0, 4],
 ];
 
 #[test]
-fn counts_are_pinned_and_no_worse_than_published() {
+fn counts_are_pinned_and_below_all_published() {
     for (model, pinned) in MODELS.iter().zip(PINNED) {
         let counts = counted(model).expect("the declaration is right");
         assert_eq!(counts, pinned, "{}", model.name);
-        for published in &model.published[1..] {
-            assert!(weighted(counts) <= weighted(*published), "{}", model.name);
-            let sum = |c: [usize; 4]| c[0] + c[1] + c[2];
-            assert!(
-                sum(counts) <= sum(*published),
-                "{}: {counts:?} against {published:?}",
-                model.name
-            );
-        }
+        let best = least_published(model);
+        let own = weighted(counts);
+        assert!(own < best, "{}: {own} against {best}", model.name);
     }
+}
+
+#[test]
+fn five_links_save_a_third() {
+    // 5 pairs of sine and cosine instead of 15: the 10 differences of angles follow from the angles.
+    let model = &MODELS[2];
+    let counts = counted(model).expect("the declaration is right");
+    assert!(3.0 * weighted(counts) <= 2.0 * least_published(model));
 }

@@ -3,6 +3,8 @@
 //! Decided here: what is paired with what (see `pairs.rs`), powers as products, what becomes a reciprocal, where signs go. A sign travels
 //! with the value instead of costing a negation, until a sum absorbs it.
 
+mod demand;
+
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::constant::{Constant, is_decimal};
@@ -10,33 +12,20 @@ use crate::function::Function;
 use crate::graph::{ExprId, Graph, Node};
 use crate::pairs::{self, Item, Kind, Operands, Pair};
 use crate::plan::{Op, Plan, Value};
+use demand::{Multiple, ONE, PositiveConstant, Terms, demanded, gather, multiple};
+pub(crate) use demand::{Opened, scaled_sums};
 
 /// Larger powers are left to the method that computes integer powers.
 const LARGEST_PRODUCT_POWER: u32 = 64;
 
 /// Arranges what the roots need.
 pub(crate) fn arrange(graph: &Graph, roots: &[ExprId]) -> Plan {
-    Arranger::new(graph).run(roots)
+    arrange_with(graph, roots, &Opened::new())
 }
 
-/// A positive multiple of an expression that is no multiple itself.
-type Multiple = (ExprId, PositiveConstant);
-
-/// A constant with an (arbitrary, but fixed) order in which 1 is the first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-struct PositiveConstant(Constant);
-
-impl PartialOrd for PositiveConstant {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for PositiveConstant {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        let key = |c: &Self| (!c.0.is_one(), c.0.to_f64().to_bits(), c.0.as_ratio());
-        key(self).cmp(&key(other))
-    }
+/// Arranges what the roots need, with the number before these sums taken to their terms.
+pub(crate) fn arrange_with(graph: &Graph, roots: &[ExprId], opened: &Opened) -> Plan {
+    Arranger::new(graph, opened).run(roots)
 }
 
 /// What an operand stands for.
@@ -148,10 +137,11 @@ struct Quotient {
 
 struct Arranger<'a> {
     graph: &'a Graph,
+    opened: &'a Opened,
     plan: Plan,
     sums: Family,
     products: Family,
-    sum_sets: HashMap<ExprId, usize>,
+    sum_sets: HashMap<Multiple, usize>,
     quotients: HashMap<Multiple, Quotient>,
     built: HashMap<Multiple, Value>,
 }
@@ -162,12 +152,11 @@ type Places = Vec<(Multiple, i32)>;
 /// Divisors of which the reciprocal is computed, each with those that always stand beside it (and itself).
 type SharedDivisors = BTreeMap<ExprId, Vec<ExprId>>;
 
-const ONE: PositiveConstant = PositiveConstant(Constant::ONE);
-
 impl<'a> Arranger<'a> {
-    fn new(graph: &'a Graph) -> Self {
+    fn new(graph: &'a Graph, opened: &'a Opened) -> Self {
         Self {
             graph,
+            opened,
             plan: Plan::default(),
             sums: Family::new(Kind::Sum),
             products: Family::new(Kind::Product),
@@ -178,13 +167,18 @@ impl<'a> Arranger<'a> {
     }
 
     fn run(mut self, roots: &[ExprId]) -> Plan {
-        let demanded = self.demanded(roots);
+        let uses = demanded(self.graph, roots, self.opened);
+        let (sums, merged) = gather(self.graph, self.opened, &uses);
+        let demanded: BTreeSet<Multiple> = uses
+            .into_keys()
+            .filter(|multiple| !merged.contains(multiple))
+            .collect();
         let shared = self.shared_divisors(&demanded);
         for multiple in &demanded {
             let (x, factor) = *multiple;
-            match self.graph.node(x) {
-                Node::Sum { .. } if factor == ONE => self.collect_sum(x),
-                Node::Product(_) => self.collect_product(*multiple, &shared),
+            match (self.graph.node(x), sums.get(multiple)) {
+                (_, Some(sum)) => self.collect_sum(*multiple, sum),
+                (Node::Product(_), _) => self.collect_product(*multiple, &shared),
                 _ if factor != ONE => self.collect_product(*multiple, &shared),
                 _ => {}
             }
@@ -203,50 +197,8 @@ impl<'a> Arranger<'a> {
         self.plan
     }
 
-    /// The multiples that have to be computed.
-    fn demanded(&self, roots: &[ExprId]) -> BTreeSet<Multiple> {
-        let mut demanded = BTreeSet::new();
-        let mut stack: Vec<Multiple> = roots
-            .iter()
-            .map(|root| self.multiple(Constant::ONE, *root).0)
-            .collect();
-        while let Some((x, factor)) = stack.pop() {
-            if !demanded.insert((x, factor)) {
-                continue;
-            }
-            match self.graph.node(x) {
-                Node::Sum { terms, .. } => {
-                    if factor == ONE {
-                        stack.extend(terms.iter().map(|(c, x)| self.multiple(*c, *x).0));
-                    } else {
-                        stack.push((x, ONE));
-                    }
-                }
-                Node::Product(factors) => stack.extend(
-                    factors
-                        .iter()
-                        .map(|(x, _)| self.multiple(Constant::ONE, *x).0),
-                ),
-                _ if factor != ONE => stack.push((x, ONE)),
-                node => stack.extend(
-                    node.children()
-                        .into_iter()
-                        .map(|x| self.multiple(Constant::ONE, x).0),
-                ),
-            }
-        }
-        demanded
-    }
-
-    /// c x as a positive multiple of something that is no multiple, and whether the sign was lost.
-    fn multiple(&self, c: Constant, x: ExprId) -> (Multiple, bool) {
-        let (inner, x) = self.graph.as_multiple(x);
-        let c = c * inner;
-        ((x, PositiveConstant(c.abs())), c.is_negative())
-    }
-
     fn value(&self, x: ExprId) -> Value {
-        let (multiple, negative) = self.multiple(Constant::ONE, x);
+        let (multiple, negative) = multiple(self.graph, Constant::ONE, x);
         let value = self.built[&multiple];
         Value {
             negative: value.negative != negative,
@@ -322,24 +274,21 @@ impl<'a> Arranger<'a> {
         factors
     }
 
-    fn collect_sum(&mut self, id: ExprId) {
-        let Node::Sum { constant, terms } = self.graph.node(id) else {
-            return;
-        };
+    fn collect_sum(&mut self, sum: Multiple, Terms { number, terms }: &Terms) {
         let mut operands = Operands::new();
-        for (c, x) in terms {
-            let (multiple, negative) = self.multiple(*c, *x);
-            let item = self
-                .sums
-                .item(Meaning::Multiple(multiple), self.graph.loops_of(multiple.0));
-            operands.insert(item, if negative { -1 } else { 1 });
+        for (multiple, negative) in terms {
+            let item = self.sums.item(
+                Meaning::Multiple(*multiple),
+                self.graph.loops_of(multiple.0),
+            );
+            operands.insert(item, if *negative { -1 } else { 1 });
         }
-        if !constant.is_zero() {
-            let item = self.sums.item(Meaning::Number(constant.abs()), 0);
-            operands.insert(item, if constant.is_negative() { -1 } else { 1 });
+        if !number.is_zero() {
+            let item = self.sums.item(Meaning::Number(number.abs()), 0);
+            operands.insert(item, if number.is_negative() { -1 } else { 1 });
         }
         let set = self.sums.set(operands);
-        self.sum_sets.insert(id, set);
+        self.sum_sets.insert(sum, set);
     }
 
     fn collect_product(&mut self, multiple: Multiple, shared: &SharedDivisors) {
@@ -433,7 +382,7 @@ impl<'a> Arranger<'a> {
             };
         }
         let (x, _) = multiple;
-        if let Some(set) = self.sum_sets.get(&x).copied() {
+        if let Some(set) = self.sum_sets.get(&multiple).copied() {
             return self.build_set(Kind::Sum, set);
         }
         let operand = |arranger: &mut Self, x: ExprId| {

@@ -9,12 +9,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::arrange::arrange;
+use crate::angles::expand_angles;
 use crate::constant::Constant;
 use crate::constraint;
 use crate::count::Counts;
 use crate::declared::{Constraint, Declared, Force, Form, Parameter};
 use crate::differentiate::{Forward, gradient};
+use crate::distribute::distribute;
 use crate::entry::{Array, Entry, Place, blocks, for_each_sink};
 use crate::factor::take_out_factors;
 use crate::graph::{ExprId, Graph, Node, SumRange};
@@ -211,12 +212,13 @@ fn program(mut graph: Graph, entries: Vec<Entry>) -> Program {
     let (cleared, mut block) = blocks(&mut graph, entries);
     let mut values = Vec::new();
     for_each_sink(&mut block, &mut |sink| values.push(sink.value));
+    let values = expand_angles(&mut graph, values);
     let values = take_out_factors(&mut graph, values);
     let mut next = values.iter();
     for_each_sink(&mut block, &mut |sink| {
         sink.value = *next.next().unwrap_or(&sink.value);
     });
-    let plan = arrange(&graph, &values);
+    let plan = distribute(&graph, &values);
     schedule(plan, cleared, &block)
 }
 

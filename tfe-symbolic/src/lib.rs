@@ -7,6 +7,7 @@
 //! Each arrow is a function from one named type to the next; [`compile`] lists them. The crate knows
 //! neither Rust tokens nor floating-point linear algebra.
 
+mod angles;
 mod arrange;
 pub mod ast;
 pub mod check;
@@ -20,6 +21,7 @@ pub mod declared;
 pub mod derivation;
 pub mod diagnostic;
 pub mod differentiate;
+mod distribute;
 mod entry;
 mod expand;
 mod factor;

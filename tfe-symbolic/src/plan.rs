@@ -88,8 +88,11 @@ impl Plan {
         self.known.get(op).copied()
     }
 
-    /// Twice the cost in the measure of [`crate::count::Counts::weighted`], with half of a pair for each sine and cosine.
+    /// Twice the cost in the measure of [`crate::count::Counts::weighted`].
     pub(crate) fn cost(&self) -> usize {
+        let has = |function, arguments: &Vec<OpId>| {
+            self.find(&Op::Call(function, arguments.clone())).is_some()
+        };
         let cost = |op: &Op| match op {
             Op::Constant(_) | Op::Input(_) | Op::Negate(_) => 0,
             Op::Add(..)
@@ -98,7 +101,10 @@ impl Plan {
             | Op::Select { .. }
             | Op::Loop { .. } => 2,
             Op::Divide(..) => 12,
-            Op::Call(Function::Sin | Function::Cos, _) => 25,
+            // One of both counts for the pair.
+            Op::Call(Function::Sin, arguments) if has(Function::Cos, arguments) => 50,
+            Op::Call(Function::Cos, arguments) if has(Function::Sin, arguments) => 0,
+            Op::Call(Function::Sin | Function::Cos, _) => 30,
             Op::IntegerPower(..) | Op::Power(..) | Op::Call(..) => 40,
         };
         self.ops.iter().map(cost).sum()
