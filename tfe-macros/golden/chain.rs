@@ -44,11 +44,11 @@ const _: () = {
             separable: true,
         };
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
-            let a = R::from_f64(self.a);
-            let k = R::from_f64(self.k);
-            let mut t0 = R::from_f64(0.0);
-            let t1 = R::from_f64(0.5) * k;
-            let t2 = R::from_f64(0.25) * a;
+            let a = t.like(self.a);
+            let k = t.like(self.k);
+            let mut t0 = t.like(0.0);
+            let t1 = t.like(0.5) * k;
+            let t2 = t.like(0.25) * a;
             for i in 0..N.saturating_sub(1) {
                 let t3 = q[i] - q[i + 1];
                 let t4 = t3 * t3;
@@ -59,11 +59,12 @@ const _: () = {
             }
             for i in 0..N {
                 let t8 = z[i] * z[i];
-                let t9 = R::from_f64(0.5) * R::from_f64(self.m[i]);
+                let t9 = t.like(0.5) * t.like(self.m[i]);
                 t0 += t8 * t9;
             }
             t0
         }
+        const LANES: bool = true;
         fn first<R: __tfe::Real>(
             &self,
             t: R,
@@ -71,31 +72,7 @@ const _: () = {
             z: &[R; N],
             first: &mut __tfe::First<R, N>,
         ) {
-            let a = R::from_f64(self.a);
-            let c = R::from_f64(self.c);
-            let f = R::from_f64(self.f);
-            let k = R::from_f64(self.k);
-            let omega = R::from_f64(self.omega);
-            first.force.fill(R::from_f64(0.0));
-            first.q.fill(R::from_f64(0.0));
-            first.z.fill(R::from_f64(0.0));
-            let t0 = omega * t;
-            let t1 = t0.sin();
-            first.force[N.saturating_sub(1)] += f * t1;
-            for i in 0..N.saturating_sub(1) {
-                let t2 = q[i] - q[i + 1];
-                let t3 = t2 * t2;
-                let t4 = a * t3;
-                let t5 = k + t4;
-                let t6 = t2 * t5;
-                first.q[i] += -t6;
-                first.q[i + 1] += t6;
-            }
-            for i in 0..N {
-                first.z[i] += R::from_f64(self.m[i]) * z[i];
-                let t7 = z[i] * c;
-                first.force[i] += -t7;
-            }
+            self.first_inline(t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -105,16 +82,61 @@ const _: () = {
             first: &mut __tfe::First<R, N>,
             zz: &mut [[R; N]; N],
         ) {
-            let a = R::from_f64(self.a);
-            let c = R::from_f64(self.c);
-            let f = R::from_f64(self.f);
-            let k = R::from_f64(self.k);
-            let omega = R::from_f64(self.omega);
-            first.force.fill(R::from_f64(0.0));
-            first.q.fill(R::from_f64(0.0));
-            first.z.fill(R::from_f64(0.0));
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            first: &mut __tfe::First<R, N>,
+        ) {
+            let a = t.like(self.a);
+            let c = t.like(self.c);
+            let f = t.like(self.f);
+            let k = t.like(self.k);
+            let omega = t.like(self.omega);
+            first.force.fill(t.like(0.0));
+            first.q.fill(t.like(0.0));
+            first.z.fill(t.like(0.0));
+            let t0 = omega * t;
+            let t1 = t0.sin();
+            first.force[N.saturating_sub(1)] += f * t1;
+            for i in 0..N.saturating_sub(1) {
+                let t2 = q[i] - q[i + 1];
+                let t3 = t2 * t2;
+                let t4 = a * t3;
+                let t5 = k + t4;
+                let t6 = t2 * t5;
+                first.q[i] += -t6;
+                first.q[i + 1] += t6;
+            }
+            for i in 0..N {
+                first.z[i] += t.like(self.m[i]) * z[i];
+                let t7 = z[i] * c;
+                first.force[i] += -t7;
+            }
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            first: &mut __tfe::First<R, N>,
+            zz: &mut [[R; N]; N],
+        ) {
+            let a = t.like(self.a);
+            let c = t.like(self.c);
+            let f = t.like(self.f);
+            let k = t.like(self.k);
+            let omega = t.like(self.omega);
+            first.force.fill(t.like(0.0));
+            first.q.fill(t.like(0.0));
+            first.z.fill(t.like(0.0));
             for row in zz.iter_mut() {
-                row.fill(R::from_f64(0.0));
+                row.fill(t.like(0.0));
             }
             let t0 = omega * t;
             let t1 = t0.sin();
@@ -129,10 +151,10 @@ const _: () = {
                 first.q[i + 1] += t6;
             }
             for i in 0..N {
-                first.z[i] += R::from_f64(self.m[i]) * z[i];
+                first.z[i] += t.like(self.m[i]) * z[i];
                 let t7 = z[i] * c;
                 first.force[i] += -t7;
-                zz[i][i] += R::from_f64(self.m[i]);
+                zz[i][i] += t.like(self.m[i]);
             }
         }
         fn second<R: __tfe::Real>(
@@ -143,27 +165,27 @@ const _: () = {
             first: &mut __tfe::First<R, N>,
             second: &mut __tfe::Second<R, N>,
         ) {
-            let a = R::from_f64(self.a);
-            let c = R::from_f64(self.c);
-            let f = R::from_f64(self.f);
-            let k = R::from_f64(self.k);
-            let omega = R::from_f64(self.omega);
-            first.force.fill(R::from_f64(0.0));
-            first.q.fill(R::from_f64(0.0));
+            let a = t.like(self.a);
+            let c = t.like(self.c);
+            let f = t.like(self.f);
+            let k = t.like(self.k);
+            let omega = t.like(self.omega);
+            first.force.fill(t.like(0.0));
+            first.q.fill(t.like(0.0));
             for row in &mut second.qq {
-                row.fill(R::from_f64(0.0));
+                row.fill(t.like(0.0));
             }
-            first.z.fill(R::from_f64(0.0));
+            first.z.fill(t.like(0.0));
             for row in &mut second.zz {
-                row.fill(R::from_f64(0.0));
+                row.fill(t.like(0.0));
             }
             for row in &mut second.force_z {
-                row.fill(R::from_f64(0.0));
+                row.fill(t.like(0.0));
             }
             let t0 = omega * t;
             let t1 = t0.sin();
             first.force[N.saturating_sub(1)] += f * t1;
-            let t2 = R::from_f64(3.0) * a;
+            let t2 = t.like(3.0) * a;
             for i in 0..N.saturating_sub(1) {
                 let t3 = q[i] - q[i + 1];
                 let t4 = t3 * t3;
@@ -182,10 +204,10 @@ const _: () = {
             }
             let t11 = -c;
             for i in 0..N {
-                first.z[i] += R::from_f64(self.m[i]) * z[i];
+                first.z[i] += t.like(self.m[i]) * z[i];
                 let t12 = z[i] * c;
                 first.force[i] += -t12;
-                second.zz[i][i] += R::from_f64(self.m[i]);
+                second.zz[i][i] += t.like(self.m[i]);
                 second.force_z[i][i] += t11;
             }
         }

@@ -43,28 +43,29 @@ const _: () = {
             separable: true,
         };
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
-            let g = R::from_f64(self.g);
-            let k = R::from_f64(self.k);
-            let m = R::from_f64(self.m);
-            let r = R::from_f64(self.r);
+            let g = t.like(self.g);
+            let k = t.like(self.k);
+            let m = t.like(self.m);
+            let r = t.like(self.r);
             let cos_theta = q[1].cos();
             let t0 = r * cos_theta;
             let t1 = q[0] - t0;
             let t2 = t1 * t1;
-            let t3 = R::from_f64(0.5) * t2;
+            let t3 = t.like(0.5) * t2;
             let t4 = k * t3;
-            let t5 = R::select(t1.less(R::from_f64(0.0)), t4, R::from_f64(0.0));
+            let t5 = R::select(t1.less(t.like(0.0)), t4, t.like(0.0));
             let t6 = z[0] * z[0];
             let t7 = r * z[1];
             let t8 = t7 * t7;
             let t9 = t6 + t8;
-            let t10 = R::from_f64(0.5) * t9;
+            let t10 = t.like(0.5) * t9;
             let t11 = q[0] * g;
             let t12 = t10 - t11;
             let t13 = m * t12;
             let t14 = t5 - t13;
             -t14
         }
+        const LANES: bool = true;
         fn first<R: __tfe::Real>(
             &self,
             t: R,
@@ -72,11 +73,31 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            let c = R::from_f64(self.c);
-            let g = R::from_f64(self.g);
-            let k = R::from_f64(self.k);
-            let m = R::from_f64(self.m);
-            let r = R::from_f64(self.r);
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            let c = t.like(self.c);
+            let g = t.like(self.g);
+            let k = t.like(self.k);
+            let m = t.like(self.m);
+            let r = t.like(self.r);
             first.z[0] = m * z[0];
             let t0 = r * r;
             let t1 = m * t0;
@@ -85,11 +106,7 @@ const _: () = {
             let (sin_theta, cos_theta) = q[1].sin_cos();
             let t3 = r * cos_theta;
             let t4 = q[0] - t3;
-            let t5 = R::select(
-                t4.less(R::from_f64(0.0)),
-                R::from_f64(1.0),
-                R::from_f64(0.0),
-            );
+            let t5 = R::select(t4.less(t.like(0.0)), t.like(1.0), t.like(0.0));
             let t6 = t4 * k;
             let t7 = t5 * t6;
             let t8 = t2 + t7;
@@ -100,7 +117,8 @@ const _: () = {
             let t11 = z[1] * c;
             first.force[1] = -t11;
         }
-        fn first_and_mass<R: __tfe::Real>(
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
             &self,
             t: R,
             q: &[R; 2],
@@ -108,11 +126,11 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            let c = R::from_f64(self.c);
-            let g = R::from_f64(self.g);
-            let k = R::from_f64(self.k);
-            let m = R::from_f64(self.m);
-            let r = R::from_f64(self.r);
+            let c = t.like(self.c);
+            let g = t.like(self.g);
+            let k = t.like(self.k);
+            let m = t.like(self.m);
+            let r = t.like(self.r);
             first.z[0] = m * z[0];
             let t0 = m * r;
             let t1 = r * t0;
@@ -121,11 +139,7 @@ const _: () = {
             let (sin_theta, cos_theta) = q[1].sin_cos();
             let t3 = r * cos_theta;
             let t4 = q[0] - t3;
-            let t5 = R::select(
-                t4.less(R::from_f64(0.0)),
-                R::from_f64(1.0),
-                R::from_f64(0.0),
-            );
+            let t5 = R::select(t4.less(t.like(0.0)), t.like(1.0), t.like(0.0));
             let t6 = t4 * k;
             let t7 = t5 * t6;
             let t8 = t2 + t7;
@@ -146,11 +160,11 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             second: &mut __tfe::Second<R, 2>,
         ) {
-            let c = R::from_f64(self.c);
-            let g = R::from_f64(self.g);
-            let k = R::from_f64(self.k);
-            let m = R::from_f64(self.m);
-            let r = R::from_f64(self.r);
+            let c = t.like(self.c);
+            let g = t.like(self.g);
+            let k = t.like(self.k);
+            let m = t.like(self.m);
+            let r = t.like(self.r);
             first.z[0] = m * z[0];
             let t0 = m * r;
             let t1 = r * t0;
@@ -159,11 +173,7 @@ const _: () = {
             let (sin_theta, cos_theta) = q[1].sin_cos();
             let t3 = r * cos_theta;
             let t4 = q[0] - t3;
-            let t5 = R::select(
-                t4.less(R::from_f64(0.0)),
-                R::from_f64(1.0),
-                R::from_f64(0.0),
-            );
+            let t5 = R::select(t4.less(t.like(0.0)), t.like(1.0), t.like(0.0));
             let t6 = k * t5;
             let t7 = t4 * t6;
             let t8 = t2 + t7;
@@ -201,7 +211,7 @@ const _: () = {
             z: &[R; 2],
             values: &mut [R],
         ) {
-            let r = R::from_f64(self.r);
+            let r = t.like(self.r);
             let cos_theta = q[1].cos();
             let t0 = r * cos_theta;
             values[0] = q[0] - t0;

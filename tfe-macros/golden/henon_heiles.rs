@@ -35,7 +35,7 @@ const _: () = {
             separable: true,
         };
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
-            let lambda = R::from_f64(self.lambda);
+            let lambda = t.like(self.lambda);
             let t0 = q[1] * q[1];
             let t1 = q[0] * q[0];
             let t2 = z[0] * z[0];
@@ -43,13 +43,14 @@ const _: () = {
             let t4 = t2 + t3;
             let t5 = t1 + t4;
             let t6 = t0 + t5;
-            let t7 = R::from_f64(0.5) * t6;
-            let t8 = t0 / R::from_f64(3.0);
+            let t7 = t.like(0.5) * t6;
+            let t8 = t0 / t.like(3.0);
             let t9 = t1 - t8;
             let t10 = q[1] * lambda;
             let t11 = t9 * t10;
             t7 + t11
         }
+        const LANES: bool = true;
         fn first<R: __tfe::Real>(
             &self,
             t: R,
@@ -57,18 +58,7 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            let lambda = R::from_f64(self.lambda);
-            first.z[0] = z[0];
-            first.z[1] = z[1];
-            let t0 = q[1] * lambda;
-            let t1 = R::from_f64(2.0) * q[0];
-            let t2 = t0 * t1;
-            first.q[0] = q[0] + t2;
-            let t3 = q[0] * q[0];
-            let t4 = lambda * t3;
-            let t5 = q[1] * t0;
-            let t6 = q[1] - t5;
-            first.q[1] = t4 + t6;
+            self.first_inline(t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -78,11 +68,21 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            let lambda = R::from_f64(self.lambda);
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            let lambda = t.like(self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
             let t0 = q[1] * lambda;
-            let t1 = R::from_f64(2.0) * q[0];
+            let t1 = t.like(2.0) * q[0];
             let t2 = t0 * t1;
             first.q[0] = q[0] + t2;
             let t3 = q[0] * q[0];
@@ -90,8 +90,30 @@ const _: () = {
             let t5 = q[1] * t0;
             let t6 = q[1] - t5;
             first.q[1] = t4 + t6;
-            zz[0][0] = R::from_f64(1.0);
-            zz[1][1] = R::from_f64(1.0);
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            let lambda = t.like(self.lambda);
+            first.z[0] = z[0];
+            first.z[1] = z[1];
+            let t0 = q[1] * lambda;
+            let t1 = t.like(2.0) * q[0];
+            let t2 = t0 * t1;
+            first.q[0] = q[0] + t2;
+            let t3 = q[0] * q[0];
+            let t4 = lambda * t3;
+            let t5 = q[1] * t0;
+            let t6 = q[1] - t5;
+            first.q[1] = t4 + t6;
+            zz[0][0] = t.like(1.0);
+            zz[1][1] = t.like(1.0);
         }
         fn second<R: __tfe::Real>(
             &self,
@@ -101,11 +123,11 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             second: &mut __tfe::Second<R, 2>,
         ) {
-            let lambda = R::from_f64(self.lambda);
+            let lambda = t.like(self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
             let t0 = q[1] * lambda;
-            let t1 = R::from_f64(2.0) * t0;
+            let t1 = t.like(2.0) * t0;
             let t2 = q[0] * t1;
             first.q[0] = q[0] + t2;
             let t3 = q[0] * lambda;
@@ -113,13 +135,13 @@ const _: () = {
             let t5 = q[1] * t0;
             let t6 = q[1] - t5;
             first.q[1] = t4 + t6;
-            second.zz[0][0] = R::from_f64(1.0);
-            second.zz[1][1] = R::from_f64(1.0);
-            second.qq[0][0] = R::from_f64(1.0) + t1;
-            let t7 = R::from_f64(2.0) * t3;
+            second.zz[0][0] = t.like(1.0);
+            second.zz[1][1] = t.like(1.0);
+            second.qq[0][0] = t.like(1.0) + t1;
+            let t7 = t.like(2.0) * t3;
             second.qq[0][1] = t7;
             second.qq[1][0] = t7;
-            let t8 = t1 - R::from_f64(1.0);
+            let t8 = t1 - t.like(1.0);
             second.qq[1][1] = -t8;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {

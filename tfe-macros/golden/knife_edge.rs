@@ -40,10 +40,10 @@ const _: () = {
             separable: true,
         };
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 3], z: &[R; 3]) -> R {
-            let alpha = R::from_f64(self.alpha);
-            let g = R::from_f64(self.g);
-            let j = R::from_f64(self.j);
-            let m = R::from_f64(self.m);
+            let alpha = t.like(self.alpha);
+            let g = t.like(self.g);
+            let j = t.like(self.j);
+            let m = t.like(self.m);
             let t0 = z[0] * z[0];
             let t1 = z[1] * z[1];
             let t2 = t0 + t1;
@@ -51,13 +51,14 @@ const _: () = {
             let t4 = z[2] * z[2];
             let t5 = j * t4;
             let t6 = t3 + t5;
-            let t7 = R::from_f64(0.5) * t6;
+            let t7 = t.like(0.5) * t6;
             let t8 = alpha.sin();
             let t9 = m * q[0];
             let t10 = g * t9;
             let t11 = t8 * t10;
             t7 + t11
         }
+        const LANES: bool = false;
         fn first<R: __tfe::Real>(
             &self,
             t: R,
@@ -65,16 +66,7 @@ const _: () = {
             z: &[R; 3],
             first: &mut __tfe::First<R, 3>,
         ) {
-            let alpha = R::from_f64(self.alpha);
-            let g = R::from_f64(self.g);
-            let j = R::from_f64(self.j);
-            let m = R::from_f64(self.m);
-            first.z[0] = m * z[0];
-            first.z[1] = m * z[1];
-            first.z[2] = j * z[2];
-            let t0 = alpha.sin();
-            let t1 = m * g;
-            first.q[0] = t0 * t1;
+            self.first_inline(t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -84,10 +76,40 @@ const _: () = {
             first: &mut __tfe::First<R, 3>,
             zz: &mut [[R; 3]; 3],
         ) {
-            let alpha = R::from_f64(self.alpha);
-            let g = R::from_f64(self.g);
-            let j = R::from_f64(self.j);
-            let m = R::from_f64(self.m);
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 3],
+            z: &[R; 3],
+            first: &mut __tfe::First<R, 3>,
+        ) {
+            let alpha = t.like(self.alpha);
+            let g = t.like(self.g);
+            let j = t.like(self.j);
+            let m = t.like(self.m);
+            first.z[0] = m * z[0];
+            first.z[1] = m * z[1];
+            first.z[2] = j * z[2];
+            let t0 = alpha.sin();
+            let t1 = m * g;
+            first.q[0] = t0 * t1;
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 3],
+            z: &[R; 3],
+            first: &mut __tfe::First<R, 3>,
+            zz: &mut [[R; 3]; 3],
+        ) {
+            let alpha = t.like(self.alpha);
+            let g = t.like(self.g);
+            let j = t.like(self.j);
+            let m = t.like(self.m);
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
             first.z[2] = j * z[2];
@@ -106,10 +128,10 @@ const _: () = {
             first: &mut __tfe::First<R, 3>,
             second: &mut __tfe::Second<R, 3>,
         ) {
-            let alpha = R::from_f64(self.alpha);
-            let g = R::from_f64(self.g);
-            let j = R::from_f64(self.j);
-            let m = R::from_f64(self.m);
+            let alpha = t.like(self.alpha);
+            let g = t.like(self.g);
+            let j = t.like(self.j);
+            let m = t.like(self.m);
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
             first.z[2] = j * z[2];

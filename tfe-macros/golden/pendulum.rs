@@ -42,18 +42,19 @@ const _: () = {
             separable: true,
         };
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
-            let g = R::from_f64(self.g);
-            let l = R::from_f64(self.l);
-            let m = R::from_f64(self.m);
+            let g = t.like(self.g);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
             let t0 = l * z[0];
             let t1 = t0 * t0;
-            let t2 = R::from_f64(0.5) * t1;
+            let t2 = t.like(0.5) * t1;
             let cos_theta = q[0].cos();
             let t3 = l * g;
             let t4 = cos_theta * t3;
             let t5 = t2 + t4;
             m * t5
         }
+        const LANES: bool = true;
         fn first<R: __tfe::Real>(
             &self,
             t: R,
@@ -61,16 +62,7 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            let g = R::from_f64(self.g);
-            let l = R::from_f64(self.l);
-            let m = R::from_f64(self.m);
-            let t0 = m * l;
-            let t1 = l * z[0];
-            first.z[0] = t0 * t1;
-            let sin_theta = q[0].sin();
-            let t2 = g * sin_theta;
-            let t3 = t0 * t2;
-            first.q[0] = -t3;
+            self.first_inline(t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -80,9 +72,39 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            let g = R::from_f64(self.g);
-            let l = R::from_f64(self.l);
-            let m = R::from_f64(self.m);
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            let g = t.like(self.g);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let t0 = m * l;
+            let t1 = l * z[0];
+            first.z[0] = t0 * t1;
+            let sin_theta = q[0].sin();
+            let t2 = g * sin_theta;
+            let t3 = t0 * t2;
+            first.q[0] = -t3;
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            let g = t.like(self.g);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
             let t0 = m * l;
             let t1 = l * t0;
             first.z[0] = t1 * z[0];
@@ -100,9 +122,9 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             second: &mut __tfe::Second<R, 1>,
         ) {
-            let g = R::from_f64(self.g);
-            let l = R::from_f64(self.l);
-            let m = R::from_f64(self.m);
+            let g = t.like(self.g);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
             let t0 = m * l;
             let t1 = l * t0;
             first.z[0] = t1 * z[0];

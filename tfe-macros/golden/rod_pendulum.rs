@@ -39,16 +39,17 @@ const _: () = {
             separable: true,
         };
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
-            let g = R::from_f64(self.g);
-            let m = R::from_f64(self.m);
+            let g = t.like(self.g);
+            let m = t.like(self.m);
             let t0 = z[0] * z[0];
             let t1 = z[1] * z[1];
             let t2 = t0 + t1;
-            let t3 = R::from_f64(0.5) * t2;
+            let t3 = t.like(0.5) * t2;
             let t4 = q[1] * g;
             let t5 = t3 - t4;
             m * t5
         }
+        const LANES: bool = false;
         fn first<R: __tfe::Real>(
             &self,
             t: R,
@@ -56,12 +57,7 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            let g = R::from_f64(self.g);
-            let m = R::from_f64(self.m);
-            first.z[0] = m * z[0];
-            first.z[1] = m * z[1];
-            let t0 = m * g;
-            first.q[1] = -t0;
+            self.first_inline(t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -71,8 +67,34 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            let g = R::from_f64(self.g);
-            let m = R::from_f64(self.m);
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            let g = t.like(self.g);
+            let m = t.like(self.m);
+            first.z[0] = m * z[0];
+            first.z[1] = m * z[1];
+            let t0 = m * g;
+            first.q[1] = -t0;
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            let g = t.like(self.g);
+            let m = t.like(self.m);
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
             let t0 = m * g;
@@ -88,8 +110,8 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             second: &mut __tfe::Second<R, 2>,
         ) {
-            let g = R::from_f64(self.g);
-            let m = R::from_f64(self.m);
+            let g = t.like(self.g);
+            let m = t.like(self.m);
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
             let t0 = m * g;
@@ -116,7 +138,7 @@ const _: () = {
             let Some(values) = values.first_chunk_mut::<1>() else {
                 return;
             };
-            let l = R::from_f64(self.l);
+            let l = t.like(self.l);
             let t0 = q[0] * q[0];
             let t1 = q[1] * q[1];
             let t2 = t0 + t1;
@@ -133,8 +155,8 @@ const _: () = {
             let Some(rows) = rows.first_chunk_mut::<1>() else {
                 return;
             };
-            rows[0][0] = R::from_f64(2.0) * q[0];
-            rows[0][1] = R::from_f64(2.0) * q[1];
+            rows[0][0] = t.like(2.0) * q[0];
+            rows[0][1] = t.like(2.0) * q[1];
         }
         fn constraint_second<R: __tfe::Real>(
             &self,
@@ -153,13 +175,13 @@ const _: () = {
             let Some(row_rates) = second.row_rates.first_chunk_mut::<1>() else {
                 return;
             };
-            let t0 = R::from_f64(2.0) * v[0];
+            let t0 = t.like(2.0) * v[0];
             psi_q[0][0] = t0;
-            let t1 = R::from_f64(2.0) * v[1];
+            let t1 = t.like(2.0) * v[1];
             psi_q[0][1] = t1;
             row_rates[0][0] = t0;
             row_rates[0][1] = t1;
-            let t2 = R::from_f64(2.0) * mu[0];
+            let t2 = t.like(2.0) * mu[0];
             second.bend[0][0] = t2;
             second.bend[1][1] = t2;
             second.rate_v[0][0] = t2;

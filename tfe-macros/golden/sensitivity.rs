@@ -43,18 +43,19 @@ const _: () = {
             separable: true,
         };
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
-            let m = R::from_f64(self.m);
+            let m = t.like(self.m);
             let t0 = z[0] * z[0];
             let t1 = m * t0;
             let t2 = q[0] * q[0];
-            let t3 = R::from_f64(self.k[0]) * t2;
+            let t3 = t.like(self.k[0]) * t2;
             let t4 = t1 - t3;
-            let t5 = R::from_f64(0.5) * t4;
+            let t5 = t.like(0.5) * t4;
             let t6 = t2 * t2;
-            let t7 = R::from_f64(0.25) * R::from_f64(self.k[1]);
+            let t7 = t.like(0.25) * t.like(self.k[1]);
             let t8 = t6 * t7;
             t5 - t8
         }
+        const LANES: bool = true;
         fn first<R: __tfe::Real>(
             &self,
             t: R,
@@ -62,21 +63,7 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            let amplitude = R::from_f64(self.amplitude);
-            let c = R::from_f64(self.c);
-            let m = R::from_f64(self.m);
-            let omega = R::from_f64(self.omega);
-            first.z[0] = m * z[0];
-            let t0 = q[0] * q[0];
-            let t1 = R::from_f64(self.k[1]) * t0;
-            let t2 = R::from_f64(self.k[0]) + t1;
-            let t3 = q[0] * t2;
-            first.q[0] = -t3;
-            let t4 = omega * t;
-            let t5 = t4.cos();
-            let t6 = amplitude * t5;
-            let t7 = z[0] * c;
-            first.force[0] = t6 - t7;
+            self.first_inline(t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -86,14 +73,49 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            let amplitude = R::from_f64(self.amplitude);
-            let c = R::from_f64(self.c);
-            let m = R::from_f64(self.m);
-            let omega = R::from_f64(self.omega);
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            let amplitude = t.like(self.amplitude);
+            let c = t.like(self.c);
+            let m = t.like(self.m);
+            let omega = t.like(self.omega);
             first.z[0] = m * z[0];
             let t0 = q[0] * q[0];
-            let t1 = R::from_f64(self.k[1]) * t0;
-            let t2 = R::from_f64(self.k[0]) + t1;
+            let t1 = t.like(self.k[1]) * t0;
+            let t2 = t.like(self.k[0]) + t1;
+            let t3 = q[0] * t2;
+            first.q[0] = -t3;
+            let t4 = omega * t;
+            let t5 = t4.cos();
+            let t6 = amplitude * t5;
+            let t7 = z[0] * c;
+            first.force[0] = t6 - t7;
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            let amplitude = t.like(self.amplitude);
+            let c = t.like(self.c);
+            let m = t.like(self.m);
+            let omega = t.like(self.omega);
+            first.z[0] = m * z[0];
+            let t0 = q[0] * q[0];
+            let t1 = t.like(self.k[1]) * t0;
+            let t2 = t.like(self.k[0]) + t1;
             let t3 = q[0] * t2;
             first.q[0] = -t3;
             let t4 = omega * t;
@@ -111,14 +133,14 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             second: &mut __tfe::Second<R, 1>,
         ) {
-            let amplitude = R::from_f64(self.amplitude);
-            let c = R::from_f64(self.c);
-            let m = R::from_f64(self.m);
-            let omega = R::from_f64(self.omega);
+            let amplitude = t.like(self.amplitude);
+            let c = t.like(self.c);
+            let m = t.like(self.m);
+            let omega = t.like(self.omega);
             first.z[0] = m * z[0];
             let t0 = q[0] * q[0];
-            let t1 = R::from_f64(self.k[1]) * t0;
-            let t2 = R::from_f64(self.k[0]) + t1;
+            let t1 = t.like(self.k[1]) * t0;
+            let t2 = t.like(self.k[0]) + t1;
             let t3 = q[0] * t2;
             first.q[0] = -t3;
             let t4 = omega * t;
@@ -127,8 +149,8 @@ const _: () = {
             let t7 = z[0] * c;
             first.force[0] = t6 - t7;
             second.zz[0][0] = m;
-            let t8 = R::from_f64(3.0) * t1;
-            let t9 = R::from_f64(self.k[0]) + t8;
+            let t8 = t.like(3.0) * t1;
+            let t9 = t.like(self.k[0]) + t8;
             second.qq[0][0] = -t9;
             second.force_z[0][0] = -c;
         }
@@ -157,8 +179,8 @@ const _: () = {
         ) {
             match by {
                 __tfe::By::Time => {
-                    let amplitude = R::from_f64(self.amplitude);
-                    let omega = R::from_f64(self.omega);
+                    let amplitude = t.like(self.amplitude);
+                    let omega = t.like(self.omega);
                     let t0 = omega * t;
                     let t1 = t0.sin();
                     let t2 = amplitude * omega;
@@ -166,8 +188,8 @@ const _: () = {
                     first.force[0] = -t3;
                 }
                 __tfe::By::Parameter(0) => {
-                    let amplitude = R::from_f64(self.amplitude);
-                    let omega = R::from_f64(self.omega);
+                    let amplitude = t.like(self.amplitude);
+                    let omega = t.like(self.omega);
                     let t0 = omega * t;
                     let t1 = t0.sin();
                     let t2 = amplitude * t;

@@ -64,7 +64,7 @@ impl<'a> Emitter<'a> {
         let statements = self.statements(&program.statements);
         let parameters = self.parameters.iter().map(|(field, local)| {
             let field = identifier(field);
-            quote!(let #local = R::from_f64(self.#field);)
+            quote!(let #local = t.like(self.#field);)
         });
         Body {
             statements: quote!(#(#parameters)* #statements),
@@ -131,7 +131,7 @@ impl<'a> Emitter<'a> {
             }
             Statement::Accumulator { target } => {
                 let name = self.define(*target);
-                quote!(let mut #name = R::from_f64(0.0);)
+                quote!(let mut #name = t.like(0.0);)
             }
             Statement::Accumulate { value, .. } | Statement::Store { value, .. } => {
                 let value = self.operand(value);
@@ -210,9 +210,8 @@ impl<'a> Emitter<'a> {
 
     fn clear(&self, output: &Output) -> TokenStream {
         let second = &self.second;
-        let vector = |array: TokenStream| quote!(#array.fill(R::from_f64(0.0)););
-        let matrix =
-            |array: TokenStream| quote!(for row in &mut #array { row.fill(R::from_f64(0.0)); });
+        let vector = |array: TokenStream| quote!(#array.fill(t.like(0.0)););
+        let matrix = |array: TokenStream| quote!(for row in &mut #array { row.fill(t.like(0.0)); });
         match output {
             Output::ByZ(_) => vector(quote!(first.z)),
             Output::ByQ(_) => vector(quote!(first.q)),
@@ -220,7 +219,7 @@ impl<'a> Emitter<'a> {
             // The mass matrix alone is passed by reference, the blocks of all second derivatives are fields.
             Output::ZZ(..) if second.is_empty() => {
                 quote!(for row in zz.iter_mut() {
-                    row.fill(R::from_f64(0.0));
+                    row.fill(t.like(0.0));
                 })
             }
             Output::ZZ(..) => matrix(quote!(#second zz)),
@@ -298,7 +297,7 @@ impl<'a> Emitter<'a> {
             }
             Operand::Constant(value) => {
                 let value = number(*value);
-                quote!(R::from_f64(#value))
+                quote!(t.like(#value))
             }
             Operand::Input(input) => self.input(input),
         }
@@ -324,11 +323,11 @@ impl<'a> Emitter<'a> {
             Input::ParameterElement(name, a) => {
                 let field = identifier(name);
                 let element = at(&quote!(self.#field), &[a]);
-                quote!(R::from_f64(#element))
+                quote!(t.like(#element))
             }
             Input::Integer(a) => {
                 let value = signed(a);
-                quote!(R::from_f64((#value) as f64))
+                quote!(t.like((#value) as f64))
             }
         }
     }

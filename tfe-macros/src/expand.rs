@@ -13,6 +13,9 @@ use tfe_symbolic::derivation::Derivation;
 use tfe_symbolic::input::Affine;
 use tfe_symbolic::program::{By, Program, Request};
 
+/// Kernels of more operations are not compiled once more for several points at once: they would take longer to compile than they save.
+const LANES_LIMIT: usize = 4000;
+
 /// Expands `#[dynamics(arguments)] item`.
 pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
     let map = SourceMap::new(arguments);
@@ -132,7 +135,7 @@ impl<'a> Kernels<'a> {
         };
         let value = self.body(value, argument());
         let (value_statements, value) = (value.statements, value.value);
-        let value = value.unwrap_or_else(|| quote!(R::from_f64(0.0)));
+        let value = value.unwrap_or_else(|| quote!(t.like(0.0)));
         let first = Request {
             first: true,
             ..nothing
@@ -145,6 +148,10 @@ impl<'a> Kernels<'a> {
             second: true,
             ..first
         };
+        // Linear models step by a matrix, constrained ones by Newton's method: neither evaluates points side by side.
+        let lanes = self.declared.constraints.is_empty()
+            && !self.derivation.structure().linear
+            && page::total(&self.derivation.counts(mass)) <= LANES_LIMIT;
         let first = self.body(first, argument()).statements;
         let mass = self.body(mass, argument()).statements;
         let second = self.body(second, quote!(second.)).statements;
@@ -172,7 +179,31 @@ impl<'a> Kernels<'a> {
                         #value
                     }
 
+                    const LANES: bool = #lanes;
+
                     fn first<R: __tfe::Real>(
+                        &self,
+                        t: R,
+                        q: &[R; #dof],
+                        z: &[R; #dof],
+                        first: &mut __tfe::First<R, #dof>,
+                    ) {
+                        self.first_inline(t, q, z, first);
+                    }
+
+                    fn first_and_mass<R: __tfe::Real>(
+                        &self,
+                        t: R,
+                        q: &[R; #dof],
+                        z: &[R; #dof],
+                        first: &mut __tfe::First<R, #dof>,
+                        zz: &mut [[R; #dof]; #dof],
+                    ) {
+                        self.first_and_mass_inline(t, q, z, first, zz);
+                    }
+
+                    #[inline(always)]
+                    fn first_inline<R: __tfe::Real>(
                         &self,
                         t: R,
                         q: &[R; #dof],
@@ -182,7 +213,8 @@ impl<'a> Kernels<'a> {
                         #first
                     }
 
-                    fn first_and_mass<R: __tfe::Real>(
+                    #[inline(always)]
+                    fn first_and_mass_inline<R: __tfe::Real>(
                         &self,
                         t: R,
                         q: &[R; #dof],

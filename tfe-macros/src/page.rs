@@ -136,6 +136,12 @@ pub(crate) fn facts(derivation: &Derivation, path: &TokenStream) -> TokenStream 
     }
 }
 
+/// All operations, each counted once.
+pub(crate) fn total(counts: &Counts) -> usize {
+    let all = operations(counts);
+    all.additions + all.multiplications + all.divisions + all.sines + all.functions
+}
+
 /// `Structure { .. }`, the value of `Name::structure()`.
 pub(crate) fn structure(
     declared: &Declared,

@@ -38,7 +38,7 @@ impl DoubleDouble {
     }
 
     /// a + b exactly.
-    const fn sum(a: f64, b: f64) -> Self {
+    pub(crate) const fn sum(a: f64, b: f64) -> Self {
         let high = a + b;
         let part = high - a;
         Self {
@@ -48,7 +48,7 @@ impl DoubleDouble {
     }
 
     /// a · b exactly, by splitting both into halves of 26 bits.
-    const fn product(a: f64, b: f64) -> Self {
+    pub(crate) const fn product(a: f64, b: f64) -> Self {
         const SPLIT: f64 = 134_217_729.0; // 2²⁷ + 1
         let (at, bt) = (SPLIT * a, SPLIT * b);
         let (ah, bh) = (at - (at - a), bt - (bt - b));

@@ -35,7 +35,11 @@ pub mod model;
 mod newton;
 mod phase_form;
 #[cfg(feature = "alloc")]
+mod points;
+#[cfg(feature = "alloc")]
 mod propagator;
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+mod quad;
 pub mod quadrature;
 pub mod real;
 pub mod scheme;
@@ -62,7 +66,7 @@ pub use model::{
 };
 pub use newton::Solve;
 pub use real::{Lanes, Real};
-pub use statistics::Statistics;
+pub use statistics::{Choice, Contraction, Statistics};
 pub use structure::{Operations, Structure};
 
 /// What generated code refers to. Not part of the public interface.

@@ -197,6 +197,30 @@ pub trait Model<const N: usize> {
         zz: &mut [[R; N]; N],
     );
 
+    /// Whether [`first_inline`](Self::first_inline) and [`first_and_mass_inline`](Self::first_and_mass_inline) are there for themselves, so that
+    /// a stepper may evaluate them at several points at once in the widest registers of the processor.
+    const LANES: bool = false;
+
+    /// The same as [`first`](Self::first), written into the place of its call: only there is it compiled for the instruction set of
+    /// that place.
+    #[inline(always)]
+    fn first_inline<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
+        self.first(t, q, z, first);
+    }
+
+    /// The same as [`first_and_mass`](Self::first_and_mass), written into the place of its call.
+    #[inline(always)]
+    fn first_and_mass_inline<R: Real>(
+        &self,
+        t: R,
+        q: &[R; N],
+        z: &[R; N],
+        first: &mut First<R, N>,
+        zz: &mut [[R; N]; N],
+    ) {
+        self.first_and_mass(t, q, z, first, zz);
+    }
+
     /// First and second derivatives together.
     fn second<R: Real>(
         &self,

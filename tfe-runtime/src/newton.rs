@@ -3,6 +3,7 @@
 use crate::equations::{Equations, Increment};
 use crate::error::StepError;
 use crate::lu;
+use crate::statistics::Contraction;
 use crate::workspace::Scratch;
 
 /// How the equations of an element are solved.
@@ -49,6 +50,52 @@ const ROUGH_ROUND_OFF: f64 = 1e-10;
 /// Fixed-point iterations that cost as much as Newton's way.
 pub(crate) const PATIENCE: u32 = 24;
 
+/// Which iteration a step begins with.
+///
+/// Stiff steps come in rows: after a fixed point that did not contract Newton's method stays chosen for some steps, so that not each of them
+/// pays for two iterations.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Preference {
+    /// Steps for which Newton's method stays chosen.
+    newton_steps: u32,
+    /// How many it will be after the next failure of the fixed point.
+    penalty: u32,
+}
+
+impl Preference {
+    pub(crate) const NONE: Self = Self {
+        newton_steps: 0,
+        penalty: 0,
+    };
+
+    /// Whether a step is to begin with the fixed point.
+    pub(crate) fn is_fixed_point(self) -> bool {
+        self.newton_steps == 0
+    }
+
+    /// The fixed point was given up.
+    pub(crate) fn leave_fixed_point(&mut self) {
+        self.penalty = (self.penalty * 2).clamp(8, 1024);
+        self.newton_steps = self.penalty;
+    }
+
+    /// The fixed point has done a step.
+    pub(crate) fn confirm_fixed_point(&mut self) {
+        self.penalty /= 2;
+    }
+
+    /// Newton's method begins a step.
+    pub(crate) fn count_newton(&mut self) {
+        self.newton_steps = self.newton_steps.saturating_sub(1);
+    }
+}
+
+/// Unknowns of an element up to which factors of its matrix are not worth keeping.
+const SMALL: usize = 8;
+
+/// Unknowns of an element from which on factors of its matrix are worth keeping for slower contraction.
+const LARGE: usize = 24;
+
 /// Judges a sequence of increments.
 pub(crate) struct Monitor {
     tolerance: f64,
@@ -78,6 +125,16 @@ impl Monitor {
             best: f64::INFINITY,
             idle: 0,
         }
+    }
+
+    /// By how much the last increment was smaller than the one before.
+    pub(crate) fn rate(&self) -> f64 {
+        self.rate
+    }
+
+    /// The last increment.
+    pub(crate) fn last(&self) -> f64 {
+        self.last
     }
 
     /// # Errors
@@ -164,25 +221,27 @@ where
         statistics.iterations += 1;
         statistics.fixed_point_iterations += 1;
         let increment = equations.measure(unknowns, step);
-        if let Verdict::Converged = monitor.judge(increment)? {
+        let verdict = monitor.judge(increment)?;
+        equations.statistics().contraction = Contraction::of(monitor.rate());
+        if let Verdict::Converged = verdict {
             return Ok(());
         }
         // The start is good to a few digits, so one evaluation of mass matrices mostly serves.
-        refresh = monitor.rate > 0.1;
+        refresh = monitor.rate() > 0.1;
         if yielding && iteration >= 2 && monitor.is_hopeless(most - iteration) {
             break;
         }
     }
     Err(StepError::FixedPointStalled {
         iterations: most,
-        residual: monitor.last,
+        residual: monitor.last(),
         tolerance: control.tolerance,
     })
 }
 
-/// Newton's method; the matrix is kept while it serves.
+/// Newton's method; the matrix is kept while it serves, also from step to step.
 ///
-/// `known` says that the scratch holds the factors already; then they are kept throughout.
+/// `known` says that the scratch holds the factors of the last step; those of linear equations are kept throughout.
 pub(crate) fn newton<E>(
     equations: &mut E,
     control: &Control,
@@ -194,7 +253,15 @@ where
     E: Equations,
 {
     let mut monitor = Monitor::new(control.tolerance);
+    // A small matrix is cheaper than the iterations that an old one would take more.
+    let known = known && (linear || scratch.unknowns.len() >= SMALL);
     let mut fresh = !known;
+    // A large matrix costs as much as many iterations with an old one.
+    let good_enough = if scratch.unknowns.len() < LARGE {
+        0.05
+    } else {
+        0.3
+    };
     for iteration in 0..control.max_iterations {
         let Scratch {
             unknowns,
@@ -232,11 +299,13 @@ where
         if refined || matches!(verdict, Verdict::Converged) {
             return equations.finish(unknowns, step);
         }
-        fresh = !linear && monitor.rate > 0.05;
+        // The first increment alone tells no rate: an old matrix may show a second one.
+        let untried = known && iteration == 0;
+        fresh = !linear && !untried && monitor.rate() > good_enough;
     }
     Err(StepError::NewtonStalled {
         iterations: control.max_iterations,
-        residual: monitor.last,
+        residual: monitor.last(),
         tolerance: control.tolerance,
     })
 }

@@ -7,6 +7,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::model::State;
+use crate::step::sum;
 
 /// A start so far away that constant forces take no digits from what it does. A power of two.
 const FAR: f64 = (1_u64 << 40) as f64;
@@ -18,6 +19,8 @@ pub(crate) struct Propagator<const N: usize> {
     h: f64,
     /// D by columns, 2N of 2N numbers, and c as the last column.
     columns: Vec<f64>,
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    isa: Option<pulp::x86::V3>,
 }
 
 impl<const N: usize> Propagator<N> {
@@ -44,7 +47,12 @@ impl<const N: usize> Propagator<N> {
                 column[N + a] = (increment.q[a] - constant.q[a]) / FAR;
             }
         }
-        Ok(Self { h, columns })
+        Ok(Self {
+            h,
+            columns,
+            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+            isa: pulp::x86::V3::try_new(),
+        })
     }
 
     /// Whether it is of this length.
@@ -52,20 +60,53 @@ impl<const N: usize> Propagator<N> {
         self.h == h
     }
 
-    /// D y + c
-    pub(crate) fn increment(&self, state: &State<N>) -> State<N> {
-        let mut sum = State::ZERO;
+    /// Moves a state that is `low` more than its rounded numbers, both in place; false, and both as they were, where the end is not finite.
+    pub(crate) fn advance(&self, state: &mut State<N>, low: &mut State<N>) -> bool {
+        #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+        if let Some(isa) = self.isa {
+            struct Job<'a, const N: usize>(&'a Propagator<N>, &'a mut State<N>, &'a mut State<N>);
+            impl<const N: usize> pulp::NullaryFnOnce for Job<'_, N> {
+                type Output = bool;
+                #[inline(always)]
+                fn call(self) -> bool {
+                    self.0.moved(self.1, self.2)
+                }
+            }
+            return isa.vectorize(Job(self, state, low));
+        }
+        self.moved(state, low)
+    }
+
+    #[inline(always)]
+    fn moved(&self, state: &mut State<N>, low: &mut State<N>) -> bool {
+        let mut change = State::ZERO;
         let (matrix, last) = self.columns.split_at(4 * N * N);
-        sum.p.copy_from_slice(&last[..N]);
-        sum.q.copy_from_slice(&last[N..]);
+        change.p.copy_from_slice(&last[..N]);
+        change.q.copy_from_slice(&last[N..]);
         let (momenta, coordinates) = matrix.split_at(2 * N * N);
-        add(momenta, &state.p, &mut sum);
-        add(coordinates, &state.q, &mut sum);
-        sum
+        add(momenta, &state.p, &mut change);
+        add(coordinates, &state.q, &mut change);
+        let (mut end, mut end_low) = (State::ZERO, State::ZERO);
+        let mut zero = 0.0;
+        for a in 0..N {
+            (end.q[a], end_low.q[a]) = sum(state.q[a], change.q[a] + low.q[a]);
+            zero += 0.0 * end.q[a];
+        }
+        for a in 0..N {
+            (end.p[a], end_low.p[a]) = sum(state.p[a], change.p[a] + low.p[a]);
+            zero += 0.0 * end.p[a];
+        }
+        // Infinities and what is no number give no zero.
+        if zero != 0.0 || zero.is_nan() {
+            return false;
+        }
+        (*state, *low) = (end, end_low);
+        true
     }
 }
 
 /// Adds columns times factors, four at a time: each partial sum is loaded once for four products.
+#[inline(always)]
 fn add<const N: usize>(columns: &[f64], factors: &[f64; N], sum: &mut State<N>) {
     let halves = columns.as_chunks::<N>().0;
     let (fours, rest) = halves.as_chunks::<8>();

@@ -1,5 +1,6 @@
 //! The scalar of generated kernels.
 
+use crate::trigonometry;
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
@@ -21,6 +22,13 @@ pub trait Real:
 
     /// The nearest number to `value`.
     fn from_f64(value: f64) -> Self;
+    /// `value` as a number of the same kind as `self`: what kernels make their constants of. Numbers that live in registers of the
+    /// processor know from `self` that it has them.
+    #[inline(always)]
+    #[must_use]
+    fn like(self, value: f64) -> Self {
+        Self::from_f64(value)
+    }
     /// sin x and cos x together.
     fn sin_cos(self) -> (Self, Self);
     /// sin x.
@@ -96,6 +104,7 @@ macro_rules! elementary {
                 #[cfg(not(feature = "std"))]
                 { libm::sincos(self) }
             }
+            scalar_sines!(f64, libm::sin, libm::cos);
         }
         impl Real for f32 {
             scalar_items!(f32);
@@ -113,28 +122,53 @@ macro_rules! elementary {
                 #[cfg(not(feature = "std"))]
                 { libm::sincosf(self) }
             }
+            scalar_sines!(f32, libm::sinf, libm::cosf);
         }
         impl<const W: usize> Real for Lanes<W> {
             lane_items!();
+            #[inline]
+            fn sin(self) -> Self {
+                self.sin_cos().0
+            }
+            #[inline]
+            fn cos(self) -> Self {
+                self.sin_cos().1
+            }
             $(lane_function!($name $($argument)*);)*
         }
     };
 }
 
-/// An elementary function of lanes: sine and cosine all at once, others one lane after the other.
-macro_rules! lane_function {
-    (sin) => {
+/// Sine and cosine alone: half the price of both.
+macro_rules! scalar_sines {
+    ($scalar:ident, $sin:path, $cos:path) => {
         #[inline]
         fn sin(self) -> Self {
-            self.sin_cos().0
+            #[cfg(feature = "std")]
+            {
+                $scalar::sin(self)
+            }
+            #[cfg(not(feature = "std"))]
+            {
+                $sin(self)
+            }
         }
-    };
-    (cos) => {
         #[inline]
         fn cos(self) -> Self {
-            self.sin_cos().1
+            #[cfg(feature = "std")]
+            {
+                $scalar::cos(self)
+            }
+            #[cfg(not(feature = "std"))]
+            {
+                $cos(self)
+            }
         }
     };
+}
+
+/// An elementary function of lanes, one lane after the other.
+macro_rules! lane_function {
     ($name:ident $($argument:ident)*) => {
         #[inline]
         fn $name(self $(, $argument: Self)*) -> Self {
@@ -220,7 +254,7 @@ macro_rules! lane_items {
         }
         #[inline]
         fn sin_cos(self) -> (Self, Self) {
-            let (sin, cos) = crate::trigonometry::sin_cos(&self.0);
+            let (sin, cos) = trigonometry::sin_cos(&self.0);
             (Self(sin), Self(cos))
         }
         #[inline]
@@ -289,8 +323,6 @@ macro_rules! lane_items {
 }
 
 elementary! {
-    sin() = sin, sin, sinf;
-    cos() = cos, cos, cosf;
     tan() = tan, tan, tanf;
     asin() = asin, asin, asinf;
     acos() = acos, acos, acosf;
@@ -310,11 +342,11 @@ elementary! {
 }
 
 /// xⁿ by repeated squaring, so that every scalar and every target gives the same digits.
-#[inline]
-fn integer_power<R: Real>(base: R, exponent: i32) -> R {
+#[inline(always)]
+pub(crate) fn integer_power<R: Real>(base: R, exponent: i32) -> R {
     let mut remaining = exponent.unsigned_abs();
     let mut square = base;
-    let mut power = R::from_f64(1.0);
+    let mut power = base.like(1.0);
     while remaining > 0 {
         if remaining & 1 == 1 {
             power = power * square;
@@ -325,7 +357,7 @@ fn integer_power<R: Real>(base: R, exponent: i32) -> R {
         }
     }
     if exponent < 0 {
-        R::from_f64(1.0) / power
+        base.like(1.0) / power
     } else {
         power
     }

@@ -21,6 +21,55 @@ pub struct Statistics {
     pub factorizations: u64,
     /// Steps at which the fixed-point iteration was given up for Newton's.
     pub fallbacks: u64,
+    /// Steps of a linear model by one product with its matrix.
+    pub products: u64,
+    /// By how much the fixed-point iteration contracted when it was last judged.
+    pub contraction: Contraction,
+}
+
+/// The ratio of two successive increments, in parts per million.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Contraction(u32);
+
+impl Contraction {
+    /// Nothing measured.
+    pub const NONE: Self = Self(0);
+
+    /// Of a ratio; what is no number counts as no contraction.
+    pub(crate) fn of(ratio: f64) -> Self {
+        let parts = (1e6 * ratio).clamp(0.0, 1e9);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a number between 0 and 10⁹"
+        )]
+        Self(if ratio.is_nan() {
+            1_000_000
+        } else {
+            parts as u32
+        })
+    }
+
+    /// The ratio.
+    #[must_use]
+    pub fn ratio(self) -> f64 {
+        f64::from(self.0) * 1e-6
+    }
+}
+
+/// Why the equations were solved as they were: what [`Solve::Auto`](crate::Solve::Auto) found. `Display` says it in a sentence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// No step was done.
+    None,
+    /// The fixed point contracted in all steps.
+    FixedPoint,
+    /// The fixed point was given up in some steps, and Newton's method took over for those that followed.
+    Both,
+    /// The equations are linear, or Newton's method was asked for, or the form at hand has no other.
+    Newton,
+    /// A linear model: one product with a matrix a step.
+    Product,
 }
 
 impl Statistics {
@@ -34,6 +83,8 @@ impl Statistics {
         tangent_evaluations: 0,
         factorizations: 0,
         fallbacks: 0,
+        products: 0,
+        contraction: Contraction::NONE,
     };
 
     /// Adds the counts of another run, for instance of another trajectory.
@@ -46,6 +97,30 @@ impl Statistics {
         self.tangent_evaluations += other.tangent_evaluations;
         self.factorizations += other.factorizations;
         self.fallbacks += other.fallbacks;
+        self.products += other.products;
+        self.contraction = self.contraction.max(other.contraction);
+    }
+
+    /// How the equations were solved.
+    #[must_use]
+    pub fn choice(&self) -> Choice {
+        if self.steps == 0 {
+            Choice::None
+        } else if self.products > 0 {
+            Choice::Product
+        } else if self.fixed_point_iterations == 0 {
+            Choice::Newton
+        } else if self.newton_iterations == 0 {
+            Choice::FixedPoint
+        } else {
+            Choice::Both
+        }
+    }
+
+    /// The same as a sentence, with the reason.
+    #[must_use]
+    pub fn reason(&self) -> impl fmt::Display + use<> {
+        Reason(*self)
     }
 }
 
@@ -64,5 +139,65 @@ impl fmt::Display for Statistics {
             self.factorizations,
             self.fallbacks
         )
+    }
+}
+
+struct Reason(Statistics);
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Statistics {
+            steps,
+            fallbacks,
+            products,
+            contraction,
+            factorizations,
+            newton_iterations,
+            ..
+        } = self.0;
+        let ratio = contraction.ratio();
+        match self.0.choice() {
+            Choice::None => f.write_str("no step was done"),
+            Choice::FixedPoint => write!(
+                f,
+                "fixed point: increments shrank by a factor of {ratio:.1e} an iteration"
+            ),
+            Choice::Both => write!(
+                f,
+                "fixed point given up at {fallbacks} of {steps} steps, Newton's method for some after each ({factorizations} factorisations \
+                 for {newton_iterations} iterations); last ratio of increments {ratio:.1e}"
+            ),
+            Choice::Newton => write!(
+                f,
+                "Newton's method throughout: {factorizations} factorisations for {newton_iterations} iterations"
+            ),
+            Choice::Product => write!(
+                f,
+                "a linear model: {products} of {steps} steps by one product with its matrix"
+            ),
+        }
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use alloc::string::ToString;
+
+    #[test]
+    fn the_reason_names_what_was_measured() {
+        let mut statistics = Statistics {
+            steps: 10,
+            fixed_point_iterations: 40,
+            contraction: Contraction::of(0.0123),
+            ..Statistics::NONE
+        };
+        let told = statistics.reason().to_string();
+        assert!(told.contains("1.2e-2"), "{told}");
+        (statistics.newton_iterations, statistics.fallbacks) = (5, 1);
+        assert_eq!(statistics.choice(), Choice::Both);
+        assert!(statistics.reason().to_string().contains("1 of 10 steps"));
+        assert!((Contraction::of(f64::NAN).ratio() - 1.0).abs() < 1e-12);
+        assert!((Contraction::of(f64::INFINITY).ratio() - 1e3).abs() < 1e-12);
     }
 }

@@ -1,12 +1,13 @@
 //! Steps: one element after the other, on memory of the caller or on its own.
 
 use crate::basis::{MAX_NODES, legendre};
-use crate::equations::{Equations, Span, weighted};
+use crate::double_double::DoubleDouble;
+use crate::equations::{Equations, Span};
 use crate::error::StepError;
 use crate::legendre::{largest, velocity};
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
-use crate::newton::{fixed_point, newton};
+use crate::newton::{Preference, fixed_point, newton};
 use crate::phase_form::PhaseForm;
 use crate::scheme::{SchemeRef, Tables};
 use crate::statistics::Statistics;
@@ -55,14 +56,12 @@ pub struct Memory<const N: usize> {
     /// What the end is more than its rounded numbers.
     pub(crate) low: State<N>,
     pub(crate) mass: Option<Block<N>>,
-    /// The step for which the workspace holds the factors of a linear, autonomous model.
+    /// The step for which the workspace holds factors.
     factored: Option<f64>,
     /// The ratio of steps for which it holds the extrapolation.
     ratio: Option<f64>,
-    /// Steps for which Newton's method stays chosen.
-    newton_steps: u32,
-    /// How many it will be after the next failure of the fixed point.
-    penalty: u32,
+    /// Which iteration a nonlinear step begins with.
+    pub(crate) preference: Preference,
 }
 
 /// The last step.
@@ -93,8 +92,7 @@ impl<const N: usize> Memory<N> {
             mass: None,
             factored: None,
             ratio: None,
-            newton_steps: 0,
-            penalty: 0,
+            preference: Preference::NONE,
         }
     }
 
@@ -104,7 +102,7 @@ impl<const N: usize> Memory<N> {
         &self.statistics
     }
 
-    /// Says that the workspace no longer holds the factors of a linear model.
+    /// Says that the workspace no longer holds factors.
     pub(crate) fn forget_factors(&mut self) {
         self.factored = None;
     }
@@ -191,8 +189,8 @@ where
             warm,
             known,
             linear: M::FACTS.linear,
-            newton_steps: &mut memory.newton_steps,
-            penalty: &mut memory.penalty,
+            preference: &mut memory.preference,
+            has_factors: false,
         };
         let scratch = Scratch {
             unknowns: parts.unknowns,
@@ -243,7 +241,7 @@ where
         if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
             return Err(StepError::NonFinite);
         }
-        if M::FACTS.linear && !M::FACTS.time_dependent && driver.has_factors() {
+        if driver.has_factors && !(M::FACTS.linear && M::FACTS.time_dependent) {
             memory.factored = Some(h);
         }
         memory.last = Some(Last {
@@ -421,18 +419,44 @@ pub(crate) fn end_of<const N: usize>(
     forces: &[[f64; N]],
     impulses: &[Impulse<N>],
 ) -> (State<N>, State<N>) {
-    let velocity = weighted(scheme.advance, scheme.advance_low, rates);
-    let force = weighted(scheme.weights, scheme.weights_low, forces);
+    // To more than the working precision: weights and step are the same numbers in every step, and what their products lose is no chance.
+    let h = DoubleDouble::new(span.h);
     let (mut end, mut low) = (State::ZERO, State::ZERO);
     for a in 0..N {
-        let mut impulse = span.h * force[a] + span.low.p[a];
+        let velocity = integral(scheme.advance, scheme.advance_low, rates, a);
+        let force = integral(scheme.weights, scheme.weights_low, forces, a);
+        let mut impulse = span.low.p[a];
         for one in impulses {
             impulse += one.value[a];
         }
-        (end.q[a], low.q[a]) = sum(span.start.q[a], span.h * velocity[a] + span.low.q[a]);
-        (end.p[a], low.p[a]) = sum(span.start.p[a], impulse);
+        let moved = |start: f64, rate: DoubleDouble, low: f64| {
+            let change = rate.times(h).plus(DoubleDouble::new(low));
+            change.plus(DoubleDouble::new(start))
+        };
+        let q = moved(span.start.q[a], velocity, span.low.q[a]);
+        let p = moved(span.start.p[a], force, impulse);
+        (end.q[a], low.q[a]) = (q.high, q.low);
+        (end.p[a], low.p[a]) = (p.high, p.low);
     }
     (end, low)
+}
+
+/// Σ (high + low) · row of one coordinate.
+fn integral<const N: usize>(
+    high: &[f64],
+    low: &[f64],
+    rows: &[[f64; N]],
+    coordinate: usize,
+) -> DoubleDouble {
+    let mut sum = DoubleDouble::ZERO;
+    for ((high, low), row) in high.iter().zip(low).zip(rows) {
+        let weight = DoubleDouble {
+            high: *high,
+            low: *low,
+        };
+        sum = sum.plus(weight.times(DoubleDouble::new(row[coordinate])));
+    }
+    sum
 }
 
 /// a + b, rounded, and what rounding took.
@@ -449,8 +473,9 @@ struct Driver<'a> {
     warm: bool,
     known: bool,
     linear: bool,
-    newton_steps: &'a mut u32,
-    penalty: &'a mut u32,
+    preference: &'a mut Preference,
+    /// Whether the tangent holds factors that may serve the next step.
+    has_factors: bool,
 }
 
 impl Driver<'_> {
@@ -472,20 +497,19 @@ impl Driver<'_> {
                 fixed_point(equations, self.control, &mut scratch, false)?;
                 return Ok(scratch);
             }
-            Solve::Auto if !self.linear && *self.newton_steps == 0 => {
+            Solve::Auto if !self.linear && self.preference.is_fixed_point() => {
                 if fixed_point(equations, self.control, &mut scratch, true).is_ok() {
-                    *self.penalty /= 2;
+                    self.preference.confirm_fixed_point();
                     return Ok(scratch);
                 }
-                // Stiff steps come in rows: do not pay for two iterations in each of them.
-                *self.penalty = (*self.penalty * 2).clamp(8, 1024);
-                *self.newton_steps = *self.penalty;
+                self.preference.leave_fixed_point();
                 equations.statistics().fallbacks += 1;
                 scratch.unknowns.copy_from_slice(self.origin);
             }
             Solve::Auto | Solve::Newton => {}
         }
-        *self.newton_steps = self.newton_steps.saturating_sub(1);
+        self.preference.count_newton();
+        self.has_factors = true;
         let first = newton(
             equations,
             self.control,
@@ -502,10 +526,5 @@ impl Driver<'_> {
             newton(equations, self.control, &mut scratch, false, self.linear)?;
         }
         Ok(scratch)
-    }
-
-    /// Whether the tangent holds the factors of a linear model now.
-    fn has_factors(&self) -> bool {
-        self.linear && self.control.solve != Solve::FixedPoint
     }
 }

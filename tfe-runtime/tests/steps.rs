@@ -261,8 +261,9 @@ fn the_solvers_agree_and_count() {
             "{element}"
         );
         assert_eq!(statistics.iterations, statistics.fixed_point_iterations);
-        assert!(newton_statistics.factorizations >= 30);
-        assert!(newton_statistics.iterations < 30 * 7, "{newton_statistics}");
+        // A larger matrix is kept from step to step while it serves, at the price of an iteration here and there.
+        assert!(newton_statistics.factorizations >= 1, "{newton_statistics}");
+        assert!(newton_statistics.iterations < 30 * 9, "{newton_statistics}");
     }
 }
 

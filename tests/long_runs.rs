@@ -1,0 +1,186 @@
+//! Rounding over long runs: no drift, and its growth is that of a random walk.
+
+use tfe::prelude::*;
+use tfe::runtime::legendre::energy;
+use tfe::runtime::step::{Control, Stepper};
+
+#[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2)/2 - 1/sqrt(x^2 + y^2))]
+struct Kepler {}
+
+/// Bodies that attract each other.
+#[dynamics(
+    coordinates(x[6], y[6], z[6]),
+    lagrangian = sum(i in 0..6, m[i]/2*(dot(x[i])^2 + dot(y[i])^2 + dot(z[i])^2))
+        + sum(i in 1..6, sum(j in 0..i, g*m[i]*m[j]/sqrt((x[i] - x[j])^2 + (y[i] - y[j])^2 + (z[i] - z[j])^2))),
+)]
+struct Bodies {
+    g: f64,
+    m: [f64; 6],
+}
+
+/// Sun, Jupiter, Saturn, Uranus, Neptune, Pluto: mass, position (astronomical units), velocity (a day).
+/// [Hairer, Lubich, Wanner, Geometric Numerical Integration, I.2.4]
+const BODIES: [(f64, [f64; 3], [f64; 3]); 6] = [
+    (1.000_005_976_82, [0.0; 3], [0.0; 3]),
+    (
+        0.000_954_786_104_043,
+        [-3.502_365_3, -3.816_984_7, -1.550_796_3],
+        [0.005_654_29, -0.004_124_90, -0.001_905_89],
+    ),
+    (
+        0.000_285_583_733_151,
+        [9.075_531_4, -3.045_835_3, -1.648_370_8],
+        [0.001_683_18, 0.004_835_25, 0.001_924_62],
+    ),
+    (
+        0.000_043_727_316_454_6,
+        [8.310_142_0, -16.290_108_6, -7.252_127_8],
+        [0.003_541_78, 0.001_371_02, 0.000_550_29],
+    ),
+    (
+        0.000_051_775_913_844_9,
+        [11.470_766_6, -25.729_482_9, -10.816_945_6],
+        [0.002_889_30, 0.001_145_27, 0.000_396_77],
+    ),
+    (
+        1.0 / 1.3e8,
+        [-15.538_735_7, -25.222_559_4, -3.190_238_2],
+        [0.002_767_25, -0.001_707_02, -0.001_365_04],
+    ),
+];
+
+/// An ellipse of eccentricity 0.6 whose pericentre lies in some direction.
+fn ellipse(angle: f64) -> State<2> {
+    let (sin, cos) = angle.sin_cos();
+    State {
+        q: [0.4 * cos, 0.4 * sin],
+        p: [-2.0 * sin, 2.0 * cos],
+    }
+}
+
+/// The planets, turned about the z axis.
+fn planets(model: &Bodies, angle: f64) -> State<18> {
+    let (sin, cos) = angle.sin_cos();
+    let turned = |[x, y, z]: [f64; 3]| [cos * x - sin * y, sin * x + cos * y, z];
+    let (mut q, mut v) = ([0.0; 18], [0.0; 18]);
+    for (i, (_, position, velocity)) in BODIES.iter().enumerate() {
+        let (position, velocity) = (turned(*position), turned(*velocity));
+        for k in 0..3 {
+            (q[6 * k + i], v[6 * k + i]) = (position[k], velocity[k]);
+        }
+    }
+    model.state(q, v)
+}
+
+/// Relative errors of the energy after so many steps, a row for each start.
+fn energy_errors<M: Model<N>, const N: usize>(
+    model: &M,
+    element: Element,
+    h: f64,
+    starts: &[State<N>],
+    checks: &[usize],
+) -> Vec<Vec<f64>> {
+    let of = |state: &State<N>| energy(model, 0.0, &state.q, &state.p).expect("an energy");
+    let run = |start: &State<N>| {
+        let control = Control::default();
+        let mut stepper = Stepper::new(model, element, control)
+            .expect("an element")
+            .ends_only();
+        let (mut state, mut done) = (*start, 0);
+        let mut errors = Vec::new();
+        for check in checks {
+            while done < *check {
+                let t = h * done as f64;
+                stepper
+                    .advance(t, h, &mut state, &[])
+                    .expect("a smooth step");
+                done += 1;
+            }
+            errors.push((of(&state) - of(start)) / of(start));
+        }
+        errors
+    };
+    starts.iter().map(run).collect()
+}
+
+/// Mean and root mean square over all starts, a pair for each check.
+fn moments(errors: &[Vec<f64>]) -> Vec<[f64; 2]> {
+    let count = errors.len() as f64;
+    let checks = errors.first().map_or(0, Vec::len);
+    let moments = (0..checks).map(|k| {
+        let sum: f64 = errors.iter().map(|row| row[k]).sum();
+        let squares: f64 = errors.iter().map(|row| row[k] * row[k]).sum();
+        [sum / count, (squares / count).sqrt()]
+    });
+    moments.collect()
+}
+
+/// The exponent of the growth between the first and the last check.
+fn growth(moments: &[[f64; 2]], checks: &[usize]) -> f64 {
+    let (first, last) = (0, checks.len() - 1);
+    let times = checks[last] as f64 / checks[first] as f64;
+    (moments[last][1] / moments[first][1]).ln() / times.ln()
+}
+
+/// After a whole number of periods the planet is where it began. Compositions of leapfrog with compensated sums reach 1e-11.
+#[test]
+fn a_thousand_kepler_periods() {
+    let steps = 2000;
+    let h = std::f64::consts::TAU / f64::from(steps);
+    for nodes in [5, 6] {
+        let element = Element::mixed(nodes);
+        let control = Control::default();
+        let mut stepper = Stepper::new(&Kepler {}, element, control)
+            .expect("an element")
+            .ends_only();
+        let start = ellipse(0.0);
+        let mut state = start;
+        for step in 0..1000 * steps {
+            let t = h * f64::from(step);
+            stepper
+                .advance(t, h, &mut state, &[])
+                .expect("a smooth step");
+        }
+        let error = (state.q[0] - start.q[0]).hypot(state.q[1] - start.q[1]);
+        println!("{element}: {error:.1e} after 1000 periods");
+        assert!(error <= 3e-11, "{element}: {error:.1e}");
+    }
+}
+
+#[test]
+fn kepler_energy_is_a_random_walk() {
+    let h = std::f64::consts::TAU / 256.0;
+    let starts: Vec<_> = (0..24).map(|k| ellipse(0.25 * f64::from(k))).collect();
+    let checks = [10, 30, 100, 300, 1000].map(|periods| 256 * periods);
+    let errors = energy_errors(&Kepler {}, Element::mixed(8), h, &starts, &checks);
+    let moments = moments(&errors);
+    let slope = growth(&moments, &checks);
+    println!("energy error after 10 to 1000 periods {moments:?}, exponent {slope:.2}");
+    // A drift of one sign in all starts would give 1; the rounding of the energy itself makes it less than 1/2.
+    assert!(slope < 0.6, "{slope}");
+    let [mean, rms] = moments[4];
+    assert!(rms < 5e-15, "{rms:.1e}");
+    // No common sign: the mean of 24 walks is a fifth of one.
+    assert!(mean.abs() < 0.6 * rms, "{mean:.1e} of {rms:.1e}");
+}
+
+#[test]
+fn planets_over_a_million_days() {
+    let model = Bodies {
+        g: 2.959_122_082_86e-4,
+        m: BODIES.map(|(mass, _, _)| mass),
+    };
+    let starts: Vec<_> = (0..6).map(|k| planets(&model, f64::from(k))).collect();
+    let days = [1e4, 1e5, 1e6];
+    for (nodes, h) in [(9, 200.0), (8, 100.0)] {
+        let checks = days.map(|days| (days / h) as usize);
+        let errors = energy_errors(&model, Element::mixed(nodes), h, &starts, &checks);
+        let moments = moments(&errors);
+        let slope = growth(&moments, &checks);
+        println!(
+            "{nodes} nodes, {h} days: energy error after 1e4, 1e5, 1e6 days {moments:?}, exponent {slope:.2}"
+        );
+        assert!(slope < 0.6, "{slope}");
+        assert!(moments[2][1] < 5e-15, "{:.1e}", moments[2][1]);
+    }
+}

@@ -1,0 +1,251 @@
+//! Steps with all points of an element at once give what Newton's method gives for one point after the other.
+
+use tfe::prelude::*;
+use tfe::runtime::Form;
+use tfe::runtime::step::{Control, Stepper};
+
+/// Second order, no forces.
+#[dynamics(coordinates(theta), lagrangian = m*l^2/2*dot(theta)^2 + m*g*l*cos(theta))]
+struct Pendulum {
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
+/// Second order, with a force of the velocity and a mass matrix that is not diagonal.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = dot(x)^2 + dot(x)*dot(y)/2 + dot(y)^2/2 - cos(x - y) - x^4/4 - y^2,
+    force(x) = -c*dot(x)^3,
+    force(y) = -c*dot(y),
+)]
+struct Coupled {
+    c: f64,
+}
+
+/// Second order in phase space, with a force of the momentum.
+#[dynamics(
+    coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2/4)/2 - 1/sqrt(x^2 + y^2),
+    force(x) = -c*px, force(y) = -c*py,
+)]
+struct Drag {
+    c: f64,
+}
+
+/// Constant mass, driven by the time.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + x^2/2 - x^4/4, force(x) = f*cos(t) - c*dot(x))]
+struct Duffing {
+    f: f64,
+    c: f64,
+}
+
+/// A mass matrix of the coordinates.
+#[dynamics(
+    coordinates(a, b),
+    lagrangian = dot(a)^2 + dot(b)^2/2 + dot(a)*dot(b)*cos(a - b) + g*(2*cos(a) + cos(b)),
+)]
+struct Double {
+    g: f64,
+}
+
+/// A Hamiltonian whose mass matrix depends on the coordinates.
+#[dynamics(coordinates(theta, phi), momenta(p, j), hamiltonian = (p^2 + j^2/sin(theta)^2)/2 + cos(theta))]
+struct Spherical {}
+
+/// Constant mass, with a term that is linear in the velocities and depends on the coordinates.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 + b*(1 + x^2)*(x*dot(y) - y*dot(x)) - (x^4 + y^4)/4,
+)]
+struct Charge {
+    b: f64,
+}
+
+/// Momenta that are no multiples of velocities although the mass is constant.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + 3*dot(x) - cos(x))]
+struct Shifted {}
+
+const STEPS: usize = 30;
+
+/// The end after some steps, and the polynomial and the matrix of the last one.
+fn run<M: Model<N>, const N: usize>(
+    model: &M,
+    element: Element,
+    solve: Solve,
+    start: State<N>,
+) -> (Vec<f64>, u64) {
+    let control = Control {
+        solve,
+        ..Control::default()
+    };
+    let mut stepper = Stepper::new(model, element, control).expect("an element");
+    let mut state = start;
+    let mut t = 0.0;
+    for step in 0..STEPS {
+        // Steps of several lengths, one of them backwards.
+        let h = [0.1, 0.1, 0.05, 0.08, -0.03][step % 5];
+        stepper
+            .advance(t, h, &mut state, &[])
+            .unwrap_or_else(|error| panic!("{element} {solve:?}: {error}"));
+        t += h;
+    }
+    let mut seen = [&state.q[..], &state.p[..]].concat();
+    let dense = stepper.dense(t + 0.03, t);
+    let inside = dense.at_time(t + 0.01);
+    seen.extend([&inside.q[..], &inside.p[..]].concat());
+    let mut matrix = vec![0.0; 4 * N * N];
+    stepper.transition(&mut matrix).expect("a regular tangent");
+    seen.extend(matrix);
+    (seen, stepper.statistics().newton_iterations)
+}
+
+fn elements() -> Vec<Element> {
+    let mut elements = Vec::new();
+    // One, two and three groups of four points, full and not.
+    for nodes in [2, 3, 5, 6, 9, 12] {
+        elements.extend([
+            Element::mixed(nodes),
+            Element::primal(nodes),
+            Element::three_field(nodes),
+            Element::energy_conserving(nodes),
+        ]);
+        if nodes > 2 {
+            elements.push(Element::radau(nodes));
+        }
+    }
+    elements
+}
+
+fn compare<M: Model<N>, const N: usize>(model: &M, start: State<N>) {
+    for element in elements() {
+        let (together, newton) = run(model, element, Solve::Auto, start);
+        // Of a Hamiltonian some elements have no such form, and may need it.
+        let has_form =
+            matches!(M::FORM, Form::Lagrangian) || element == Element::mixed(element.nodes());
+        assert!(newton == 0 || !has_form, "{element}");
+        let (one_by_one, _) = run(model, element, Solve::Newton, start);
+        let scale = one_by_one.iter().fold(1.0_f64, |s, x| s.max(x.abs()));
+        for (x, y) in together.iter().zip(&one_by_one) {
+            // Rounding of thirty steps, and what either iteration leaves.
+            assert!((x - y).abs() < 2e-13 * scale, "{element}: {x} {y}");
+        }
+    }
+}
+
+#[test]
+fn second_order() {
+    let pendulum = Pendulum {
+        m: 1.3,
+        l: 0.7,
+        g: 9.81,
+    };
+    compare(&pendulum, pendulum.state([1.5], [0.3]));
+    let coupled = Coupled { c: 0.3 };
+    compare(&coupled, coupled.state([0.7, -0.4], [0.1, 0.5]));
+    let start = State {
+        q: [0.9, 0.1],
+        p: [0.1, 3.0],
+    };
+    compare(&Drag { c: 0.1 }, start);
+}
+
+#[test]
+fn velocities_as_unknowns() {
+    let duffing = Duffing { f: 0.4, c: 0.2 };
+    compare(&duffing, duffing.state([1.0], [0.0]));
+    let double = Double { g: 9.81 };
+    compare(&double, double.state([0.5, -0.3], [0.2, 0.0]));
+    let charge = Charge { b: 0.7 };
+    compare(&charge, charge.state([0.5, -0.3], [0.2, 0.6]));
+    let shifted = Shifted {};
+    compare(&shifted, shifted.state([0.5], [0.2]));
+}
+
+#[test]
+fn phase_space() {
+    let start = State {
+        q: [1.0, 0.0],
+        p: [0.2, 0.5],
+    };
+    compare(&Spherical {}, start);
+}
+
+/// What a run does must not depend on whether somebody looks inside its elements.
+#[test]
+fn the_inside_of_elements_costs_no_digit() {
+    let double = Double { g: 9.81 };
+    let start = double.state([0.5, -0.3], [0.2, 0.0]);
+    let control = Control::default();
+    let mut watched = Stepper::new(&double, Mixed::<6>.into(), control).expect("an element");
+    let mut alone = watched.clone().ends_only();
+    let (mut seen, mut unseen) = (start, start);
+    for step in 0..100 {
+        let t = 0.05 * f64::from(step);
+        watched.advance(t, 0.05, &mut seen, &[]).expect("smooth");
+        alone.advance(t, 0.05, &mut unseen, &[]).expect("smooth");
+        let _ = watched.dense(t, t + 0.05);
+    }
+    assert_eq!(seen, unseen);
+    // Afterwards the inside is still to be had.
+    let (one, other) = (watched.dense(4.95, 5.0), alone.dense(4.95, 5.0));
+    let (one, other) = (one.at_time(4.97), other.at_time(4.97));
+    for a in 0..2 {
+        assert!((one.q[a] - other.q[a]).abs() < 1e-13);
+        assert!((one.p[a] - other.p[a]).abs() < 1e-12);
+    }
+}
+
+/// Stiff steps go to Newton's method and come back, with the inside of elements and without.
+#[test]
+fn stiff_steps_are_left_to_newton() {
+    /// A stiff spring that acts only far out.
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k*exp(8*(x - 1)) - x^2/2)]
+    struct Wall {
+        k: f64,
+    }
+    let wall = Wall { k: 0.01 };
+    for ends_only in [false, true] {
+        let control = Control::default();
+        let mut stepper = Stepper::new(&wall, Mixed::<3>.into(), control).expect("an element");
+        if ends_only {
+            stepper = stepper.ends_only();
+        }
+        let mut state = wall.state([0.0], [8.0]);
+        for step in 0..400 {
+            let t = 0.05 * f64::from(step);
+            stepper.advance(t, 0.05, &mut state, &[]).expect("a step");
+        }
+        let statistics = stepper.statistics();
+        assert!(statistics.fallbacks > 0, "{statistics}");
+        assert!(statistics.fixed_point_iterations > 400, "{statistics}");
+        assert!(statistics.newton_iterations > 0, "{statistics}");
+        assert_eq!(statistics.steps, 400);
+        assert_eq!(statistics.choice(), tfe::runtime::Choice::Both);
+        let reason = statistics.reason().to_string();
+        assert!(reason.contains("given up"), "{reason}");
+    }
+}
+
+#[test]
+fn what_is_no_number_is_told() {
+    let pendulum = Pendulum {
+        m: 1.0,
+        l: 1.0,
+        g: f64::NAN,
+    };
+    for solve in [Solve::Auto, Solve::FixedPoint] {
+        let control = Control {
+            solve,
+            ..Control::default()
+        };
+        let mut stepper = Stepper::new(&pendulum, Mixed::<6>.into(), control).expect("an element");
+        let start = State { q: [1.0], p: [0.0] };
+        let mut state = start;
+        let error = stepper.advance(0.0, 0.1, &mut state, &[]);
+        assert!(
+            matches!(error, Err(tfe::runtime::StepError::NonFinite)),
+            "{error:?}"
+        );
+        assert_eq!(state, start);
+    }
+}

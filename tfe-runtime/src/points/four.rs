@@ -1,0 +1,205 @@
+//! Four points side by side.
+
+use crate::double_double::DoubleDouble;
+use crate::model::{First, Model};
+use crate::real::{Lanes, Real};
+
+/// Four numbers, one for each of four points.
+pub(super) trait Four: Real {
+    /// The same kind of numbers with these values.
+    fn with(self, lanes: [f64; 4]) -> Self;
+
+    /// The values.
+    fn lanes(self) -> [f64; 4];
+
+    /// The product and what rounding takes from it, exactly.
+    fn product(self, other: Self) -> (Self, Self);
+
+    /// The sum and what rounding takes from it, exactly.
+    #[inline(always)]
+    fn exact_sum(self, other: Self) -> (Self, Self) {
+        let high = self + other;
+        let part = high - self;
+        (high, (self - (high - part)) + (other - part))
+    }
+
+    /// The kernel of first derivatives at four points.
+    fn first<M, const N: usize>(
+        model: &M,
+        t: Self,
+        q: &[Self; N],
+        z: &[Self; N],
+        first: &mut First<Self, N>,
+    ) where
+        M: Model<N>;
+
+    /// The kernel of first derivatives and ∂²/∂z∂z at four points.
+    fn first_and_mass<M, const N: usize>(
+        model: &M,
+        t: Self,
+        q: &[Self; N],
+        z: &[Self; N],
+        first: &mut First<Self, N>,
+        mass: &mut [[Self; N]; N],
+    ) where
+        M: Model<N>;
+}
+
+/// On every processor: the arithmetic in vectors as the compiler likes, the kernel for one point after the other.
+impl Four for Lanes<4> {
+    #[inline(always)]
+    fn with(self, lanes: [f64; 4]) -> Self {
+        Self(lanes)
+    }
+
+    #[inline(always)]
+    fn lanes(self) -> [f64; 4] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        let (mut high, mut low) = (self, self);
+        for lane in 0..4 {
+            let product = DoubleDouble::product(self.0[lane], other.0[lane]);
+            (high.0[lane], low.0[lane]) = (product.high, product.low);
+        }
+        (high, low)
+    }
+
+    #[inline(always)]
+    fn first<M, const N: usize>(
+        model: &M,
+        t: Self,
+        q: &[Self; N],
+        z: &[Self; N],
+        first: &mut First<Self, N>,
+    ) where
+        M: Model<N>,
+    {
+        // A lane of its own has the sines of all lanes; a plain number has those of the system, which differ in the last digit.
+        if M::LANES {
+            each_point::<Lanes<1>, M, N>(model, t, q, z, first, None);
+        } else {
+            each_point::<f64, M, N>(model, t, q, z, first, None);
+        }
+    }
+
+    #[inline(always)]
+    fn first_and_mass<M, const N: usize>(
+        model: &M,
+        t: Self,
+        q: &[Self; N],
+        z: &[Self; N],
+        first: &mut First<Self, N>,
+        mass: &mut [[Self; N]; N],
+    ) where
+        M: Model<N>,
+    {
+        if M::LANES {
+            each_point::<Lanes<1>, M, N>(model, t, q, z, first, Some(mass));
+        } else {
+            each_point::<f64, M, N>(model, t, q, z, first, Some(mass));
+        }
+    }
+}
+
+/// One number.
+trait One: Real {
+    fn value(self) -> f64;
+}
+
+impl One for f64 {
+    fn value(self) -> f64 {
+        self
+    }
+}
+
+impl One for Lanes<1> {
+    fn value(self) -> f64 {
+        self.0[0]
+    }
+}
+
+/// The kernel for one point after the other.
+fn each_point<R: One, M, const N: usize>(
+    model: &M,
+    t: Lanes<4>,
+    q: &[Lanes<4>; N],
+    z: &[Lanes<4>; N],
+    first: &mut First<Lanes<4>, N>,
+    mut mass: Option<&mut [[Lanes<4>; N]; N]>,
+) where
+    M: Model<N>,
+{
+    let (mut one, mut mass_of_one) = (First::<R, N>::zero(), [[R::from_f64(0.0); N]; N]);
+    for lane in 0..4 {
+        let t = R::from_f64(t.0[lane]);
+        let (mut q_of_one, mut z_of_one) = ([t; N], [t; N]);
+        for a in 0..N {
+            q_of_one[a] = R::from_f64(q[a].0[lane]);
+            z_of_one[a] = R::from_f64(z[a].0[lane]);
+        }
+        if let Some(mass) = &mut mass {
+            model.first_and_mass(t, &q_of_one, &z_of_one, &mut one, &mut mass_of_one);
+            for a in 0..N {
+                for b in 0..N {
+                    mass[a][b].0[lane] = mass_of_one[a][b].value();
+                }
+            }
+        } else {
+            model.first(t, &q_of_one, &z_of_one, &mut one);
+        }
+        for a in 0..N {
+            first.z[a].0[lane] = one.z[a].value();
+            first.q[a].0[lane] = one.q[a].value();
+            first.force[a].0[lane] = one.force[a].value();
+        }
+    }
+}
+
+/// In registers of the processor, the kernel for all four points at once.
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl Four for crate::quad::Quad {
+    #[inline(always)]
+    fn with(self, lanes: [f64; 4]) -> Self {
+        self.with(lanes)
+    }
+
+    #[inline(always)]
+    fn lanes(self) -> [f64; 4] {
+        self.lanes()
+    }
+
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        self.product(other)
+    }
+
+    #[inline(always)]
+    fn first<M, const N: usize>(
+        model: &M,
+        t: Self,
+        q: &[Self; N],
+        z: &[Self; N],
+        first: &mut First<Self, N>,
+    ) where
+        M: Model<N>,
+    {
+        model.first_inline(t, q, z, first);
+    }
+
+    #[inline(always)]
+    fn first_and_mass<M, const N: usize>(
+        model: &M,
+        t: Self,
+        q: &[Self; N],
+        z: &[Self; N],
+        first: &mut First<Self, N>,
+        mass: &mut [[Self; N]; N],
+    ) where
+        M: Model<N>,
+    {
+        model.first_and_mass_inline(t, q, z, first, mass);
+    }
+}
