@@ -6,16 +6,21 @@ mod grid;
 mod measure;
 mod measurements;
 mod output;
+mod peer;
 mod point;
 mod reference;
+mod rounds;
 
 use grid::Grid;
-use measure::Measure;
+use measure::{Measure, Way};
+use peer::Rival;
 use reference::Source;
+use rounds::Timed;
+use std::error::Error;
 use std::fmt;
 use std::io::Write;
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Model, Solve, State};
 
@@ -24,6 +29,7 @@ use crate::simulation::Simulation;
 pub use error::{SaveError, WorkPrecisionError};
 pub use fit::Slope;
 pub use measurements::{Curve, Measurements};
+pub use peer::{Peer, PeerMeasured, PeerPoint, PeerRun};
 pub use point::{Cost, Measured, Point};
 pub use reference::Reference;
 
@@ -76,6 +82,8 @@ pub struct WorkPrecision<'m, M, const N: usize> {
     solvers: Vec<Solve>,
     steps: Vec<f64>,
     control: Control,
+    tolerances: Vec<f64>,
+    rivals: Vec<Rival<'m, N>>,
     source: Source<'m, N>,
     uncertainty: Option<f64>,
     repeat_for: Duration,
@@ -95,6 +103,8 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
             solvers: Vec::new(),
             steps: Vec::new(),
             control: Control::default(),
+            tolerances: Vec::new(),
+            rivals: Vec::new(),
             source: Source::Computed,
             uncertainty: None,
             repeat_for: Duration::from_millis(20),
@@ -135,6 +145,63 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;
+        self
+    }
+
+    /// Several tolerances instead of one: each point takes the loosest that leaves its error within a quarter of that with the tightest, and
+    /// [names it](Point::tolerance). To iterate to round-off for an error of 1e-4 would waste time.
+    #[must_use]
+    pub fn tolerances(mut self, tolerances: impl IntoIterator<Item = f64>) -> Self {
+        self.tolerances.extend(tolerances);
+        self
+    }
+
+    /// Adds a curve of another integrator, by the same clock and against the same reference: `run` is called with each setting (a tolerance,
+    /// a step), in turn with the elements and as often, and says where it ended and how long its steps took.
+    ///
+    /// ```
+    /// use std::time::Instant;
+    /// use tfe::prelude::*;
+    /// use tfe::work_precision::PeerRun;
+    ///
+    /// #[dynamics(coordinates(x), momenta(p), hamiltonian = p^2/2 + x^2/2)]
+    /// struct Oscillator;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let start = State { q: [1.0], p: [0.0] };
+    /// let measured = WorkPrecision::new(&Oscillator, start, 0.0..10.0)
+    ///     .element(Mixed::<3>)
+    ///     .steps([0.1, 0.05])
+    ///     .peer("leapfrog", [0.1, 0.01, 0.001], |step| {
+    ///         let (clock, mut end, steps) = (Instant::now(), start, (10.0 / step).round() as u64);
+    ///         for _ in 0..steps {
+    ///             end.p[0] -= step / 2.0 * end.q[0];
+    ///             end.q[0] += step * end.p[0];
+    ///             end.p[0] -= step / 2.0 * end.q[0];
+    ///         }
+    ///         Ok(PeerRun { end, time: clock.elapsed(), evaluations: steps })
+    ///     })
+    ///     .run()?;
+    /// let (peer, point) = measured.fastest_peer(1e-4).ok_or("leapfrog reaches 1e-4")?;
+    /// assert_eq!((peer.name(), point.setting), ("leapfrog", 0.01));
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn peer<F>(
+        mut self,
+        name: impl Into<String>,
+        settings: impl IntoIterator<Item = f64>,
+        run: F,
+    ) -> Self
+    where
+        F: Fn(f64) -> Result<PeerRun<N>, Box<dyn Error>> + 'm,
+    {
+        self.rivals.push(Rival {
+            name: name.into(),
+            settings: settings.into_iter().collect(),
+            run: Box::new(run),
+        });
         self
     }
 
@@ -188,14 +255,14 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
         self
     }
 
-    /// Says on standard error which curves are done.
+    /// Says on standard error how far it is, and how many runs of each curve were done.
     #[must_use]
     pub fn progress(mut self) -> Self {
         self.progress = true;
         self
     }
 
-    /// Makes all runs, one after the other so that none disturbs the time of another.
+    /// Makes all runs, one after the other so that none disturbs the time of another, and repeats them in turn.
     ///
     /// A run that fails is kept as a point without figures, with its error ([`Point::outcome`]); the others are made all the same.
     ///
@@ -216,7 +283,6 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
             model: self.model,
             start: self.start,
             reference: &reference,
-            repeat_for: self.repeat_for,
         };
         let solvers = match self.solvers.as_slice() {
             [] => &[Solve::Auto],
@@ -225,31 +291,48 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
         let mut curves = Vec::new();
         for &element in &self.elements {
             for &solve in solvers {
-                let clock = Instant::now();
                 let control = Control {
                     solve,
                     ..self.control
                 };
-                let point = |grid: &Grid| Point {
-                    element,
-                    solve,
-                    step: grid.step(),
-                    outcome: measure.run(element, control, grid),
+                let look = |grid| {
+                    let way = Way {
+                        element,
+                        control,
+                        grid,
+                    };
+                    Timed::look(&measure, way, &self.tolerances)
                 };
-                let curve = Curve::new(grids.iter().map(point).collect(), reference.uncertainty());
-                self.report(format_args!(
-                    "{element} ({solve:?}): {} of {} runs done in {:.2} s",
-                    curve.measured().count(),
-                    curve.points().len(),
-                    clock.elapsed().as_secs_f64()
-                ));
-                curves.push(curve);
+                curves.push(grids.iter().map(look).collect::<Vec<_>>());
             }
+        }
+        self.report(format_args!("{} curves …", curves.len()));
+        let mut peers = rounds::look_at_peers(&self.rivals, &reference, self.span.end);
+        rounds::repeat(
+            &measure,
+            &mut curves,
+            (&self.rivals, &mut peers),
+            self.repeat_for,
+        );
+        let curve = |timed: Vec<Timed<'_>>| {
+            let points = timed.into_iter().map(|one| one.point).collect();
+            Curve::new(points, reference.uncertainty())
+        };
+        let curves: Vec<Curve> = curves.into_iter().map(curve).collect();
+        for curve in &curves {
+            self.report(format_args!(
+                "{} ({:?}): {} of {} runs done",
+                curve.element(),
+                curve.solve(),
+                curve.measured().count(),
+                curve.points().len()
+            ));
         }
         Ok(Measurements {
             title: self.title.clone(),
             constrained: !M::CONSTRAINTS.is_empty(),
             curves,
+            peers,
             reference: reference.into_summary(),
             cost: self.cost,
         })

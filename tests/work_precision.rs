@@ -7,7 +7,7 @@ use std::time::Duration;
 use tfe::RunErrorKind;
 use tfe::prelude::*;
 use tfe::work_precision::{
-    Cost, Curve, Measurements, Point, Reference, SaveError, WorkPrecisionError,
+    Cost, Curve, Measurements, PeerRun, Point, Reference, SaveError, WorkPrecisionError,
 };
 
 /// H = p²/2 − cos q
@@ -427,4 +427,148 @@ fn backwards_and_with_a_shorter_last_step() {
         .map(|point| point.cost(Cost::Steps))
         .collect();
     assert_eq!(steps, [Some(34.0), Some(143.0)]);
+}
+
+/// Leapfrog for the table's pendulum, with a clock that always says the same.
+fn leapfrog(step: f64) -> PeerRun<1> {
+    let (mut end, steps) = (START, (10.0 / step).round() as u64);
+    for _ in 0..steps {
+        end.p[0] -= step / 2.0 * end.q[0].sin();
+        end.q[0] += step * end.p[0];
+        end.p[0] -= step / 2.0 * end.q[0].sin();
+    }
+    PeerRun {
+        end,
+        time: Duration::from_micros(steps),
+        evaluations: steps,
+    }
+}
+
+fn beside_leapfrog() -> Measurements {
+    let model = Pendulum {};
+    let end = end_of_table();
+    pendulum(&model)
+        .element(Mixed::<3>)
+        .steps([0.2, 0.1])
+        .reference_end(end.q, end.p)
+        .peer("leapfrog, by hand", [0.1, 0.01, 0.001], |step| {
+            Ok(leapfrog(step))
+        })
+        .peer("none", [1.0], |_| Err("it \"never\" runs".into()))
+        .run()
+        .unwrap()
+}
+
+#[test]
+fn other_integrators_stand_beside_ours() {
+    let measured = beside_leapfrog();
+    let [peer, none] = measured.peers() else {
+        panic!("{:?}", measured.peers());
+    };
+    assert_eq!((peer.name(), peer.failed()), ("leapfrog, by hand", 0));
+    let errors: Vec<f64> = peer
+        .points()
+        .iter()
+        .map(|point| point.measured().unwrap().error())
+        .collect();
+    // Order two, by tenths of the step; the coarsest is not quite in the limit.
+    for pair in errors.windows(2) {
+        assert!((pair[0] / pair[1] / 100.0 - 1.0).abs() < 0.1, "{errors:?}");
+    }
+    // The error is that of the same formula as ours: against the table, relative to the larger of start and end.
+    let (known, run) = (end_of_table(), leapfrog(0.01));
+    let one = peer.points()[1].measured().unwrap();
+    let expected = (run.end.p[0] - known.p[0]).abs() / known.p[0].abs();
+    assert!((one.error_p - expected).abs() < 1e-14, "{one:?}");
+    assert_eq!((one.evaluations, one.seconds), (1000, 1e-3));
+    assert_eq!(none.failed(), 1);
+    assert!(none.points()[0].outcome.is_err());
+    // At equal or better error the cheapest, and none below what it reaches.
+    let (found, point) = measured.fastest_peer(errors[1]).unwrap();
+    assert_eq!((found.name(), point.setting), (peer.name(), 0.01));
+    assert!(measured.fastest_peer(errors[2] / 2.0).is_none());
+    let front = measured.front_of_peers();
+    assert_eq!(front.len(), 3);
+    assert!(
+        front
+            .windows(2)
+            .all(|pair| pair[0].0 < pair[1].0 && pair[0].1 > pair[1].1)
+    );
+    // Ours are what they would be alone.
+    assert!(
+        measured
+            .front()
+            .iter()
+            .all(|point| point.element == Element::mixed(3))
+    );
+    assert!(measured.clone().without_peers().peers().is_empty());
+    // Nothing counts a peer's iterations.
+    assert!(
+        measured
+            .against(Cost::Iterations)
+            .fastest_peer(1.0)
+            .is_none()
+    );
+}
+
+#[test]
+fn other_integrators_are_repeated_as_ours_are() {
+    let model = Pendulum {};
+    let measured = pendulum(&model)
+        .element(Mixed::<3>)
+        .steps([0.5])
+        .repeat_for(Duration::from_millis(1))
+        .peer("leapfrog", [0.1], |step| Ok(leapfrog(step)))
+        .run()
+        .unwrap();
+    let one = *measured.peers()[0].points()[0].measured().unwrap();
+    // A millisecond of runs that say they took a tenth of it.
+    assert_eq!((one.repetitions, one.seconds), (10, 1e-4));
+}
+
+#[test]
+fn other_integrators_are_in_the_files() {
+    let measured = beside_leapfrog();
+    let csv = measured.to_csv();
+    let header: Vec<_> = csv.lines().next().unwrap().split(',').collect();
+    // The name has a comma, and is quoted.
+    let line = csv.lines().find(|line| line.contains(",0.01,")).unwrap();
+    let rest = line.strip_prefix("\"leapfrog, by hand\",").unwrap();
+    let fields: Vec<_> = rest.split(',').collect();
+    assert_eq!(fields.len() + 1, header.len());
+    let column = |name: &str| header.iter().position(|one| *one == name).unwrap() - 1;
+    assert_eq!(fields[column("solver")], "peer");
+    assert_eq!(fields[column("seconds")].parse(), Ok(1e-3));
+    assert!(csv.contains("\"it \"\"never\"\" runs\""));
+    #[cfg(feature = "charts")]
+    {
+        let svg = measured.chart().to_svg().unwrap();
+        assert!(svg.contains("leapfrog, by hand") && !svg.contains("none, 1 failed"));
+    }
+}
+
+#[test]
+fn the_loosest_tolerance_that_does_not_show() {
+    let model = Pendulum {};
+    let end = end_of_table();
+    let tightest = 1e-15;
+    let with = |tolerances: &[f64]| {
+        let problem = pendulum(&model).element(Mixed::<3>).element(Mixed::<6>);
+        let problem = problem.steps([0.5, 0.1]).reference_end(end.q, end.p);
+        let problem = problem.tolerances(tolerances.iter().copied());
+        problem.run().unwrap()
+    };
+    let (swept, tight) = (with(&[1e-8, 1e-3, tightest]), with(&[tightest]));
+    let mut looser = 0;
+    for (point, other) in swept.points().zip(tight.points()) {
+        assert_eq!(other.tolerance, tightest);
+        let (one, other) = (point.measured().unwrap(), other.measured().unwrap());
+        let least = other.error().max(swept.reference().uncertainty());
+        assert!(one.error() <= 1.25 * least, "{point:?}");
+        assert!(one.statistics.iterations <= other.statistics.iterations);
+        looser += u32::from(point.tolerance > tightest);
+    }
+    // Errors of 1e-3 and 1e-6 do not need an iteration to round-off; one of 1e-13 does.
+    assert!(looser >= 2, "{swept:?}");
+    assert_eq!(swept.points().last().unwrap().tolerance, tightest);
 }

@@ -5,35 +5,51 @@
 //! cargo run --release --example speed_accuracy -- folder
 //! ```
 //!
-//! Every family with 2 to 6 and 8 nodes runs each scene with several steps; errors are those at the end, against values that are known to
+//! Every family with 2 to 5, 7 and 9 nodes runs each scene with several steps; errors are those at the end, against values that are known to
 //! more digits where there are any, else against a finer run that is checked against another. Each module holds the scenes of one kind.
 
-mod lattice;
-mod oscillators;
-mod planets;
+mod overview;
 mod runs;
-mod stiff;
+mod scenes;
+mod table;
 
-use runs::{HEADER, Scene};
+use runs::Scene;
+use scenes::lattice::lattice;
+use scenes::oscillators::{double_pendulum, henon_heiles, pendulum, van_der_pol};
+use scenes::planets::{kepler, solar_system};
+use scenes::stiff::elastic_pendulum;
 use std::error::Error;
 use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
+use table::HEADER;
 use tfe::charts::{Page, Section};
+use tfe::work_precision::WorkPrecisionError;
 
-type Outcome = Result<Scene, Box<dyn Error>>;
-type Run = fn() -> Outcome;
+type Run = fn() -> Result<Scene, WorkPrecisionError>;
 
 /// One after the other, because they measure time.
 const SCENES: [(&str, Run); 8] = [
-    ("pendulum", oscillators::pendulum),
-    ("kepler", planets::kepler),
-    ("henon_heiles", oscillators::henon_heiles),
-    ("double_pendulum", oscillators::double_pendulum),
-    ("solar_system", planets::solar_system),
-    ("lattice", lattice::scene),
-    ("van_der_pol", oscillators::van_der_pol),
-    ("elastic_pendulum", stiff::scene),
+    ("pendulum", || Scene::measure("Pendulum", pendulum())),
+    ("kepler", || Scene::measure("Kepler, e = 0.6", kepler())),
+    ("henon_heiles", || {
+        Scene::measure("Hénon–Heiles", henon_heiles())
+    }),
+    ("double_pendulum", || {
+        Scene::measure("Double pendulum", double_pendulum())
+    }),
+    ("solar_system", || {
+        Scene::measure("Outer solar system", solar_system())
+    }),
+    ("lattice", || {
+        Scene::measure("FPUT lattice, N = 32", lattice())
+    }),
+    ("van_der_pol", || {
+        Scene::measure("Van der Pol", van_der_pol())
+    }),
+    ("elastic_pendulum", || {
+        Scene::measure("Elastic pendulum, k = 10⁶", elastic_pendulum())
+    }),
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -41,22 +57,26 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = folder.map_or_else(|| PathBuf::from("target/speed_accuracy"), PathBuf::from);
     fs::create_dir_all(&folder)?;
     let clock = Instant::now();
-    let (mut rows, mut sections) = (Vec::new(), Vec::new());
-    println!("{}", runs::line(HEADER));
+    let (mut rows, mut sections, mut scenes) = (Vec::new(), Vec::new(), Vec::new());
+    println!("{}", table::line(HEADER));
     for (name, scene) in SCENES {
         let scene = scene().map_err(|error| format!("{name}: {error}"))?;
-        for row in scene.rows() {
-            println!("{}", runs::line(row.each_ref().map(String::as_str)));
+        for row in table::rows(&scene) {
+            println!("{}", table::line(row.each_ref().map(String::as_str)));
             rows.push(row);
         }
         sections.extend(scene.save(&folder, name)?);
+        scenes.push(scene);
     }
+    let overview = overview::overview(&scenes);
+    fs::write(folder.join("overview.svg"), &overview)?;
     let summary = Section::new("The fastest elements")
         .paragraph(
             "The least time in which any element with any of the steps reaches an error at the end of the run, relative to the \
              largest state, the larger one of coordinates and momenta; the time is of the steps alone, on one processor. “—” where \
              none does, or where the reference is not known that well.",
         )
+        .figure(overview, "All scenes")
         .table(HEADER, rows);
     let page = Page::new("Speed and accuracy of finite elements in time").section(summary);
     let path = folder.join("speed_accuracy.html");

@@ -1,29 +1,20 @@
-//! What all scenes share: the elements, the charts, the table.
+//! What all scenes share: the elements, the errors to be reached, the charts.
 
 use std::error::Error;
 use std::path::Path;
 use std::time::Duration;
 use tfe::charts::Section;
 use tfe::prelude::*;
-use tfe::work_precision::{Measurements, WorkPrecisionError};
+use tfe::work_precision::{Curve, Measurements, WorkPrecisionError};
 
-/// The columns of the table.
-pub const HEADER: [&str; 6] = [
-    "scene",
-    "error",
-    "time",
-    "fastest element",
-    "step",
-    "energy",
-];
 /// The errors to be reached.
-const TARGETS: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
-const NODES: [usize; 6] = [2, 3, 4, 5, 6, 8];
+pub const TARGETS: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
+const NODES: [usize; 6] = [2, 3, 4, 5, 7, 9];
 
 /// A scene that was measured.
 pub struct Scene {
-    title: &'static str,
-    measured: Measurements,
+    pub title: &'static str,
+    pub measured: Measurements,
 }
 
 impl Scene {
@@ -32,55 +23,44 @@ impl Scene {
         title: &'static str,
         problem: WorkPrecision<'_, M, N>,
     ) -> Result<Self, WorkPrecisionError> {
-        let problem = problem.elements(elements());
-        let measured = problem.repeat_for(Duration::from_millis(25)).run()?;
+        let measured = problem
+            .elements(elements())
+            .tolerances([1e-5, 1e-8, 1e-11, 0.05 * f64::EPSILON])
+            .repeat_for(Duration::from_millis(20))
+            .run()?;
         Ok(Self { title, measured })
     }
 
-    /// The fastest run for every target.
-    pub fn rows(&self) -> [[String; 6]; 4] {
-        TARGETS.map(|target| {
-            let title = self.title.to_owned();
-            let found = self.measured.fastest(target);
-            let found = found.and_then(|point| Some((point, point.measured()?)));
-            match found {
-                None => {
-                    let none = || "—".to_owned();
-                    [
-                        title,
-                        format!("{target:.0e}"),
-                        none(),
-                        none(),
-                        none(),
-                        none(),
-                    ]
-                }
-                Some((point, one)) => [
-                    title,
-                    format!("{target:.0e}"),
-                    format!("{:.3} ms", 1e3 * one.seconds),
-                    point.element.to_string(),
-                    point.step.to_string(),
-                    format!("{:.1e}", one.energy_error),
-                ],
-            }
-        })
-    }
-
-    /// Writes all figures and two charts into the folder; the sections of the page hold the same charts.
-    pub fn save(&self, folder: &Path, name: &str) -> Result<[Section; 2], Box<dyn Error>> {
+    /// Writes all figures and the charts into the folder; the sections of the page hold the same charts.
+    pub fn save(&self, folder: &Path, name: &str) -> Result<Vec<Section>, Box<dyn Error>> {
         let of = |what: &str| format!("{}: {what}", self.title);
-        let mixed = |curve: &tfe::work_precision::Curve| {
-            let element = curve.element();
-            element == Element::mixed(element.nodes())
-        };
-        let by_nodes = self.measured.only(mixed).title(of("mixed, 2 to 8 nodes"));
-        let by_family = self.measured.only(|curve| curve.element().nodes() == 4);
-        let by_family = by_family.title(of("all families, 4 nodes"));
+        let mixed = |curve: &Curve| curve.element() == Element::mixed(curve.element().nodes());
+        let ours = self.measured.clone().without_peers();
+        let mut charts = vec![
+            ("nodes", ours.only(mixed).title(of("mixed, 2 to 9 nodes"))),
+            (
+                "families",
+                ours.only(|curve| curve.element().nodes() == 4)
+                    .title(of("all families, 4 nodes")),
+            ),
+        ];
+        if !self.measured.peers().is_empty() {
+            let fastest = TARGETS.map(|target| Some(self.measured.fastest(target)?.element));
+            let beside = self
+                .measured
+                .only(|curve| fastest.contains(&Some(curve.element())));
+            charts.insert(
+                0,
+                ("peers", beside.title(of("our fastest beside other crates"))),
+            );
+        }
         self.measured.save(folder.join(format!("{name}.csv")))?;
-        by_nodes.save(folder.join(format!("{name}_nodes.svg")))?;
-        by_family.save(folder.join(format!("{name}_families.svg")))?;
-        Ok([by_nodes.section()?, by_family.section()?])
+        let mut sections = Vec::new();
+        for (what, chart) in charts {
+            chart.save(folder.join(format!("{name}_{what}.svg")))?;
+            sections.push(chart.section()?);
+        }
+        Ok(sections)
     }
 }
 
@@ -98,10 +78,4 @@ fn elements() -> Vec<Element> {
         ]
     };
     NODES.into_iter().flat_map(of).collect()
-}
-
-/// A line of the printed table.
-pub fn line(row: [&str; 6]) -> String {
-    let [scene, error, time, element, step, energy] = row;
-    format!("{scene:<26} {error:>6} {time:>12}   {element:<26} {step:>8} {energy:>9}")
 }

@@ -12,49 +12,86 @@ use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::{Element, Model, State, legendre};
 
 /// The most repetitions of a run: the best of a hundred is not much above the best of a thousand.
-const MOST_REPETITIONS: u32 = 100;
+pub(super) const MOST_REPETITIONS: u32 = 100;
 
 /// What all runs have in common.
 pub(super) struct Measure<'a, M, const N: usize> {
     pub(super) model: &'a M,
     pub(super) start: State<N>,
     pub(super) reference: &'a Known<N>,
-    pub(super) repeat_for: Duration,
+}
+
+/// One way to cross the span.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way<'g> {
+    pub(super) element: Element,
+    pub(super) control: Control,
+    pub(super) grid: &'g Grid,
 }
 
 impl<M: Model<N>, const N: usize> Measure<'_, M, N> {
-    /// Makes the run, with the clock stopped while it is looked at, then again without looking.
-    pub(super) fn run(
-        &self,
-        element: Element,
-        control: Control,
-        grid: &Grid,
-    ) -> Result<Measured, RunErrorKind> {
-        let stepper = || Stepper::new(self.model, element, control).map_err(RunErrorKind::Element);
-        let mut first = stepper()?;
+    fn stepper(&self, way: Way<'_>) -> Result<Stepper<'_, M, N>, RunErrorKind> {
+        Stepper::new(self.model, way.element, way.control).map_err(RunErrorKind::Element)
+    }
+
+    /// Makes the run, with the clock stopped while it is looked at.
+    pub(super) fn look(&self, way: Way<'_>) -> Result<Measured, RunErrorKind> {
+        let (grid, mut stepper) = (way.grid, self.stepper(way)?);
         let mut observer = Observer::new(self, grid.node(0));
-        let (mut state, mut from, mut best) = (self.start, 0, Duration::ZERO);
+        let (mut state, mut from, mut time) = (self.start, 0, Duration::ZERO);
         for look in grid.looks() {
-            best += advance(&mut first, grid, from..look.node, &mut state)?;
+            time += advance(&mut stepper, grid, from..look.node, &mut state)?;
             from = look.node;
             observer.look(grid.node(look.node), &state, look.compare);
         }
-        let (mut total, mut repetitions) = (best, 1);
-        while total < self.repeat_for && repetitions < MOST_REPETITIONS {
-            let mut state = self.start;
-            let time = advance(&mut stepper()?, grid, 0..grid.steps(), &mut state)?;
-            total += time;
-            best = best.min(time);
-            repetitions += 1;
-        }
         let mut measured = observer.measured;
-        measured.seconds = best.as_secs_f64();
-        measured.repetitions = repetitions;
-        measured.statistics = *first.statistics();
+        measured.seconds = time.as_secs_f64();
+        measured.repetitions = 1;
+        measured.statistics = *stepper.statistics();
         measured.at_reference_floor = measured.error() <= self.reference.uncertainty();
         Ok(measured)
     }
+
+    /// Makes the run without looking.
+    pub(super) fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind> {
+        let (grid, mut state) = (way.grid, self.start);
+        advance(&mut self.stepper(way)?, grid, 0..grid.steps(), &mut state)
+    }
+
+    /// Makes the run with each tolerance, the tightest first, and keeps the loosest that does not show in the error.
+    pub(super) fn look_with(
+        &self,
+        way: Way<'_>,
+        tolerances: &[f64],
+    ) -> (f64, Result<Measured, RunErrorKind>) {
+        let with = |tolerance| {
+            let control = Control {
+                tolerance,
+                ..way.control
+            };
+            (tolerance, self.look(Way { control, ..way }))
+        };
+        let mut sorted = tolerances.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let Some((tightest, looser)) = sorted.split_first() else {
+            return with(way.control.tolerance);
+        };
+        let best = with(*tightest);
+        let Ok(limit) = best.1.as_ref().map(|one| {
+            let error = one.error().max(self.reference.uncertainty());
+            SHOWS * error
+        }) else {
+            return best;
+        };
+        let found = looser.iter().rev().map(|tolerance| with(*tolerance));
+        let mut found =
+            found.filter(|(_, outcome)| outcome.as_ref().is_ok_and(|one| one.error() <= limit));
+        found.next().unwrap_or(best)
+    }
 }
+
+/// By what factor the error may be larger than with the tightest tolerance.
+const SHOWS: f64 = 1.25;
 
 /// Moves `state` over some elements of the grid, and says how long that took.
 pub(super) fn advance<M: Model<N>, const N: usize>(

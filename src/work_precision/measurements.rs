@@ -1,6 +1,7 @@
 //! All runs of a comparison.
 
 use super::fit::{self, Slope};
+use super::peer::{Peer, PeerPoint};
 use super::point::{Cost, Measured, Point};
 use super::reference::Reference;
 use tfe_runtime::{Element, Solve};
@@ -97,6 +98,7 @@ pub struct Measurements {
     pub(super) title: String,
     pub(super) constrained: bool,
     pub(super) curves: Vec<Curve>,
+    pub(super) peers: Vec<Peer>,
     pub(super) reference: Reference,
     pub(super) cost: Cost,
 }
@@ -115,6 +117,11 @@ impl Measurements {
     /// The runs that failed.
     pub fn failures(&self) -> impl Iterator<Item = &Point> {
         self.points().filter(|point| point.outcome.is_err())
+    }
+
+    /// The curves of other integrators, in the order in which they were asked for.
+    pub fn peers(&self) -> &[Peer] {
+        &self.peers
     }
 
     /// What errors were measured against.
@@ -136,18 +143,26 @@ impl Measurements {
         self
     }
 
-    /// Some of the curves, for a chart of their own.
+    /// Some of the curves, for a chart of their own; those of other integrators stay.
     #[must_use]
     pub fn only(&self, wanted: impl Fn(&Curve) -> bool) -> Self {
         let curves = self.curves.iter().filter(|curve| wanted(curve));
         Self {
             curves: curves.cloned().collect(),
+            peers: self.peers.clone(),
             title: self.title.clone(),
             ..*self
         }
     }
 
-    /// The Pareto front: the runs for which no other has both a smaller error and a smaller cost, the cheapest first.
+    /// The same without the other integrators.
+    #[must_use]
+    pub fn without_peers(mut self) -> Self {
+        self.peers.clear();
+        self
+    }
+
+    /// The Pareto front of our runs: those for which no other has both a smaller error and a smaller cost, the cheapest first.
     ///
     /// An error below the uncertainty of the reference counts as that uncertainty.
     pub fn front(&self) -> Vec<&Point> {
@@ -156,15 +171,8 @@ impl Measurements {
             let (cost, error) = self.place(point)?;
             (cost.is_finite() && error.is_finite()).then_some((cost, error, point))
         };
-        let mut all: Vec<(f64, f64, &Point)> = self.points().filter_map(known).collect();
-        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let mut least = f64::INFINITY;
-        all.retain(|(_, error, _)| {
-            let is_better = *error < least;
-            least = least.min(*error);
-            is_better
-        });
-        all.into_iter().map(|(_, _, point)| point).collect()
+        let all = self.points().filter_map(known).collect();
+        pareto(all).into_iter().map(|(_, _, point)| point).collect()
     }
 
     /// The cheapest run with an error of at most `error`. Below the uncertainty of the reference there is none: no run can be told to
@@ -172,6 +180,37 @@ impl Measurements {
     pub fn fastest(&self, error: f64) -> Option<&Point> {
         let uncertainty = self.reference.uncertainty();
         cheapest(self.points(), error, uncertainty, self.cost)
+    }
+
+    /// The Pareto front of the other integrators alone, as (cost, error), the cheapest first.
+    pub fn front_of_peers(&self) -> Vec<(f64, f64)> {
+        let points = self.peers.iter().flat_map(|peer| &peer.points);
+        let places = points.filter_map(|point| {
+            let one = point.measured()?;
+            let (cost, error) = (one.cost(self.cost)?, one.error());
+            (cost.is_finite() && error.is_finite()).then_some((cost, error, ()))
+        });
+        let front = pareto(places.collect());
+        let known = |(cost, error, ()): (f64, f64, ())| (cost, error);
+        front.into_iter().map(known).collect()
+    }
+
+    /// The cheapest run of another integrator with an error of at most `error`, as [`fastest`](Self::fastest) finds ours.
+    pub fn fastest_peer(&self, error: f64) -> Option<(&Peer, &PeerPoint)> {
+        if error < self.reference.uncertainty() {
+            return None;
+        }
+        let points = self.peers.iter().flat_map(|peer| {
+            let points = peer.points.iter();
+            points.map(move |point| (peer, point))
+        });
+        let costs = points.filter_map(|(peer, point)| {
+            let measured = point.measured().filter(|one| one.error() <= error)?;
+            Some((measured.cost(self.cost)?, (peer, point)))
+        });
+        costs
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, found)| found)
     }
 
     /// Cost and error of a point, for the front.
@@ -185,6 +224,18 @@ impl Measurements {
         };
         Some((point.cost(self.cost)?, error))
     }
+}
+
+/// Those of (cost, error, what) that no other beats, the cheapest first.
+fn pareto<T>(mut all: Vec<(f64, f64, T)>) -> Vec<(f64, f64, T)> {
+    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut least = f64::INFINITY;
+    all.retain(|(_, error, _)| {
+        let is_better = *error < least;
+        least = least.min(*error);
+        is_better
+    });
+    all
 }
 
 fn cheapest<'p>(

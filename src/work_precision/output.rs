@@ -2,6 +2,7 @@
 
 use super::error::SaveError;
 use super::measurements::Measurements;
+use super::peer::PeerPoint;
 use super::point::{Measured, Point};
 use std::fs;
 use std::path::Path;
@@ -10,7 +11,7 @@ use std::path::Path;
 mod pictures;
 
 /// The columns of the table.
-const HEADER: &str = "element,nodes,points,order,solver,step,error_q,error_p,max_error_q,max_error_p,energy_error,\
+const HEADER: &str = "element,nodes,points,order,solver,step,tolerance,error_q,error_p,max_error_q,max_error_p,energy_error,\
 constraint_position,constraint_velocity,seconds,repetitions,steps,iterations,fixed_point_iterations,newton_iterations,\
 residual_evaluations,tangent_evaluations,factorizations,at_reference_floor,on_front,failure\n";
 
@@ -50,7 +51,8 @@ impl Measurements {
     }
 
     /// All points as text: a header, then a line for each, those that failed with their error in the last column. Numbers read back
-    /// exactly; what is not finite, or was not measured, is an empty field.
+    /// exactly; what is not finite, or was not measured, is an empty field. Other integrators follow: the name as the element, `peer` as
+    /// the solver, the setting as the step, evaluations as those of the residual.
     pub fn to_csv(&self) -> String {
         let front = self.front();
         let mut text = String::from(HEADER);
@@ -58,8 +60,32 @@ impl Measurements {
             let on_front = front.iter().any(|other| std::ptr::eq(*other, point));
             text += &line(point, on_front);
         }
+        for peer in &self.peers {
+            for point in &peer.points {
+                text += &line_of_peer(peer.name(), point);
+            }
+        }
         text
     }
+}
+
+/// The columns that other integrators have.
+fn line_of_peer(name: &str, point: &PeerPoint) -> String {
+    let value = |column: &str| match (column, &point.outcome) {
+        ("element", _) => quoted(name),
+        ("solver", _) => "peer".to_owned(),
+        ("step", _) => number(point.setting),
+        ("failure", Err(failure)) => quoted(failure),
+        ("error_q", Ok(one)) => number(one.error_q),
+        ("error_p", Ok(one)) => number(one.error_p),
+        ("seconds", Ok(one)) => number(one.seconds),
+        ("repetitions", Ok(one)) => one.repetitions.to_string(),
+        ("residual_evaluations", Ok(one)) if one.evaluations > 0 => one.evaluations.to_string(),
+        ("at_reference_floor", Ok(one)) => one.at_reference_floor.to_string(),
+        _ => String::new(),
+    };
+    let fields: Vec<String> = HEADER.trim_end().split(',').map(value).collect();
+    fields.join(",") + "\n"
 }
 
 fn line(point: &Point, on_front: bool) -> String {
@@ -71,6 +97,7 @@ fn line(point: &Point, on_front: bool) -> String {
         element.order().to_string(),
         format!("{:?}", point.solve),
         number(point.step),
+        number(point.tolerance),
     ];
     match &point.outcome {
         Ok(measured) => {

@@ -39,6 +39,8 @@ pub struct Point {
     pub solve: Solve,
     /// The step, in the units of time, positive.
     pub step: f64,
+    /// The tolerance of its iteration.
+    pub tolerance: f64,
     /// What was measured, or why the run stopped.
     pub outcome: Result<Measured, RunErrorKind>,
 }

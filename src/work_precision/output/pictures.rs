@@ -1,6 +1,7 @@
 //! Charts and sections of pages.
 
 use crate::charts::{Axis, Chart, ChartError, Scale, Section, Style};
+use crate::work_precision::peer::{PeerMeasured, PeerPoint};
 use crate::work_precision::point::Measured;
 use crate::work_precision::{Curve, Measurements, Point};
 
@@ -8,8 +9,9 @@ use crate::work_precision::{Curve, Measurements, Point};
 const LEAST: f64 = 0.5 * f64::EPSILON;
 
 impl Measurements {
-    /// Error at the end (the larger one of coordinates and momenta) against cost, both logarithmic: a line for every curve, the front in
-    /// dashes. Runs that failed are counted in the legend; errors above ten are cut off.
+    /// Error at the end (the larger one of coordinates and momenta) against cost, both logarithmic: a line for every curve, with its power of
+    /// the step, and for every other integrator; our front in dashes; another marker on each point below the uncertainty of the reference.
+    /// Runs that failed are counted in the legend; errors above ten are cut off.
     pub fn chart(&self) -> Chart {
         let logarithmic = |label: &str| Axis::new(label).scale(Scale::Logarithmic);
         let mut chart = Chart::new(&self.title)
@@ -20,6 +22,19 @@ impl Measurements {
             let place = |one: &Measured| (one.cost(self.cost), one.error().max(LEAST));
             let points = curve.measured().map(|(_, one)| place(one));
             chart = chart.series(self.name(curve), Style::LineWithMarkers, points);
+        }
+        for peer in &self.peers {
+            let place = |one: &PeerMeasured| Some((one.cost(self.cost)?, one.error().max(LEAST)));
+            let points = peer.points.iter().filter_map(PeerPoint::measured);
+            let points: Vec<_> = points.filter_map(place).collect();
+            if !points.is_empty() {
+                let name = with_failures(peer.name().to_owned(), peer.failed());
+                chart = chart.series(name, Style::LineWithMarkers, points);
+            }
+        }
+        let unsure = self.below_reference();
+        if !unsure.is_empty() {
+            chart = chart.series("at the floor of the reference", Style::Markers, unsure);
         }
         let front = self.steps_of_front();
         if front.len() > 1 {
@@ -48,7 +63,11 @@ impl Measurements {
     /// The axis of errors. Runs that blew up without failing would press all others into a line.
     fn errors(&self, axis: Axis) -> Axis {
         const LOST: f64 = 10.0;
-        let errors = || self.points().filter_map(Point::error);
+        let errors = || {
+            let peers = self.peers.iter().flat_map(|peer| &peer.points);
+            let peers = peers.filter_map(|point| Some(point.measured()?.error()));
+            self.points().filter_map(Point::error).chain(peers)
+        };
         if !errors().any(|error| error > LOST) {
             return axis;
         }
@@ -128,10 +147,22 @@ impl Measurements {
         if self.curves.iter().any(|other| Some(other.solve()) != first) {
             name += &format!(", {:?}", curve.solve());
         }
-        match curve.failed() {
-            0 => name,
-            failed => format!("{name}, {failed} failed"),
+        if let Some(slope) = curve.slope() {
+            name += &format!(" ~ h^{:.1}", slope.exponent);
         }
+        with_failures(name, curve.failed())
+    }
+
+    /// Where errors are too small to be told.
+    fn below_reference(&self) -> Vec<(f64, f64)> {
+        let ours = self.points().filter_map(Point::measured);
+        let ours = ours.filter(|one| one.at_reference_floor);
+        let ours = ours.map(|one| (one.cost(self.cost), one.error().max(LEAST)));
+        let peers = self.peers.iter().flat_map(|peer| &peer.points);
+        let peers = peers.filter_map(PeerPoint::measured);
+        let peers = peers.filter(|one| one.at_reference_floor);
+        let peers = peers.filter_map(|one| Some((one.cost(self.cost)?, one.error().max(LEAST))));
+        ours.chain(peers).collect()
     }
 
     /// The front as steps: at every cost the least error so far.
@@ -148,5 +179,12 @@ impl Measurements {
             last = Some(error);
         }
         line
+    }
+}
+
+fn with_failures(name: String, failed: usize) -> String {
+    match failed {
+        0 => name,
+        failed => format!("{name}, {failed} failed"),
     }
 }

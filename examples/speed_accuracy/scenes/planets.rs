@@ -1,25 +1,26 @@
 //! Gravity.
 
-use crate::Outcome;
-use crate::runs::Scene;
+use super::Start;
 use tfe::prelude::*;
 
 #[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2)/2 - 1/sqrt(x^2 + y^2))]
-struct Kepler {}
+pub struct Kepler {}
+
+pub const KEPLER_START: Start<2> = Start {
+    q: [0.4, 0.0],
+    v: [0.0, 2.0],
+    end: 20.0,
+};
 
 /// Eccentricity 0.6, from the pericentre, three times around. The end by 32 digits of arithmetic.
-pub fn kepler() -> Outcome {
-    let start = State {
-        q: [0.4, 0.0],
-        p: [0.0, 2.0],
-    };
-    let problem = WorkPrecision::new(&Kepler {}, start, 0.0..20.0)
-        .steps([0.5, 0.25, 0.1, 0.05, 0.025, 0.01])
+pub fn kepler() -> WorkPrecision<'static, Kepler, 2> {
+    let Start { q, v, end } = KEPLER_START;
+    WorkPrecision::new(&Kepler {}, State { q, p: v }, 0.0..end)
+        .steps([0.5, 0.3, 0.25, 0.2, 0.15, 0.1, 0.07, 0.05, 0.025])
         .reference_end(
             [-0.770_075_578_411_240_4, 0.788_344_816_994_424_4],
             [-0.894_183_731_988_691_5, -0.123_461_764_158_440_96],
-        );
-    Ok(Scene::measure("Kepler, e = 0.6", problem)?)
+        )
 }
 
 /// Bodies that attract each other: `x`, `y`, `z` of each.
@@ -28,9 +29,9 @@ pub fn kepler() -> Outcome {
     lagrangian = sum(i in 0..6, m[i]/2*(dot(x[i])^2 + dot(y[i])^2 + dot(z[i])^2))
         + sum(i in 1..6, sum(j in 0..i, g*m[i]*m[j]/sqrt((x[i] - x[j])^2 + (y[i] - y[j])^2 + (z[i] - z[j])^2))),
 )]
-struct Bodies {
-    g: f64,
-    m: [f64; 6],
+pub struct Bodies {
+    pub g: f64,
+    pub m: [f64; 6],
 }
 
 /// Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune, Pluto: mass (of the Sun's), position (astronomical units), velocity (a day).
@@ -64,19 +65,36 @@ const BODIES: [(f64, [f64; 3], [f64; 3]); 6] = [
     ),
 ];
 
+pub const SOLAR_SYSTEM: Bodies = Bodies {
+    g: 2.959_122_082_86e-4,
+    m: [
+        BODIES[0].0,
+        BODIES[1].0,
+        BODIES[2].0,
+        BODIES[3].0,
+        BODIES[4].0,
+        BODIES[5].0,
+    ],
+};
+
 /// 27 years, two and a half of Jupiter's.
-pub fn solar_system() -> Outcome {
-    let model = Bodies {
-        g: 2.959_122_082_86e-4,
-        m: BODIES.map(|(mass, _, _)| mass),
-    };
+pub fn solar_system_start() -> Start<18> {
     let (mut q, mut v) = ([0.0; 18], [0.0; 18]);
     for (i, (_, position, velocity)) in BODIES.iter().enumerate() {
         for k in 0..3 {
             (q[6 * k + i], v[6 * k + i]) = (position[k], velocity[k]);
         }
     }
-    let problem = WorkPrecision::new(&model, model.state(q, v), 0.0..10_000.0)
-        .steps([800.0, 400.0, 200.0, 100.0, 50.0]);
-    Ok(Scene::measure("Outer solar system", problem)?)
+    Start {
+        q,
+        v,
+        end: 10_000.0,
+    }
+}
+
+pub fn solar_system() -> WorkPrecision<'static, Bodies, 18> {
+    let Start { q, v, end } = solar_system_start();
+    WorkPrecision::new(&SOLAR_SYSTEM, SOLAR_SYSTEM.state(q, v), 0.0..end).steps([
+        2000.0, 1500.0, 1000.0, 800.0, 600.0, 400.0, 300.0, 200.0, 100.0, 50.0,
+    ])
 }

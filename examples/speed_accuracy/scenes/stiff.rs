@@ -1,0 +1,29 @@
+//! Two times in one motion: a pendulum on a stiff spring.
+
+use super::Start;
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(r, theta),
+    lagrangian = (dot(r)^2 + r^2*dot(theta)^2)/2 + g*r*cos(theta) - k/2*(r - 1)^2,
+)]
+pub struct ElasticPendulum {
+    pub g: f64,
+    pub k: f64,
+}
+
+pub const ELASTIC: ElasticPendulum = ElasticPendulum { g: 9.81, k: 1e6 };
+
+pub const ELASTIC_START: Start<2> = Start {
+    q: [1.0, 1.0],
+    v: [0.0, 0.0],
+    end: 1.0,
+};
+
+/// The spring swings 160 times a second, the pendulum once in two. The momentum of the spring is the small part of the state, and its
+/// phase is what the errors of long steps are of.
+pub fn elastic_pendulum() -> WorkPrecision<'static, ElasticPendulum, 2> {
+    let Start { q, v, end } = ELASTIC_START;
+    WorkPrecision::new(&ELASTIC, ELASTIC.state(q, v), 0.0..end)
+        .steps([0.1, 0.05, 0.02, 0.01, 5e-3, 3e-3, 2e-3, 1e-3])
+}

@@ -1,0 +1,162 @@
+//! Curves of other integrators.
+
+use super::measure::MOST_REPETITIONS;
+use super::point::Cost;
+use super::reference::Known;
+use std::error::Error;
+use std::time::Duration;
+use tfe_runtime::State;
+
+/// What another integrator says of one run, see [`WorkPrecision::peer`](super::WorkPrecision::peer).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PeerRun<const N: usize> {
+    /// Where it ended.
+    pub end: State<N>,
+    /// How long the run took, without what comes before its first step.
+    pub time: Duration,
+    /// How often it evaluated the equations; zero where nothing counts them.
+    pub evaluations: u64,
+}
+
+/// The runs of another integrator, in the order of the settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Peer {
+    pub(super) name: String,
+    pub(super) points: Vec<PeerPoint>,
+}
+
+/// One run of another integrator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PeerPoint {
+    /// Its tolerance, or its step.
+    pub setting: f64,
+    /// What was measured, or what the integrator said when it stopped.
+    pub outcome: Result<PeerMeasured, String>,
+}
+
+/// What was measured of another integrator's run, as in [`Measured`](super::Measured).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PeerMeasured {
+    /// Error of the coordinates at the end of the span.
+    pub error_q: f64,
+    /// Error of the momenta at the end of the span.
+    pub error_p: f64,
+    /// Seconds, the least of all repetitions.
+    pub seconds: f64,
+    /// How often the run was repeated for that.
+    pub repetitions: u32,
+    /// Evaluations of the equations; zero where nothing counts them.
+    pub evaluations: u64,
+    /// Whether the error is no larger than the uncertainty of the reference.
+    pub at_reference_floor: bool,
+}
+
+impl Peer {
+    /// The name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// All runs, those that failed included.
+    pub fn points(&self) -> &[PeerPoint] {
+        &self.points
+    }
+
+    /// How many runs failed.
+    pub fn failed(&self) -> usize {
+        let failed = |point: &&PeerPoint| point.outcome.is_err();
+        self.points.iter().filter(failed).count()
+    }
+}
+
+impl PeerPoint {
+    /// What was measured, if the run reached its end.
+    pub fn measured(&self) -> Option<&PeerMeasured> {
+        self.outcome.as_ref().ok()
+    }
+}
+
+impl PeerMeasured {
+    /// The larger of the errors of coordinates and momenta.
+    pub fn error(&self) -> f64 {
+        // `f64::max` would drop a NaN.
+        if self.error_p <= self.error_q {
+            self.error_q
+        } else {
+            self.error_p
+        }
+    }
+
+    /// What it cost; `None` where peers do not count it.
+    pub fn cost(&self, cost: Cost) -> Option<f64> {
+        match cost {
+            Cost::Time => Some(self.seconds),
+            Cost::Evaluations => (self.evaluations > 0).then_some(self.evaluations as f64),
+            Cost::Iterations | Cost::Steps => None,
+        }
+    }
+}
+
+/// A run of another integrator with one setting.
+type Run<'m, const N: usize> = dyn Fn(f64) -> Result<PeerRun<N>, Box<dyn Error>> + 'm;
+
+/// Another integrator, not run yet.
+pub(super) struct Rival<'m, const N: usize> {
+    pub(super) name: String,
+    pub(super) settings: Vec<f64>,
+    pub(super) run: Box<Run<'m, N>>,
+}
+
+impl<const N: usize> Rival<'_, N> {
+    /// The first run with each setting.
+    pub(super) fn look(&self, reference: &Known<N>, end: f64) -> Peer {
+        let point = |setting: &f64| PeerPoint {
+            setting: *setting,
+            outcome: self.look_at(*setting, reference, end),
+        };
+        Peer {
+            name: self.name.clone(),
+            points: self.settings.iter().map(point).collect(),
+        }
+    }
+
+    fn look_at(
+        &self,
+        setting: f64,
+        reference: &Known<N>,
+        end: f64,
+    ) -> Result<PeerMeasured, String> {
+        let run = (self.run)(setting).map_err(|error| error.to_string())?;
+        let finite = run.end.q.iter().chain(&run.end.p).all(|x| x.is_finite());
+        let errors = reference.errors(end, &run.end).filter(|_| finite);
+        let (error_q, error_p) = errors.ok_or("the end is not finite")?;
+        let mut measured = PeerMeasured {
+            error_q,
+            error_p,
+            seconds: run.time.as_secs_f64(),
+            repetitions: 1,
+            evaluations: run.evaluations,
+            at_reference_floor: false,
+        };
+        measured.at_reference_floor = measured.error() <= reference.uncertainty();
+        Ok(measured)
+    }
+
+    /// Repeats all runs until each of them has taken `until` in all, of which `spent` was before.
+    pub(super) fn repeat(&self, peer: &mut Peer, spent: &mut [Duration], until: Duration) {
+        for (point, spent) in peer.points.iter_mut().zip(spent) {
+            let Ok(measured) = &mut point.outcome else {
+                continue;
+            };
+            while *spent < until && measured.repetitions < MOST_REPETITIONS {
+                // It has run before, with the same setting.
+                let Ok(run) = (self.run)(point.setting) else {
+                    break;
+                };
+                *spent += run.time;
+                measured.seconds = measured.seconds.min(run.time.as_secs_f64());
+                measured.repetitions += 1;
+            }
+        }
+    }
+}

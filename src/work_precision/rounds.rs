@@ -1,0 +1,112 @@
+//! Runs taken in turn.
+//!
+//! A processor is not equally fast at all times. Of runs that are repeated in turn, none has all of its repetitions in a slow moment.
+
+use super::measure::{MOST_REPETITIONS, Measure, Way};
+use super::peer::{Peer, Rival};
+use super::point::Point;
+use super::reference::Known;
+use std::time::Duration;
+use tfe_runtime::Model;
+use tfe_runtime::step::Control;
+
+/// How often all runs have their turn after the first.
+const ROUNDS: u32 = 4;
+
+/// A point of a curve, which may be repeated.
+pub(super) struct Timed<'g> {
+    pub(super) point: Point,
+    way: Way<'g>,
+    spent: Duration,
+}
+
+impl<'g> Timed<'g> {
+    /// The first run.
+    pub(super) fn look<M: Model<N>, const N: usize>(
+        measure: &Measure<'_, M, N>,
+        way: Way<'g>,
+        tolerances: &[f64],
+    ) -> Self {
+        let (tolerance, outcome) = measure.look_with(way, tolerances);
+        let Way {
+            element,
+            control,
+            grid,
+        } = way;
+        let way = Way {
+            control: Control {
+                tolerance,
+                ..control
+            },
+            ..way
+        };
+        let seconds = outcome.as_ref().map_or(0.0, |one| one.seconds);
+        Self {
+            point: Point {
+                element,
+                solve: control.solve,
+                step: grid.step(),
+                tolerance,
+                outcome,
+            },
+            way,
+            spent: Duration::try_from_secs_f64(seconds).unwrap_or_default(),
+        }
+    }
+
+    /// Repeats the run until it has taken `until` in all.
+    fn repeat<M: Model<N>, const N: usize>(
+        &mut self,
+        measure: &Measure<'_, M, N>,
+        until: Duration,
+    ) {
+        let Ok(measured) = &mut self.point.outcome else {
+            return;
+        };
+        while self.spent < until && measured.repetitions < MOST_REPETITIONS {
+            // It has run before, from the same start.
+            let Ok(time) = measure.time(self.way) else {
+                break;
+            };
+            self.spent += time;
+            measured.seconds = measured.seconds.min(time.as_secs_f64());
+            measured.repetitions += 1;
+        }
+    }
+}
+
+/// Repeats all runs in turn, each for `repeat_for` in all.
+pub(super) fn repeat<M: Model<N>, const N: usize>(
+    measure: &Measure<'_, M, N>,
+    curves: &mut [Vec<Timed<'_>>],
+    (rivals, peers): (&[Rival<'_, N>], &mut [Peer]),
+    repeat_for: Duration,
+) {
+    let first = |peer: &Peer| {
+        let seconds = peer.points.iter().map(|point| {
+            let seconds = point.measured().map_or(0.0, |one| one.seconds);
+            Duration::try_from_secs_f64(seconds).unwrap_or_default()
+        });
+        seconds.collect::<Vec<_>>()
+    };
+    let mut spent: Vec<Vec<Duration>> = peers.iter().map(first).collect();
+    for round in 1..=ROUNDS {
+        let until = repeat_for / ROUNDS * round;
+        for timed in curves.iter_mut().flatten() {
+            timed.repeat(measure, until);
+        }
+        for ((rival, peer), spent) in rivals.iter().zip(&mut *peers).zip(&mut spent) {
+            rival.repeat(peer, spent, until);
+        }
+    }
+}
+
+/// All rivals, each run once.
+pub(super) fn look_at_peers<const N: usize>(
+    rivals: &[Rival<'_, N>],
+    reference: &Known<N>,
+    end: f64,
+) -> Vec<Peer> {
+    let looks = rivals.iter().map(|rival| rival.look(reference, end));
+    looks.collect()
+}
