@@ -129,11 +129,14 @@ impl<'a> Emitter<'a> {
                 let cosine = self.define_of_coordinate(*cosine, "cos", Some(argument));
                 quote!(let (#sine, #cosine) = #of.sin_cos();)
             }
-            Statement::Accumulator { target } => {
+            Statement::Accumulator { target, start } => {
+                let start = self.operand(start);
                 let name = self.define(*target);
-                quote!(let mut #name = t.like(0.0);)
+                quote!(let mut #name = #start;)
             }
-            Statement::Accumulate { value, .. } | Statement::Store { value, .. } => {
+            Statement::Accumulate { value, .. }
+            | Statement::Assign { value, .. }
+            | Statement::Store { value, .. } => {
                 let value = self.operand(value);
                 self.write(statement, value)
             }
@@ -151,7 +154,7 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    /// A store or an accumulation of `value`.
+    /// A store, an accumulation or an assignment of `value`.
     fn write(&mut self, statement: &Statement, value: TokenStream) -> TokenStream {
         match statement {
             Statement::Store {
@@ -176,6 +179,10 @@ impl<'a> Emitter<'a> {
             Statement::Accumulate { target, .. } => {
                 let name = self.name(*target);
                 quote!(#name += #value;)
+            }
+            Statement::Assign { target, .. } => {
+                let name = self.name(*target);
+                quote!(#name = #value;)
             }
             _ => TokenStream::new(),
         }
@@ -410,10 +417,12 @@ impl<'a> Emitter<'a> {
     }
 }
 
-/// What a store or an accumulation writes.
+/// What a store, an accumulation or an assignment writes.
 fn written(statement: &Statement) -> Option<&Operand> {
     match statement {
-        Statement::Store { value, .. } | Statement::Accumulate { value, .. } => Some(value),
+        Statement::Store { value, .. }
+        | Statement::Accumulate { value, .. }
+        | Statement::Assign { value, .. } => Some(value),
         _ => None,
     }
 }
@@ -438,10 +447,11 @@ fn operands(statement: &Statement) -> Vec<&Operand> {
             } => vec![left, right, then, otherwise],
         },
         Statement::SineCosine { argument, .. } => vec![argument],
-        Statement::Accumulate { value, .. } | Statement::Store { value, .. } => vec![value],
-        Statement::Accumulator { .. } | Statement::Loop { .. } | Statement::Clear { .. } => {
-            Vec::new()
-        }
+        Statement::Accumulator { start: value, .. }
+        | Statement::Accumulate { value, .. }
+        | Statement::Assign { value, .. }
+        | Statement::Store { value, .. } => vec![value],
+        Statement::Loop { .. } | Statement::Clear { .. } => Vec::new(),
     }
 }
 

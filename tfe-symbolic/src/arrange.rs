@@ -4,6 +4,7 @@
 //! with the value instead of costing a negation, until a sum absorbs it.
 
 mod demand;
+mod fractions;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -14,6 +15,7 @@ use crate::pairs::{self, Item, Kind, Operands, Pair};
 use crate::plan::{Op, Plan, Value};
 use demand::{Multiple, ONE, PositiveConstant, Terms, demanded, gather, multiple};
 pub(crate) use demand::{Opened, scaled_sums};
+use fractions::{Factors, Fractions};
 
 /// Larger powers are left to the method that computes integer powers.
 const LARGEST_PRODUCT_POWER: u32 = 64;
@@ -38,6 +40,8 @@ enum Meaning {
     Reciprocal(Vec<ExprId>),
     /// xⁿ for large n
     LargePower(ExprId, i32),
+    /// A fraction that several products have.
+    Fraction(usize),
     /// A group of operands that vary in fewer loops than the whole.
     Group(usize),
 }
@@ -143,6 +147,8 @@ struct Arranger<'a> {
     products: Family,
     sum_sets: HashMap<Multiple, usize>,
     quotients: HashMap<Multiple, Quotient>,
+    fractions: Fractions,
+    fraction_sets: Vec<Quotient>,
     built: HashMap<Multiple, Value>,
 }
 
@@ -162,6 +168,8 @@ impl<'a> Arranger<'a> {
             products: Family::new(Kind::Product),
             sum_sets: HashMap::new(),
             quotients: HashMap::new(),
+            fractions: Fractions::default(),
+            fraction_sets: Vec::new(),
             built: HashMap::new(),
         }
     }
@@ -173,6 +181,8 @@ impl<'a> Arranger<'a> {
             .into_keys()
             .filter(|multiple| !merged.contains(multiple))
             .collect();
+        self.fractions = Fractions::of(self.graph, &demanded);
+        self.collect_fractions();
         let shared = self.shared_divisors(&demanded);
         for multiple in &demanded {
             let (x, factor) = *multiple;
@@ -211,10 +221,8 @@ impl<'a> Arranger<'a> {
         let mut places: BTreeMap<ExprId, Places> = BTreeMap::new();
         let mut outside: BTreeSet<ExprId> = BTreeSet::new();
         for multiple in demanded {
-            let Node::Product(factors) = self.graph.node(multiple.0) else {
-                continue;
-            };
-            for (x, n) in self.roots_below(factors) {
+            let (_, factors) = self.fractions.rest(self.graph, multiple);
+            for (x, n) in self.roots_below(&factors) {
                 // A number below is divided by: its reciprocal may not be exact.
                 if n < 0 && self.graph.as_constant(x).is_none() {
                     places.entry(x).or_default().push((*multiple, n));
@@ -291,6 +299,27 @@ impl<'a> Arranger<'a> {
         self.sum_sets.insert(sum, set);
     }
 
+    fn collect_fractions(&mut self) {
+        let fractions = std::mem::take(&mut self.fractions);
+        for fraction in &fractions.all {
+            let mut set = |factors: &Factors| {
+                let mut operands = Operands::new();
+                for (x, n) in factors {
+                    let loops = self.graph.loops_of(*x);
+                    let item = self.products.item(Meaning::Multiple((*x, ONE)), loops);
+                    operands.insert(item, *n);
+                }
+                (!operands.is_empty()).then(|| self.products.set(operands))
+            };
+            let quotient = Quotient {
+                above: set(&fraction.above),
+                below: set(&fraction.below),
+            };
+            self.fraction_sets.push(quotient);
+        }
+        self.fractions = fractions;
+    }
+
     fn collect_product(&mut self, multiple: Multiple, shared: &SharedDivisors) {
         let (x, PositiveConstant(c)) = multiple;
         let (mut above, mut below) = (Operands::new(), Operands::new());
@@ -310,19 +339,19 @@ impl<'a> Arranger<'a> {
                 above.insert(item, 1);
             }
         }
-        let factors = match self.graph.node(x) {
-            Node::Product(factors) => {
-                let merged = self.roots_below(factors);
-                let is_shared = |(x, n): &(ExprId, i32)| *n > 0 || shared.contains_key(x);
-                let known = |factor: &&(ExprId, i32)| !factors.contains(*factor);
-                // Merging pays only where the reciprocal of the root is computed.
-                if merged.iter().filter(known).all(is_shared) {
-                    merged
-                } else {
-                    factors.clone()
-                }
-            }
-            _ => vec![(x, 1)],
+        let (fractions, factors) = self.fractions.rest(self.graph, &multiple);
+        for fraction in fractions {
+            let meaning = Meaning::Fraction(fraction);
+            above.insert(self.products.item(meaning, self.graph.loops_of(x)), 1);
+        }
+        let merged = self.roots_below(&factors);
+        let is_shared = |(x, n): &(ExprId, i32)| *n > 0 || shared.contains_key(x);
+        let known = |factor: &&(ExprId, i32)| !factors.contains(*factor);
+        // Merging pays only where the reciprocal of the root is computed.
+        let factors = if merged.iter().filter(known).all(is_shared) {
+            merged
+        } else {
+            factors
         };
         for (x, n) in factors {
             let (loops, size) = (self.graph.loops_of(x), n.unsigned_abs());
@@ -360,26 +389,8 @@ impl<'a> Arranger<'a> {
     }
 
     fn build(&mut self, multiple: Multiple) -> Value {
-        if let Some(Quotient { above, below }) = self.quotients.get(&multiple).copied() {
-            let one = |plan: &mut Plan| Value {
-                negative: false,
-                op: plan.push(Op::Constant(Constant::ONE)),
-            };
-            let top = match above {
-                Some(set) => self.build_set(Kind::Product, set),
-                None => one(&mut self.plan),
-            };
-            return match below {
-                Some(set) => {
-                    let bottom = self.build_set(Kind::Product, set);
-                    let op = self.plan.push(Op::Divide(top.op, bottom.op));
-                    Value {
-                        negative: top.negative != bottom.negative,
-                        op,
-                    }
-                }
-                None => top,
-            };
+        if let Some(quotient) = self.quotients.get(&multiple).copied() {
+            return self.build_quotient(quotient);
         }
         let (x, _) = multiple;
         if let Some(set) = self.sum_sets.get(&multiple).copied() {
@@ -438,6 +449,22 @@ impl<'a> Arranger<'a> {
         Value {
             negative: false,
             op: self.plan.push(op),
+        }
+    }
+
+    fn build_quotient(&mut self, Quotient { above, below }: Quotient) -> Value {
+        let top = match above {
+            Some(set) => self.build_set(Kind::Product, set),
+            None => Value {
+                negative: false,
+                op: self.plan.push(Op::Constant(Constant::ONE)),
+            },
+        };
+        let Some(set) = below else { return top };
+        let bottom = self.build_set(Kind::Product, set);
+        Value {
+            negative: top.negative != bottom.negative,
+            op: self.plan.push(Op::Divide(top.op, bottom.op)),
         }
     }
 
@@ -522,6 +549,7 @@ impl<'a> Arranger<'a> {
             Meaning::Multiple(multiple) => self.built[&multiple],
             Meaning::Number(value) => positive(self.plan.push(Op::Constant(value))),
             Meaning::Group(set) => self.build_set(kind, set),
+            Meaning::Fraction(fraction) => self.build_quotient(self.fraction_sets[fraction]),
             Meaning::Reciprocal(divisors) => {
                 let below: Vec<Value> = divisors.into_iter().map(|x| self.value(x)).collect();
                 let below = self.fold(Kind::Product, &below);

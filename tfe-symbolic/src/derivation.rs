@@ -9,19 +9,17 @@
 
 use std::collections::BTreeMap;
 
-use crate::angles::expand_angles;
 use crate::constant::Constant;
 use crate::constraint;
 use crate::count::Counts;
 use crate::declared::{Constraint, Declared, Force, Form, Parameter};
 use crate::differentiate::{Forward, gradient};
-use crate::distribute::distribute;
-use crate::entry::{Array, Entry, Place, blocks, for_each_sink};
-use crate::factor::take_out_factors;
+use crate::draft::Draft;
+use crate::entry::{Array, Entry, Place};
 use crate::graph::{ExprId, Graph, Node, SumRange};
 use crate::input::{Affine, IndexSymbol, Input, LoopVariable};
 use crate::program::{By, Program, Request};
-use crate::schedule::schedule;
+use crate::quadratic::{self, Writing};
 use crate::sensitivity::{Leaf, entries_by};
 use crate::structure::Structure;
 
@@ -90,6 +88,8 @@ impl From<&Declared> for Model {
 pub struct Derivation {
     graph: Graph,
     entries: Vec<Entry>,
+    /// The same by the matrix of an energy that is quadratic in z, in several ways.
+    by_matrix: Vec<Vec<Entry>>,
     structure: Structure,
     sensitivities: Vec<Parameter>,
 }
@@ -131,9 +131,14 @@ impl Derivation {
         let mut entries = deriver.entries;
         entries.extend(constraint::entries(&mut graph, &constraints));
         let structure = Structure::of(&graph, form, &dof, &entries);
+        let by_matrix = [Writing::AsDerived, Writing::Expanded]
+            .into_iter()
+            .filter_map(|writing| quadratic::entries(&mut graph, energy, &entries, writing))
+            .collect();
         Self {
             graph,
             entries,
+            by_matrix,
             structure,
             sensitivities,
         }
@@ -141,11 +146,14 @@ impl Derivation {
 
     /// The program of a kernel.
     pub fn program(&self, request: Request) -> Program {
-        let wanted = self
-            .entries
-            .iter()
-            .filter(|entry| entry.place.array.is_wanted(request));
-        program(self.graph.clone(), wanted.cloned().collect())
+        let draft = |entries: &Vec<Entry>| {
+            let wanted = entries
+                .iter()
+                .filter(|entry| entry.place.array.is_wanted(request));
+            Draft::of(self.graph.clone(), wanted.cloned().collect())
+        };
+        let plain = std::iter::once(&self.entries);
+        Draft::best(plain.chain(&self.by_matrix).map(draft).collect())
     }
 
     /// The program of the first derivatives and forces differentiated once more, partially at fixed (q, z):
@@ -186,7 +194,7 @@ impl Derivation {
         };
         let mut graph = self.graph.clone();
         let entries = entries_by(&mut graph, &self.entries, leaf);
-        program(graph, entries)
+        Draft::best(vec![Draft::of(graph, entries)])
     }
 
     /// What is known about the model.
@@ -198,28 +206,6 @@ impl Derivation {
     pub fn counts(&self, request: Request) -> Counts {
         Counts::of(&self.program(request))
     }
-}
-
-/// The program that computes these entries.
-fn program(mut graph: Graph, entries: Vec<Entry>) -> Program {
-    let values: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
-    let values = graph.open_single_sums(&values);
-    let entries = entries
-        .into_iter()
-        .zip(values)
-        .map(|(entry, value)| Entry { value, ..entry })
-        .collect();
-    let (cleared, mut block) = blocks(&mut graph, entries);
-    let mut values = Vec::new();
-    for_each_sink(&mut block, &mut |sink| values.push(sink.value));
-    let values = expand_angles(&mut graph, values);
-    let values = take_out_factors(&mut graph, values);
-    let mut next = values.iter();
-    for_each_sink(&mut block, &mut |sink| {
-        sink.value = *next.next().unwrap_or(&sink.value);
-    });
-    let plan = distribute(&graph, &values);
-    schedule(plan, cleared, &block)
 }
 
 /// Collects the entries.

@@ -1,15 +1,12 @@
-//! Entries of results: what is added where, on every turn of which loops; and their order in a program.
+//! Entries of results: what is added where, on every turn of which loops.
 
-use std::collections::BTreeMap;
-
-use crate::constant::Constant;
-use crate::graph::{ExprId, Graph, SumRange};
-use crate::input::Affine;
+use crate::graph::{ExprId, SumRange};
+use crate::input::{Affine, LoopVariable};
 use crate::program::{Output, Request};
-use crate::schedule::{Block, Sink, Target};
+use crate::rewrite::substitute;
 
 /// The arrays of results.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Array {
     Value,
     ByZ,
@@ -72,7 +69,8 @@ impl Place {
         }
     }
 
-    fn output(&self) -> Output {
+    /// The place in a program.
+    pub(crate) fn output(&self) -> Output {
         let (row, column) = (self.row.clone(), self.column.clone());
         match self.array {
             Array::Value => Output::Value,
@@ -96,9 +94,18 @@ impl Place {
         }
     }
 
-    /// Whether it is the same entry in every run and on every turn of a loop.
-    fn is_literal(&self) -> bool {
-        self.row.terms.is_empty() && self.column.terms.is_empty()
+    /// Whether it is another entry on every turn of a loop.
+    pub(crate) fn depends_on(&self, variable: LoopVariable) -> bool {
+        self.row.depends_on(variable) || self.column.depends_on(variable)
+    }
+
+    /// The place where the variable has this value.
+    pub(crate) fn at(&self, variable: LoopVariable, value: &Affine) -> Self {
+        Self {
+            array: self.array,
+            row: substitute(&self.row, variable, value),
+            column: substitute(&self.column, variable, value),
+        }
     }
 }
 
@@ -108,69 +115,4 @@ pub(crate) struct Entry {
     pub(crate) nest: Vec<SumRange>,
     pub(crate) place: Place,
     pub(crate) value: ExprId,
-}
-
-/// `Σ c x`
-type Terms = Vec<(Constant, ExprId)>;
-
-/// Orders entries into nested loops; arrays that loops add to are cleared first.
-pub(crate) fn blocks(graph: &mut Graph, entries: Vec<Entry>) -> (Vec<Output>, Block) {
-    let adds = |entry: &Entry| !entry.nest.is_empty() || !entry.place.is_literal();
-    let mut added: Vec<Array> = entries
-        .iter()
-        .filter(|entry| adds(entry))
-        .map(|entry| entry.place.array)
-        .collect();
-    added.sort_unstable();
-    added.dedup();
-    let mut merged: BTreeMap<(Vec<SumRange>, Place), Terms> = BTreeMap::new();
-    for Entry { nest, place, value } in entries {
-        merged
-            .entry((nest, place))
-            .or_default()
-            .push((Constant::ONE, value));
-    }
-    let mut cleared = Vec::new();
-    let mut root = Block::default();
-    for ((nest, place), values) in merged {
-        let value = graph.linear(Constant::ZERO, &values);
-        let accumulate = added.contains(&place.array);
-        let target = match place.array {
-            Array::Value => Target::Value,
-            _ => Target::Store {
-                output: place.output(),
-                accumulate,
-            },
-        };
-        if accumulate && place.array != Array::Value {
-            let output = Place::vector(place.array, Affine::default()).output();
-            if !cleared.contains(&output) {
-                cleared.push(output);
-            }
-        }
-        let mut block = &mut root;
-        for range in nest {
-            let at = block
-                .inner
-                .iter()
-                .position(|(known, _)| *known == range)
-                .unwrap_or_else(|| {
-                    block.inner.push((range.clone(), Block::default()));
-                    block.inner.len() - 1
-                });
-            block = &mut block.inner[at].1;
-        }
-        block.sinks.push(Sink { target, value });
-    }
-    (cleared, root)
-}
-
-/// The sinks of a block and of the loops inside, in the order of the program.
-pub(crate) fn for_each_sink(root: &mut Block, visit: &mut dyn FnMut(&mut Sink)) {
-    for sink in &mut root.sinks {
-        visit(sink);
-    }
-    for (_, inner) in &mut root.inner {
-        for_each_sink(inner, visit);
-    }
 }

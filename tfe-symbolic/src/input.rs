@@ -86,6 +86,15 @@ impl Affine {
         Some(sum)
     }
 
+    /// What the loop variable is multiplied by.
+    pub(crate) fn factor_of(&self, variable: LoopVariable) -> i64 {
+        let own = self
+            .terms
+            .iter()
+            .find(|(symbol, _)| *symbol == IndexSymbol::Loop(variable));
+        own.map_or(0, |(_, factor)| *factor)
+    }
+
     /// Whether it depends on the loop variable.
     pub fn depends_on(&self, variable: LoopVariable) -> bool {
         self.terms

@@ -175,7 +175,14 @@ impl Machine<'_> {
                     self.set(*sine, s)?;
                     self.set(*cosine, c)?;
                 }
-                Statement::Accumulator { target } => self.set(*target, 0.0)?,
+                Statement::Accumulator {
+                    target,
+                    start: value,
+                }
+                | Statement::Assign { target, value } => {
+                    let value = self.operand(value)?;
+                    self.set(*target, value)?;
+                }
                 Statement::Accumulate { target, value } => {
                     let sum = self.temporary(*target)? + self.operand(value)?;
                     self.set(*target, sum)?;

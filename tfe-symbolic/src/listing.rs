@@ -29,7 +29,11 @@ fn list(statements: &[Statement], depth: usize, f: &mut fmt::Formatter<'_>) -> f
                 cosine,
                 argument,
             } => writeln!(f, "({sine}, {cosine}) = sin_cos({argument})")?,
-            Statement::Accumulator { target } => writeln!(f, "{target} = 0")?,
+            Statement::Accumulator {
+                target,
+                start: value,
+            }
+            | Statement::Assign { target, value } => writeln!(f, "{target} = {value}")?,
             Statement::Accumulate { target, value } => writeln!(f, "{target} += {value}")?,
             Statement::Store {
                 output,

@@ -104,7 +104,7 @@ impl Plan {
             // One of both counts for the pair.
             Op::Call(Function::Sin, arguments) if has(Function::Cos, arguments) => 50,
             Op::Call(Function::Cos, arguments) if has(Function::Sin, arguments) => 0,
-            Op::Call(Function::Sin | Function::Cos, _) => 30,
+            Op::Call(Function::Sin | Function::Cos, _) => 40,
             Op::IntegerPower(..) | Op::Power(..) | Op::Call(..) => 40,
         };
         self.ops.iter().map(cost).sum()

@@ -6,7 +6,7 @@ use crate::ast::Comparison;
 use crate::function::Function;
 use crate::input::{Affine, Input, LoopVariable};
 
-/// A value computed by a program. Each is assigned once (accumulators: declared once, then added to).
+/// A value computed by a program. Each is assigned once (accumulators: declared once, then added to or assigned).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Temporary(pub u32);
 
@@ -117,16 +117,25 @@ pub enum Statement {
         /// The argument
         argument: Operand,
     },
-    /// `let mut target = 0`, before a loop that adds to it
+    /// `let mut target = start`, before a loop that changes it
     Accumulator {
         /// The running sum
         target: Temporary,
+        /// What it begins with
+        start: Operand,
     },
     /// `target += value`, inside the loop
     Accumulate {
         /// The running sum
         target: Temporary,
         /// What is added
+        value: Operand,
+    },
+    /// `target = value`, inside the loop: what the next turn begins with
+    Assign {
+        /// The running sum
+        target: Temporary,
+        /// What it becomes
         value: Operand,
     },
     /// `for variable in start..end { body }`
@@ -146,7 +155,7 @@ pub enum Statement {
         output: Output,
         /// What
         value: Operand,
-        /// Add to what is there (the program has cleared it before: see [`Statement::Clear`])
+        /// Add to what is there (the program has stored it before, or cleared the array: see [`Statement::Clear`])
         accumulate: bool,
     },
     /// Sets a whole array of results (all its entries) to zero, before loops scatter into it; the indices are ignored

@@ -1,43 +1,17 @@
 //! From arranged operations to a program: temporaries in the order of their use, each as far outside of the loops as it can be.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
+use crate::blocks::{Block, Local, Sink, Target};
+use crate::entry::{Array, Place};
 use crate::function::Function;
-use crate::graph::{ExprId, SumRange, loop_bit};
+use crate::graph::{SumRange, loop_bit};
 use crate::input::LoopVariable;
 use crate::plan::{Op, OpId, Plan, Value};
-use crate::program::{Operand, Operation, Output, Program, Statement, Temporary};
+use crate::program::{Operand, Operation, Program, Statement, Temporary};
 
-/// What is computed at one level of nesting, and the loops inside.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Block {
-    /// Results at this level.
-    pub(crate) sinks: Vec<Sink>,
-    /// The loops at this level.
-    pub(crate) inner: Vec<(SumRange, Block)>,
-}
-
-/// A result.
-#[derive(Clone, Debug)]
-pub(crate) struct Sink {
-    /// Where it goes; several entries of equal value are computed once.
-    pub(crate) target: Target,
-    /// What it is.
-    pub(crate) value: ExprId,
-}
-
-/// Where a result goes.
-#[derive(Clone, Debug)]
-pub(crate) enum Target {
-    /// Into the results.
-    Store { output: Output, accumulate: bool },
-    /// Onto the value that is stored at the end of the program.
-    Value,
-}
-
-/// Schedules a plan that holds the values of all sinks.
-pub(crate) fn schedule(plan: Plan, cleared: Vec<Output>, root: &Block) -> Program {
-    let looped = has_value(&root.inner);
+/// Schedules a plan that holds the values of all results; these arrays are cleared first.
+pub(crate) fn schedule(plan: Plan, cleared: &BTreeSet<Array>, root: &Block) -> Program {
     let mut scheduler = Scheduler {
         reductions: plan
             .ids()
@@ -46,41 +20,19 @@ pub(crate) fn schedule(plan: Plan, cleared: Vec<Output>, root: &Block) -> Progra
         plan,
         scopes: vec![Scope::default()],
         temporaries: 0,
-        value: None,
+        locals: HashMap::new(),
     };
-    for output in cleared {
-        scheduler.append(Statement::Clear { output });
-    }
-    if looped {
-        let total = scheduler.temporary();
-        scheduler.append(Statement::Accumulator { target: total });
-        scheduler.value = Some(total);
-    }
-    scheduler.block(root);
-    if let Some(total) = scheduler.value {
-        let value = Operand::Temporary(total);
-        scheduler.append(Statement::Store {
-            output: Output::Value,
-            value,
-            accumulate: false,
+    for array in cleared {
+        scheduler.append(Statement::Clear {
+            output: Place::scalar(*array).output(),
         });
     }
+    scheduler.block(root);
     let statements = scheduler.scopes.swap_remove(0).statements;
     Program {
         statements,
         temporaries: scheduler.temporaries,
     }
-}
-
-/// Whether a loop adds to the energy.
-fn has_value(inner: &[(SumRange, Block)]) -> bool {
-    inner.iter().any(|(_, block)| {
-        block
-            .sinks
-            .iter()
-            .any(|sink| matches!(sink.target, Target::Value))
-            || has_value(&block.inner)
-    })
 }
 
 /// The body being written of one loop (or of the program), with the values known in it.
@@ -98,8 +50,8 @@ struct Scheduler {
     reductions: Vec<OpId>,
     scopes: Vec<Scope>,
     temporaries: u32,
-    /// The running sum of the energy where loops add to it.
-    value: Option<Temporary>,
+    /// The variables that loops change.
+    locals: HashMap<usize, Temporary>,
 }
 
 impl Scheduler {
@@ -115,35 +67,71 @@ impl Scheduler {
     }
 
     fn block(&mut self, block: &Block) {
-        for sink in &block.sinks {
-            let Some(value) = self.plan.value(sink.value) else {
-                continue;
+        for (local, start) in &block.locals {
+            let start = match start.and_then(|start| self.plan.value(start)) {
+                Some(start) => self.plain(start),
+                None => Operand::Constant(0.0),
             };
-            let value = self.plain(value);
-            match &sink.target {
-                Target::Store { output, accumulate } => {
-                    let (output, accumulate) = (output.clone(), *accumulate);
-                    self.append(Statement::Store {
-                        output,
-                        value,
-                        accumulate,
-                    });
-                }
-                Target::Value => match self.value {
-                    Some(target) => self.append(Statement::Accumulate { target, value }),
-                    None => self.append(Statement::Store {
-                        output: Output::Value,
-                        value,
-                        accumulate: false,
-                    }),
-                },
-            }
+            let target = self.temporary();
+            self.locals.insert(local.0, target);
+            self.append(Statement::Accumulator { target, start });
+        }
+        for sink in &block.sinks {
+            self.sink(sink);
         }
         for (range, inner) in &block.inner {
             self.open(range.variable);
             self.block(inner);
             self.close(range);
         }
+        for sink in &block.after {
+            self.sink(sink);
+        }
+    }
+
+    fn sink(&mut self, sink: &Sink) {
+        let value = sink.value.and_then(|value| self.plan.value(value));
+        let local = sink.local.and_then(|local| self.local(local));
+        let value = match (local, value) {
+            (Some(local), Some(value)) => self.onto(local, value),
+            (Some(local), None) => Operand::Temporary(local),
+            (None, Some(value)) => self.plain(value),
+            (None, None) => return,
+        };
+        match &sink.target {
+            Target::Store { place, accumulate } => self.append(Statement::Store {
+                output: place.output(),
+                value,
+                accumulate: *accumulate,
+            }),
+            Target::Add(local) => {
+                if let Some(target) = self.local(*local) {
+                    self.append(Statement::Accumulate { target, value });
+                }
+            }
+            Target::Set(local) => {
+                if let Some(target) = self.local(*local) {
+                    self.append(Statement::Assign { target, value });
+                }
+            }
+        }
+    }
+
+    fn local(&self, local: Local) -> Option<Temporary> {
+        self.locals.get(&local.0).copied()
+    }
+
+    /// A variable plus a value. The sum is no operation of the plan: the variable is another number on the next turn.
+    fn onto(&mut self, local: Temporary, value: Value) -> Operand {
+        let (local, other) = (Operand::Temporary(local), self.operand(value.op));
+        let operation = if value.negative {
+            Operation::Subtract(local, other)
+        } else {
+            Operation::Add(local, other)
+        };
+        let target = self.temporary();
+        self.append(Statement::Let { target, operation });
+        Operand::Temporary(target)
     }
 
     fn open(&mut self, variable: LoopVariable) {
@@ -298,7 +286,10 @@ impl Scheduler {
         let mut totals = Vec::with_capacity(together.len());
         for (other, body) in together {
             let target = self.temporary();
-            self.append(Statement::Accumulator { target });
+            self.append(Statement::Accumulator {
+                target,
+                start: Operand::Constant(0.0),
+            });
             totals.push((other, body, target));
         }
         self.open(range.variable);

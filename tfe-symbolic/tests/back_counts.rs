@@ -96,6 +96,28 @@ fn five_links() {
 }
 
 #[test]
+fn declared_by_positions() {
+    // The same pendulum by where its masses are: the mass matrix is found again, with cos² + sin² = 1.
+    let text = "coordinates(a, b), let x1 = sin(a), let y1 = -cos(a), let x2 = x1 + sin(b), let y2 = y1 - cos(b), \
+        lagrangian = (dot(x1)^2 + dot(y1)^2 + dot(x2)^2 + dot(y2)^2)/2 - 9.81*(y1 + y2)";
+    let declared = declare(text, &Context::default()).expect("a model of the test");
+    let second = Request {
+        value: false,
+        ..ALL
+    };
+    let counts = |text: &str| {
+        let declared = declare(text, &Context::default()).expect("a model of the test");
+        Derivation::of(&declared).counts(second)
+    };
+    let by_angles = counts(DOUBLE_PENDULUM);
+    let by_positions = Derivation::of(&declared).counts(second);
+    assert!(
+        by_positions.weighted() <= by_angles.weighted() + 2,
+        "{by_positions} and {by_angles}"
+    );
+}
+
+#[test]
 fn heavy_top() {
     // 14/33/2, 12/31/2, 12/28/2
     check(HEAVY_TOP, 11, 23, 2);

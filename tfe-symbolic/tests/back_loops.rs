@@ -4,7 +4,7 @@ use tfe_symbolic::compile::declare;
 use tfe_symbolic::context::{Context, Field, FieldKind};
 use tfe_symbolic::derivation::{Derivation, Model};
 use tfe_symbolic::interpret::{Environment, Results, interpret};
-use tfe_symbolic::program::Request;
+use tfe_symbolic::program::{Program, Request};
 
 const ALL: Request = Request {
     value: true,
@@ -53,7 +53,20 @@ fn results(text: &str, n: usize, request: Request) -> Results {
     let declared =
         declare(text, &context(text)).unwrap_or_else(|problems| panic!("{text}\n{problems:?}"));
     let program = Derivation::of(&declared).program(request);
-    interpret(&program, &environment(n)).unwrap_or_else(|error| panic!("{error}\n{program}"))
+    let run = |program: &Program| {
+        interpret(program, &environment(n)).unwrap_or_else(|error| panic!("{error}\n{program}"))
+    };
+    // Twice on the same results: the program must not need them to be zero.
+    assert_same(&run(&twice(&program)), &run(&program));
+    run(&program)
+}
+
+/// The program, and the same once more on its results.
+fn twice(program: &Program) -> Program {
+    Program {
+        statements: [&program.statements[..], &program.statements[..]].concat(),
+        ..program.clone()
+    }
 }
 
 /// Sums of at most some hundred terms of size one in another order: 1e-12 leaves a factor of ten.
@@ -112,6 +125,103 @@ fn a_chain_in_loops_equals_the_chain_written_out() {
             joined(0..10, |i| format!("m/2*dot(q[{i}])^2")),
             joined(0..9, spring)
         ),
+    );
+}
+
+/// Compares literal ranges with the model written out. The program runs twice on the same results: it must not need them to be zero.
+#[track_caller]
+fn check_literal(n: usize, looped: &str, written: &str) -> Program {
+    let declared = |text: &str| {
+        let text = format!("coordinates(q[{n}]), lagrangian = {text}");
+        let declared = declare(&text, &context(&text));
+        declared.unwrap_or_else(|problems| panic!("{text}\n{problems:?}"))
+    };
+    let run = |program: &Program| {
+        interpret(program, &environment(n)).unwrap_or_else(|error| panic!("{error}\n{program}"))
+    };
+    let program = Derivation::of(&declared(looped)).program(ALL);
+    let written = run(&Derivation::of(&declared(written)).program(ALL));
+    assert_same(&run(&program), &written);
+    assert_same(&run(&twice(&program)), &written);
+    program
+}
+
+#[test]
+fn a_literal_chain_is_stored_once() {
+    let spring = |i: usize| format!("k/2*(q[{0}]-q[{i}])^2 + a/3*(q[{0}]-q[{i}])^3", i + 1);
+    let program = check_literal(
+        40,
+        "sum(i in 0..40, m/2*dot(q[i])^2) - sum(i in 0..39, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3) - k/2*q[0]^2 - k/2*q[39]^2",
+        &format!(
+            "{} - ({}) - k/2*q[0]^2 - k/2*q[39]^2",
+            joined(0..40, |i| format!("m/2*dot(q[{i}])^2")),
+            joined(0..39, spring)
+        ),
+    );
+    // Each place is complete when it is written, and the energy is a variable.
+    let text = program.to_string();
+    let onto_results = text.lines().filter(|line| line.contains("] +="));
+    assert_eq!(
+        onto_results.count() + text.matches("clear").count(),
+        0,
+        "{text}"
+    );
+}
+
+#[test]
+fn neighbours_of_neighbours_and_rings() {
+    let pull = |i: usize| {
+        let [j, k] = [i + 1, i + 2];
+        format!("k*q[{i}]*q[{j}]^2*q[{k}] + a*cos(q[{k}] - q[{i}])")
+    };
+    check_literal(
+        40,
+        "sum(i in 0..40, m/2*dot(q[i])^2) - sum(i in 0..38, k*q[i]*q[i+1]^2*q[i+2] + a*cos(q[i+2] - q[i])) - c*q[0]*q[39]^2*q[1]",
+        &format!(
+            "{} - ({}) - c*q[0]*q[39]^2*q[1]",
+            joined(0..40, |i| format!("m/2*dot(q[{i}])^2")),
+            joined(0..38, pull)
+        ),
+    );
+}
+
+#[test]
+fn pairs_are_stored_off_the_diagonal_and_added_on_it() {
+    let pairs = || (1..7).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let attraction: Vec<String> = pairs()
+        .map(|(i, j)| format!("{i}*k/sqrt(1 + (q[{i}] - q[{j}])^2)"))
+        .collect();
+    let program = check_literal(
+        7,
+        "sum(i in 0..7, m/2*dot(q[i])^2) + sum(i in 1..7, sum(j in 0..i, i*k/sqrt(1 + (q[i] - q[j])^2)))",
+        &format!(
+            "{} + {}",
+            joined(0..7, |i| format!("m/2*dot(q[{i}])^2")),
+            attraction.join(" + ")
+        ),
+    );
+    let text = program.to_string();
+    assert!(!text.contains("clear"), "{text}");
+    assert!(text.contains("E_qq[i, j] = "), "{text}");
+    assert!(text.contains("E_qq[j, j] += "), "{text}");
+    assert!(text.contains("E_qq[i, i] = "), "{text}");
+}
+
+#[test]
+fn a_force_between_two_bodies_divides_once() {
+    let text = "coordinates(x[2], y[2]), lagrangian = dot(x[0])^2 + dot(x[1])^2 + dot(y[0])^2 + dot(y[1])^2 \
+         + k/sqrt((x[0] - x[1])^2 + (y[0] - y[1])^2)";
+    let declared = declare(text, &context(text)).expect("a model of the test");
+    let first = Request {
+        first: true,
+        ..Request::default()
+    };
+    let counts = Derivation::of(&declared).counts(first);
+    // k x/(r √r) and k y/(r √r): four doubled velocities, two squares, r √r, and one product each.
+    assert_eq!(
+        (counts.divisions, counts.multiplications),
+        (1, 9),
+        "{counts}"
     );
 }
 

@@ -65,11 +65,10 @@ fn an_element_counts_where_the_loop_meets_it() {
     .program_by(By::Parameter(0));
     assert_eq!(
         program.to_string(),
-        "clear E_z\n\
-         for i in 0..N\n  \
+        "for i in 0..N\n  \
            t0 = (i-2) * (i-2)\n  \
            t1 = select(t0 <= 0, v[i], 0)\n  \
-           E_z[i] += t1\n"
+           E_z[i] = t1\n"
     );
     let environment = environment(&[1.0, 1.1, 1.2, 1.3]);
     assert_eq!(

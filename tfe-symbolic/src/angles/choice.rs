@@ -51,7 +51,7 @@ struct Step {
 
 /// A sine with its cosine, and one of them alone, in additions.
 const PAIR: usize = 25;
-const LONE: usize = 15;
+const LONE: usize = 20;
 
 /// How many helpers are tried one by one.
 const MOST_TRIALS: usize = 24;
@@ -78,7 +78,7 @@ pub(super) fn choose(wanted: &BTreeMap<Angle, Need>, is_number: &dyn Fn(ExprId) 
         let atom = vec![(*x, 1)];
         if is_number(*x) {
             numbers.push(atom);
-        } else if !wanted.contains_key(&atom) {
+        } else if wanted.get(&atom) != Some(&BOTH) {
             helpers.insert(atom, false);
         }
     }

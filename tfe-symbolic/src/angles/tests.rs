@@ -76,13 +76,21 @@ fn a_difference_alone_stays() {
 }
 
 #[test]
-fn a_lone_cosine_stays_where_two_lone_cosines_would_become_pairs() {
-    // cos(a), cos(b), cos(a − b) cost 45; two pairs, two products and a sum would cost 53.
+fn lone_cosines_become_pairs_only_where_enough_follows() {
     let mut g = Graph::default();
     let (a, b) = (q(&mut g, 0), q(&mut g, 1));
     let difference = g.subtract(a, b);
-    let roots = [a, b, difference].map(|x| cosine(&mut g, x)).to_vec();
+    // cos(a), cos(a − b) cost 40; two pairs, two products and a sum would cost 53.
+    let roots = [a, difference].map(|x| cosine(&mut g, x)).to_vec();
     check_unchanged(&mut g, roots);
+    // cos(a), cos(b), cos(a − b) cost 60.
+    let roots = [a, b, difference].map(|x| cosine(&mut g, x)).to_vec();
+    let expanded = expand_angles(&mut g, roots.clone());
+    assert_eq!(expanded[..2], roots[..2]);
+    assert_eq!(
+        g.display(expanded[2]).to_string(),
+        "(cos(q[0])*cos(q[1])) + (sin(q[0])*sin(q[1]))"
+    );
 }
 
 #[test]
