@@ -49,7 +49,7 @@ const WIDTH: usize = 8;
 /// model, which no two lanes share.
 ///
 /// Results depend neither on the number of processors nor on the order or number of the other starts, not by one bit. From a
-/// [`Simulation`](crate::Simulation) of one start they differ by rounding.
+/// [`Simulation`](crate::Simulation) of one start they differ by rounding, if at all.
 ///
 /// Defaults are those of `Simulation`: `Mixed::<4>` (order 6), a thousandth of the span as step, iteration to round-off.
 #[derive(Debug)]
@@ -253,10 +253,13 @@ where
             Models::One(model)
                 if Bundle::<M, N, WIDTH>::uses_lanes(&self.element, &self.control) =>
             {
+                // The tables of the element are made once, not for every batch.
+                let empty = Bundle::new(model, self.element, self.control);
+                let empty = empty.map_err(RunErrorKind::Element)?;
                 summed(count.div_ceil(WIDTH), |batch| {
                     let from = batch * WIDTH;
                     let starts = &starts[from..(from + WIDTH).min(count)];
-                    let statistics = plan.run_together(model, starts, |lane, result| {
+                    let statistics = plan.run_together(empty.clone(), starts, |lane, result| {
                         finished(from + lane, result);
                     });
                     progress.advance(starts.len());
@@ -337,22 +340,13 @@ impl<const N: usize> Plan<N> {
     /// Up to [`WIDTH`] runs in lanes.
     fn run_together<M>(
         &self,
-        model: &M,
+        mut bundle: Bundle<'_, M, N, WIDTH>,
         starts: &[State<N>],
         finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
     ) -> Statistics
     where
         M: Model<N>,
     {
-        let mut bundle = match Bundle::<M, N, WIDTH>::new(model, self.element, self.control) {
-            Ok(bundle) => bundle,
-            Err(error) => {
-                for lane in 0..starts.len() {
-                    finished(lane, Err(RunErrorKind::Element(error)));
-                }
-                return Statistics::default();
-            }
-        };
         bundle.start(starts);
         let mut failures: [Option<RunErrorKind>; WIDTH] = [const { None }; WIDTH];
         for (start, failure) in starts.iter().zip(&mut failures) {

@@ -1,26 +1,38 @@
-//! Several trajectories of one model side by side: every kernel call serves W of them.
+//! Several trajectories of one model side by side: every kernel call serves eight of them.
 //!
-//! The trajectories of a [`Bundle`] take the same steps at the same times. Their states lie in [`Lanes`](crate::Lanes), and the fixed-point iteration of an
-//! element runs for all of them at once, each lane judged by the stopping rule of a [`Stepper`]. A lane that has converged is held while
-//! others go on, so that what a trajectory does never depends, not by one bit, on which others are beside it. A lane whose iteration does not
+//! The trajectories of a [`Bundle`] take the same steps at the same times. Eight at a time share the registers of the processor, and the fixed-point
+//! iteration of an element runs for all eight at once, each lane judged by the stopping rule of a [`Stepper`]: the same equations as those of a
+//! stepper, of second order where the model allows it. A lane that has converged is held while others go on, so that what a trajectory does never depends, not by one bit, on which others are beside it. A lane whose iteration does not
 //! contract takes this step and some that follow with a stepper of its own, by Newton's method; one that fails there is out.
 //!
 //! Lanes are used for two-field elements (and others that are Runge–Kutta methods in the form at hand) and models without constraints whose
 //! kernels can be solved by a fixed point: any Lagrangian, and Hamiltonians in phase space. Everything else runs too, lane after lane.
 
-mod equations;
-mod lanes;
-mod sweep;
+mod engine;
+mod first_order;
+mod group;
+mod judge;
+mod pair;
+mod products;
+mod second_order;
+mod step;
 
 use crate::element::{Element, ElementError};
 use crate::error::StepError;
 use crate::legendre::largest;
-use crate::model::{Form, Model, State};
-use crate::newton::{Control, Solve};
+use crate::model::{Model, State};
+use crate::newton::{Control, Preference, Solve};
+use crate::points::has_form;
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
 use crate::step::Stepper;
-use equations::Equations;
+use alloc::vec;
+use alloc::vec::Vec;
+use engine::Engine;
+use group::Group;
+use pair::LANES;
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+pub(crate) use pair::Pair;
 
 /// Up to W trajectories that take the same steps.
 ///
@@ -75,7 +87,9 @@ pub struct Bundle<'m, M, const N: usize, const W: usize> {
     model: &'m M,
     table: SchemeTable,
     control: Control,
-    equations: Equations<N, W>,
+    /// Of models and elements that can be stepped side by side.
+    engine: Option<Engine<N>>,
+    groups: Vec<Group<N>>,
     fates: [Fate<'m, M, N>; W],
     /// Statistics of steps in lanes.
     together: Statistics,
@@ -88,19 +102,38 @@ pub struct Bundle<'m, M, const N: usize, const W: usize> {
 struct Fate<'m, M, const N: usize> {
     failure: Option<StepError>,
     is_used: bool,
-    /// For how many steps it goes its own way.
-    away: u32,
-    /// How many it will be the next time.
-    penalty: u32,
+    /// Whether it goes its own way, and for how many steps.
+    preference: Preference,
     stepper: Option<Stepper<'m, M, N>>,
+}
+
+// Not derived: the model is borrowed, it need not be `Clone`.
+impl<M, const N: usize> Clone for Fate<'_, M, N> {
+    fn clone(&self) -> Self {
+        Self {
+            stepper: self.stepper.clone(),
+            ..*self
+        }
+    }
+}
+
+impl<M, const N: usize, const W: usize> Clone for Bundle<'_, M, N, W> {
+    fn clone(&self) -> Self {
+        Self {
+            table: self.table.clone(),
+            engine: self.engine.clone(),
+            groups: self.groups.clone(),
+            fates: self.fates.clone(),
+            ..*self
+        }
+    }
 }
 
 impl<M, const N: usize> Fate<'_, M, N> {
     const UNUSED: Self = Self {
         failure: None,
         is_used: false,
-        away: 0,
-        penalty: 0,
+        preference: Preference::NONE,
         stepper: None,
     };
 
@@ -119,12 +152,18 @@ where
     /// [`ElementError`] if the element is none.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
         let table = SchemeTable::new(element)?;
+        let engine = if Self::uses_lanes(&element, &control) {
+            Engine::new(model, &table)
+        } else {
+            None
+        };
         let points = table.view().points();
         Ok(Self {
             model,
             table,
             control,
-            equations: Equations::new(points),
+            engine,
+            groups: vec![Group::new(points); W.div_ceil(LANES)],
             fates: [const { Fate::UNUSED }; W],
             together: Statistics::NONE,
             past: Statistics::NONE,
@@ -134,11 +173,7 @@ where
     /// Whether this model with this element and control is stepped in lanes; else lane after lane, as by a [`Stepper`].
     #[must_use]
     pub fn uses_lanes(element: &Element, control: &Control) -> bool {
-        let has_form = match M::FORM {
-            Form::Lagrangian => element.is_collocated(),
-            Form::Hamiltonian => element.has_phase_form(),
-        };
-        has_form && M::CONSTRAINTS.is_empty() && control.solve != Solve::Newton
+        has_form::<M, N>(element) && M::CONSTRAINTS.is_empty() && control.solve != Solve::Newton
     }
 
     /// Begins anew with these states, one a lane; those beyond W are left out. Statistics go on.
@@ -154,57 +189,48 @@ where
                     fate.failure = Some(StepError::NonFinite);
                 }
             }
-            // Lanes without a trajectory compute along with the first one; nobody looks at them.
-            let state = starts.get(lane).or(starts.first());
-            self.equations.place(lane, state.unwrap_or(&State::ZERO));
         }
-        let element = self.table.view().element;
-        let known = self.equations.set_constant_mass(self.model);
-        if !Self::uses_lanes(&element, &self.control) || !known {
-            for fate in &mut self.fates {
-                fate.away = u32::MAX;
+        // Lanes without a trajectory compute along with the first one; nobody looks at them.
+        let first = starts.first().unwrap_or(&State::ZERO);
+        for (k, group) in self.groups.iter_mut().enumerate() {
+            for lane in 0..LANES {
+                group.place(lane, starts.get(LANES * k + lane).unwrap_or(first));
             }
         }
     }
 
     /// Moves all trajectories from t to t + h; true if one of them failed in this step. One that has failed stays at its last good state.
     pub fn advance(&mut self, t: f64, h: f64) -> bool {
-        let mut wanted = [false; W];
-        for (wanted, fate) in wanted.iter_mut().zip(&self.fates) {
-            *wanted = fate.is_alive() && fate.away == 0;
-        }
-        let valid = h.is_finite() && h != 0.0;
-        let mut arrived = [false; W];
-        if valid && wanted.contains(&true) {
-            let scheme = self.table.view();
-            let control = &self.control;
-            arrived = self.equations.advance(
-                (self.model, &scheme, control),
+        let mut lanes = [false; W];
+        let is_step = h.is_finite() && h != 0.0;
+        // Constant, so that nothing is compiled for models that never step like this.
+        if const { M::CONSTRAINTS.is_empty() }
+            && is_step
+            && let Some(engine) = &mut self.engine
+        {
+            for (lane, fate) in lanes.iter_mut().zip(&self.fates) {
+                *lane = fate.is_alive() && fate.preference.is_fixed_point();
+            }
+            engine.advance(
+                (self.model, &self.table, &self.control),
                 (t, h),
-                wanted,
+                &mut self.groups,
+                &mut lanes,
                 &mut self.together,
             );
         }
-        if arrived == [true; W] {
-            for fate in &mut self.fates {
-                fate.penalty /= 2;
-            }
-            return false;
-        }
         let mut has_failed = false;
-        for lane in 0..W {
+        for (lane, arrived) in lanes.into_iter().enumerate() {
             let fate = &mut self.fates[lane];
             if !fate.is_alive() {
                 continue;
             }
-            if arrived[lane] {
-                fate.penalty /= 2;
+            if arrived {
+                fate.preference.confirm_fixed_point();
                 continue;
             }
-            if fate.away == 0 {
-                // Stiff steps come in rows: do not pay for two iterations in each of them.
-                fate.penalty = (fate.penalty * 2).clamp(8, 1024);
-                fate.away = fate.penalty;
+            if self.engine.is_some() && fate.preference.is_fixed_point() {
+                fate.preference.leave_fixed_point();
                 self.together.fallbacks += 1;
             }
             if let Err(error) = self.advance_alone(lane, t, h) {
@@ -224,13 +250,12 @@ where
             fate.stepper = stepper.ok();
         }
         if let Some(stepper) = &mut fate.stepper {
-            let mut state = self.equations.state(lane);
+            let group = &mut self.groups[lane / LANES];
+            let mut state = group.state(lane % LANES);
             stepper.advance(t, h, &mut state, &[])?;
-            self.equations.place(lane, &state);
+            group.place(lane % LANES, &state);
         }
-        if fate.away != u32::MAX {
-            fate.away -= 1;
-        }
+        fate.preference.count_newton();
         Ok(())
     }
 
@@ -241,7 +266,7 @@ where
     pub fn state(&self, lane: usize) -> Result<State<N>, StepError> {
         match self.fates.get(lane) {
             Some(fate) if fate.is_used => match fate.failure {
-                None => Ok(self.equations.state(lane)),
+                None => Ok(self.groups[lane / LANES].state(lane % LANES)),
                 Some(error) => Err(error),
             },
             _ => Err(StepError::NonFinite),

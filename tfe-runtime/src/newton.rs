@@ -42,10 +42,10 @@ impl Default for Control {
 }
 
 /// Increments below it are the rounding of the residual, if they no longer fall.
-const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
+pub(crate) const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
 
 /// The same where Newton's method is ill-conditioned, if they have not fallen for some time.
-const ROUGH_ROUND_OFF: f64 = 1e-10;
+pub(crate) const ROUGH_ROUND_OFF: f64 = 1e-10;
 
 /// Fixed-point iterations that cost as much as Newton's way.
 pub(crate) const PATIENCE: u32 = 24;
@@ -113,7 +113,7 @@ pub(crate) enum Verdict {
 }
 
 /// So many iterations without a smaller increment are noise, if the coordinates do not move any more.
-const IDLE: u32 = 6;
+pub(crate) const IDLE: u32 = 6;
 
 impl Monitor {
     pub(crate) fn new(tolerance: f64) -> Self {

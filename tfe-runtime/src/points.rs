@@ -12,11 +12,11 @@
 //! rounding took from the tables is summed once a step, at the start of the iteration. A step whose iteration contracts badly is left to
 //! the other forms.
 
-mod end;
-mod four;
+pub(crate) mod end;
+pub(crate) mod four;
 mod second_order;
-mod sweep;
-mod tables;
+pub(crate) mod sweep;
+pub(crate) mod tables;
 
 use crate::double_double::DoubleDouble;
 use crate::element::Element;
@@ -65,13 +65,13 @@ pub(crate) struct Points<const N: usize> {
 
 /// A constant mass matrix.
 #[derive(Clone, Debug)]
-struct Inertia<const N: usize> {
+pub(crate) struct Inertia<const N: usize> {
     /// Its diagonal, if it has nothing else.
-    diagonal: Option<[f64; N]>,
+    pub(crate) diagonal: Option<[f64; N]>,
     /// What rounding took from the inverse of the diagonal.
-    inverse_low: [f64; N],
+    pub(crate) inverse_low: [f64; N],
     /// M⁻¹ (or H_pp), row by row; nothing where it is not constant.
-    inverse: Vec<[f64; N]>,
+    pub(crate) inverse: Vec<[f64; N]>,
 }
 
 /// Where and from where.
@@ -104,15 +104,7 @@ impl<const N: usize> Points<N> {
         if N == 0 || is_large || !has_form::<M, N>(element) {
             return None;
         }
-        let inertia = if M::FACTS.constant_mass {
-            Inertia::of(model)?
-        } else {
-            Inertia {
-                diagonal: None,
-                inverse_low: [0.0; N],
-                inverse: Vec::new(),
-            }
-        };
+        let inertia = Inertia::of(model)?;
         let tables = Tables::new(scheme);
         let groups = tables.groups;
         let rows = || vec![[0.0; 4]; N * groups];
@@ -367,12 +359,19 @@ impl<const N: usize> Points<N> {
 }
 
 impl<const N: usize> Inertia<N> {
-    /// M⁻¹ of a model whose mass matrix is constant; nothing if it is singular, or if momenta are no multiples of velocities where they
-    /// have to be.
-    fn of<M>(model: &M) -> Option<Self>
+    /// M⁻¹ of a model, empty unless its mass matrix is constant; nothing if that is singular, or if momenta are no multiples of velocities
+    /// where they have to be.
+    pub(crate) fn of<M>(model: &M) -> Option<Self>
     where
         M: Model<N>,
     {
+        if !M::FACTS.constant_mass {
+            return Some(Self {
+                diagonal: None,
+                inverse_low: [0.0; N],
+                inverse: Vec::new(),
+            });
+        }
         let (mut first, mut mass) = (First::ZERO, [[0.0; N]; N]);
         model.first_and_mass(0.0, &[0.0; N], &[0.0; N], &mut first, &mut mass);
         if is_second_order::<M, N>() && first.z != [0.0; N] {
@@ -409,7 +408,7 @@ impl<const N: usize> Inertia<N> {
 }
 
 /// Whether the equations are M q̈ = f.
-const fn is_second_order<M, const N: usize>() -> bool
+pub(crate) const fn is_second_order<M, const N: usize>() -> bool
 where
     M: Model<N>,
 {
@@ -417,7 +416,7 @@ where
 }
 
 /// Whether rates of momenta are unknowns as well.
-const fn is_phase<M, const N: usize>() -> bool
+pub(crate) const fn is_phase<M, const N: usize>() -> bool
 where
     M: Model<N>,
 {
@@ -425,7 +424,7 @@ where
 }
 
 /// Whether the element is a Runge–Kutta method for the model as it was declared.
-fn has_form<M, const N: usize>(element: &Element) -> bool
+pub(crate) fn has_form<M, const N: usize>(element: &Element) -> bool
 where
     M: Model<N>,
 {
@@ -445,14 +444,14 @@ fn is_finite<const N: usize>(state: &State<N>) -> bool {
 }
 
 #[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::model::{CoordinateName, Facts, Second};
     use crate::real::Real;
     use crate::{Mixed, Radau};
 
     /// Two bodies, an angle, a force: products, quotients, roots, sines.
-    struct Planet;
+    pub(crate) struct Planet;
 
     impl Model<3> for Planet {
         const FORM: Form = Form::Lagrangian;

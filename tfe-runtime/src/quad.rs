@@ -4,6 +4,7 @@
 //! and cosine are those of [`trigonometry`](crate::trigonometry). Code that computes with these numbers has to be compiled for that
 //! instruction set, hence everything is written into the place of its call, and the outermost call goes through [`pulp`].
 
+use crate::bundle::Pair;
 use crate::real::{Real, integer_power};
 use crate::trigonometry::{LIMIT, Turn, reduced};
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
@@ -49,6 +50,24 @@ impl Quad {
             },
             Self { value: low, ..self },
         )
+    }
+
+    /// Whether all arguments are reduced here.
+    #[inline(always)]
+    fn is_small(self) -> bool {
+        let isa = self.isa;
+        let small = isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), self.like(LIMIT).value);
+        isa.first_true_m64s(isa.not_m64x4(small)) == 4
+    }
+
+    /// sin and cos of both: the chains of operations overlap.
+    #[inline(always)]
+    pub(crate) fn sin_cos_of_two(self, other: Self) -> ((Self, Self), (Self, Self)) {
+        if !(self.is_small() & other.is_small()) {
+            return (self.sin_cos(), other.sin_cos());
+        }
+        let (sin, cos) = reduced(Pair(self, other));
+        ((sin.0, cos.0), (sin.1, cos.1))
     }
 
     /// What has no instruction, one lane after the other.
@@ -130,10 +149,8 @@ impl Real for Quad {
 
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        let isa = self.isa;
         let (sin, cos) = reduced(self);
-        let small = isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), self.like(LIMIT).value);
-        if isa.first_true_m64s(isa.not_m64x4(small)) == 4 {
+        if self.is_small() {
             return (sin, cos);
         }
         let (x, mut sin, mut cos) = (self.lanes(), sin.lanes(), cos.lanes());
@@ -214,5 +231,14 @@ impl Turn for Quad {
         let cos = isa.xor_u64s(isa.xor_u64s(cos, difference), cos_sign);
         let (sin, cos) = (pulp::cast(sin), pulp::cast(cos));
         (Self { isa, value: sin }, Self { isa, value: cos })
+    }
+}
+
+impl Turn for Pair<Quad> {
+    #[inline(always)]
+    fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self) {
+        let first = Quad::turned(sin.0, cos.0, quadrant.0);
+        let second = Quad::turned(sin.1, cos.1, quadrant.1);
+        (Self(first.0, second.0), Self(first.1, second.1))
     }
 }

@@ -460,6 +460,7 @@ fn integral<const N: usize>(
 }
 
 /// a + b, rounded, and what rounding took.
+#[cfg(feature = "alloc")]
 pub(crate) fn sum(a: f64, b: f64) -> (f64, f64) {
     let high = a + b;
     let part = high - a;

@@ -69,9 +69,9 @@ fn agree<M: Model<N>, const N: usize>(model: &M, element: Element, starts: &[Sta
         assert!(error <= 1e-13, "{element}: {error:.1e}");
     }
     assert_eq!(statistics.steps, expected_statistics.steps);
-    // The same iteration, but for equations of second order, which a stepper solves as such with fewer.
+    // The same iteration, but for when mass matrices are evaluated and for sines, which may differ by a unit in the last place.
     let ratio = statistics.iterations as f64 / expected_statistics.iterations as f64;
-    assert!((0.95..1.5).contains(&ratio), "{element}: {ratio}");
+    assert!((0.95..1.1).contains(&ratio), "{element}: {ratio}");
     assert_eq!(statistics.fallbacks, 0);
 }
 

@@ -1,6 +1,6 @@
 //! The end of an element, to more than the working precision.
 
-use super::four::Four;
+use super::four::{Four, Precise};
 use super::{Leg, Points};
 use crate::model::State;
 
@@ -76,16 +76,24 @@ fn moved<V: Four, const N: usize>(
     let (mut end, mut end_low) = (*start, *start_low);
     let h = like.like(h);
     for at in (0..N).step_by(4) {
-        let (product, rest) = h.product(of(like, rate, at));
-        let rest = (rest + h * of(like, rate_low, at)) + of(like, start_low, at);
-        let (sum, lost) = of(like, start, at).exact_sum(product);
-        let (high, low) = sum.exact_sum(lost + rest);
+        let rate = (of(like, rate, at), of(like, rate_low, at));
+        let start = (of(like, start, at), of(like, start_low, at));
+        let (high, low) = moved_exactly(h, rate, start);
         let (high, low) = (high.lanes(), low.lanes());
         for a in at..N.min(at + 4) {
             (end[a], end_low[a]) = (high[a - at], low[a - at]);
         }
     }
     (end, end_low)
+}
+
+/// start + h · rate, each a number and what rounding took from it.
+#[inline(always)]
+pub(crate) fn moved_exactly<V: Precise>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
+    let (product, rest) = h.product(rate.0);
+    let rest = (rest + h * rate.1) + start.1;
+    let (sum, lost) = start.0.exact_sum(product);
+    sum.exact_sum(lost + rest)
 }
 
 /// Four of the numbers; zeros beyond the last.

@@ -4,14 +4,8 @@ use crate::double_double::DoubleDouble;
 use crate::model::{First, Model};
 use crate::real::{Lanes, Real};
 
-/// Four numbers, one for each of four points.
-pub(super) trait Four: Real {
-    /// The same kind of numbers with these values.
-    fn with(self, lanes: [f64; 4]) -> Self;
-
-    /// The values.
-    fn lanes(self) -> [f64; 4];
-
+/// Numbers whose products and sums can be had exactly.
+pub(crate) trait Precise: Real {
     /// The product and what rounding takes from it, exactly.
     fn product(self, other: Self) -> (Self, Self);
 
@@ -21,6 +15,21 @@ pub(super) trait Four: Real {
         let high = self + other;
         let part = high - self;
         (high, (self - (high - part)) + (other - part))
+    }
+}
+
+/// Four numbers, one for each of four points.
+pub(crate) trait Four: Precise {
+    /// The same kind of numbers with these values.
+    fn with(self, lanes: [f64; 4]) -> Self;
+
+    /// The values.
+    fn lanes(self) -> [f64; 4];
+
+    /// sin and cos of `self`, and of `other`.
+    #[inline(always)]
+    fn sin_cos_of_two(self, other: Self) -> ((Self, Self), (Self, Self)) {
+        (self.sin_cos(), other.sin_cos())
     }
 
     /// The kernel of first derivatives at four points.
@@ -45,6 +54,18 @@ pub(super) trait Four: Real {
         M: Model<N>;
 }
 
+impl Precise for Lanes<4> {
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        let (mut high, mut low) = (self, self);
+        for lane in 0..4 {
+            let product = DoubleDouble::product(self.0[lane], other.0[lane]);
+            (high.0[lane], low.0[lane]) = (product.high, product.low);
+        }
+        (high, low)
+    }
+}
+
 /// On every processor: the arithmetic in vectors as the compiler likes, the kernel for one point after the other.
 impl Four for Lanes<4> {
     #[inline(always)]
@@ -55,16 +76,6 @@ impl Four for Lanes<4> {
     #[inline(always)]
     fn lanes(self) -> [f64; 4] {
         self.0
-    }
-
-    #[inline(always)]
-    fn product(self, other: Self) -> (Self, Self) {
-        let (mut high, mut low) = (self, self);
-        for lane in 0..4 {
-            let product = DoubleDouble::product(self.0[lane], other.0[lane]);
-            (high.0[lane], low.0[lane]) = (product.high, product.low);
-        }
-        (high, low)
     }
 
     #[inline(always)]
@@ -158,6 +169,14 @@ fn each_point<R: One, M, const N: usize>(
     }
 }
 
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl Precise for crate::quad::Quad {
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        self.product(other)
+    }
+}
+
 /// In registers of the processor, the kernel for all four points at once.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 impl Four for crate::quad::Quad {
@@ -172,8 +191,8 @@ impl Four for crate::quad::Quad {
     }
 
     #[inline(always)]
-    fn product(self, other: Self) -> (Self, Self) {
-        self.product(other)
+    fn sin_cos_of_two(self, other: Self) -> ((Self, Self), (Self, Self)) {
+        self.sin_cos_of_two(other)
     }
 
     #[inline(always)]

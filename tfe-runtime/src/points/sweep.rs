@@ -1,21 +1,22 @@
 //! First-order equations, and what all iterations share.
 
 use super::four::Four;
-use super::{Leg, Points};
+use super::{Inertia, Leg, Points};
 use crate::equations::Increment;
 use crate::legendre::largest;
 use crate::model::{First, Model};
+use crate::real::Real;
 
 /// The largest magnitude so far in each lane, and a sum that shows what is no number.
 #[derive(Clone, Copy)]
-pub(super) struct Largest<V> {
+pub(crate) struct Largest<V> {
     size: V,
     sum: V,
 }
 
-impl<V: Four> Largest<V> {
+impl<V: Real> Largest<V> {
     #[inline(always)]
-    pub(super) fn none(like: V) -> Self {
+    pub(crate) fn none(like: V) -> Self {
         let zero = like.like(0.0);
         Self {
             size: zero,
@@ -24,12 +25,20 @@ impl<V: Four> Largest<V> {
     }
 
     #[inline(always)]
-    pub(super) fn raise(&mut self, value: V) {
+    pub(crate) fn raise(&mut self, value: V) {
         let size = value.abs();
         self.size = V::select(self.size.less(size), size, self.size);
         self.sum += value;
     }
 
+    /// One for each lane; NaN where one value of that lane was not finite.
+    #[inline(always)]
+    pub(crate) fn by_lane(self) -> V {
+        self.size + self.sum * self.sum.like(0.0)
+    }
+}
+
+impl<V: Four> Largest<V> {
     /// NaN if one value was not finite.
     #[inline(always)]
     pub(super) fn get(self) -> f64 {
@@ -124,7 +133,7 @@ impl<const N: usize> Points<N> {
                 step[a] = wanted - (like.with(self.momenta[k]) - like.like(leg.start.p[a]));
             }
             if const { M::FACTS.constant_mass } {
-                step = self.times_inverse(like, &step);
+                step = self.inertia.times(like, &step);
             } else {
                 solve(like, &self.masses[c], &mut step);
             }
@@ -173,7 +182,7 @@ impl<const N: usize> Points<N> {
             }
             let mut by_change = [zero; N];
             if !is_first && M::FACTS.constant_mass {
-                by_change = self.times_inverse(like, &change);
+                by_change = self.inertia.times(like, &change);
             } else if !is_first {
                 for a in 0..N {
                     for b in 0..N {
@@ -231,13 +240,15 @@ impl<const N: usize> Points<N> {
         };
         Increment { relative, position }
     }
+}
 
-    /// The constant M⁻¹ (or H_pp) times a vector at every point of a group.
+impl<const N: usize> Inertia<N> {
+    /// The constant M⁻¹ (or H_pp) times a vector for each of four.
     #[inline(always)]
-    fn times_inverse<V: Four>(&self, like: V, vector: &[V; N]) -> [V; N] {
+    pub(crate) fn times<V: Real>(&self, like: V, vector: &[V; N]) -> [V; N] {
         let mut product = [like.like(0.0); N];
-        for (a, row) in self.inertia.inverse.iter().enumerate() {
-            if self.inertia.diagonal.is_some() {
+        for (a, row) in self.inverse.iter().enumerate() {
+            if self.diagonal.is_some() {
                 product[a] = like.like(row[a]) * vector[a];
                 continue;
             }
@@ -259,7 +270,7 @@ fn store<V: Four, const N: usize>(to: &mut [[[f64; 4]; N]; N], matrix: &[[V; N];
 }
 
 #[inline(always)]
-pub(super) fn no_derivatives<V: Four, const N: usize>(like: V) -> First<V, N> {
+pub(crate) fn no_derivatives<V: Real, const N: usize>(like: V) -> First<V, N> {
     let zero = [like.like(0.0); N];
     First {
         z: zero,
@@ -271,7 +282,7 @@ pub(super) fn no_derivatives<V: Four, const N: usize>(like: V) -> First<V, N> {
 /// Factors without exchanging rows: a mass matrix is positive definite, and where it is not the iteration does not converge and the step is
 /// left to another method. The diagonal holds the inverse pivots.
 #[inline(always)]
-fn factor<V: Four, const N: usize>(like: V, matrix: &mut [[V; N]; N]) {
+pub(crate) fn factor<V: Real, const N: usize>(like: V, matrix: &mut [[V; N]; N]) {
     for column in 0..N {
         let inverse = like.like(1.0) / matrix[column][column];
         matrix[column][column] = inverse;

@@ -12,7 +12,7 @@ pub(super) const MAX_GROUPS: usize = 4;
 
 /// A K × K matrix by columns, the rows in groups of four. Rows beyond the last are copies of it, so that nothing extraordinary happens there.
 #[derive(Clone, Debug)]
-pub(super) struct Matrix {
+pub(crate) struct Matrix {
     groups: usize,
     columns: Vec<[f64; 4]>,
 }
@@ -38,7 +38,7 @@ impl Matrix {
 
     /// The product with a vector over the points for every coordinate; `rows` and `products` have one row of groups a coordinate.
     #[inline(always)]
-    pub(super) fn apply<V: Four>(&self, like: V, rows: &[[f64; 4]], products: &mut [[f64; 4]]) {
+    pub(crate) fn apply<V: Four>(&self, like: V, rows: &[[f64; 4]], products: &mut [[f64; 4]]) {
         match self.groups {
             1 => self.apply_to::<V, 1>(like, rows, products),
             2 => self.apply_to::<V, 2>(like, rows, products),
@@ -69,11 +69,17 @@ impl Matrix {
             }
         }
     }
+
+    /// The columns, padded to groups of four.
+    #[inline(always)]
+    pub(crate) fn columns(&self) -> core::slice::ChunksExact<'_, f64> {
+        self.columns.as_flattened().chunks_exact(4 * self.groups)
+    }
 }
 
 /// A weight for each point and what rounding took from it; zeros beyond the last.
 #[derive(Clone, Debug)]
-pub(super) struct Weights(Vec<[[f64; 4]; 2]>);
+pub(crate) struct Weights(Vec<[[f64; 4]; 2]>);
 
 impl Weights {
     fn new(high: &[f64], low: &[f64]) -> Self {
@@ -90,7 +96,7 @@ impl Weights {
     /// This is what all steps add up. With products of one rounding each, the energy of a Kepler orbit drifts ten times as fast: weights
     /// and step are the same numbers in every step, and what their products lose is no chance.
     #[inline(always)]
-    pub(super) fn sum<V: Four>(&self, like: V, row: &[[f64; 4]]) -> (f64, f64) {
+    pub(crate) fn sum<V: Four>(&self, like: V, row: &[[f64; 4]]) -> (f64, f64) {
         let (mut high, mut low) = (like.like(0.0), like.like(0.0));
         for ([weight, weight_low], value) in self.0.iter().zip(row) {
             let value = like.with(*value);
@@ -105,37 +111,44 @@ impl Weights {
         let lost = (left.low + right.low) + all.low;
         (all.high, ((e + f) + (g + h)) + lost)
     }
+
+    /// The weight of one point and what rounding took from it.
+    #[inline(always)]
+    pub(crate) fn of(&self, point: usize) -> (f64, f64) {
+        let [weight, low] = &self.0[point / 4];
+        (weight[point % 4], low[point % 4])
+    }
 }
 
 /// All tables; `low` is what rounding took.
 #[derive(Clone, Debug)]
-pub(super) struct Tables {
-    pub(super) points: usize,
-    pub(super) groups: usize,
+pub(crate) struct Tables {
+    pub(crate) points: usize,
+    pub(crate) groups: usize,
     /// c
-    pub(super) nodes: Vec<[f64; 4]>,
+    pub(crate) nodes: Vec<[f64; 4]>,
     /// A 1: how far a constant velocity reaches. It is c for collocation methods only.
-    pub(super) reach: Vec<[f64; 4]>,
-    pub(super) reach_low: Vec<[f64; 4]>,
+    pub(crate) reach: Vec<[f64; 4]>,
+    pub(crate) reach_low: Vec<[f64; 4]>,
     /// A
-    pub(super) once: Matrix,
-    pub(super) once_low: Matrix,
+    pub(crate) once: Matrix,
+    pub(crate) once_low: Matrix,
     /// A²: what two integrations make of accelerations.
-    pub(super) twice: Matrix,
-    pub(super) twice_low: Matrix,
+    pub(crate) twice: Matrix,
+    pub(crate) twice_low: Matrix,
     /// b
-    pub(super) weights: Weights,
+    pub(crate) weights: Weights,
     /// bᵀA
-    pub(super) lever: Weights,
+    pub(crate) lever: Weights,
     /// From the last element to this one, for steps of the ratio that follows.
-    pub(super) continued: Matrix,
+    pub(crate) continued: Matrix,
     ratio: Option<f64>,
     scratch: Vec<f64>,
 }
 
 impl Tables {
     /// Of an element that is a Runge–Kutta method.
-    pub(super) fn new(scheme: &SchemeRef<'_>) -> Self {
+    pub(crate) fn new(scheme: &SchemeRef<'_>) -> Self {
         let points = scheme.points();
         let coefficient = |i: usize, j: usize| DoubleDouble {
             high: scheme.position[i * points + j],
@@ -185,7 +198,7 @@ impl Tables {
     }
 
     /// Makes `continued` that of steps of this ratio.
-    pub(super) fn set_ratio(&mut self, table: &SchemeTable, ratio: f64) {
+    pub(crate) fn set_ratio(&mut self, table: &SchemeTable, ratio: f64) {
         // Far outside the last element its polynomial says nothing; backwards it may be reused.
         let near = (-1.5..=3.0).contains(&ratio);
         let fraction = if near { ratio } else { 0.0 };

@@ -1,0 +1,249 @@
+//! What all trajectories share, and the choice of the instruction set.
+
+use super::group::{Group, Work};
+use super::pair::{Eight, LANES, Pair};
+use super::step::Step;
+use crate::model::Model;
+use crate::newton::Control;
+use crate::points::Inertia;
+use crate::points::tables::Tables;
+use crate::scheme::{SchemeTable, Tables as _};
+use crate::statistics::{Contraction, Statistics};
+
+/// Tables and scratch of steps side by side.
+#[derive(Clone, Debug)]
+pub(super) struct Engine<const N: usize> {
+    tables: Tables,
+    inertia: Inertia<N>,
+    work: Work<N>,
+    last_step: f64,
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    pub(super) isa: Option<pulp::x86::V3>,
+}
+
+/// All steps of a bundle from one time to the next.
+struct Job<'a, M, const N: usize> {
+    step: Step<'a, M, N>,
+    groups: &'a mut [Group<N>],
+    work: &'a mut Work<N>,
+    lanes: &'a mut [bool],
+    statistics: &'a mut Statistics,
+}
+
+impl<M, const N: usize> Job<'_, M, N>
+where
+    M: Model<N>,
+{
+    #[inline(always)]
+    fn run<V: Eight>(self, like: V) {
+        for (group, lanes) in self.groups.iter_mut().zip(self.lanes.chunks_mut(LANES)) {
+            if lanes.contains(&true) {
+                (self.step).advance(like, group, self.work, lanes, self.statistics);
+            }
+        }
+    }
+}
+
+impl<const N: usize> Engine<N> {
+    /// For an element that is a Runge–Kutta method; nothing if a constant mass matrix is singular.
+    pub(super) fn new<M>(model: &M, table: &SchemeTable) -> Option<Self>
+    where
+        M: Model<N>,
+    {
+        let inertia = Inertia::of(model)?;
+        let tables = Tables::new(&table.view());
+        let work = Work::new(tables.points, !M::FACTS.constant_mass);
+        Some(Self {
+            tables,
+            inertia,
+            work,
+            last_step: 0.0,
+            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+            isa: if M::LANES {
+                pulp::x86::V3::try_new()
+            } else {
+                None
+            },
+        })
+    }
+
+    /// Moves the wanted lanes from t to t + h and says which of them have arrived; the others are where they were.
+    pub(super) fn advance<M>(
+        &mut self,
+        (model, table, control): (&M, &SchemeTable, &Control),
+        (t, h): (f64, f64),
+        groups: &mut [Group<N>],
+        lanes: &mut [bool],
+        statistics: &mut Statistics,
+    ) where
+        M: Model<N>,
+    {
+        self.tables.set_ratio(table, h / self.last_step);
+        self.last_step = h;
+        // The slowest one of this step.
+        statistics.contraction = Contraction::NONE;
+        let step = Step {
+            model,
+            tables: &self.tables,
+            inertia: &self.inertia,
+            control,
+            t,
+            h,
+        };
+        for (group, lanes) in groups.iter_mut().zip(lanes.chunks(LANES)) {
+            for (lane, wanted) in lanes.iter().enumerate() {
+                if *wanted && !group.warm[lane] {
+                    step.start_cold(&table.view(), group, &mut self.work, lane);
+                }
+            }
+        }
+        let job = Job {
+            step,
+            groups,
+            work: &mut self.work,
+            lanes,
+            statistics,
+        };
+        #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+        // Without kernels for lanes the constant is false, and the compiler drops the call.
+        if let (Some(isa), true) = (self.isa, M::LANES) {
+            isa.vectorize(Wide { job, isa });
+            return;
+        }
+        let like = crate::Lanes([0.0; 4]);
+        job.run(Pair(like, like));
+    }
+}
+
+/// The same in registers of four.
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+struct Wide<'a, M, const N: usize> {
+    job: Job<'a, M, N>,
+    isa: pulp::x86::V3,
+}
+
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for Wide<'_, M, N> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let like = crate::quad::Quad::of(self.isa, [0.0; 4]);
+        self.job.run(Pair(like, like));
+    }
+}
+
+#[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
+mod tests {
+    use crate::bundle::Bundle;
+    use crate::element::Element;
+    use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
+    use crate::points::tests::Planet;
+    use crate::real::Real;
+    use crate::step::Control;
+    use crate::{Mixed, Radau};
+
+    /// Two damped pendulums of masses 3 and 7: equations of second order.
+    struct Pendulums;
+
+    impl Model<2> for Pendulums {
+        const FORM: Form = Form::Lagrangian;
+        const FACTS: Facts = Facts {
+            time_dependent: false,
+            forced: true,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: false,
+            separable: true,
+        };
+        const LANES: bool = true;
+
+        fn energy_function<R: Real>(&self, _: R, _: &[R; 2], v: &[R; 2]) -> R {
+            v[0]
+        }
+
+        fn first<R: Real>(&self, t: R, q: &[R; 2], v: &[R; 2], first: &mut First<R, 2>) {
+            self.first_inline(t, q, v, first);
+        }
+
+        #[inline(always)]
+        fn first_inline<R: Real>(&self, t: R, q: &[R; 2], v: &[R; 2], first: &mut First<R, 2>) {
+            first.z = [v[0] * t.like(3.0), v[1] * t.like(7.0)];
+            first.q = [-q[0].sin(), -(q[1] - q[0]).sin()];
+            first.force = [-v[0] * t.like(0.01), -v[1] * t.like(0.02)];
+        }
+
+        fn first_and_mass<R: Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            v: &[R; 2],
+            first: &mut First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            self.first_inline(t, q, v, first);
+            (zz[0][0], zz[1][1]) = (t.like(3.0), t.like(7.0));
+        }
+
+        fn second<R: Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            v: &[R; 2],
+            first: &mut First<R, 2>,
+            second: &mut Second<R, 2>,
+        ) {
+            self.first_and_mass(t, q, v, first, &mut second.zz);
+        }
+
+        fn coordinate_name(_: usize) -> CoordinateName {
+            CoordinateName::single("q")
+        }
+    }
+
+    /// Runs thirteen lanes with and without wide registers.
+    fn agree<M: Model<N>, const N: usize>(model: &M, element: Element, start: State<N>, h: f64) {
+        let mut with = Bundle::<_, N, 13>::new(model, element, Control::default()).unwrap();
+        let mut starts = [start; 13];
+        for (lane, start) in starts.iter_mut().enumerate() {
+            start.p[0] *= 1.0 + 0.01 * lane as f64;
+        }
+        with.start(&starts);
+        let mut without = with.clone();
+        match &mut without.engine {
+            Some(engine) if engine.isa.is_some() => engine.isa = None,
+            _ => return, // Nothing to compare with on this processor.
+        }
+        for step in 0..200 {
+            let t = h * f64::from(step);
+            assert!(!with.advance(t, h) && !without.advance(t, h));
+        }
+        for lane in 0..13 {
+            let end = with.state(lane).unwrap();
+            assert_eq!(end, without.state(lane).unwrap());
+            assert!(end.q[0].is_finite() && end.q[0] != start.q[0]);
+        }
+        assert_eq!(with.statistics(), without.statistics());
+    }
+
+    #[test]
+    fn every_processor_gives_the_same_bits() {
+        for element in [Mixed::<4>.into(), Mixed::<9>.into(), Radau::<11>.into()] {
+            // The last angle is so large that sines of the system are taken.
+            let start = State {
+                q: [0.4, 0.0, 2e5],
+                p: [0.0, 2.0, 0.3],
+            };
+            let moving = State {
+                p: [0.1, 2.0, 0.3],
+                ..start
+            };
+            agree(&Planet, element, start, 0.02);
+            agree(&Planet, element, moving, 0.02);
+            let start = State {
+                q: [1.0, -0.5],
+                p: [0.3, 0.2],
+            };
+            agree(&Pendulums, element, start, 0.1);
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! Equations of first order: velocities are the unknowns, or the rates of phase space.
+
+use super::group::{Group, Row, Work, load, replace};
+use super::judge::{Increments, larger};
+use super::pair::Eight;
+use super::products::{apply, sum};
+use super::second_order::largest;
+use super::step::Step;
+use crate::model::Model;
+use crate::points::end::moved_exactly;
+use crate::points::sweep::{Largest, factor, no_derivatives};
+
+impl<M, const N: usize> Step<'_, M, N>
+where
+    M: Model<N>,
+{
+    /// What low words of the start and of the tables add at the points.
+    #[inline(always)]
+    pub(super) fn begin<V: Eight>(&self, like: V, group: &Group<N>, work: &mut Work<N>) {
+        let table = &self.tables.once_low;
+        apply(like, table, &group.rates, &mut work.products);
+        apply(like, table, &group.forces, &mut work.more_products);
+        let h = like.like(self.h);
+        for l in 0..self.tables.points {
+            for a in 0..N {
+                let moved = h * like.with(work.products[l][a]);
+                work.low_position[l][a] = (like.with(group.low.q[a]) + moved).lanes();
+                let moved = h * like.with(work.more_products[l][a]);
+                work.low_momentum[l][a] = (like.with(group.low.p[a]) + moved).lanes();
+            }
+        }
+    }
+
+    /// A Lagrangian: momenta and forces at the velocities, then velocities that belong to the momenta asked for.
+    #[inline(always)]
+    pub(super) fn sweep_velocity<V: Eight>(
+        &self,
+        like: V,
+        group: &mut Group<N>,
+        work: &mut Work<N>,
+        mask: V::Mask,
+        refresh: bool,
+    ) -> Increments<V> {
+        let (h, zero) = (like.like(self.h), like.like(0.0));
+        let (start_q, start_p) = (load(like, &group.start.q), load(like, &group.start.p));
+        apply(like, &self.tables.once, &group.rates, &mut work.products);
+        for l in 0..self.tables.points {
+            let mut q = start_q;
+            for a in 0..N {
+                let low = like.with(work.low_position[l][a]);
+                q[a] += h * like.with(work.products[l][a]) + low;
+            }
+            let v = load(like, &group.rates[l]);
+            let mut first = no_derivatives(like);
+            let t = self.time(like, l);
+            if const { !M::FACTS.constant_mass } && refresh {
+                let mut mass = [[zero; N]; N];
+                (self.model).first_and_mass_inline(t, &q, &v, &mut first, &mut mass);
+                factor(like, &mut mass);
+                store(&mut work.masses[l], &mass);
+            } else {
+                self.model.first_inline(t, &q, &v, &mut first);
+            }
+            for a in 0..N {
+                work.momenta[l][a] = first.z[a].lanes();
+                replace::<V>(mask, &mut group.forces[l][a], first.q[a] + first.force[a]);
+            }
+        }
+        apply(like, &self.tables.once, &group.forces, &mut work.products);
+        let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
+        for l in 0..self.tables.points {
+            let mut step = [zero; N];
+            for a in 0..N {
+                let low = like.with(work.low_momentum[l][a]);
+                let wanted = h * like.with(work.products[l][a]) + low;
+                step[a] = wanted - (like.with(work.momenta[l][a]) - start_p[a]);
+            }
+            if const { M::FACTS.constant_mass } {
+                step = self.inertia.times(like, &step);
+            } else {
+                solve(like, &work.masses[l], &mut step);
+            }
+            for a in 0..N {
+                let old = &mut group.rates[l][a];
+                let rate = like.with(*old) + step[a];
+                changed.raise(step[a]);
+                size.raise(rate);
+                replace::<V>(mask, old, rate);
+            }
+        }
+        let (changed, size) = (changed.by_lane(), size.by_lane());
+        let position = self.relative(largest(like, &start_q), size, changed);
+        // The momentum at the end is as good as the velocities, whatever the step; what is left of an increment reaches it through forces
+        // only, hence the factor.
+        let velocity = changed / larger(size, like.like(f64::MIN_POSITIVE));
+        let velocity = like.like(0.25) * velocity;
+        Increments {
+            relative: larger(velocity, position),
+            position,
+        }
+    }
+
+    /// A Hamiltonian: momenta, the velocities that belong to them, coordinates, and then both rates anew.
+    #[inline(always)]
+    pub(super) fn sweep_phase<V: Eight>(
+        &self,
+        like: V,
+        group: &mut Group<N>,
+        work: &mut Work<N>,
+        mask: V::Mask,
+        (is_first, refresh): (bool, bool),
+    ) -> Increments<V> {
+        let (h, zero) = (like.like(self.h), like.like(0.0));
+        let (start_q, start_p) = (load(like, &group.start.q), load(like, &group.start.p));
+        apply(like, &self.tables.once, &group.forces, &mut work.products);
+        for l in 0..self.tables.points {
+            let mut change = [zero; N];
+            for a in 0..N {
+                let low = like.with(work.low_momentum[l][a]);
+                let p = start_p[a] + (h * like.with(work.products[l][a]) + low);
+                change[a] = p - like.with(work.momenta[l][a]);
+                work.momenta[l][a] = p.lanes();
+            }
+            let mut by_change = [zero; N];
+            if !is_first && M::FACTS.constant_mass {
+                by_change = self.inertia.times(like, &change);
+            } else if !is_first {
+                for a in 0..N {
+                    for b in 0..N {
+                        by_change[a] += like.with(work.masses[l][a][b]) * change[b];
+                    }
+                }
+            }
+            for a in 0..N {
+                work.velocities[l][a] = (like.with(group.rates[l][a]) + by_change[a]).lanes();
+            }
+        }
+        apply(
+            like,
+            &self.tables.once,
+            &work.velocities,
+            &mut work.products,
+        );
+        let none = Largest::none(like);
+        let (mut force_changed, mut force_size) = (none, none);
+        let (mut rate_changed, mut rate_size) = (none, none);
+        for l in 0..self.tables.points {
+            let mut q = start_q;
+            for a in 0..N {
+                let low = like.with(work.low_position[l][a]);
+                q[a] += h * like.with(work.products[l][a]) + low;
+            }
+            let p = load(like, &work.momenta[l]);
+            let mut first = no_derivatives(like);
+            let t = self.time(like, l);
+            if const { !M::FACTS.constant_mass } && refresh {
+                let mut mass = [[zero; N]; N];
+                (self.model).first_and_mass_inline(t, &q, &p, &mut first, &mut mass);
+                store(&mut work.masses[l], &mass);
+            } else {
+                self.model.first_inline(t, &q, &p, &mut first);
+            }
+            for a in 0..N {
+                let (old_force, old_rate) = (&mut group.forces[l][a], &mut group.rates[l][a]);
+                let force = first.force[a] - first.q[a];
+                force_changed.raise(force - like.with(*old_force));
+                rate_changed.raise(first.z[a] - like.with(*old_rate));
+                force_size.raise(force);
+                rate_size.raise(first.z[a]);
+                replace::<V>(mask, old_force, force);
+                replace::<V>(mask, old_rate, first.z[a]);
+            }
+        }
+        let position = self.relative(
+            largest(like, &start_q),
+            rate_size.by_lane(),
+            rate_changed.by_lane(),
+        );
+        let momentum = self.relative(
+            largest(like, &start_p),
+            force_size.by_lane(),
+            force_changed.by_lane(),
+        );
+        Increments {
+            // A NaN in one of them must not be lost.
+            relative: larger(position, momentum) + like.like(0.0) * (position + momentum),
+            position,
+        }
+    }
+
+    /// Start plus h times the integrals of the rates, of coordinate `a`.
+    #[inline(always)]
+    pub(super) fn end<V: Eight>(&self, like: V, group: &Group<N>, a: usize) -> ((V, V), (V, V)) {
+        let h = like.like(self.h);
+        let velocity = sum(like, &self.tables.weights, &group.rates, a);
+        let force = sum(like, &self.tables.weights, &group.forces, a);
+        let q = (like.with(group.start.q[a]), like.with(group.low.q[a]));
+        let p = (like.with(group.start.p[a]), like.with(group.low.p[a]));
+        (moved_exactly(h, velocity, q), moved_exactly(h, force, p))
+    }
+}
+
+#[inline(always)]
+fn store<V: Eight, const N: usize>(to: &mut [Row<N>; N], matrix: &[[V; N]; N]) {
+    for a in 0..N {
+        for b in 0..N {
+            to[a][b] = matrix[a][b].lanes();
+        }
+    }
+}
+
+/// Solves with what [`factor`] has made.
+#[inline(always)]
+fn solve<V: Eight, const N: usize>(like: V, factors: &[Row<N>; N], vector: &mut [V; N]) {
+    for row in 0..N {
+        for j in 0..row {
+            vector[row] = vector[row] - like.with(factors[row][j]) * vector[j];
+        }
+    }
+    for row in (0..N).rev() {
+        for j in row + 1..N {
+            vector[row] = vector[row] - like.with(factors[row][j]) * vector[j];
+        }
+        vector[row] = vector[row] * like.with(factors[row][row]);
+    }
+}

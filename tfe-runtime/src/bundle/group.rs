@@ -1,0 +1,140 @@
+//! Eight trajectories side by side, and what the iteration of their elements needs.
+
+use super::pair::{Eight, LANES};
+use crate::model::State;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// A number for every coordinate of each of eight trajectories.
+pub(super) type Row<const N: usize> = [[f64; LANES]; N];
+
+/// Coordinates and momenta at a node.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ends<const N: usize> {
+    pub(super) q: Row<N>,
+    pub(super) p: Row<N>,
+}
+
+/// The trajectories and the unknowns of their elements.
+#[derive(Clone, Debug)]
+pub(super) struct Group<const N: usize> {
+    pub(super) start: Ends<N>,
+    /// What rounding took from it.
+    pub(super) low: Ends<N>,
+    /// Whether a lane continues its last step.
+    pub(super) warm: [bool; LANES],
+    /// L_q + Q, or π: rates of the momenta at the points.
+    pub(super) forces: Vec<Row<N>>,
+    /// ν, or κ: rates of the coordinates.
+    pub(super) rates: Vec<Row<N>>,
+}
+
+/// Scratch of one step.
+#[derive(Clone, Debug)]
+pub(super) struct Work<const N: usize> {
+    /// Momenta at the points.
+    pub(super) momenta: Vec<Row<N>>,
+    /// Velocities from which coordinates follow in phase space; accelerations in equations of second order.
+    pub(super) velocities: Vec<Row<N>>,
+    /// Products with the tables.
+    pub(super) products: Vec<Row<N>>,
+    pub(super) more_products: Vec<Row<N>>,
+    /// What the low words of state and tables add at the points.
+    pub(super) low_position: Vec<Row<N>>,
+    pub(super) low_momentum: Vec<Row<N>>,
+    /// Factors of L_vv, or H_pp, where they are not constant.
+    pub(super) masses: Vec<[Row<N>; N]>,
+    /// Velocities at the start.
+    pub(super) velocity: Row<N>,
+    pub(super) velocity_low: Row<N>,
+    /// One trajectory at a cold start.
+    pub(super) cold: Vec<f64>,
+}
+
+impl<const N: usize> Group<N> {
+    pub(super) fn new(points: usize) -> Self {
+        let ends = Ends {
+            q: [[0.0; LANES]; N],
+            p: [[0.0; LANES]; N],
+        };
+        Self {
+            start: ends,
+            low: ends,
+            warm: [false; LANES],
+            forces: vec![[[0.0; LANES]; N]; points],
+            rates: vec![[[0.0; LANES]; N]; points],
+        }
+    }
+
+    /// Sets a trajectory to a state that continues no step.
+    pub(super) fn place(&mut self, lane: usize, state: &State<N>) {
+        for a in 0..N {
+            self.start.q[a][lane] = state.q[a];
+            self.start.p[a][lane] = state.p[a];
+            self.low.q[a][lane] = 0.0;
+            self.low.p[a][lane] = 0.0;
+        }
+        self.warm[lane] = false;
+    }
+
+    pub(super) fn state(&self, lane: usize) -> State<N> {
+        let mut state = State::ZERO;
+        for a in 0..N {
+            state.q[a] = self.start.q[a][lane];
+            state.p[a] = self.start.p[a][lane];
+        }
+        state
+    }
+}
+
+impl<const N: usize> Work<N> {
+    /// For elements of so many points; `varied` if the mass matrix is not constant.
+    pub(super) fn new(points: usize, varied: bool) -> Self {
+        let rows = || vec![[[0.0; LANES]; N]; points];
+        Self {
+            momenta: rows(),
+            velocities: rows(),
+            products: rows(),
+            more_products: rows(),
+            low_position: rows(),
+            low_momentum: rows(),
+            masses: vec![[[[0.0; LANES]; N]; N]; if varied { points } else { 0 }],
+            velocity: [[0.0; LANES]; N],
+            velocity_low: [[0.0; LANES]; N],
+            cold: vec![0.0; 2 * points * N],
+        }
+    }
+}
+
+/// A row in registers.
+#[inline(always)]
+pub(super) fn load<V: Eight, const N: usize>(like: V, row: &Row<N>) -> [V; N] {
+    let mut loaded = [like; N];
+    for a in 0..N {
+        loaded[a] = like.with(row[a]);
+    }
+    loaded
+}
+
+/// `new` in the lanes of the mask.
+#[inline(always)]
+pub(super) fn replace<V: Eight>(mask: V::Mask, old: &mut [f64; LANES], new: V) {
+    let kept = new.with(*old);
+    *old = V::select(mask, new, kept).lanes();
+}
+
+/// One where a lane is chosen, else zero.
+pub(super) fn flags(lanes: &[bool]) -> [f64; LANES] {
+    let mut flags = [0.0; LANES];
+    for (flag, lane) in flags.iter_mut().zip(lanes) {
+        *flag = f64::from(u8::from(*lane));
+    }
+    flags
+}
+
+/// Whether a lane is not zero; none is negative.
+#[inline(always)]
+pub(super) fn any<V: Eight>(flags: V) -> bool {
+    let [a, b, c, d, e, f, g, h] = flags.lanes();
+    ((a + e) + (b + f)) + ((c + g) + (d + h)) > 0.0
+}

@@ -1,0 +1,174 @@
+//! The stopping rule of single trajectories for several at once, without branches.
+
+use crate::newton::{IDLE, ROUGH_ROUND_OFF, ROUND_OFF};
+use crate::real::Real;
+
+/// Judges the increments of several trajectories as [`Monitor`](crate::newton::Monitor) judges those of one. Truth values are one and zero.
+#[derive(Clone, Copy)]
+pub(super) struct Judge<V> {
+    tolerance: V,
+    last: V,
+    rate: V,
+    risen: V,
+    best: V,
+    idle: V,
+}
+
+/// Increments, relative to the state, and of the coordinates alone.
+#[derive(Clone, Copy)]
+pub(super) struct Increments<V> {
+    pub(super) relative: V,
+    pub(super) position: V,
+}
+
+impl<V: Real> Judge<V> {
+    #[inline(always)]
+    pub(super) fn new(like: V, tolerance: f64) -> Self {
+        Self {
+            tolerance: like.like(tolerance),
+            last: like.like(f64::INFINITY),
+            rate: like.like(1.0),
+            risen: like.like(0.0),
+            best: like.like(f64::INFINITY),
+            idle: like.like(0.0),
+        }
+    }
+
+    /// By how much the last increments were smaller than those before.
+    #[inline(always)]
+    pub(super) fn rates(&self) -> V {
+        self.rate
+    }
+
+    /// Which of the `active` lanes have converged, and which go on; those in neither have lost their numbers.
+    #[inline(always)]
+    pub(super) fn judge(&mut self, increments: Increments<V>, active: V) -> (V, V) {
+        let size = increments.relative;
+        let (zero, one, infinity) = (size.like(0.0), size.like(1.0), size.like(f64::INFINITY));
+        let is_first = infinity.less_or_equal(self.last);
+        let rate = V::select(size.less_or_equal(zero), zero, size / self.last);
+        // The rest of a geometric series, with a memory of the rate before.
+        let cautious = larger(rate, size.like(0.1) * self.rate);
+        let series = size * cautious / (one - cautious);
+        let left = V::select(one.less_or_equal(cautious), size, series);
+        let left = V::select(is_first, size, left);
+        self.risen = V::select(one.less_or_equal(rate), self.risen + one, zero);
+        let is_better = size.less(size.like(0.5) * self.best);
+        self.best = V::select(is_better, size, self.best);
+        self.idle = V::select(is_better, zero, self.idle + one);
+        self.last = size;
+        self.rate = V::select(is_first, one, rate);
+        // Comparisons with a NaN are false.
+        let finite = V::select(size.less(infinity), active, zero);
+        let done = V::select(left.less_or_equal(self.tolerance), finite, zero);
+        let done = V::select(zero.less(self.stalled(increments)), finite, done);
+        (done, finite - done)
+    }
+
+    /// Which are at round-off and no longer fall.
+    #[inline(always)]
+    fn stalled(&self, increments: Increments<V>) -> V {
+        let size = increments.relative;
+        let (zero, one) = (size.like(0.0), size.like(1.0));
+        let settled = (increments.position).less_or_equal(size.like(4.0 * f64::EPSILON));
+        let settled = V::select(settled, one, zero);
+        let fine = V::select(size.less_or_equal(size.like(ROUND_OFF)), one, zero);
+        let rough = V::select(size.less_or_equal(size.like(ROUGH_ROUND_OFF)), one, settled);
+        let risen = V::select(one.less_or_equal(self.risen), fine, zero);
+        let often = V::select(size.like(3.0).less_or_equal(self.risen), rough, zero);
+        let idle = size.like(f64::from(IDLE)).less_or_equal(self.idle);
+        risen + (often + V::select(idle, settled, zero))
+    }
+
+    /// Which of the `active` lanes so many more iterations might serve, at their present rates.
+    #[inline(always)]
+    pub(super) fn hopeful(&self, active: V, remaining: u32) -> V {
+        let target = larger(self.tolerance, active.like(64.0 * f64::EPSILON));
+        let exponent = i32::try_from(remaining).unwrap_or(i32::MAX);
+        // It falls all the way, or it never does. A loop with an exit would cost more: where it ends, nobody can foresee.
+        let projected = self.last * self.rate.powi(exponent);
+        let zero = active.like(0.0);
+        let hopeful = V::select(projected.less_or_equal(target), active, zero);
+        V::select(self.last.less_or_equal(target), active, hopeful)
+    }
+}
+
+/// The larger one; of numbers that are no NaN.
+#[inline(always)]
+pub(super) fn larger<V: Real>(x: V, y: V) -> V {
+    V::select(x.less(y), y, x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Lanes;
+    use crate::equations::Increment;
+    use crate::newton::{Monitor, Verdict};
+
+    /// Increments that fall, rise, stay, and stop being numbers.
+    fn sequence(seed: u64) -> [(f64, f64); 24] {
+        let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        let mut next = || {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            (random >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let fall = [1.0, 3.0, 9.0, 30.0][seed as usize % 4];
+        let (mut size, mut all) = (0.3, [(0.0, 0.0); 24]);
+        for place in &mut all {
+            size *= (fall * (0.3 - next())).exp();
+            let lost = next() < 0.01;
+            let relative = if lost { f64::NAN } else { size.max(1e-17) };
+            *place = (relative, relative * next());
+        }
+        all
+    }
+
+    #[test]
+    fn several_at_once_are_judged_as_one() {
+        let (mut converged, mut failed, mut hopeless) = (0, 0, 0);
+        for seed in 0..4000 {
+            let lanes = [0, 1, 2, 3].map(|lane| sequence(4 * seed + lane));
+            let like = Lanes([0.0; 4]);
+            let mut judge = Judge::new(like, 1e-17);
+            let mut monitors = [(); 4].map(|()| Monitor::new(1e-17));
+            let mut active = [true; 4];
+            for step in 0..24 {
+                let increments = Increments {
+                    relative: Lanes([0, 1, 2, 3].map(|lane| lanes[lane][step].0)),
+                    position: Lanes([0, 1, 2, 3].map(|lane| lanes[lane][step].1)),
+                };
+                let flags = Lanes(active.map(|lane| f64::from(u8::from(lane))));
+                let (done, going) = judge.judge(increments, flags);
+                let hopeful = judge.hopeful(going, 24 - step as u32);
+                for lane in 0..4 {
+                    if !active[lane] {
+                        assert_eq!((done.0[lane], going.0[lane]), (0.0, 0.0));
+                        continue;
+                    }
+                    let (relative, position) = lanes[lane][step];
+                    let monitor = &mut monitors[lane];
+                    let expected = match monitor.judge(Increment { relative, position }) {
+                        Ok(Verdict::Converged) => (1.0, 0.0),
+                        Ok(Verdict::GoOn) => (0.0, 1.0),
+                        Err(_) => (0.0, 0.0),
+                    };
+                    assert_eq!((done.0[lane], going.0[lane]), expected);
+                    converged += u32::from(expected.0 > 0.0);
+                    failed += u32::from(expected == (0.0, 0.0));
+                    active[lane] = expected.1 > 0.0;
+                    if active[lane] {
+                        assert_eq!(judge.rates().0[lane], monitor.rate());
+                        let lost = monitor.is_hopeless(24 - step as u32);
+                        assert_eq!(hopeful.0[lane] == 0.0, lost);
+                        hopeless += u32::from(lost);
+                    }
+                }
+            }
+        }
+        // All kinds have been there.
+        assert!(converged > 1000 && failed > 100 && hopeless > 1000);
+    }
+}

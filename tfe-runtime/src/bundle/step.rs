@@ -1,0 +1,239 @@
+//! A step of eight trajectories: start of the iteration, the iteration, the end.
+
+use super::group::{Group, Work, any, flags, replace};
+use super::judge::{Increments, Judge, larger};
+use super::pair::{Eight, LANES};
+use super::products::apply;
+use crate::model::{First, Model};
+use crate::newton::{Control, PATIENCE, Solve};
+use crate::points::tables::Tables;
+use crate::points::{Inertia, is_phase, is_second_order};
+use crate::scheme::SchemeRef;
+use crate::statistics::{Contraction, Statistics};
+use crate::step::{cold_phase, cold_velocity};
+
+/// What is the same for all trajectories.
+pub(super) struct Step<'a, M, const N: usize> {
+    pub(super) model: &'a M,
+    pub(super) tables: &'a Tables,
+    pub(super) inertia: &'a Inertia<N>,
+    pub(super) control: &'a Control,
+    pub(super) t: f64,
+    pub(super) h: f64,
+}
+
+/// After these iterations mass matrices are evaluated anew. The start is good to a few digits, so that one evaluation mostly serves; that
+/// they do not depend on how the iteration goes keeps lanes independent of one another.
+const REFRESHED: [u32; 4] = [0, 4, 8, 14];
+
+impl<M, const N: usize> Step<'_, M, N>
+where
+    M: Model<N>,
+{
+    /// Moves the wanted lanes from t to t + h and says which of them have arrived; the others are where they were.
+    #[inline(always)]
+    pub(super) fn advance<V: Eight>(
+        &self,
+        like: V,
+        group: &mut Group<N>,
+        work: &mut Work<N>,
+        lanes: &mut [bool],
+        statistics: &mut Statistics,
+    ) {
+        self.continue_last(like, group, work);
+        if const { is_second_order::<M, N>() } {
+            self.begin_second_order(like, group, work);
+        } else {
+            self.begin(like, group, work);
+        }
+        let mut arrived = self.iterate(like, group, work, like.with(flags(lanes)), statistics);
+
+        if const { is_second_order::<M, N>() } {
+            self.prepare_end(like, group, work);
+        }
+        let (zero, mut ends) = (like.like(0.0), [((like, like), (like, like)); N]);
+        for a in 0..N {
+            ends[a] = if const { is_second_order::<M, N>() } {
+                self.end_second_order(like, group, work, a)
+            } else {
+                self.end(like, group, a)
+            };
+            // Zero times what is not finite is a NaN.
+            let nothing = zero * (ends[a].0).0 + zero * (ends[a].1).0;
+            arrived = V::select(nothing.less_or_equal(zero), arrived, zero);
+        }
+        let mask = zero.less(arrived);
+        for a in 0..N {
+            let ((q, q_low), (p, p_low)) = ends[a];
+            replace::<V>(mask, &mut group.start.q[a], q);
+            replace::<V>(mask, &mut group.start.p[a], p);
+            replace::<V>(mask, &mut group.low.q[a], q_low);
+            replace::<V>(mask, &mut group.low.p[a], p_low);
+        }
+        let arrived = arrived.lanes();
+        for lane in 0..LANES {
+            group.warm[lane] = arrived[lane] > 0.0;
+            statistics.steps += u64::from(group.warm[lane]);
+        }
+        for (lane, warm) in lanes.iter_mut().zip(&group.warm) {
+            *lane = *warm;
+        }
+    }
+
+    /// Sets the unknowns of lanes that continue a step to the polynomial of that, continued.
+    #[inline(always)]
+    fn continue_last<V: Eight>(&self, like: V, group: &mut Group<N>, work: &mut Work<N>) {
+        let warm = like.with(flags(&group.warm));
+        if !any(warm) {
+            return;
+        }
+        let mask = like.like(0.0).less(warm);
+        let table = &self.tables.continued;
+        if const { is_second_order::<M, N>() || is_phase::<M, N>() } {
+            apply(like, table, &group.forces, &mut work.products);
+            for (old, new) in group.forces.iter_mut().zip(&work.products) {
+                for a in 0..N {
+                    replace::<V>(mask, &mut old[a], like.with(new[a]));
+                }
+            }
+        }
+        if const { !is_second_order::<M, N>() } {
+            apply(like, table, &group.rates, &mut work.products);
+            for (old, new) in group.rates.iter_mut().zip(&work.products) {
+                for a in 0..N {
+                    replace::<V>(mask, &mut old[a], like.with(new[a]));
+                }
+            }
+        }
+    }
+
+    /// The fixed-point iteration: one for each lane that has converged.
+    #[inline(always)]
+    fn iterate<V: Eight>(
+        &self,
+        like: V,
+        group: &mut Group<N>,
+        work: &mut Work<N>,
+        wanted: V,
+        statistics: &mut Statistics,
+    ) -> V {
+        // Where Newton's method may follow, the iteration gives up early.
+        let yielding = self.control.solve == Solve::Auto;
+        let most = if yielding {
+            self.control.max_iterations.min(PATIENCE)
+        } else {
+            self.control.max_iterations
+        };
+        let zero = like.like(0.0);
+        let mut judge = Judge::new(like, self.control.tolerance);
+        let (mut active, mut arrived, mut count, mut rates) = (wanted, zero, zero, zero);
+        let mut iteration = 0;
+        while iteration < most {
+            let mask = zero.less(active);
+            let increments = self.sweep(like, group, work, mask, iteration);
+            count += active;
+            let (done, going) = judge.judge(increments, active);
+            // Lanes that have converged before keep their last rate.
+            rates = V::select(mask, judge.rates(), rates);
+            arrived += done;
+            active = going;
+            if yielding && iteration >= 2 {
+                active = judge.hopeful(active, most - iteration);
+            }
+            iteration += 1;
+            if !any(active) {
+                break;
+            }
+        }
+        let mut sum = 0.0;
+        for count in count.lanes() {
+            sum += count;
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a small whole number"
+        )]
+        let count = sum as u64;
+        statistics.iterations += count;
+        statistics.fixed_point_iterations += count;
+        statistics.residual_evaluations += count * self.tables.points as u64;
+        let mut slowest = 0.0_f64;
+        for rate in rates.lanes() {
+            slowest = slowest.max(rate);
+        }
+        statistics.contraction = statistics.contraction.max(Contraction::of(slowest));
+        arrived
+    }
+
+    /// One iteration of the lanes of the mask.
+    #[inline(always)]
+    fn sweep<V: Eight>(
+        &self,
+        like: V,
+        group: &mut Group<N>,
+        work: &mut Work<N>,
+        mask: V::Mask,
+        iteration: u32,
+    ) -> Increments<V> {
+        // Constant conditions, so that of the three iterations one is compiled.
+        if const { is_second_order::<M, N>() } {
+            return self.sweep_second_order(like, group, work, mask);
+        }
+        let refresh = const { !M::FACTS.constant_mass } && REFRESHED.contains(&iteration);
+        if const { is_phase::<M, N>() } {
+            self.sweep_phase(like, group, work, mask, (iteration == 0, refresh))
+        } else {
+            self.sweep_velocity(like, group, work, mask, refresh)
+        }
+    }
+
+    /// When point l is.
+    #[inline(always)]
+    pub(super) fn time<V: Eight>(&self, like: V, l: usize) -> V {
+        like.like(self.t + self.h * self.tables.nodes.as_flattened()[l])
+    }
+
+    /// |h δ| over the larger one of start and |h x|; zero over zero is zero, NaN stays NaN.
+    #[inline(always)]
+    pub(super) fn relative<V: Eight>(&self, start: V, x: V, step: V) -> V {
+        let (h, zero) = (start.like(self.h.abs()), start.like(0.0));
+        let quotient = h * step / larger(start, h * x);
+        V::select(step.less_or_equal(zero), zero, quotient)
+    }
+
+    /// Constant rates for one lane.
+    #[cold]
+    pub(super) fn start_cold(
+        &self,
+        scheme: &SchemeRef<'_>,
+        group: &mut Group<N>,
+        work: &mut Work<N>,
+        lane: usize,
+    ) {
+        let (state, points) = (group.state(lane), self.tables.points);
+        let unknowns = &mut work.cold;
+        let (mut force, mut rate) = ([0.0; N], [0.0; N]);
+        if const { is_phase::<M, N>() } {
+            cold_phase(self.model, scheme, self.t, &state, unknowns);
+            force.copy_from_slice(&unknowns[..N]);
+            rate.copy_from_slice(&unknowns[points * N..][..N]);
+        } else {
+            cold_velocity(self.model, self.t, &state, unknowns);
+            rate.copy_from_slice(&unknowns[..N]);
+            if is_second_order::<M, N>() {
+                let mut first = First::ZERO;
+                self.model.first(self.t, &state.q, &rate, &mut first);
+                for a in 0..N {
+                    force[a] = first.q[a] + first.force[a];
+                }
+            }
+        }
+        for l in 0..points {
+            for a in 0..N {
+                group.forces[l][a][lane] = force[a];
+                group.rates[l][a][lane] = rate[a];
+            }
+        }
+    }
+}
