@@ -5,7 +5,7 @@
 //! cargo run --release --example speed_accuracy -- folder
 //! ```
 //!
-//! Every family with 2 to 5, 7 and 9 nodes runs each scene with several steps; errors are those at the end, against values that are known to
+//! Every family with 2 to 5, 7, 9 and 12 nodes runs each scene with several steps; errors are those at the end, against values that are known to
 //! more digits where there are any, else against a finer run that is checked against another. Each module holds the scenes of one kind.
 
 mod overview;

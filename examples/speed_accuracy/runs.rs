@@ -9,7 +9,7 @@ use tfe::work_precision::{Curve, Measurements, WorkPrecisionError};
 
 /// The errors to be reached.
 pub const TARGETS: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
-const NODES: [usize; 6] = [2, 3, 4, 5, 7, 9];
+const NODES: [usize; 7] = [2, 3, 4, 5, 7, 9, 12];
 
 /// A scene that was measured.
 pub struct Scene {
@@ -26,7 +26,7 @@ impl Scene {
         let measured = problem
             .elements(elements())
             .tolerances([1e-5, 1e-8, 1e-11, 0.05 * f64::EPSILON])
-            .repeat_for(Duration::from_millis(20))
+            .repeat_for(Duration::from_millis(10))
             .run()?;
         Ok(Self { title, measured })
     }
@@ -37,7 +37,7 @@ impl Scene {
         let mixed = |curve: &Curve| curve.element() == Element::mixed(curve.element().nodes());
         let ours = self.measured.clone().without_peers();
         let mut charts = vec![
-            ("nodes", ours.only(mixed).title(of("mixed, 2 to 9 nodes"))),
+            ("nodes", ours.only(mixed).title(of("mixed, 2 to 12 nodes"))),
             (
                 "families",
                 ours.only(|curve| curve.element().nodes() == 4)

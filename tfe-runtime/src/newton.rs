@@ -3,6 +3,7 @@
 use crate::equations::{Equations, Increment};
 use crate::error::StepError;
 use crate::lu;
+use crate::real::integer_power;
 use crate::statistics::Contraction;
 use crate::workspace::Scratch;
 
@@ -75,7 +76,7 @@ impl Preference {
 
     /// The fixed point was given up.
     pub(crate) fn leave_fixed_point(&mut self) {
-        self.penalty = (self.penalty * 2).clamp(8, 1024);
+        self.penalty = (self.penalty * 2).clamp(1, 1024);
         self.newton_steps = self.penalty;
     }
 
@@ -139,31 +140,33 @@ impl Monitor {
 
     /// # Errors
     /// [`StepError::NonFinite`].
+    #[inline(always)]
     pub(crate) fn judge(&mut self, increment: Increment) -> Result<Verdict, StepError> {
         let size = increment.relative;
         if !size.is_finite() {
             return Err(StepError::NonFinite);
         }
-        let first = self.last.is_infinite();
-        let rate = if size == 0.0 { 0.0 } else { size / self.last };
-        // What is left is the rest of a geometric series. One lucky small increment must not end
-        // the iteration, hence a memory of the rate before.
-        let cautious = rate.max(0.1 * self.rate);
-        let left = if first || cautious >= 1.0 {
-            size
+        let (last, first) = (self.last, self.last.is_infinite());
+        // What is left is the rest of a geometric series, size · ρ/(1 − ρ). One lucky small increment must not end the iteration, hence a
+        // memory of the rate before. Written without quotients: what follows waits for this decision.
+        let memory = 0.1 * self.rate;
+        let converged = if first || size >= last {
+            size <= self.tolerance
         } else {
-            size * cautious / (1.0 - cautious)
+            let by_rate = size * size <= self.tolerance * (last - size);
+            by_rate & (size * memory <= self.tolerance * (1.0 - memory))
         };
-        self.risen = if rate >= 1.0 { self.risen + 1 } else { 0 };
+        let rate = if size == 0.0 { 0.0 } else { size / last };
+        self.last = size;
+        self.rate = if first { 1.0 } else { rate };
+        if converged {
+            return Ok(Verdict::Converged);
+        }
+        self.risen = if size >= last { self.risen + 1 } else { 0 };
         if size < 0.5 * self.best {
             (self.best, self.idle) = (size, 0);
         } else {
             self.idle += 1;
-        }
-        self.last = size;
-        self.rate = if first { 1.0 } else { rate };
-        if left <= self.tolerance {
-            return Ok(Verdict::Converged);
         }
         // Near rest the velocities are noise themselves, and increments beside them say nothing.
         let settled = increment.position <= 4.0 * f64::EPSILON;
@@ -178,19 +181,15 @@ impl Monitor {
     }
 
     /// Whether so many more iterations would not do, at the present rate.
+    #[inline(always)]
     pub(crate) fn is_hopeless(&self, remaining: u32) -> bool {
         let target = self.tolerance.max(64.0 * f64::EPSILON);
         if self.last <= target {
             return false;
         }
-        let mut projected = self.last;
-        for _ in 0..remaining {
-            projected *= self.rate;
-            if projected <= target {
-                return false;
-            }
-        }
-        true
+        // It falls all the way, or it never does.
+        let exponent = i32::try_from(remaining).unwrap_or(i32::MAX);
+        self.last * integer_power(self.rate, exponent) > target
     }
 }
 

@@ -15,6 +15,7 @@
 pub(crate) mod end;
 pub(crate) mod four;
 mod second_order;
+mod step;
 pub(crate) mod sweep;
 pub(crate) mod tables;
 
@@ -22,39 +23,42 @@ use crate::double_double::DoubleDouble;
 use crate::element::Element;
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
-use crate::newton::{Control, Monitor, PATIENCE, Verdict};
+use crate::newton::Control;
 use crate::scheme::{SchemeRef, SchemeTable, Tables as _};
 use crate::step::{cold_phase, cold_velocity};
 use alloc::vec;
 use alloc::vec::Vec;
 use four::Four;
+use step::Job;
 use tables::Tables;
 
-/// Values at all points: for each coordinate a row of groups of four points.
-type Rows = Vec<[f64; 4]>;
+/// A number for every coordinate at each of four points.
+type Row<const N: usize> = [[f64; 4]; N];
 
-/// The unknowns of an element and everything that their iteration needs.
+/// The unknowns of an element and everything that their iteration needs: rows for groups of four points.
 #[derive(Clone, Debug)]
 pub(crate) struct Points<const N: usize> {
     tables: Tables,
     /// L_q + Q, or π: rates of the momenta.
-    forces: Rows,
+    forces: Vec<Row<N>>,
     /// ν, or κ: rates of the coordinates.
-    rates: Rows,
-    /// Momenta; accelerations in the equations of second order.
-    momenta: Rows,
-    velocities: Rows,
+    rates: Vec<Row<N>>,
+    momenta: Vec<Row<N>>,
+    velocities: Vec<Row<N>>,
     /// Products with the tables.
-    products: Rows,
-    more_products: Rows,
+    products: Vec<Row<N>>,
+    more_products: Vec<Row<N>>,
     /// What low words of state and tables add at the points.
-    low_position: Rows,
-    low_momentum: Rows,
-    /// Factors of L_vv, or H_pp, a group each, where they are not constant.
-    masses: Vec<[[[f64; 4]; N]; N]>,
+    low_position: Vec<Row<N>>,
+    low_momentum: Vec<Row<N>>,
+    /// Factors of L_vv, or H_pp, where they are not constant.
+    masses: Vec<[Row<N>; N]>,
     inertia: Inertia<N>,
     velocity_low: [f64; N],
     velocity: [f64; N],
+    /// The largest coordinate at the start, and the largest velocity or momentum.
+    distance: f64,
+    speed: f64,
     /// Scratch of cold starts.
     cold: Vec<f64>,
     is_warm: bool,
@@ -68,6 +72,8 @@ pub(crate) struct Points<const N: usize> {
 pub(crate) struct Inertia<const N: usize> {
     /// Its diagonal, if it has nothing else.
     pub(crate) diagonal: Option<[f64; N]>,
+    /// The diagonal of the inverse; ones where that is not constant.
+    pub(crate) inverse_diagonal: [f64; N],
     /// What rounding took from the inverse of the diagonal.
     pub(crate) inverse_low: [f64; N],
     /// M⁻¹ (or H_pp), row by row; nothing where it is not constant.
@@ -107,10 +113,9 @@ impl<const N: usize> Points<N> {
         let inertia = Inertia::of(model)?;
         let tables = Tables::new(scheme);
         let groups = tables.groups;
-        let rows = || vec![[0.0; 4]; N * groups];
+        let rows = || vec![[[0.0; 4]; N]; groups];
         let varied = if M::FACTS.constant_mass { 0 } else { groups };
         Some(Self {
-            tables,
             forces: rows(),
             rates: rows(),
             momenta: rows(),
@@ -120,9 +125,12 @@ impl<const N: usize> Points<N> {
             low_position: rows(),
             low_momentum: rows(),
             masses: vec![[[[0.0; 4]; N]; N]; varied],
+            tables,
             inertia,
             velocity_low: [0.0; N],
             velocity: [0.0; N],
+            distance: 0.0,
+            speed: 0.0,
             cold: vec![0.0; 2 * scheme.points() * N],
             is_warm: false,
             last_step: 0.0,
@@ -163,148 +171,16 @@ impl<const N: usize> Points<N> {
             self.start_cold(model, &table.view(), &leg);
         }
         self.last_step = leg.h;
-        let outcome = self.dispatch(model, control, leg, yielding);
+        let job = Job {
+            points: self,
+            model,
+            control,
+            leg,
+            yielding,
+        };
+        let outcome = job.run();
         self.is_warm = outcome.end.is_some();
         outcome
-    }
-
-    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-    fn dispatch<M>(
-        &mut self,
-        model: &M,
-        control: &Control,
-        leg: Leg<'_, N>,
-        yielding: bool,
-    ) -> Outcome<N>
-    where
-        M: Model<N>,
-    {
-        struct Job<'a, M, const N: usize> {
-            points: &'a mut Points<N>,
-            model: &'a M,
-            control: &'a Control,
-            leg: Leg<'a, N>,
-            yielding: bool,
-            isa: pulp::x86::V3,
-        }
-        impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for Job<'_, M, N> {
-            type Output = Outcome<N>;
-            #[inline(always)]
-            fn call(self) -> Outcome<N> {
-                let like = crate::quad::Quad::of(self.isa, [0.0; 4]);
-                let Self { model, control, .. } = self;
-                (self.points).step(like, model, control, self.leg, self.yielding)
-            }
-        }
-        match self.isa {
-            // Without kernels for lanes the constant is false, and the compiler drops the call.
-            Some(isa) if M::LANES => isa.vectorize(Job {
-                points: self,
-                model,
-                control,
-                leg,
-                yielding,
-                isa,
-            }),
-            _ => self.step(crate::Lanes([0.0; 4]), model, control, leg, yielding),
-        }
-    }
-
-    #[cfg(not(all(feature = "simd", target_arch = "x86_64")))]
-    fn dispatch<M>(
-        &mut self,
-        model: &M,
-        control: &Control,
-        leg: Leg<'_, N>,
-        yielding: bool,
-    ) -> Outcome<N>
-    where
-        M: Model<N>,
-    {
-        self.step(crate::Lanes([0.0; 4]), model, control, leg, yielding)
-    }
-
-    /// The whole step.
-    #[inline(always)]
-    fn step<V: Four, M>(
-        &mut self,
-        like: V,
-        model: &M,
-        control: &Control,
-        leg: Leg<'_, N>,
-        yielding: bool,
-    ) -> Outcome<N>
-    where
-        M: Model<N>,
-    {
-        // Constant conditions, so that of the three iterations one is compiled.
-        if self.is_warm {
-            if const { is_second_order::<M, N>() || is_phase::<M, N>() } {
-                self.tables
-                    .continued
-                    .apply(like, &self.forces, &mut self.products);
-                core::mem::swap(&mut self.forces, &mut self.products);
-            }
-            if const { !is_second_order::<M, N>() } {
-                self.tables
-                    .continued
-                    .apply(like, &self.rates, &mut self.products);
-                core::mem::swap(&mut self.rates, &mut self.products);
-            }
-        }
-        if const { is_second_order::<M, N>() } {
-            self.begin_second_order(like, &leg);
-        } else {
-            self.begin(like, &leg);
-        }
-        let mut monitor = Monitor::new(control.tolerance);
-        let most = if yielding {
-            control.max_iterations.min(PATIENCE)
-        } else {
-            control.max_iterations
-        };
-        let (mut iterations, mut refresh, mut converged) = (0, true, false);
-        while iterations < most {
-            let increment = if const { is_second_order::<M, N>() } {
-                self.sweep_second_order::<V, M>(like, model, &leg)
-            } else if const { is_phase::<M, N>() } {
-                self.sweep_phase::<V, M>(like, model, &leg, iterations == 0, refresh)
-            } else {
-                self.sweep_velocity::<V, M>(like, model, &leg, refresh)
-            };
-            iterations += 1;
-            match monitor.judge(increment) {
-                Ok(Verdict::Converged) => {
-                    converged = true;
-                    break;
-                }
-                Ok(Verdict::GoOn) => {}
-                Err(_) => break,
-            }
-            // The start is good to a few digits, so one evaluation of mass matrices mostly serves.
-            refresh = monitor.rate() > 0.1;
-            if yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1) {
-                break;
-            }
-        }
-        // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
-        let mut end = None;
-        if converged {
-            let reached = if const { is_second_order::<M, N>() } {
-                self.end_second_order(like, &leg)
-            } else {
-                self.end(like, &leg)
-            };
-            if is_finite(&reached.0) {
-                end = Some(reached);
-            }
-        }
-        Outcome {
-            end,
-            iterations,
-            residual: monitor.last(),
-            contraction: monitor.rate(),
-        }
     }
 
     /// Constant rates.
@@ -313,7 +189,7 @@ impl<const N: usize> Points<N> {
     where
         M: Model<N>,
     {
-        let (points, groups) = (self.tables.points, self.tables.groups);
+        let points = self.tables.points;
         let unknowns = &mut self.cold;
         let (mut force, mut rate) = ([0.0; N], [0.0; N]);
         if matches!(M::FORM, Form::Hamiltonian) {
@@ -331,9 +207,10 @@ impl<const N: usize> Points<N> {
                 }
             }
         }
-        for a in 0..N {
-            self.forces[a * groups..(a + 1) * groups].fill([force[a]; 4]);
-            self.rates[a * groups..(a + 1) * groups].fill([rate[a]; 4]);
+        for (forces, rates) in self.forces.iter_mut().zip(&mut self.rates) {
+            for a in 0..N {
+                (forces[a], rates[a]) = ([force[a]; 4], [rate[a]; 4]);
+            }
         }
     }
 
@@ -345,14 +222,11 @@ impl<const N: usize> Points<N> {
         if is_second_order::<M, N>() {
             self.set_rates(h);
         }
-        let groups = self.tables.groups;
-        for a in 0..N {
-            let row = a * groups..(a + 1) * groups;
-            let both = self.rates[row.clone()].as_flattened().iter();
-            let both = both.zip(self.forces[row].as_flattened());
-            for (l, (rate, force)) in both.take(self.tables.points).enumerate() {
-                rates[l * N + a] = *rate;
-                forces[l * N + a] = *force;
+        for l in 0..self.tables.points {
+            let (group, lane) = (l / 4, l % 4);
+            for a in 0..N {
+                rates[l * N + a] = self.rates[group][a][lane];
+                forces[l * N + a] = self.forces[group][a][lane];
             }
         }
     }
@@ -368,6 +242,7 @@ impl<const N: usize> Inertia<N> {
         if !M::FACTS.constant_mass {
             return Some(Self {
                 diagonal: None,
+                inverse_diagonal: [1.0; N],
                 inverse_low: [0.0; N],
                 inverse: Vec::new(),
             });
@@ -394,13 +269,15 @@ impl<const N: usize> Inertia<N> {
                 }
             }
         }
-        let mut inverse_low = [0.0; N];
+        let (mut inverse_diagonal, mut inverse_low) = ([0.0; N], [0.0; N]);
         for a in 0..N {
+            inverse_diagonal[a] = inverse[a][a];
             let exact = DoubleDouble::ONE.over(DoubleDouble::new(mass[a][a]));
             inverse_low[a] = exact.minus(DoubleDouble::new(inverse[a][a])).high;
         }
         Some(Self {
             diagonal,
+            inverse_diagonal,
             inverse_low,
             inverse: inverse.to_vec(),
         })
@@ -432,6 +309,36 @@ where
         Form::Lagrangian => element.is_collocated(),
         Form::Hamiltonian => element.has_phase_form(),
     }
+}
+
+/// Four of the numbers; zeros beyond the last.
+#[inline(always)]
+fn block<V: Four, const N: usize>(like: V, numbers: &[f64; N], at: usize) -> V {
+    if let Some(four) = numbers[at..].first_chunk() {
+        return like.with(*four);
+    }
+    let mut four = [0.0; 4];
+    four[..N - at].copy_from_slice(&numbers[at..]);
+    like.with(four)
+}
+
+/// Writes them back.
+#[inline(always)]
+fn put<V: Four, const N: usize>(four: V, numbers: &mut [f64; N], at: usize) {
+    let four = four.lanes();
+    let end = N.min(at + 4);
+    numbers[at..end].copy_from_slice(&four[..end - at]);
+}
+
+/// The largest magnitude.
+#[inline(always)]
+fn largest<const N: usize>(numbers: &[f64; N]) -> f64 {
+    let mut largest = 0.0;
+    for a in 0..N {
+        let size = numbers[a].abs();
+        largest = if largest < size { size } else { largest };
+    }
+    largest
 }
 
 fn is_finite<const N: usize>(state: &State<N>) -> bool {
@@ -537,7 +444,7 @@ pub(crate) mod tests {
             }
             let mut without = with.clone();
             without.isa = None;
-            let mut ends = [with, without].map(|mut points| {
+            let ends = [with, without].map(|mut points| {
                 let (mut state, mut low) = (
                     State {
                         q: [0.4, 0.0, 2e5],
@@ -559,9 +466,8 @@ pub(crate) mod tests {
                 }
                 state
             });
-            let [with, without] = &mut ends;
-            assert_eq!(with, without);
-            assert!(with.q[0].is_finite());
+            assert_eq!(ends[0], ends[1]);
+            assert!(ends[0].q[0].is_finite());
         }
     }
 }

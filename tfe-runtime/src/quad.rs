@@ -52,6 +52,13 @@ impl Quad {
         )
     }
 
+    /// The larger one; of a NaN and a number, the second.
+    #[inline(always)]
+    pub(crate) fn larger(self, other: Self) -> Self {
+        let value = self.isa.max_f64s(self.value, other.value);
+        Self { value, ..self }
+    }
+
     /// Whether all arguments are reduced here.
     #[inline(always)]
     fn is_small(self) -> bool {

@@ -1,6 +1,6 @@
 //! Many coordinates: the lattice of Fermi, Pasta, Ulam and Tsingou.
 
-use super::Start;
+use super::{Start, steps};
 use tfe::prelude::*;
 
 /// Unit masses between walls, 33 springs of force δ + a δ².
@@ -31,6 +31,5 @@ pub fn lattice_start() -> Start<32> {
 
 pub fn lattice() -> WorkPrecision<'static, Lattice, 32> {
     let Start { q, v, end } = lattice_start();
-    WorkPrecision::new(&LATTICE, LATTICE.state(q, v), 0.0..end)
-        .steps([2.0, 1.0, 0.7, 0.5, 0.35, 0.25, 0.1, 0.05])
+    WorkPrecision::new(&LATTICE, LATTICE.state(q, v), 0.0..end).steps(steps(end, 10, 400))
 }

@@ -13,3 +13,11 @@ pub struct Start<const N: usize> {
     /// From zero.
     pub end: f64,
 }
+
+/// So many equal steps from zero to `end`, each time a quarter more or less.
+pub fn steps(end: f64, fewest: u32, most: u32) -> impl Iterator<Item = f64> {
+    let counts = std::iter::successors(Some(fewest), |count| Some(count + count.div_ceil(4)));
+    counts
+        .take_while(move |count| *count <= most)
+        .map(move |count| end / f64::from(count))
+}

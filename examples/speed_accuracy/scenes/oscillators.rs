@@ -1,6 +1,6 @@
 //! Few coordinates, smooth motions.
 
-use super::Start;
+use super::{Start, steps};
 use tfe::prelude::*;
 
 /// In units of √(l/g).
@@ -19,7 +19,7 @@ pub const PENDULUM_START: Start<1> = Start {
 pub fn pendulum() -> WorkPrecision<'static, Pendulum, 1> {
     let Start { q, v, end } = PENDULUM_START;
     WorkPrecision::new(&PENDULUM, PENDULUM.state(q, v), 0.0..end)
-        .steps([5.0, 3.4, 2.5, 2.0, 1.5, 1.0, 0.7, 0.5, 0.25, 0.1, 0.05])
+        .steps(steps(end, 2, 200))
         .reference_end([0.7131481806013794], [-1.5313085041358347])
 }
 
@@ -37,7 +37,7 @@ pub const HENON_HEILES_START: Start<2> = Start {
 pub fn henon_heiles() -> WorkPrecision<'static, HenonHeiles, 2> {
     let Start { q, v, end } = HENON_HEILES_START;
     WorkPrecision::new(&HenonHeiles {}, State { q, p: v }, 0.0..end)
-        .steps([3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.25, 0.1, 0.05])
+        .steps(steps(end, 30, 2000))
         .reference_end(
             [-0.040_194_237_876_068_82, 0.679_016_921_772_021_6],
             [0.038_450_928_951_859_83, 0.048_594_831_533_003_55],
@@ -68,7 +68,7 @@ pub fn double_pendulum() -> WorkPrecision<'static, DoublePendulum, 2> {
         [1.800_047_274_825, -1.734_236_997_103],
     );
     WorkPrecision::new(&DOUBLE_PENDULUM, DOUBLE_PENDULUM.state(q, v), 0.0..end)
-        .steps([0.5, 0.25, 0.2, 0.15, 0.1, 0.07, 0.05, 0.025, 0.01])
+        .steps(steps(end, 20, 1000))
         .reference_end(last.q, last.p)
         .reference_uncertainty(1e-12)
 }
@@ -89,6 +89,5 @@ pub const VAN_DER_POL_START: Start<1> = Start {
 /// Onto its limit cycle and three times around; energy is no invariant.
 pub fn van_der_pol() -> WorkPrecision<'static, VanDerPol, 1> {
     let Start { q, v, end } = VAN_DER_POL_START;
-    WorkPrecision::new(&VAN_DER_POL, VAN_DER_POL.state(q, v), 0.0..end)
-        .steps([1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.025])
+    WorkPrecision::new(&VAN_DER_POL, VAN_DER_POL.state(q, v), 0.0..end).steps(steps(end, 20, 800))
 }

@@ -1,6 +1,6 @@
 //! Gravity.
 
-use super::Start;
+use super::{Start, steps};
 use tfe::prelude::*;
 
 #[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2)/2 - 1/sqrt(x^2 + y^2))]
@@ -16,7 +16,7 @@ pub const KEPLER_START: Start<2> = Start {
 pub fn kepler() -> WorkPrecision<'static, Kepler, 2> {
     let Start { q, v, end } = KEPLER_START;
     WorkPrecision::new(&Kepler {}, State { q, p: v }, 0.0..end)
-        .steps([0.5, 0.3, 0.25, 0.2, 0.15, 0.1, 0.07, 0.05, 0.025])
+        .steps(steps(end, 30, 800))
         .reference_end(
             [-0.770_075_578_411_240_4, 0.788_344_816_994_424_4],
             [-0.894_183_731_988_691_5, -0.123_461_764_158_440_96],
@@ -94,7 +94,5 @@ pub fn solar_system_start() -> Start<18> {
 
 pub fn solar_system() -> WorkPrecision<'static, Bodies, 18> {
     let Start { q, v, end } = solar_system_start();
-    WorkPrecision::new(&SOLAR_SYSTEM, SOLAR_SYSTEM.state(q, v), 0.0..end).steps([
-        2000.0, 1500.0, 1000.0, 800.0, 600.0, 400.0, 300.0, 200.0, 100.0, 50.0,
-    ])
+    WorkPrecision::new(&SOLAR_SYSTEM, SOLAR_SYSTEM.state(q, v), 0.0..end).steps(steps(end, 5, 200))
 }

@@ -1,6 +1,6 @@
 //! Two times in one motion: a pendulum on a stiff spring.
 
-use super::Start;
+use super::{Start, steps};
 use tfe::prelude::*;
 
 #[dynamics(
@@ -24,6 +24,5 @@ pub const ELASTIC_START: Start<2> = Start {
 /// phase is what the errors of long steps are of.
 pub fn elastic_pendulum() -> WorkPrecision<'static, ElasticPendulum, 2> {
     let Start { q, v, end } = ELASTIC_START;
-    WorkPrecision::new(&ELASTIC, ELASTIC.state(q, v), 0.0..end)
-        .steps([0.1, 0.05, 0.02, 0.01, 5e-3, 3e-3, 2e-3, 1e-3])
+    WorkPrecision::new(&ELASTIC, ELASTIC.state(q, v), 0.0..end).steps(steps(end, 10, 1000))
 }

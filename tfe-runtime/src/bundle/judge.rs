@@ -48,11 +48,13 @@ impl<V: Real> Judge<V> {
         let is_first = infinity.less_or_equal(self.last);
         let rate = V::select(size.less_or_equal(zero), zero, size / self.last);
         // The rest of a geometric series, with a memory of the rate before.
-        let cautious = larger(rate, size.like(0.1) * self.rate);
-        let series = size * cautious / (one - cautious);
-        let left = V::select(one.less_or_equal(cautious), size, series);
-        let left = V::select(is_first, size, left);
-        self.risen = V::select(one.less_or_equal(rate), self.risen + one, zero);
+        let memory = size.like(0.1) * self.rate;
+        let by_rate = size * size - self.tolerance * (self.last - size);
+        let by_memory = size * memory - self.tolerance * (one - memory);
+        let beyond = larger(by_rate, by_memory);
+        let beyond = V::select(self.last.less_or_equal(size), size - self.tolerance, beyond);
+        let beyond = V::select(is_first, size - self.tolerance, beyond);
+        self.risen = V::select(self.last.less_or_equal(size), self.risen + one, zero);
         let is_better = size.less(size.like(0.5) * self.best);
         self.best = V::select(is_better, size, self.best);
         self.idle = V::select(is_better, zero, self.idle + one);
@@ -60,7 +62,7 @@ impl<V: Real> Judge<V> {
         self.rate = V::select(is_first, one, rate);
         // Comparisons with a NaN are false.
         let finite = V::select(size.less(infinity), active, zero);
-        let done = V::select(left.less_or_equal(self.tolerance), finite, zero);
+        let done = V::select(beyond.less_or_equal(zero), finite, zero);
         let done = V::select(zero.less(self.stalled(increments)), finite, done);
         (done, finite - done)
     }

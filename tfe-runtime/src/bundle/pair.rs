@@ -39,6 +39,11 @@ impl<V: Four> Precise for Pair<V> {
         let (first, second) = (self.0.product(other.0), self.1.product(other.1));
         (Self(first.0, second.0), Self(first.1, second.1))
     }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        Self(self.0.larger(other.0), self.1.larger(other.1))
+    }
 }
 
 macro_rules! operators {

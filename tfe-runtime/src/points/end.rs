@@ -1,90 +1,92 @@
-//! The end of an element, to more than the working precision.
+//! The end of an element, to more than the working precision where that is asked for.
 
 use super::four::{Four, Precise};
-use super::{Leg, Points};
+use super::{Leg, Points, block, put};
 use crate::model::State;
-
-/// A number for every coordinate, and what rounding took from it.
-type Exact<const N: usize> = ([f64; N], [f64; N]);
 
 impl<const N: usize> Points<N> {
     /// Start plus h times the integrals of the rates of first-order equations.
     #[inline(always)]
-    pub(super) fn end<V: Four>(&self, like: V, leg: &Leg<'_, N>) -> (State<N>, State<N>) {
-        let velocity = self.integral(like, &self.tables.weights, &self.rates);
-        let force = self.integral(like, &self.tables.weights, &self.forces);
-        let (start, low) = (leg.start, leg.low);
-        ends(
-            moved(like, leg.h, &velocity, (&start.q, &low.q)),
-            moved(like, leg.h, &force, (&start.p, &low.p)),
-        )
-    }
-
-    /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h Σ (bᵀA) M⁻¹ f) of second-order equations.
-    #[inline(always)]
-    pub(super) fn end_second_order<V: Four>(
-        &mut self,
+    pub(super) fn end<V: Four, const EXACT: bool>(
+        &self,
         like: V,
         leg: &Leg<'_, N>,
     ) -> (State<N>, State<N>) {
-        let groups = self.tables.groups;
-        if let Some(mass) = &self.inertia.diagonal {
-            // Rounded for itself at every point, not with the one rounding of 1/m.
-            for a in 0..N {
-                let mass = like.like(mass[a]);
-                for k in a * groups..(a + 1) * groups {
-                    self.momenta[k] = (like.with(self.forces[k]) / mass).lanes();
-                }
-            }
-        } else {
-            self.accelerate(like);
+        let (mut end, mut end_low) = (State::ZERO, State::ZERO);
+        let (weights, h) = (&self.tables.weights, like.like(leg.h));
+        for at in (0..N).step_by(4) {
+            let velocity = weights.sums::<_, N, EXACT>(like, &self.rates, at);
+            let force = weights.sums::<_, N, EXACT>(like, &self.forces, at);
+            let q = (block(like, &leg.start.q, at), block(like, &leg.low.q, at));
+            let p = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
+            let (q, q_low) = moved::<_, EXACT>(h, velocity, q);
+            let (p, p_low) = moved::<_, EXACT>(h, force, p);
+            put(q, &mut end.q, at);
+            put(p, &mut end.p, at);
+            put(q_low, &mut end_low.q, at);
+            put(p_low, &mut end_low.p, at);
         }
-        let force = self.integral(like, &self.tables.weights, &self.forces);
-        let lever = self.integral(like, &self.tables.lever, &self.momenta);
-        let start = (&self.velocity, &self.velocity_low);
-        let velocity = moved(like, leg.h, &lever, start);
-        let (start, low) = (leg.start, leg.low);
-        ends(
-            moved(like, leg.h, &velocity, (&start.q, &low.q)),
-            moved(like, leg.h, &force, (&start.p, &low.p)),
-        )
+        (end, end_low)
     }
 
+    /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) of second-order equations.
     #[inline(always)]
-    fn integral<V: Four>(
+    pub(super) fn end_second_order<V: Four, const EXACT: bool>(
         &self,
         like: V,
-        weights: &super::tables::Weights,
-        rows: &[[f64; 4]],
-    ) -> Exact<N> {
-        let (mut high, mut low) = ([0.0; N], [0.0; N]);
-        for (a, row) in rows.chunks_exact(self.tables.groups).enumerate() {
-            (high[a], low[a]) = weights.sum(like, row);
+        leg: &Leg<'_, N>,
+    ) -> (State<N>, State<N>) {
+        let (mut end, mut end_low) = (State::ZERO, State::ZERO);
+        let (mut lever, mut lever_low) = ([0.0; N], [0.0; N]);
+        let (forces, h) = (&self.forces, like.like(leg.h));
+        for at in (0..N).step_by(4) {
+            let (sum, low) = self.tables.lever.sums::<_, N, EXACT>(like, forces, at);
+            put(sum, &mut lever, at);
+            put(low, &mut lever_low, at);
         }
-        (high, low)
+        if self.inertia.diagonal.is_none() {
+            (lever, lever_low) = self.inertia.of_both(&lever, &lever_low);
+        }
+        for at in (0..N).step_by(4) {
+            let mut acceleration = (block(like, &lever, at), block(like, &lever_low, at));
+            if self.inertia.diagonal.is_some() {
+                // Times 1/m, which has a low word of its own: one rounding of it would be the same in every step.
+                let inverse = block(like, &self.inertia.inverse_diagonal, at);
+                let inverse_low = block(like, &self.inertia.inverse_low, at);
+                if const { EXACT } {
+                    let (product, rest) = inverse.product(acceleration.0);
+                    let rest = rest + (inverse * acceleration.1 + inverse_low * acceleration.0);
+                    acceleration = (product, rest);
+                } else {
+                    acceleration.0 = inverse * acceleration.0;
+                }
+            }
+            let force = self.tables.weights.sums::<_, N, EXACT>(like, forces, at);
+            let v = (
+                block(like, &self.velocity, at),
+                block(like, &self.velocity_low, at),
+            );
+            let q = (block(like, &leg.start.q, at), block(like, &leg.low.q, at));
+            let p = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
+            let (q, q_low) = moved::<_, EXACT>(h, moved::<_, EXACT>(h, acceleration, v), q);
+            let (p, p_low) = moved::<_, EXACT>(h, force, p);
+            put(q, &mut end.q, at);
+            put(p, &mut end.p, at);
+            put(q_low, &mut end_low.q, at);
+            put(p_low, &mut end_low.p, at);
+        }
+        (end, end_low)
     }
 }
 
-/// start + h · rate
+/// start + h · rate, to twice the precision or to the working one.
 #[inline(always)]
-fn moved<V: Four, const N: usize>(
-    like: V,
-    h: f64,
-    (rate, rate_low): &Exact<N>,
-    (start, start_low): (&[f64; N], &[f64; N]),
-) -> Exact<N> {
-    let (mut end, mut end_low) = (*start, *start_low);
-    let h = like.like(h);
-    for at in (0..N).step_by(4) {
-        let rate = (of(like, rate, at), of(like, rate_low, at));
-        let start = (of(like, start, at), of(like, start_low, at));
-        let (high, low) = moved_exactly(h, rate, start);
-        let (high, low) = (high.lanes(), low.lanes());
-        for a in at..N.min(at + 4) {
-            (end[a], end_low[a]) = (high[a - at], low[a - at]);
-        }
+fn moved<V: Precise, const EXACT: bool>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
+    if const { EXACT } {
+        moved_exactly(h, rate, start)
+    } else {
+        (start.0 + h * rate.0, h.like(0.0))
     }
-    (end, end_low)
 }
 
 /// start + h · rate, each a number and what rounding took from it.
@@ -94,18 +96,4 @@ pub(crate) fn moved_exactly<V: Precise>(h: V, rate: (V, V), start: (V, V)) -> (V
     let rest = (rest + h * rate.1) + start.1;
     let (sum, lost) = start.0.exact_sum(product);
     sum.exact_sum(lost + rest)
-}
-
-/// Four of the numbers; zeros beyond the last.
-#[inline(always)]
-fn of<V: Four, const N: usize>(like: V, numbers: &[f64; N], at: usize) -> V {
-    let mut four = [0.0; 4];
-    let end = N.min(at + 4);
-    four[..end - at].copy_from_slice(&numbers[at..end]);
-    like.with(four)
-}
-
-#[inline(always)]
-fn ends<const N: usize>((q, q_low): Exact<N>, (p, p_low): Exact<N>) -> (State<N>, State<N>) {
-    (State { q, p }, State { q: q_low, p: p_low })
 }

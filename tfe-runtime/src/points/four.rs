@@ -16,6 +16,12 @@ pub(crate) trait Precise: Real {
         let part = high - self;
         (high, (self - (high - part)) + (other - part))
     }
+
+    /// The larger one; of a NaN and a number, either.
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        Self::select(self.less(other), other, self)
+    }
 }
 
 /// Four numbers, one for each of four points.
@@ -174,6 +180,11 @@ impl Precise for crate::quad::Quad {
     #[inline(always)]
     fn product(self, other: Self) -> (Self, Self) {
         self.product(other)
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        self.larger(other)
     }
 }
 

@@ -2,93 +2,70 @@
 
 use super::four::Four;
 use super::sweep::{Largest, no_derivatives, relative};
-use super::{Leg, Points};
-use crate::double_double::DoubleDouble;
+use super::{Leg, Points, block, put};
 use crate::equations::Increment;
-use crate::legendre::largest;
 use crate::model::{Form, Model};
 
 impl<const N: usize> Points<N> {
-    /// Velocity at the start, and what low words add.
+    /// Velocity at the start, and what it lost by rounding.
     #[inline(always)]
     pub(super) fn begin_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
-        let groups = self.tables.groups;
-        let mut missing = leg.low.p;
-        if let Some(mass) = &self.inertia.diagonal {
-            for a in 0..N {
+        let inertia = &self.inertia;
+        if let Some(mass) = &inertia.diagonal {
+            for at in (0..N).step_by(4) {
+                let p = block(like, &leg.start.p, at);
+                let inverse = block(like, &inertia.inverse_diagonal, at);
+                let v = p * inverse;
                 // The momentum belongs to no rounded velocity; the rest counts as low word.
-                let v = leg.start.p[a] / mass[a];
-                let rest = DoubleDouble::product(v, mass[a]);
-                missing[a] += DoubleDouble::new(leg.start.p[a]).minus(rest).high;
-                self.velocity[a] = v;
-                self.velocity_low[a] = missing[a] / mass[a];
+                let (product, rest) = v.product(block(like, mass, at));
+                let missing = block(like, &leg.low.p, at) + ((p - product) - rest);
+                put(v, &mut self.velocity, at);
+                put(missing * inverse, &mut self.velocity_low, at);
             }
-        } else {
-            for (a, row) in self.inertia.inverse.iter().enumerate() {
-                let (mut v, mut low) = (0.0, 0.0);
-                for b in 0..N {
-                    v += row[b] * leg.start.p[b];
-                    low += row[b] * missing[b];
-                }
-                (self.velocity[a], self.velocity_low[a]) = (v, low);
-            }
+            return;
         }
-        self.accelerate(like);
-        self.tables
-            .twice_low
-            .apply(like, &self.momenta, &mut self.products);
-        if self.inertia.diagonal.is_some() {
-            // What the one rounding of 1/m takes from all accelerations.
-            for a in 0..N {
-                let rest = like.like(self.inertia.inverse_low[a]);
-                for k in a * groups..(a + 1) * groups {
-                    self.momenta[k] = (rest * like.with(self.forces[k])).lanes();
-                }
+        for (a, row) in inertia.inverse.iter().enumerate() {
+            let (mut v, mut low) = (0.0, 0.0);
+            for b in 0..N {
+                v += row[b] * leg.start.p[b];
+                low += row[b] * leg.low.p[b];
             }
-            self.tables
-                .twice
-                .apply(like, &self.momenta, &mut self.more_products);
-            for (sum, part) in self.products.iter_mut().zip(&self.more_products) {
-                *sum = (like.with(*sum) + like.with(*part)).lanes();
-            }
-        }
-        let h = like.like(leg.h);
-        for a in 0..N {
-            let (low_q, low_v) = (like.like(leg.low.q[a]), like.like(self.velocity_low[a]));
-            for c in 0..groups {
-                let k = a * groups + c;
-                let reach = like.with(self.tables.reach[c]);
-                let reach_low = like.with(self.tables.reach_low[c]);
-                let drift = reach * low_v + reach_low * like.like(self.velocity[a]);
-                let moved = h * (drift + h * like.with(self.products[k]));
-                self.low_position[k] = (low_q + moved).lanes();
-            }
+            (self.velocity[a], self.velocity_low[a]) = (v, low);
         }
     }
 
-    /// M⁻¹ f
+    /// What low words add at the points. The products are A² f, those with its low part follow here.
     #[inline(always)]
-    pub(super) fn accelerate<V: Four>(&mut self, like: V) {
-        let groups = self.tables.groups;
-        for (a, row) in self.inertia.inverse.iter().enumerate() {
-            if self.inertia.diagonal.is_some() {
-                let inverse = like.like(row[a]);
-                for k in a * groups..(a + 1) * groups {
-                    self.momenta[k] = (inverse * like.with(self.forces[k])).lanes();
+    pub(super) fn set_low_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
+        let products = &mut self.more_products;
+        (self.tables.twice_low).apply(like, &self.forces, products);
+        let (groups, h) = (self.tables.groups, like.like(leg.h));
+        let low = &mut self.low_position[..groups];
+        let products_low = &self.more_products[..groups];
+        let products = &self.products[..groups];
+        for c in 0..groups {
+            let reach = like.with(self.tables.reach[c]);
+            let reach_low = like.with(self.tables.reach_low[c]);
+            for a in 0..N {
+                let v = like.like(self.velocity[a]);
+                let drift = reach * like.like(self.velocity_low[a]) + reach_low * v;
+                let mut rate = self.inertia.row(like, &products_low[c], a);
+                if self.inertia.diagonal.is_some() {
+                    // What the one rounding of 1/m takes from all accelerations.
+                    rate += like.like(self.inertia.inverse_low[a]) * like.with(products[c][a]);
                 }
-                continue;
-            }
-            for c in 0..groups {
-                let mut product = like.like(0.0);
-                for b in 0..N {
-                    product += like.like(row[b]) * like.with(self.forces[b * groups + c]);
-                }
-                self.momenta[a * groups + c] = product.lanes();
+                low[c][a] = (like.like(leg.low.q[a]) + h * (drift + h * rate)).lanes();
             }
         }
     }
 
-    /// One iteration: coordinates from accelerations, forces at the coordinates.
+    /// A² f
+    #[inline(always)]
+    pub(super) fn integrate_twice<V: Four>(&mut self, like: V) {
+        (self.tables.twice).apply(like, &self.forces, &mut self.products);
+    }
+
+    /// One iteration: coordinates from products with the forces, forces at the coordinates.
     #[inline(always)]
     pub(super) fn sweep_second_order<V: Four, M>(
         &mut self,
@@ -99,76 +76,74 @@ impl<const N: usize> Points<N> {
     where
         M: Model<N>,
     {
-        let groups = self.tables.groups;
-        self.accelerate(like);
-        self.tables
-            .twice
-            .apply(like, &self.momenta, &mut self.products);
-        if M::FACTS.forced {
-            let rates = match M::FORM {
-                Form::Lagrangian => &self.momenta,
-                Form::Hamiltonian => &self.forces,
-            };
-            self.tables.once.apply(like, rates, &mut self.more_products);
+        if const { M::FACTS.forced } {
+            (self.tables.once).apply(like, &self.forces, &mut self.more_products);
         }
         let h = like.like(leg.h);
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
         let zero = like.like(0.0);
-        for c in 0..groups {
-            let reach = like.with(self.tables.reach[c]);
+        let forces = &mut self.forces;
+        let count = forces.len();
+        let products = &self.products[..count];
+        let more_products = &self.more_products[..count];
+        let low = &self.low_position[..count];
+        let reach = &self.tables.reach[..count];
+        let nodes = &self.tables.nodes[..count];
+        for c in 0..count {
+            let reach = like.with(reach[c]);
             let (mut q, mut z) = ([zero; N], [zero; N]);
             for a in 0..N {
-                let k = a * groups + c;
                 let v = like.like(self.velocity[a]);
-                let moved = h * (reach * v + h * like.with(self.products[k]));
-                q[a] = like.like(leg.start.q[a]) + (moved + like.with(self.low_position[k]));
-                if M::FACTS.forced {
-                    let start = match M::FORM {
-                        Form::Lagrangian => v,
-                        Form::Hamiltonian => like.like(leg.start.p[a]),
+                let rate = self.inertia.row(like, &products[c], a);
+                let moved = h * (reach * v + h * rate);
+                q[a] = like.like(leg.start.q[a]) + (moved + like.with(low[c][a]));
+                if const { M::FACTS.forced } {
+                    z[a] = match M::FORM {
+                        Form::Lagrangian => v + h * self.inertia.row(like, &more_products[c], a),
+                        Form::Hamiltonian => {
+                            like.like(leg.start.p[a]) + h * like.with(more_products[c][a])
+                        }
                     };
-                    z[a] = start + h * like.with(self.more_products[k]);
                 }
             }
-            let t = like.like(leg.t) + h * like.with(self.tables.nodes[c]);
+            let t = like.like(leg.t) + h * like.with(nodes[c]);
             let mut first = no_derivatives(like);
             V::first(model, t, &q, &z, &mut first);
             for a in 0..N {
-                let k = a * groups + c;
                 let force = match M::FORM {
                     Form::Lagrangian => first.q[a] + first.force[a],
                     Form::Hamiltonian => first.force[a] - first.q[a],
                 };
-                let step = force - like.with(self.forces[k]);
-                self.forces[k] = force.lanes();
                 // As accelerations: momenta of light and heavy bodies say nothing beside each other.
-                let inverse = like.like(self.inertia.inverse[a][a]);
-                changed.raise(inverse * step);
+                let inverse = like.like(self.inertia.inverse_diagonal[a]);
+                changed.raise(inverse * (force - like.with(forces[c][a])));
                 size.raise(inverse * force);
+                forces[c][a] = force.lanes();
             }
         }
         let (changed, size) = (changed.get(), size.get());
         let h = leg.h;
-        let velocity = relative(h, largest(&self.velocity), size, changed);
-        let moved = largest(&self.velocity) + h.abs() * size;
-        let position = relative(h, largest(&leg.start.q), moved, 0.5 * h.abs() * changed);
+        let velocity = relative(h, self.speed, size, changed);
+        let moved = self.speed + h.abs() * size;
+        let position = relative(h, self.distance, moved, 0.5 * h.abs() * changed);
         // Both are NaN, or none is.
-        let relative = velocity.max(position);
+        let relative = if velocity > position {
+            velocity
+        } else {
+            position
+        };
         Increment { relative, position }
     }
 
     /// Velocities at the points, which the iteration itself does not need.
     pub(super) fn set_rates(&mut self, h: f64) {
-        let groups = self.tables.groups;
         let like = crate::Lanes([0.0; 4]);
-        self.accelerate(like);
-        self.tables
-            .once
-            .apply(like, &self.momenta, &mut self.products);
-        for a in 0..N {
-            for k in a * groups..(a + 1) * groups {
+        (self.tables.once).apply(like, &self.forces, &mut self.products);
+        for (product, rate) in self.products.iter().zip(&mut self.rates) {
+            for a in 0..N {
+                let change = self.inertia.row(like, product, a).0;
                 for lane in 0..4 {
-                    self.rates[k][lane] = self.velocity[a] + h * self.products[k][lane];
+                    rate[a][lane] = self.velocity[a] + h * change[lane];
                 }
             }
         }

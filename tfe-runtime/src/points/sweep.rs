@@ -1,9 +1,9 @@
 //! First-order equations, and what all iterations share.
 
-use super::four::Four;
-use super::{Inertia, Leg, Points};
+use super::four::{Four, Precise};
+use super::{Inertia, Leg, Points, Row};
+use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
-use crate::legendre::largest;
 use crate::model::{First, Model};
 use crate::real::Real;
 
@@ -14,7 +14,7 @@ pub(crate) struct Largest<V> {
     sum: V,
 }
 
-impl<V: Real> Largest<V> {
+impl<V: Precise> Largest<V> {
     #[inline(always)]
     pub(crate) fn none(like: V) -> Self {
         let zero = like.like(0.0);
@@ -26,8 +26,7 @@ impl<V: Real> Largest<V> {
 
     #[inline(always)]
     pub(crate) fn raise(&mut self, value: V) {
-        let size = value.abs();
-        self.size = V::select(self.size.less(size), size, self.size);
+        self.size = value.abs().larger(self.size);
         self.sum += value;
     }
 
@@ -36,15 +35,18 @@ impl<V: Real> Largest<V> {
     pub(crate) fn by_lane(self) -> V {
         self.size + self.sum * self.sum.like(0.0)
     }
-}
 
-impl<V: Four> Largest<V> {
-    /// NaN if one value was not finite.
+    /// Of all lanes; NaN if one value was not finite.
     #[inline(always)]
-    pub(super) fn get(self) -> f64 {
-        let ([a, b, c, d], [e, f, g, h]) = (self.size.lanes(), self.sum.lanes());
-        let zero = 0.0 * ((e + f) + (g + h));
-        a.max(b).max(c.max(d)) + zero
+    pub(super) fn get(self) -> f64
+    where
+        V: Four,
+    {
+        let [a, b, c, d] = self.by_lane().lanes();
+        // Pairs of pairs: whether the iteration goes on waits for this.
+        let (left, right) = (if a < b { b } else { a }, if c < d { d } else { c });
+        let largest = if left < right { right } else { left };
+        largest + 0.0 * ((a + b) + (c + d))
     }
 }
 
@@ -62,21 +64,21 @@ pub(super) fn relative(h: f64, start: f64, x: f64, step: f64) -> f64 {
 impl<const N: usize> Points<N> {
     /// What low words of the start and of the tables add at the points.
     #[inline(always)]
-    pub(super) fn begin<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
-        self.tables
-            .once_low
-            .apply(like, &self.rates, &mut self.products);
-        self.tables
-            .once_low
-            .apply(like, &self.forces, &mut self.more_products);
-        let (groups, h) = (self.tables.groups, like.like(leg.h));
-        for a in 0..N {
-            let (low_q, low_p) = (like.like(leg.low.q[a]), like.like(leg.low.p[a]));
-            for k in a * groups..(a + 1) * groups {
-                let moved = h * like.with(self.products[k]);
-                self.low_position[k] = (low_q + moved).lanes();
-                let moved = h * like.with(self.more_products[k]);
-                self.low_momentum[k] = (low_p + moved).lanes();
+    pub(super) fn set_low<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
+        let (products, more_products) = (&mut self.products, &mut self.more_products);
+        (self.tables.once_low).apply(like, &self.rates, products);
+        (self.tables.once_low).apply(like, &self.forces, more_products);
+        let h = like.like(leg.h);
+        for (low, product) in self.low_position.iter_mut().zip(products) {
+            for a in 0..N {
+                let moved = h * like.with(product[a]);
+                low[a] = (like.like(leg.low.q[a]) + moved).lanes();
+            }
+        }
+        for (low, product) in self.low_momentum.iter_mut().zip(more_products) {
+            for a in 0..N {
+                let moved = h * like.with(product[a]);
+                low[a] = (like.like(leg.low.p[a]) + moved).lanes();
             }
         }
     }
@@ -93,64 +95,69 @@ impl<const N: usize> Points<N> {
     where
         M: Model<N>,
     {
-        let (groups, h, zero) = (self.tables.groups, like.like(leg.h), like.like(0.0));
-        self.tables
-            .once
-            .apply(like, &self.rates, &mut self.products);
-        for c in 0..groups {
+        let (h, zero) = (like.like(leg.h), like.like(0.0));
+        let rates = &mut self.rates;
+        let count = rates.len();
+        let forces = &mut self.forces[..count];
+        let momenta = &mut self.momenta[..count];
+        let products = &mut self.products[..count];
+        let low_position = &self.low_position[..count];
+        let low_momentum = &self.low_momentum[..count];
+        let nodes = &self.tables.nodes[..count];
+        let masses = &mut self.masses;
+        self.tables.once.apply(like, rates, products);
+        for c in 0..count {
             let (mut q, mut v) = ([zero; N], [zero; N]);
             for a in 0..N {
-                let k = a * groups + c;
-                let moved = h * like.with(self.products[k]) + like.with(self.low_position[k]);
+                let moved = h * like.with(products[c][a]) + like.with(low_position[c][a]);
                 q[a] = like.like(leg.start.q[a]) + moved;
-                v[a] = like.with(self.rates[k]);
+                v[a] = like.with(rates[c][a]);
             }
-            let t = like.like(leg.t) + h * like.with(self.tables.nodes[c]);
+            let t = like.like(leg.t) + h * like.with(nodes[c]);
             let mut first = no_derivatives(like);
             if const { !M::FACTS.constant_mass } && refresh {
                 let mut mass = [[zero; N]; N];
                 V::first_and_mass(model, t, &q, &v, &mut first, &mut mass);
                 factor(like, &mut mass);
-                store(&mut self.masses[c], &mass);
+                store(&mut masses[c], &mass);
             } else {
                 V::first(model, t, &q, &v, &mut first);
             }
             for a in 0..N {
-                let k = a * groups + c;
-                self.momenta[k] = first.z[a].lanes();
-                self.forces[k] = (first.q[a] + first.force[a]).lanes();
+                momenta[c][a] = first.z[a].lanes();
+                forces[c][a] = (first.q[a] + first.force[a]).lanes();
             }
         }
-        self.tables
-            .once
-            .apply(like, &self.forces, &mut self.products);
+        self.tables.once.apply(like, forces, products);
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
-        for c in 0..groups {
+        for c in 0..count {
             let mut step = [zero; N];
             for a in 0..N {
-                let k = a * groups + c;
-                let wanted = h * like.with(self.products[k]) + like.with(self.low_momentum[k]);
-                step[a] = wanted - (like.with(self.momenta[k]) - like.like(leg.start.p[a]));
+                let wanted = h * like.with(products[c][a]) + like.with(low_momentum[c][a]);
+                step[a] = wanted - (like.with(momenta[c][a]) - like.like(leg.start.p[a]));
             }
             if const { M::FACTS.constant_mass } {
                 step = self.inertia.times(like, &step);
             } else {
-                solve(like, &self.masses[c], &mut step);
+                solve(like, &masses[c], &mut step);
             }
             for a in 0..N {
-                let k = a * groups + c;
-                let rate = like.with(self.rates[k]) + step[a];
-                self.rates[k] = rate.lanes();
+                let rate = like.with(rates[c][a]) + step[a];
+                rates[c][a] = rate.lanes();
                 changed.raise(step[a]);
                 size.raise(rate);
             }
         }
         let (changed, size) = (changed.get(), size.get());
-        let position = relative(leg.h, largest(&leg.start.q), size, changed);
+        let position = relative(leg.h, self.distance, size, changed);
         // The momentum at the end is as good as the velocities, whatever the step; what is left of an increment reaches it through forces
         // only, hence the factor.
         let velocity = 0.25 * relative(1.0, 0.0, size, changed);
-        let relative = velocity.max(position);
+        let relative = if velocity > position {
+            velocity
+        } else {
+            position
+        };
         Increment { relative, position }
     }
 
@@ -167,72 +174,75 @@ impl<const N: usize> Points<N> {
     where
         M: Model<N>,
     {
-        let (groups, h, zero) = (self.tables.groups, like.like(leg.h), like.like(0.0));
-        self.tables
-            .once
-            .apply(like, &self.forces, &mut self.products);
-        for c in 0..groups {
+        let (h, zero) = (like.like(leg.h), like.like(0.0));
+        let rates = &mut self.rates;
+        let count = rates.len();
+        let forces = &mut self.forces[..count];
+        let momenta = &mut self.momenta[..count];
+        let velocities = &mut self.velocities[..count];
+        let products = &mut self.products[..count];
+        let low_position = &self.low_position[..count];
+        let low_momentum = &self.low_momentum[..count];
+        let nodes = &self.tables.nodes[..count];
+        let masses = &mut self.masses;
+        self.tables.once.apply(like, forces, products);
+        for c in 0..count {
             let mut change = [zero; N];
             for a in 0..N {
-                let k = a * groups + c;
-                let moved = h * like.with(self.products[k]) + like.with(self.low_momentum[k]);
+                let moved = h * like.with(products[c][a]) + like.with(low_momentum[c][a]);
                 let p = like.like(leg.start.p[a]) + moved;
-                change[a] = p - like.with(self.momenta[k]);
-                self.momenta[k] = p.lanes();
+                change[a] = p - like.with(momenta[c][a]);
+                momenta[c][a] = p.lanes();
             }
             let mut by_change = [zero; N];
-            if !is_first && M::FACTS.constant_mass {
-                by_change = self.inertia.times(like, &change);
+            if const { M::FACTS.constant_mass } {
+                if !is_first {
+                    by_change = self.inertia.times(like, &change);
+                }
             } else if !is_first {
                 for a in 0..N {
                     for b in 0..N {
-                        by_change[a] += like.with(self.masses[c][a][b]) * change[b];
+                        by_change[a] += like.with(masses[c][a][b]) * change[b];
                     }
                 }
             }
             for a in 0..N {
-                let k = a * groups + c;
-                self.velocities[k] = (like.with(self.rates[k]) + by_change[a]).lanes();
+                velocities[c][a] = (like.with(rates[c][a]) + by_change[a]).lanes();
             }
         }
-        self.tables
-            .once
-            .apply(like, &self.velocities, &mut self.products);
+        self.tables.once.apply(like, velocities, products);
         let none = Largest::none(like);
         let (mut force_changed, mut force_size) = (none, none);
         let (mut rate_changed, mut rate_size) = (none, none);
-        for c in 0..groups {
+        for c in 0..count {
             let (mut q, mut p) = ([zero; N], [zero; N]);
             for a in 0..N {
-                let k = a * groups + c;
-                let moved = h * like.with(self.products[k]) + like.with(self.low_position[k]);
+                let moved = h * like.with(products[c][a]) + like.with(low_position[c][a]);
                 q[a] = like.like(leg.start.q[a]) + moved;
-                p[a] = like.with(self.momenta[k]);
+                p[a] = like.with(momenta[c][a]);
             }
-            let t = like.like(leg.t) + h * like.with(self.tables.nodes[c]);
+            let t = like.like(leg.t) + h * like.with(nodes[c]);
             let mut first = no_derivatives(like);
             if const { !M::FACTS.constant_mass } && refresh {
                 let mut mass = [[zero; N]; N];
                 V::first_and_mass(model, t, &q, &p, &mut first, &mut mass);
-                store(&mut self.masses[c], &mass);
+                store(&mut masses[c], &mass);
             } else {
                 V::first(model, t, &q, &p, &mut first);
             }
             for a in 0..N {
-                let k = a * groups + c;
                 let force = first.force[a] - first.q[a];
-                force_changed.raise(force - like.with(self.forces[k]));
-                rate_changed.raise(first.z[a] - like.with(self.rates[k]));
+                force_changed.raise(force - like.with(forces[c][a]));
+                rate_changed.raise(first.z[a] - like.with(rates[c][a]));
                 force_size.raise(force);
                 rate_size.raise(first.z[a]);
-                self.forces[k] = force.lanes();
-                self.rates[k] = first.z[a].lanes();
+                forces[c][a] = force.lanes();
+                rates[c][a] = first.z[a].lanes();
             }
         }
-        let start = leg.start;
         let (force_changed, rate_changed) = (force_changed.get(), rate_changed.get());
-        let position = relative(leg.h, largest(&start.q), rate_size.get(), rate_changed);
-        let momentum = relative(leg.h, largest(&start.p), force_size.get(), force_changed);
+        let position = relative(leg.h, self.distance, rate_size.get(), rate_changed);
+        let momentum = relative(leg.h, self.speed, force_size.get(), force_changed);
         let relative = if (position + momentum).is_nan() {
             f64::NAN
         } else {
@@ -243,25 +253,55 @@ impl<const N: usize> Points<N> {
 }
 
 impl<const N: usize> Inertia<N> {
-    /// The constant M⁻¹ (or H_pp) times a vector for each of four.
+    /// The constant M⁻¹ (or H_pp) times a vector for each of several points.
     #[inline(always)]
     pub(crate) fn times<V: Real>(&self, like: V, vector: &[V; N]) -> [V; N] {
         let mut product = [like.like(0.0); N];
-        for (a, row) in self.inverse.iter().enumerate() {
-            if self.diagonal.is_some() {
-                product[a] = like.like(row[a]) * vector[a];
-                continue;
+        if self.diagonal.is_some() {
+            for a in 0..N {
+                product[a] = like.like(self.inverse_diagonal[a]) * vector[a];
             }
+            return product;
+        }
+        for (a, row) in self.inverse.iter().enumerate() {
             for b in 0..N {
                 product[a] += like.like(row[b]) * vector[b];
             }
         }
         product
     }
+
+    /// One line of it times the numbers at four points.
+    #[inline(always)]
+    pub(super) fn row<V: Four>(&self, like: V, row: &Row<N>, a: usize) -> V {
+        if self.diagonal.is_some() {
+            return like.like(self.inverse_diagonal[a]) * like.with(row[a]);
+        }
+        let mut sum = like.like(0.0);
+        for b in 0..N {
+            sum += like.like(self.inverse[a][b]) * like.with(row[b]);
+        }
+        sum
+    }
+
+    /// The same of a number and what rounding took from it.
+    #[inline(always)]
+    pub(super) fn of_both(&self, high: &[f64; N], low: &[f64; N]) -> ([f64; N], [f64; N]) {
+        let (mut of_high, mut of_low) = ([0.0; N], [0.0; N]);
+        for (a, row) in self.inverse.iter().enumerate() {
+            let mut sum = DoubleDouble::ZERO;
+            for b in 0..N {
+                let product = DoubleDouble::product(row[b], high[b]);
+                sum = sum.plus(product).plus(DoubleDouble::new(row[b] * low[b]));
+            }
+            (of_high[a], of_low[a]) = (sum.high, sum.low);
+        }
+        (of_high, of_low)
+    }
 }
 
 #[inline(always)]
-fn store<V: Four, const N: usize>(to: &mut [[[f64; 4]; N]; N], matrix: &[[V; N]; N]) {
+fn store<V: Four, const N: usize>(to: &mut [Row<N>; N], matrix: &[[V; N]; N]) {
     for a in 0..N {
         for b in 0..N {
             to[a][b] = matrix[a][b].lanes();
@@ -297,7 +337,7 @@ pub(crate) fn factor<V: Real, const N: usize>(like: V, matrix: &mut [[V; N]; N])
 }
 
 #[inline(always)]
-fn solve<V: Four, const N: usize>(like: V, factors: &[[[f64; 4]; N]; N], vector: &mut [V; N]) {
+fn solve<V: Four, const N: usize>(like: V, factors: &[Row<N>; N], vector: &mut [V; N]) {
     for row in 0..N {
         for j in 0..row {
             vector[row] = vector[row] - like.with(factors[row][j]) * vector[j];

@@ -1,5 +1,6 @@
-//! The tables of an element, their rows in groups of four.
+//! The tables of an element, their rows in groups of four points.
 
+use super::Row;
 use super::four::Four;
 use crate::double_double::DoubleDouble;
 use crate::scheme::{SchemeRef, SchemeTable, Tables as _};
@@ -20,10 +21,8 @@ pub(crate) struct Matrix {
 impl Matrix {
     fn new(points: usize, row_by_row: &[f64]) -> Self {
         let groups = points.div_ceil(4);
-        let mut matrix = Self {
-            groups,
-            columns: vec![[0.0; 4]; points * groups],
-        };
+        let columns = vec![[0.0; 4]; points * groups];
+        let mut matrix = Self { groups, columns };
         matrix.set(points, row_by_row);
         matrix
     }
@@ -36,36 +35,56 @@ impl Matrix {
         }
     }
 
-    /// The product with a vector over the points for every coordinate; `rows` and `products` have one row of groups a coordinate.
+    /// The product with a vector over the points for every coordinate.
     #[inline(always)]
-    pub(crate) fn apply<V: Four>(&self, like: V, rows: &[[f64; 4]], products: &mut [[f64; 4]]) {
-        match self.groups {
-            1 => self.apply_to::<V, 1>(like, rows, products),
-            2 => self.apply_to::<V, 2>(like, rows, products),
-            3 => self.apply_to::<V, 3>(like, rows, products),
-            _ => self.apply_to::<V, MAX_GROUPS>(like, rows, products),
+    pub(crate) fn apply<V: Four, const N: usize>(
+        &self,
+        like: V,
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
+        match rows.len() {
+            1 => self.apply_to::<V, N, 1>(like, rows, products),
+            2 => self.apply_to::<V, N, 2>(like, rows, products),
+            3 => self.apply_to::<V, N, 3>(like, rows, products),
+            _ => self.apply_to::<V, N, MAX_GROUPS>(like, rows, products),
         }
     }
 
     #[inline(always)]
-    fn apply_to<V: Four, const C: usize>(
+    fn apply_to<V: Four, const N: usize, const C: usize>(
         &self,
         like: V,
-        rows: &[[f64; 4]],
-        products: &mut [[f64; 4]],
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
     ) {
         let columns = self.columns.as_chunks::<C>().0;
-        let (rows, products) = (rows.as_chunks::<C>().0, products.as_chunks_mut::<C>().0);
-        for (row, product) in rows.iter().zip(products) {
+        let (whole, rest) = columns.as_chunks::<4>();
+        let ([rows], [products]) = (rows.as_chunks::<C>().0, products.as_chunks_mut::<C>().0)
+        else {
+            return;
+        };
+        for a in 0..N {
             let mut sum = [like.like(0.0); C];
-            for (column, value) in columns.iter().zip(row.as_flattened()) {
-                let value = like.like(*value);
-                for c in 0..C {
-                    sum[c] += like.with(column[c]) * value;
+            // Whole groups of columns are written out by the compiler.
+            for (columns, row) in whole.iter().zip(rows) {
+                for lane in 0..4 {
+                    let value = like.like(row[a][lane]);
+                    for c in 0..C {
+                        sum[c] += like.with(columns[lane][c]) * value;
+                    }
+                }
+            }
+            if let Some(row) = rows.get(whole.len()) {
+                for (column, value) in rest.iter().zip(&row[a]) {
+                    let value = like.like(*value);
+                    for c in 0..C {
+                        sum[c] += like.with(column[c]) * value;
+                    }
                 }
             }
             for c in 0..C {
-                product[c] = sum[c].lanes();
+                products[c][a] = sum[c].lanes();
             }
         }
     }
@@ -91,25 +110,47 @@ impl Weights {
         Self(groups)
     }
 
-    /// Σ weight · value, and what rounding takes from it.
+    /// Σ weight · value over the points of four coordinates at most from `from` on, and what rounding takes from it.
     ///
     /// This is what all steps add up. With products of one rounding each, the energy of a Kepler orbit drifts ten times as fast: weights
-    /// and step are the same numbers in every step, and what their products lose is no chance.
+    /// and step are the same numbers in every step, and what their products lose is no chance. Without `EXACT` that is left out.
     #[inline(always)]
-    pub(crate) fn sum<V: Four>(&self, like: V, row: &[[f64; 4]]) -> (f64, f64) {
-        let (mut high, mut low) = (like.like(0.0), like.like(0.0));
-        for ([weight, weight_low], value) in self.0.iter().zip(row) {
-            let value = like.with(*value);
-            let (product, rest) = like.with(*weight).product(value);
-            let (sum, lost) = high.exact_sum(product);
-            high = sum;
-            low += (rest + like.with(*weight_low) * value) + lost;
+    pub(crate) fn sums<V: Four, const N: usize, const EXACT: bool>(
+        &self,
+        like: V,
+        rows: &[Row<N>],
+        from: usize,
+    ) -> (V, V) {
+        let (mut high, mut low) = ([like.like(0.0); 4], [like.like(0.0); 4]);
+        for (group, ([weight, weight_low], row)) in self.0.iter().zip(rows).enumerate() {
+            let (weight, weight_low) = (like.with(*weight), like.with(*weight_low));
+            for a in 0..4.min(N - from) {
+                let value = like.with(row[from + a]);
+                if const { !EXACT } {
+                    high[a] += weight * value;
+                    continue;
+                }
+                let (product, rest) = weight.product(value);
+                let rest = rest + weight_low * value;
+                if group == 0 {
+                    (high[a], low[a]) = (product, rest);
+                } else {
+                    let (sum, lost) = high[a].exact_sum(product);
+                    (high[a], low[a]) = (sum, low[a] + (rest + lost));
+                }
+            }
         }
-        let ([a, b, c, d], [e, f, g, h]) = (high.lanes(), low.lanes());
-        let (left, right) = (DoubleDouble::sum(a, b), DoubleDouble::sum(c, d));
-        let all = DoubleDouble::sum(left.high, right.high);
-        let lost = (left.low + right.low) + all.low;
-        (all.high, ((e + f) + (g + h)) + lost)
+        // From a register for each coordinate to one for each of four points.
+        let [a, b, c, d] = transposed(high);
+        if const { !EXACT } {
+            return ((a + b) + (c + d), like.like(0.0));
+        }
+        let [e, f, g, h] = transposed(low);
+        let (left, left_low) = a.exact_sum(b);
+        let (right, right_low) = c.exact_sum(d);
+        let (all, all_low) = left.exact_sum(right);
+        let lost = (left_low + right_low) + all_low;
+        (all, ((e + f) + (g + h)) + lost)
     }
 
     /// The weight of one point and what rounding took from it.
@@ -118,6 +159,29 @@ impl Weights {
         let [weight, low] = &self.0[point / 4];
         (weight[point % 4], low[point % 4])
     }
+}
+
+#[inline(always)]
+fn transposed<V: Four>(rows: [V; 4]) -> [V; 4] {
+    let like = rows[0];
+    let lanes = [
+        rows[0].lanes(),
+        rows[1].lanes(),
+        rows[2].lanes(),
+        rows[3].lanes(),
+    ];
+    let mut columns = [[0.0; 4]; 4];
+    for i in 0..4 {
+        for j in 0..4 {
+            columns[i][j] = lanes[j][i];
+        }
+    }
+    [
+        like.with(columns[0]),
+        like.with(columns[1]),
+        like.with(columns[2]),
+        like.with(columns[3]),
+    ]
 }
 
 /// All tables; `low` is what rounding took.
@@ -142,7 +206,7 @@ pub(crate) struct Tables {
     pub(crate) lever: Weights,
     /// From the last element to this one, for steps of the ratio that follows.
     pub(crate) continued: Matrix,
-    ratio: Option<f64>,
+    ratio: f64,
     scratch: Vec<f64>,
 }
 
@@ -179,7 +243,7 @@ impl Tables {
             (reach[group][lane], reach_low[group][lane]) = (sum.high, sum.low);
         }
         let scratch = vec![0.0; points * points];
-        Self {
+        let mut tables = Self {
             points,
             groups: nodes.len(),
             nodes,
@@ -192,21 +256,29 @@ impl Tables {
             weights: Weights::new(scheme.weights, scheme.weights_low),
             lever: Weights::new(&high(&lever), &low(&lever)),
             continued: Matrix::new(points, &scratch),
-            ratio: None,
+            ratio: 1.0,
             scratch,
-        }
+        };
+        // Most steps are as long as the one before.
+        tables.continue_by(scheme, 1.0);
+        tables
     }
 
     /// Makes `continued` that of steps of this ratio.
     pub(crate) fn set_ratio(&mut self, table: &SchemeTable, ratio: f64) {
         // Far outside the last element its polynomial says nothing; backwards it may be reused.
         let near = (-1.5..=3.0).contains(&ratio);
-        let fraction = if near { ratio } else { 0.0 };
-        if self.ratio != Some(fraction) {
-            set_extrapolation(&table.view(), fraction, &mut self.scratch);
-            self.continued.set(self.points, &self.scratch);
-            self.ratio = Some(fraction);
+        let ratio = if near { ratio } else { 0.0 };
+        if self.ratio != ratio {
+            self.continue_by(&table.view(), ratio);
         }
+    }
+
+    #[cold]
+    fn continue_by(&mut self, scheme: &SchemeRef<'_>, ratio: f64) {
+        set_extrapolation(scheme, ratio, &mut self.scratch);
+        self.continued.set(self.points, &self.scratch);
+        self.ratio = ratio;
     }
 }
 
