@@ -25,7 +25,8 @@ impl Scene {
     ) -> Result<Self, WorkPrecisionError> {
         let measured = problem
             .elements(elements())
-            .tolerances([1e-5, 1e-8, 1e-11, 0.05 * f64::EPSILON])
+            .tolerances((3..13).map(|digits| 10_f64.powi(-digits)))
+            .tolerances([0.05 * f64::EPSILON])
             .repeat_for(Duration::from_millis(10))
             .run()?;
         Ok(Self { title, measured })

@@ -1,6 +1,7 @@
 //! The fastest elements.
 
 use crate::runs::{Scene, TARGETS};
+use crate::scenes::short;
 
 /// The columns of the table.
 pub const HEADER: [&str; 7] = [
@@ -37,7 +38,7 @@ pub fn rows(scene: &Scene) -> [[String; 7]; 4] {
                 format!("{target:.0e}"),
                 format!("{:.3} ms", 1e3 * one.seconds),
                 point.element.to_string(),
-                point.step.to_string(),
+                short(point.step),
                 format!("{:.0e}", point.tolerance),
                 format!("{:.1e}", one.energy_error),
             ],

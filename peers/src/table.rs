@@ -1,6 +1,7 @@
 //! Who reaches an error first.
 
 use crate::runs::{Scene, TARGETS};
+use crate::scenes::short;
 use tfe::work_precision::{Measurements, Peer, PeerPoint, Point};
 
 /// The columns.
@@ -52,7 +53,7 @@ pub fn rows_of(
                 point.element,
                 chance(is_luck(measured, point, *target))
             );
-            row[3] = point.step.to_string();
+            row[3] = short(point.step);
             row[4] = format!("{:.0e}", point.tolerance);
             row[5] = milliseconds(one.seconds);
         }

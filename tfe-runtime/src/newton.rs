@@ -31,6 +31,15 @@ pub struct Control {
     pub solve: Solve,
 }
 
+/// Steps whose iteration may end above it need no more than the working precision.
+const ROUGH: f64 = 1e-14;
+
+impl Control {
+    pub(crate) fn is_rough(&self) -> bool {
+        self.tolerance > ROUGH
+    }
+}
+
 impl Default for Control {
     fn default() -> Self {
         Self {

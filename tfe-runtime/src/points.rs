@@ -48,6 +48,8 @@ pub(crate) struct Points<const N: usize> {
     /// Products with the tables.
     products: Vec<Row<N>>,
     more_products: Vec<Row<N>>,
+    /// How far the velocity at the start reaches, in equations of second order.
+    drift: Vec<Row<N>>,
     /// What low words of state and tables add at the points.
     low_position: Vec<Row<N>>,
     low_momentum: Vec<Row<N>>,
@@ -122,6 +124,7 @@ impl<const N: usize> Points<N> {
             velocities: rows(),
             products: rows(),
             more_products: rows(),
+            drift: rows(),
             low_position: rows(),
             low_momentum: rows(),
             masses: vec![[[[0.0; 4]; N]; N]; varied],

@@ -21,3 +21,14 @@ pub fn steps(end: f64, fewest: u32, most: u32) -> impl Iterator<Item = f64> {
         .take_while(move |count| *count <= most)
         .map(move |count| end / f64::from(count))
 }
+
+/// A step for people: three digits.
+pub fn short(step: f64) -> String {
+    let magnitude = step.abs().log10().floor();
+    let unit = 10_f64.powf(magnitude - 2.0);
+    if !unit.is_normal() {
+        return step.to_string();
+    }
+    let digits = usize::try_from(2 - magnitude as i64).unwrap_or(0);
+    format!("{:.digits$}", (step / unit).round() * unit)
+}

@@ -7,7 +7,7 @@ use super::products::{apply, sum};
 use super::second_order::largest;
 use super::step::Step;
 use crate::model::Model;
-use crate::points::end::moved_exactly;
+use crate::points::end::moved;
 use crate::points::sweep::{Largest, factor, no_derivatives};
 
 impl<M, const N: usize> Step<'_, M, N>
@@ -190,13 +190,21 @@ where
 
     /// Start plus h times the integrals of the rates, of coordinate `a`.
     #[inline(always)]
-    pub(super) fn end<V: Eight>(&self, like: V, group: &Group<N>, a: usize) -> ((V, V), (V, V)) {
+    pub(super) fn end<V: Eight, const EXACT: bool>(
+        &self,
+        like: V,
+        group: &Group<N>,
+        a: usize,
+    ) -> ((V, V), (V, V)) {
         let h = like.like(self.h);
-        let velocity = sum(like, &self.tables.weights, &group.rates, a);
-        let force = sum(like, &self.tables.weights, &group.forces, a);
+        let velocity = sum::<_, N, EXACT>(like, &self.tables.weights, &group.rates, a);
+        let force = sum::<_, N, EXACT>(like, &self.tables.weights, &group.forces, a);
         let q = (like.with(group.start.q[a]), like.with(group.low.q[a]));
         let p = (like.with(group.start.p[a]), like.with(group.low.p[a]));
-        (moved_exactly(h, velocity, q), moved_exactly(h, force, p))
+        (
+            moved::<_, EXACT>(h, velocity, q),
+            moved::<_, EXACT>(h, force, p),
+        )
     }
 }
 

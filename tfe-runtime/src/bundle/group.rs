@@ -34,11 +34,13 @@ pub(super) struct Group<const N: usize> {
 pub(super) struct Work<const N: usize> {
     /// Momenta at the points.
     pub(super) momenta: Vec<Row<N>>,
-    /// Velocities from which coordinates follow in phase space; accelerations in equations of second order.
+    /// Velocities from which coordinates follow in phase space; accelerations at the end in equations of second order.
     pub(super) velocities: Vec<Row<N>>,
     /// Products with the tables.
     pub(super) products: Vec<Row<N>>,
     pub(super) more_products: Vec<Row<N>>,
+    /// How far velocities at the start reach, in equations of second order.
+    pub(super) drift: Vec<Row<N>>,
     /// What the low words of state and tables add at the points.
     pub(super) low_position: Vec<Row<N>>,
     pub(super) low_momentum: Vec<Row<N>>,
@@ -96,6 +98,7 @@ impl<const N: usize> Work<N> {
             velocities: rows(),
             products: rows(),
             more_products: rows(),
+            drift: rows(),
             low_position: rows(),
             low_momentum: rows(),
             masses: vec![[[[0.0; LANES]; N]; N]; if varied { points } else { 0 }],

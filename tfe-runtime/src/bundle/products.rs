@@ -47,9 +47,9 @@ fn apply_block<V: Eight, const N: usize, const B: usize>(
     }
 }
 
-/// Σ weight · value over the points of coordinate `a`, and what rounding takes from it, as in [`Weights::sum`].
+/// Σ weight · value over the points of coordinate `a`, and what rounding takes from it, as in [`Weights::sums`].
 #[inline(always)]
-pub(super) fn sum<V: Eight, const N: usize>(
+pub(super) fn sum<V: Eight, const N: usize, const EXACT: bool>(
     like: V,
     weights: &Weights,
     rows: &[Row<N>],
@@ -59,6 +59,10 @@ pub(super) fn sum<V: Eight, const N: usize>(
     for (l, row) in rows.iter().enumerate() {
         let (weight, weight_low) = weights.of(l);
         let value = like.with(row[a]);
+        if const { !EXACT } {
+            high += like.like(weight) * value;
+            continue;
+        }
         let (product, rest) = like.like(weight).product(value);
         let (sum, lost) = high.exact_sum(product);
         high = sum;

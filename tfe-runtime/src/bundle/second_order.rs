@@ -5,15 +5,16 @@ use super::judge::{Increments, larger};
 use super::pair::Eight;
 use super::products::{apply, sum};
 use super::step::Step;
+use crate::double_double::DoubleDouble;
 use crate::model::{Form, Model};
-use crate::points::end::moved_exactly;
+use crate::points::end::moved;
 use crate::points::sweep::{Largest, no_derivatives};
 
 impl<M, const N: usize> Step<'_, M, N>
 where
     M: Model<N>,
 {
-    /// Velocities at the start, and what low words add at the points.
+    /// Velocities at the start, and what they lost by rounding.
     #[inline(always)]
     pub(super) fn begin_second_order<V: Eight>(
         &self,
@@ -26,12 +27,12 @@ where
         if let Some(mass) = &self.inertia.diagonal {
             for a in 0..N {
                 // The momentum belongs to no rounded velocity; the rest counts as low word.
-                let mass = like.like(mass[a]);
-                let v = momenta[a] / mass;
-                let (product, rest) = v.product(mass);
+                let inverse = like.like(self.inertia.inverse_diagonal[a]);
+                let v = momenta[a] * inverse;
+                let (product, rest) = v.product(like.like(mass[a]));
                 missing[a] += (momenta[a] - product) - rest;
                 work.velocity[a] = v.lanes();
-                work.velocity_low[a] = (missing[a] / mass).lanes();
+                work.velocity_low[a] = (missing[a] * inverse).lanes();
             }
         } else {
             let v = self.inertia.times(like, &momenta);
@@ -40,58 +41,55 @@ where
                 (work.velocity[a], work.velocity_low[a]) = (v[a].lanes(), low[a].lanes());
             }
         }
-        self.accelerate(like, &group.forces, &mut work.velocities);
-        apply(
-            like,
-            &self.tables.twice_low,
-            &work.velocities,
-            &mut work.products,
-        );
-        if self.inertia.diagonal.is_some() && self.inertia.inverse_low != [0.0; N] {
-            // What the one rounding of 1/m takes from all accelerations; nothing from those of unit masses.
-            for (rest, force) in work.velocities.iter_mut().zip(&group.forces) {
-                for a in 0..N {
-                    let low = like.like(self.inertia.inverse_low[a]);
-                    rest[a] = (low * like.with(force[a])).lanes();
-                }
-            }
-            apply(
-                like,
-                &self.tables.twice,
-                &work.velocities,
-                &mut work.more_products,
-            );
-            for (sum, part) in work.products.iter_mut().zip(&work.more_products) {
-                for a in 0..N {
-                    sum[a] = (like.with(sum[a]) + like.with(part[a])).lanes();
-                }
+    }
+
+    /// How far the velocities at the start reach.
+    #[inline(always)]
+    fn set_drift<V: Eight>(&self, like: V, work: &mut Work<N>) {
+        let h = like.like(self.h);
+        for (drift, reach) in work.drift.iter_mut().zip(self.tables.reach.as_flattened()) {
+            let reach = h * like.like(*reach);
+            for a in 0..N {
+                drift[a] = (reach * like.with(work.velocity[a])).lanes();
             }
         }
+    }
+
+    /// The same with what low words of states and tables add. The products are A² f.
+    #[inline(always)]
+    fn set_exact_drift<V: Eight>(&self, like: V, group: &Group<N>, work: &mut Work<N>) {
+        let table = &self.tables.twice_low;
+        apply(like, table, &group.forces, &mut work.more_products);
         let h = like.like(self.h);
+        // What the one rounding of h² takes, the same in every step.
+        let square_low = like.like(DoubleDouble::product(self.h, self.h).low);
         for l in 0..self.tables.points {
             let reach = like.like(self.tables.reach.as_flattened()[l]);
             let reach_low = like.like(self.tables.reach_low.as_flattened()[l]);
+            let mut rate = self.accelerations(like, &work.more_products[l]);
+            let whole = self.accelerations(like, &work.products[l]);
             for a in 0..N {
+                if self.inertia.diagonal.is_some() {
+                    // What the one rounding of 1/m takes from all accelerations.
+                    let low = like.like(self.inertia.inverse_low[a]);
+                    rate[a] += low * like.with(work.products[l][a]);
+                }
                 let (v, v_low) = (like.with(work.velocity[a]), like.with(work.velocity_low[a]));
-                let drift = reach * v_low + reach_low * v;
-                let moved = h * (drift + h * like.with(work.products[l][a]));
-                work.low_position[l][a] = (like.with(group.low.q[a]) + moved).lanes();
+                let v_low = reach * v_low + reach_low * v;
+                let low = like.with(group.low.q[a]) + h * (v_low + h * rate[a]);
+                let low = low + square_low * whole[a];
+                work.drift[l][a] = (h * (reach * v) + low).lanes();
             }
         }
     }
 
-    /// M⁻¹ f
+    /// M⁻¹ f at a point.
     #[inline(always)]
-    fn accelerate<V: Eight>(&self, like: V, forces: &[Row<N>], accelerations: &mut [Row<N>]) {
-        for (acceleration, force) in accelerations.iter_mut().zip(forces) {
-            let product = self.inertia.times(like, &load(like, force));
-            for a in 0..N {
-                acceleration[a] = product[a].lanes();
-            }
-        }
+    fn accelerations<V: Eight>(&self, like: V, forces: &Row<N>) -> [V; N] {
+        self.inertia.times(like, &load(like, forces))
     }
 
-    /// One iteration: coordinates from accelerations, forces at the coordinates.
+    /// One iteration: coordinates from products with the forces, forces at the coordinates.
     #[inline(always)]
     pub(super) fn sweep_second_order<V: Eight>(
         &self,
@@ -99,22 +97,22 @@ where
         group: &mut Group<N>,
         work: &mut Work<N>,
         mask: V::Mask,
+        iteration: u32,
     ) -> Increments<V> {
-        self.accelerate(like, &group.forces, &mut work.velocities);
-        apply(
-            like,
-            &self.tables.twice,
-            &work.velocities,
-            &mut work.products,
-        );
-        if M::FACTS.forced {
-            let rates = match M::FORM {
-                Form::Lagrangian => &work.velocities,
-                Form::Hamiltonian => &group.forces,
-            };
-            apply(like, &self.tables.once, rates, &mut work.more_products);
+        let table = &self.tables.twice;
+        apply(like, table, &group.forces, &mut work.products);
+        if iteration == 0 {
+            if self.control.is_rough() {
+                self.set_drift(like, work);
+            } else {
+                self.set_exact_drift(like, group, work);
+            }
         }
-        let h = like.like(self.h);
+        if const { M::FACTS.forced } {
+            let table = &self.tables.once;
+            apply(like, table, &group.forces, &mut work.more_products);
+        }
+        let (h, square) = (like.like(self.h), like.like(self.h * self.h));
         let start_q = load(like, &group.start.q);
         let start_v = load(like, &work.velocity);
         let start_z = match M::FORM {
@@ -124,13 +122,18 @@ where
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
         let zero = like.like(0.0);
         for l in 0..self.tables.points {
-            let reach = like.like(self.tables.reach.as_flattened()[l]);
             let (mut q, mut z) = ([zero; N], [zero; N]);
+            let rate = self.accelerations(like, &work.products[l]);
             for a in 0..N {
-                let moved = h * (reach * start_v[a] + h * like.with(work.products[l][a]));
-                q[a] = start_q[a] + (moved + like.with(work.low_position[l][a]));
-                if M::FACTS.forced {
-                    z[a] = start_z[a] + h * like.with(work.more_products[l][a]);
+                q[a] = start_q[a] + (like.with(work.drift[l][a]) + square * rate[a]);
+            }
+            if const { M::FACTS.forced } {
+                let rate = match M::FORM {
+                    Form::Lagrangian => self.accelerations(like, &work.more_products[l]),
+                    Form::Hamiltonian => load(like, &work.more_products[l]),
+                };
+                for a in 0..N {
+                    z[a] = start_z[a] + h * rate[a];
                 }
             }
             let mut first = no_derivatives(like);
@@ -143,7 +146,7 @@ where
                 };
                 let old = &mut group.forces[l][a];
                 // As accelerations: momenta of light and heavy bodies say nothing beside each other.
-                let inverse = like.like(self.inertia.inverse[a][a]);
+                let inverse = like.like(self.inertia.inverse_diagonal[a]);
                 changed.raise(inverse * (force - like.with(*old)));
                 size.raise(inverse * force);
                 replace::<V>(mask, old, force);
@@ -166,9 +169,9 @@ where
         }
     }
 
-    /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h Σ (bᵀA) M⁻¹ f) of coordinate `a`; [`prepare_end`](Self::prepare_end) goes before.
+    /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) of coordinate `a`; [`prepare_end`](Self::prepare_end) goes before.
     #[inline(always)]
-    pub(super) fn end_second_order<V: Eight>(
+    pub(super) fn end_second_order<V: Eight, const EXACT: bool>(
         &self,
         like: V,
         group: &Group<N>,
@@ -176,26 +179,37 @@ where
         a: usize,
     ) -> ((V, V), (V, V)) {
         let h = like.like(self.h);
-        let force = sum(like, &self.tables.weights, &group.forces, a);
-        let lever = sum(like, &self.tables.lever, &work.velocities, a);
+        let force = sum::<_, N, EXACT>(like, &self.tables.weights, &group.forces, a);
+        let lever = &self.tables.lever;
+        let lever = if self.inertia.diagonal.is_some() {
+            let (sum, low) = sum::<_, N, EXACT>(like, lever, &group.forces, a);
+            let inverse = like.like(self.inertia.inverse_diagonal[a]);
+            let inverse_low = like.like(self.inertia.inverse_low[a]);
+            let (product, rest) = inverse.product(sum);
+            (product, rest + (inverse * low + inverse_low * sum))
+        } else {
+            sum::<_, N, EXACT>(like, lever, &work.velocities, a)
+        };
         let velocity = (like.with(work.velocity[a]), like.with(work.velocity_low[a]));
-        let velocity = moved_exactly(h, lever, velocity);
+        let velocity = moved::<_, EXACT>(h, lever, velocity);
         let q = (like.with(group.start.q[a]), like.with(group.low.q[a]));
         let p = (like.with(group.start.p[a]), like.with(group.low.p[a]));
-        (moved_exactly(h, velocity, q), moved_exactly(h, force, p))
+        (
+            moved::<_, EXACT>(h, velocity, q),
+            moved::<_, EXACT>(h, force, p),
+        )
     }
 
-    /// Accelerations at the end of the iteration.
+    /// Accelerations at the end of the iteration, where each follows from several forces.
     #[inline(always)]
     pub(super) fn prepare_end<V: Eight>(&self, like: V, group: &Group<N>, work: &mut Work<N>) {
-        let Some(mass) = &self.inertia.diagonal else {
-            self.accelerate(like, &group.forces, &mut work.velocities);
+        if self.inertia.diagonal.is_some() {
             return;
-        };
-        // Rounded for itself at every point, not with the one rounding of 1/m.
+        }
         for (acceleration, force) in work.velocities.iter_mut().zip(&group.forces) {
+            let product = self.accelerations(like, force);
             for a in 0..N {
-                acceleration[a] = (like.with(force[a]) / like.like(mass[a])).lanes();
+                acceleration[a] = product[a].lanes();
             }
         }
     }

@@ -43,7 +43,7 @@ where
         self.continue_last(like, group, work);
         if const { is_second_order::<M, N>() } {
             self.begin_second_order(like, group, work);
-        } else {
+        } else if !self.control.is_rough() {
             self.begin(like, group, work);
         }
         let mut arrived = self.iterate(like, group, work, like.with(flags(lanes)), statistics);
@@ -53,10 +53,10 @@ where
         }
         let (zero, mut ends) = (like.like(0.0), [((like, like), (like, like)); N]);
         for a in 0..N {
-            ends[a] = if const { is_second_order::<M, N>() } {
-                self.end_second_order(like, group, work, a)
+            ends[a] = if self.control.is_rough() {
+                self.end_of::<V, false>(like, group, work, a)
             } else {
-                self.end(like, group, a)
+                self.end_of::<V, true>(like, group, work, a)
             };
             // Zero times what is not finite is a NaN.
             let nothing = zero * (ends[a].0).0 + zero * (ends[a].1).0;
@@ -77,6 +77,22 @@ where
         }
         for (lane, warm) in lanes.iter_mut().zip(&group.warm) {
             *lane = *warm;
+        }
+    }
+
+    /// Coordinate and momentum at the end.
+    #[inline(always)]
+    fn end_of<V: Eight, const EXACT: bool>(
+        &self,
+        like: V,
+        group: &Group<N>,
+        work: &Work<N>,
+        a: usize,
+    ) -> ((V, V), (V, V)) {
+        if const { is_second_order::<M, N>() } {
+            self.end_second_order::<V, EXACT>(like, group, work, a)
+        } else {
+            self.end::<V, EXACT>(like, group, a)
         }
     }
 
@@ -178,7 +194,7 @@ where
     ) -> Increments<V> {
         // Constant conditions, so that of the three iterations one is compiled.
         if const { is_second_order::<M, N>() } {
-            return self.sweep_second_order(like, group, work, mask);
+            return self.sweep_second_order(like, group, work, mask, iteration);
         }
         let refresh = const { !M::FACTS.constant_mass } && REFRESHED.contains(&iteration);
         if const { is_phase::<M, N>() } {

@@ -81,7 +81,7 @@ impl<const N: usize> Points<N> {
 
 /// start + h · rate, to twice the precision or to the working one.
 #[inline(always)]
-fn moved<V: Precise, const EXACT: bool>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
+pub(crate) fn moved<V: Precise, const EXACT: bool>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
     if const { EXACT } {
         moved_exactly(h, rate, start)
     } else {
@@ -91,7 +91,7 @@ fn moved<V: Precise, const EXACT: bool>(h: V, rate: (V, V), start: (V, V)) -> (V
 
 /// start + h · rate, each a number and what rounding took from it.
 #[inline(always)]
-pub(crate) fn moved_exactly<V: Precise>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
+fn moved_exactly<V: Precise>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
     let (product, rest) = h.product(rate.0);
     let rest = (rest + h * rate.1) + start.1;
     let (sum, lost) = start.0.exact_sum(product);

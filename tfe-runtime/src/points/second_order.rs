@@ -3,6 +3,7 @@
 use super::four::Four;
 use super::sweep::{Largest, no_derivatives, relative};
 use super::{Leg, Points, block, put};
+use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
 use crate::model::{Form, Model};
 
@@ -34,13 +35,27 @@ impl<const N: usize> Points<N> {
         }
     }
 
-    /// What low words add at the points. The products are A² f, those with its low part follow here.
+    /// How far the velocity at the start reaches.
     #[inline(always)]
-    pub(super) fn set_low_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
+    pub(super) fn set_drift<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
+        let h = like.like(leg.h);
+        for (drift, reach) in self.drift.iter_mut().zip(&self.tables.reach) {
+            let reach = h * like.with(*reach);
+            for a in 0..N {
+                drift[a] = (reach * like.like(self.velocity[a])).lanes();
+            }
+        }
+    }
+
+    /// The same with what low words of state and tables add. The products are A² f, those with its low part follow here.
+    #[inline(always)]
+    pub(super) fn set_exact_drift<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
         let products = &mut self.more_products;
         (self.tables.twice_low).apply(like, &self.forces, products);
         let (groups, h) = (self.tables.groups, like.like(leg.h));
-        let low = &mut self.low_position[..groups];
+        // What the one rounding of h² takes, the same in every step.
+        let square_low = like.like(DoubleDouble::product(leg.h, leg.h).low);
+        let drift = &mut self.drift[..groups];
         let products_low = &self.more_products[..groups];
         let products = &self.products[..groups];
         for c in 0..groups {
@@ -48,13 +63,15 @@ impl<const N: usize> Points<N> {
             let reach_low = like.with(self.tables.reach_low[c]);
             for a in 0..N {
                 let v = like.like(self.velocity[a]);
-                let drift = reach * like.like(self.velocity_low[a]) + reach_low * v;
+                let v_low = reach * like.like(self.velocity_low[a]) + reach_low * v;
                 let mut rate = self.inertia.row(like, &products_low[c], a);
                 if self.inertia.diagonal.is_some() {
                     // What the one rounding of 1/m takes from all accelerations.
                     rate += like.like(self.inertia.inverse_low[a]) * like.with(products[c][a]);
                 }
-                low[c][a] = (like.like(leg.low.q[a]) + h * (drift + h * rate)).lanes();
+                let low = like.like(leg.low.q[a]) + h * (v_low + h * rate);
+                let low = low + square_low * self.inertia.row(like, &products[c], a);
+                drift[c][a] = (h * (reach * v) + low).lanes();
             }
         }
     }
@@ -79,27 +96,27 @@ impl<const N: usize> Points<N> {
         if const { M::FACTS.forced } {
             (self.tables.once).apply(like, &self.forces, &mut self.more_products);
         }
-        let h = like.like(leg.h);
+        let (h, square) = (like.like(leg.h), like.like(leg.h * leg.h));
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
         let zero = like.like(0.0);
         let forces = &mut self.forces;
         let count = forces.len();
         let products = &self.products[..count];
         let more_products = &self.more_products[..count];
-        let low = &self.low_position[..count];
-        let reach = &self.tables.reach[..count];
+        let drift = &self.drift[..count];
         let nodes = &self.tables.nodes[..count];
         for c in 0..count {
-            let reach = like.with(reach[c]);
             let (mut q, mut z) = ([zero; N], [zero; N]);
             for a in 0..N {
-                let v = like.like(self.velocity[a]);
                 let rate = self.inertia.row(like, &products[c], a);
-                let moved = h * (reach * v + h * rate);
-                q[a] = like.like(leg.start.q[a]) + (moved + like.with(low[c][a]));
+                let moved = like.with(drift[c][a]) + square * rate;
+                q[a] = like.like(leg.start.q[a]) + moved;
                 if const { M::FACTS.forced } {
                     z[a] = match M::FORM {
-                        Form::Lagrangian => v + h * self.inertia.row(like, &more_products[c], a),
+                        Form::Lagrangian => {
+                            like.like(self.velocity[a])
+                                + h * self.inertia.row(like, &more_products[c], a)
+                        }
                         Form::Hamiltonian => {
                             like.like(leg.start.p[a]) + h * like.with(more_products[c][a])
                         }

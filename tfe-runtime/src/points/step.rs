@@ -5,9 +5,6 @@ use super::{Leg, Outcome, Points, is_finite, is_phase, is_second_order, largest}
 use crate::model::Model;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 
-/// Iterations that are to end above it need no more than the working precision.
-const ROUGH: f64 = 1e-14;
-
 /// A step to be done.
 pub(super) struct Job<'a, M, const N: usize> {
     pub(super) points: &'a mut Points<N>,
@@ -43,7 +40,7 @@ where
             yielding,
         } = self;
         points.begin::<V, M>(like, &leg);
-        let is_rough = control.tolerance > ROUGH;
+        let is_rough = control.is_rough();
         let mut monitor = Monitor::new(control.tolerance);
         let most = if yielding {
             control.max_iterations.min(PATIENCE)
@@ -55,8 +52,12 @@ where
             // Constant conditions, so that of the three iterations one is compiled.
             let increment = if const { is_second_order::<M, N>() } {
                 points.integrate_twice(like);
-                if iterations == 0 && !is_rough {
-                    points.set_low_second_order(like, &leg);
+                if iterations == 0 {
+                    if is_rough {
+                        points.set_drift(like, &leg);
+                    } else {
+                        points.set_exact_drift(like, &leg);
+                    }
                 }
                 points.sweep_second_order::<V, M>(like, model, &leg)
             } else {

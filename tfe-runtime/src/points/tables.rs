@@ -64,14 +64,16 @@ impl Matrix {
         else {
             return;
         };
+        let zero = like.like(0.0);
         for a in 0..N {
-            let mut sum = [like.like(0.0); C];
+            // Two sums, of even and of odd columns: with few coordinates, additions in a row are what takes time.
+            let mut sums = [[zero; C]; 2];
             // Whole groups of columns are written out by the compiler.
             for (columns, row) in whole.iter().zip(rows) {
                 for lane in 0..4 {
                     let value = like.like(row[a][lane]);
                     for c in 0..C {
-                        sum[c] += like.with(columns[lane][c]) * value;
+                        sums[lane % 2][c] += like.with(columns[lane][c]) * value;
                     }
                 }
             }
@@ -79,12 +81,12 @@ impl Matrix {
                 for (column, value) in rest.iter().zip(&row[a]) {
                     let value = like.like(*value);
                     for c in 0..C {
-                        sum[c] += like.with(column[c]) * value;
+                        sums[0][c] += like.with(column[c]) * value;
                     }
                 }
             }
             for c in 0..C {
-                products[c][a] = sum[c].lanes();
+                products[c][a] = (sums[0][c] + sums[1][c]).lanes();
             }
         }
     }
