@@ -88,7 +88,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         self
     }
 
-    /// When the iteration inside an element is done: the relative size of the last increment. The default iterates to round-off.
+    /// When the iteration inside an element is done: the relative size of the last increment. The default iterates to round-off; above 1e-14
+    /// the sums of a step are no longer carried with what rounding takes from them (`docs/theory.md` §10.4).
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;

@@ -2,8 +2,8 @@
 //!
 //! The trajectories of a [`Bundle`] take the same steps at the same times. Eight at a time share the registers of the processor, and the fixed-point
 //! iteration of an element runs for all eight at once, each lane judged by the stopping rule of a [`Stepper`]: the same equations as those of a
-//! stepper, of second order where the model allows it. A lane that has converged is held while others go on, so that what a trajectory does never depends, not by one bit, on which others are beside it. A lane whose iteration does not
-//! contract takes this step and some that follow with a stepper of its own, by Newton's method; one that fails there is out.
+//! stepper, of second order where the model allows it. A lane that has converged is held while others go on, so that what a trajectory does never
+//! depends, not by one bit, on which others are beside it. A lane whose iteration does not contract takes this step and some that follow with a stepper of its own, by Newton's method; one that fails there is out.
 //!
 //! Lanes are used for two-field elements (and others that are Runge–Kutta methods in the form at hand) and models without constraints whose
 //! kernels can be solved by a fixed point: any Lagrangian, and Hamiltonians in phase space. Everything else runs too, lane after lane.
@@ -29,6 +29,8 @@ use crate::step::Stepper;
 use alloc::vec;
 use alloc::vec::Vec;
 use engine::Engine;
+#[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
+pub(crate) use engine::tests::Pendulums;
 use group::Group;
 use pair::LANES;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]

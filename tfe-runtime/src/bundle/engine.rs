@@ -133,7 +133,7 @@ impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for Wide<'_, M, N> {
 }
 
 #[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
-mod tests {
+pub(crate) mod tests {
     use crate::bundle::Bundle;
     use crate::element::Element;
     use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
@@ -143,7 +143,7 @@ mod tests {
     use crate::{Mixed, Radau};
 
     /// Two damped pendulums of masses 3 and 7: equations of second order.
-    struct Pendulums;
+    pub(crate) struct Pendulums;
 
     impl Model<2> for Pendulums {
         const FORM: Form = Form::Lagrangian;
