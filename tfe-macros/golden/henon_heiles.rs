@@ -4,7 +4,7 @@
 /// coordinates: x, y      momenta: px, py      parameters: λ
 /// operations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other
 /// operations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other
-/// operations, gradient and second derivatives: 5 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other
+/// operations, gradient and second derivatives: 4 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other
 /// declared by             Hamiltonian, 2 coordinates
 /// depends on time         no
 /// forces                  no
@@ -81,15 +81,15 @@ const _: () = {
             let lambda = t.like(self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
-            let t0 = q[1] * lambda;
+            let t0 = lambda * q[1];
             let t1 = t.like(2.0) * q[0];
             let t2 = t0 * t1;
             first.q[0] = q[0] + t2;
             let t3 = q[0] * q[0];
             let t4 = lambda * t3;
             let t5 = q[1] * t0;
-            let t6 = q[1] - t5;
-            first.q[1] = t4 + t6;
+            let t6 = t5 - q[1];
+            first.q[1] = t4 - t6;
         }
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
@@ -103,15 +103,15 @@ const _: () = {
             let lambda = t.like(self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
-            let t0 = q[1] * lambda;
+            let t0 = lambda * q[1];
             let t1 = t.like(2.0) * q[0];
             let t2 = t0 * t1;
             first.q[0] = q[0] + t2;
             let t3 = q[0] * q[0];
             let t4 = lambda * t3;
             let t5 = q[1] * t0;
-            let t6 = q[1] - t5;
-            first.q[1] = t4 + t6;
+            let t6 = t5 - q[1];
+            first.q[1] = t4 - t6;
             zz[0][0] = t.like(1.0);
             zz[1][1] = t.like(1.0);
         }
@@ -126,23 +126,22 @@ const _: () = {
             let lambda = t.like(self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
-            let t0 = q[1] * lambda;
+            let t0 = lambda * q[1];
             let t1 = t.like(2.0) * t0;
-            let t2 = q[0] * t1;
-            first.q[0] = q[0] + t2;
+            let t2 = t.like(1.0) + t1;
+            first.q[0] = q[0] * t2;
             let t3 = q[0] * lambda;
             let t4 = q[0] * t3;
             let t5 = q[1] * t0;
-            let t6 = q[1] - t5;
-            first.q[1] = t4 + t6;
+            let t6 = t5 - q[1];
+            first.q[1] = t4 - t6;
             second.zz[0][0] = t.like(1.0);
             second.zz[1][1] = t.like(1.0);
-            second.qq[0][0] = t.like(1.0) + t1;
+            second.qq[0][0] = t2;
             let t7 = t.like(2.0) * t3;
             second.qq[0][1] = t7;
             second.qq[1][0] = t7;
-            let t8 = t1 - t.like(1.0);
-            second.qq[1][1] = -t8;
+            second.qq[1][1] = t.like(1.0) - t1;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {
             match index {
@@ -191,13 +190,13 @@ impl HenonHeiles {
                 functions: 0,
             },
             second: ::tfe::__private::Operations {
-                additions: 5,
+                additions: 4,
                 multiplications: 7,
                 divisions: 0,
                 sines: 0,
                 functions: 0,
             },
-            page: "H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)\ncoordinates: x, y      momenta: px, py      parameters: λ\noperations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 5 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in p          yes\nconstant H_pp           yes\nseparable (H_pq = 0)    yes\ncyclic coordinates      none\npattern H_pp            (0,0) (1,1)\npattern H_pq            zero\npattern H_qq            (0,0) (0,1) (1,0) (1,1)",
+            page: "H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)\ncoordinates: x, y      momenta: px, py      parameters: λ\noperations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in p          yes\nconstant H_pp           yes\nseparable (H_pq = 0)    yes\ncyclic coordinates      none\npattern H_pp            (0,0) (1,1)\npattern H_pq            zero\npattern H_qq            (0,0) (0,1) (1,0) (1,1)",
         }
     }
 }

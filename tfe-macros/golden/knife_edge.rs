@@ -44,19 +44,19 @@ const _: () = {
             let g = t.like(self.g);
             let j = t.like(self.j);
             let m = t.like(self.m);
-            let t0 = z[0] * z[0];
-            let t1 = z[1] * z[1];
-            let t2 = t0 + t1;
-            let t3 = m * t2;
-            let t4 = z[2] * z[2];
-            let t5 = j * t4;
-            let t6 = t3 + t5;
-            let t7 = t.like(0.5) * t6;
-            let t8 = alpha.sin();
+            let t0 = alpha.sin();
+            let t1 = z[0] * z[0];
+            let t2 = z[1] * z[1];
+            let t3 = t1 + t2;
+            let t4 = m * t3;
+            let t5 = z[2] * z[2];
+            let t6 = j * t5;
+            let t7 = t4 + t6;
+            let t8 = t.like(0.5) * t7;
             let t9 = m * q[0];
             let t10 = g * t9;
-            let t11 = t8 * t10;
-            t7 + t11
+            let t11 = t0 * t10;
+            t8 + t11
         }
         const LANES: bool = false;
         fn first<R: __tfe::Real>(
@@ -90,10 +90,10 @@ const _: () = {
             let g = t.like(self.g);
             let j = t.like(self.j);
             let m = t.like(self.m);
+            let t0 = alpha.sin();
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
             first.z[2] = j * z[2];
-            let t0 = alpha.sin();
             let t1 = m * g;
             first.q[0] = t0 * t1;
         }
@@ -110,10 +110,10 @@ const _: () = {
             let g = t.like(self.g);
             let j = t.like(self.j);
             let m = t.like(self.m);
+            let t0 = alpha.sin();
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
             first.z[2] = j * z[2];
-            let t0 = alpha.sin();
             let t1 = m * g;
             first.q[0] = t0 * t1;
             zz[0][0] = m;
@@ -132,10 +132,10 @@ const _: () = {
             let g = t.like(self.g);
             let j = t.like(self.j);
             let m = t.like(self.m);
+            let t0 = alpha.sin();
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
             first.z[2] = j * z[2];
-            let t0 = alpha.sin();
             let t1 = m * g;
             first.q[0] = t0 * t1;
             second.zz[0][0] = m;
@@ -190,8 +190,8 @@ const _: () = {
                 return;
             };
             let (sin_phi, cos_phi) = q[2].sin_cos();
-            let t0 = v[1] * sin_phi;
-            let t1 = v[0] * cos_phi;
+            let t0 = sin_phi * v[1];
+            let t1 = cos_phi * v[0];
             psi_q[0][2] = t0 + t1;
             let t2 = v[2] * cos_phi;
             row_rates[0][0] = t2;

@@ -163,7 +163,9 @@ impl Kernels<'_> {
 /// Whether a program writes a result of this kind. Constraints hold no loops.
 fn writes(program: &Program, kind: fn(&Output) -> bool) -> bool {
     program.statements.iter().any(|statement| match statement {
-        Statement::Store { output, .. } | Statement::Clear { output } => kind(output),
+        Statement::Store { output, .. }
+        | Statement::Balance { output, .. }
+        | Statement::Clear { output } => kind(output),
         _ => false,
     })
 }

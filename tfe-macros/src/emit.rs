@@ -1,5 +1,6 @@
 //! Programs of the engine as Rust statements.
 
+use crate::balance::balance;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::{BTreeMap, BTreeSet};
@@ -150,6 +151,7 @@ impl<'a> Emitter<'a> {
                 let body = self.statements(body);
                 quote!(for #variable in #start..#end { #body })
             }
+            Statement::Balance { output, length } => balance(&self.second, output, length),
             Statement::Clear { output } => self.clear(output),
         }
     }
@@ -451,7 +453,7 @@ fn operands(statement: &Statement) -> Vec<&Operand> {
         | Statement::Accumulate { value, .. }
         | Statement::Assign { value, .. }
         | Statement::Store { value, .. } => vec![value],
-        Statement::Loop { .. } | Statement::Clear { .. } => Vec::new(),
+        Statement::Loop { .. } | Statement::Balance { .. } | Statement::Clear { .. } => Vec::new(),
     }
 }
 

@@ -3,6 +3,7 @@
 //! A thin shell: tokens become text with a table of places (`source_map`), the engine `tfe-symbolic` derives the model, and
 //! `expand` writes the resulting programs as Rust. See the documentation of `tfe` for the language.
 
+mod balance;
 mod constraint;
 mod emit;
 mod expand;

@@ -26,7 +26,7 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-use crate::arrange::arrange;
+use crate::arrange::{Grouping, arrange};
 use crate::constant::Constant;
 use crate::function::Function;
 use crate::graph::{ExprId, Graph, Node};
@@ -101,7 +101,8 @@ pub(crate) fn expand_angles(graph: &mut Graph, roots: Vec<ExprId>) -> Vec<ExprId
         mapping.set(old, new);
     }
     let expanded: Vec<ExprId> = roots.iter().map(|root| mapping.of(*root)).collect();
-    if arrange(graph, &expanded).cost() < arrange(graph, &roots).cost() {
+    let cost = |roots: &[ExprId]| arrange(graph, roots, Grouping::ByLoops).cost();
+    if cost(&expanded) < cost(&roots) {
         expanded
     } else {
         roots

@@ -6,7 +6,7 @@
 mod demand;
 mod fractions;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use crate::constant::{Constant, is_decimal};
 use crate::function::Function;
@@ -20,15 +20,37 @@ use fractions::{Factors, Fractions};
 /// Larger powers are left to the method that computes integer powers.
 const LARGEST_PRODUCT_POWER: u32 = 64;
 
+/// Which factors of a product are multiplied with each other first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Grouping {
+    /// Those that vary in fewer loops.
+    #[default]
+    ByLoops,
+    /// The parameters too: they are one coefficient wherever they stand together.
+    ParametersApart,
+}
+
 /// Arranges what the roots need.
-pub(crate) fn arrange(graph: &Graph, roots: &[ExprId]) -> Plan {
-    arrange_with(graph, roots, &Opened::new())
+pub(crate) fn arrange(graph: &Graph, roots: &[ExprId], grouping: Grouping) -> Plan {
+    arrange_with(graph, roots, &Opened::new(), grouping)
 }
 
 /// Arranges what the roots need, with the number before these sums taken to their terms.
-pub(crate) fn arrange_with(graph: &Graph, roots: &[ExprId], opened: &Opened) -> Plan {
-    Arranger::new(graph, opened).run(roots)
+pub(crate) fn arrange_with(
+    graph: &Graph,
+    roots: &[ExprId],
+    opened: &Opened,
+    grouping: Grouping,
+) -> Plan {
+    let moving = match grouping {
+        Grouping::ByLoops => HashSet::new(),
+        Grouping::ParametersApart => graph.moving(roots),
+    };
+    Arranger::new(graph, opened, moving).run(roots)
 }
+
+/// The mark of a factor that is more than parameters, among the bits of loops: none nest so deep.
+const MOVES: u64 = 1 << 62;
 
 /// What an operand stands for.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -99,16 +121,33 @@ impl Family {
                 .insert(*item, *power);
         }
         let mut grouped = Operands::new();
+        // Outer ones first: what varies in no loop goes with what varies in one.
+        let mut outer = (0, Operands::new());
         for (loops, class) in classes {
-            if loops == whole || class.len() < 2 {
+            if loops == whole {
                 grouped.extend(class);
+            } else if outer.0 & !loops == 0 {
+                let (inside, class_inside) = outer;
+                let mut class = class;
+                self.put_together(class_inside, inside, &mut class);
+                outer = (loops, class);
             } else {
-                let set = self.intern(class);
-                let item = self.item(Meaning::Group(set), loops);
-                grouped.insert(item, 1);
+                self.put_together(class, loops, &mut grouped);
             }
         }
+        self.put_together(outer.1, outer.0, &mut grouped);
         self.intern(grouped)
+    }
+
+    /// Adds operands to others, several of them as one.
+    fn put_together(&mut self, class: Operands, loops: u64, whole: &mut Operands) {
+        if class.len() < 2 {
+            whole.extend(class);
+        } else {
+            let set = self.intern(class);
+            let item = self.item(Meaning::Group(set), loops);
+            whole.insert(item, 1);
+        }
     }
 
     fn intern(&mut self, operands: Operands) -> usize {
@@ -142,6 +181,8 @@ struct Quotient {
 struct Arranger<'a> {
     graph: &'a Graph,
     opened: &'a Opened,
+    /// What is to be kept apart from parameters.
+    moving: HashSet<ExprId>,
     plan: Plan,
     sums: Family,
     products: Family,
@@ -159,10 +200,11 @@ type Places = Vec<(Multiple, i32)>;
 type SharedDivisors = BTreeMap<ExprId, Vec<ExprId>>;
 
 impl<'a> Arranger<'a> {
-    fn new(graph: &'a Graph, opened: &'a Opened) -> Self {
+    fn new(graph: &'a Graph, opened: &'a Opened, moving: HashSet<ExprId>) -> Self {
         Self {
             graph,
             opened,
+            moving,
             plan: Plan::default(),
             sums: Family::new(Kind::Sum),
             products: Family::new(Kind::Product),
@@ -205,6 +247,12 @@ impl<'a> Arranger<'a> {
             self.plan.set_value(*root, value);
         }
         self.plan
+    }
+
+    /// The bits by which factors are grouped.
+    fn class_of(&self, x: ExprId) -> u64 {
+        let moves = if self.moving.contains(&x) { MOVES } else { 0 };
+        self.graph.loops_of(x) | moves
     }
 
     fn value(&self, x: ExprId) -> Value {
@@ -305,7 +353,7 @@ impl<'a> Arranger<'a> {
             let mut set = |factors: &Factors| {
                 let mut operands = Operands::new();
                 for (x, n) in factors {
-                    let loops = self.graph.loops_of(*x);
+                    let loops = self.class_of(*x);
                     let item = self.products.item(Meaning::Multiple((*x, ONE)), loops);
                     operands.insert(item, *n);
                 }
@@ -342,7 +390,8 @@ impl<'a> Arranger<'a> {
         let (fractions, factors) = self.fractions.rest(self.graph, &multiple);
         for fraction in fractions {
             let meaning = Meaning::Fraction(fraction);
-            above.insert(self.products.item(meaning, self.graph.loops_of(x)), 1);
+            let class = self.class_of(x);
+            above.insert(self.products.item(meaning, class), 1);
         }
         let merged = self.roots_below(&factors);
         let is_shared = |(x, n): &(ExprId, i32)| *n > 0 || shared.contains_key(x);
@@ -354,7 +403,7 @@ impl<'a> Arranger<'a> {
             factors
         };
         for (x, n) in factors {
-            let (loops, size) = (self.graph.loops_of(x), n.unsigned_abs());
+            let (loops, size) = (self.class_of(x), n.unsigned_abs());
             let together = shared
                 .get(&x)
                 .filter(|_| n < 0 && size <= LARGEST_PRODUCT_POWER);

@@ -4,7 +4,7 @@
 //! turn is a running sum: what an inner loop adds to a place that it does not move, and, where a loop adds to the places i and i + 1, the part
 //! of i + 1 that the next turn completes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::constant::Constant;
 use crate::entry::{Entry, Place};
@@ -118,6 +118,18 @@ impl Block {
             inner.for_each_value(visit);
         }
         values(&mut self.after, visit);
+    }
+
+    /// The values that are wanted as they are: what is added to a variable may as well be subtracted.
+    pub(crate) fn stored(&self) -> BTreeSet<ExprId> {
+        let starts = self.locals.iter().filter_map(|(_, start)| *start);
+        let adds = |sink: &&Sink| matches!(sink.target, Target::Add(_)) || sink.local.is_some();
+        let sinks = self.sinks.iter().chain(&self.after);
+        let stored = sinks
+            .filter(|sink| !adds(sink))
+            .filter_map(|sink| sink.value);
+        let inner = self.inner.iter().flat_map(|(_, inner)| inner.stored());
+        starts.chain(stored).chain(inner).collect()
     }
 
     /// The block inside of these loops.

@@ -37,6 +37,7 @@ impl Counts {
                 Statement::Let { operation, .. } => counts.note(operation),
                 Statement::SineCosine { .. } => counts.sine_cosine_pairs += 1,
                 Statement::Accumulate { .. }
+                | Statement::Balance { .. }
                 | Statement::Store {
                     accumulate: true, ..
                 } => counts.additions += 1,

@@ -76,8 +76,8 @@ impl From<&Declared> for Model {
 /// let first = derivation.program(Request { first: true, ..Request::default() });
 /// assert_eq!(
 ///     first.to_string(),
-///     "E_z[0] = v[0]\n\
-///      t0 = sin(q[0])\n\
+///     "t0 = sin(q[0])\n\
+///      E_z[0] = v[0]\n\
 ///      t1 = 9.81 * t0\n\
 ///      t2 = -t1\n\
 ///      E_q[0] = t2\n"
@@ -176,12 +176,12 @@ impl Derivation {
     /// let derivation = Derivation::of(&declare(text, &context).expect("no mistakes in it"));
     /// assert_eq!(
     ///     derivation.program_by(By::Parameter(0)).to_string(),
-    ///     "t0 = 2 * q[0]\n\
-    ///      t1 = k * t0\n\
-    ///      t2 = -t1\n\
-    ///      E_q[0] = t2\n\
-    ///      t3 = cos(t)\n\
-    ///      Q[0] = t3\n"
+    ///     "t0 = cos(t)\n\
+    ///      t1 = 2 * q[0]\n\
+    ///      t2 = k * t1\n\
+    ///      t3 = -t2\n\
+    ///      E_q[0] = t3\n\
+    ///      Q[0] = t0\n"
     /// );
     /// ```
     pub fn program_by(&self, by: By) -> Program {

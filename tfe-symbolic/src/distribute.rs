@@ -4,7 +4,7 @@
 //! opposite does: the blocks of masses that attract each other have 3 x off the diagonal, and 3 (x + y) on it. As in `factor.rs`, a change
 //! is kept only if the arranged whole costs less, and the number of trials depends on the size.
 
-use crate::arrange::{Opened, arrange_with, scaled_sums};
+use crate::arrange::{Grouping, Opened, arrange_with, scaled_sums};
 use crate::graph::{ExprId, Graph};
 use crate::plan::Plan;
 
@@ -12,9 +12,9 @@ use crate::plan::Plan;
 const BUDGET: usize = 25_000;
 
 /// The arranged roots, with such numbers taken to the terms.
-pub(crate) fn distribute(graph: &Graph, roots: &[ExprId]) -> Plan {
+pub(crate) fn distribute(graph: &Graph, roots: &[ExprId], grouping: Grouping) -> Plan {
     let mut opened = Opened::new();
-    let mut best = arrange_with(graph, roots, &opened);
+    let mut best = arrange_with(graph, roots, &opened, grouping);
     let mut budget = BUDGET;
     // All at once first: large models get no further.
     let all: Opened = scaled_sums(graph, roots, &opened).into_iter().collect();
@@ -22,7 +22,7 @@ pub(crate) fn distribute(graph: &Graph, roots: &[ExprId]) -> Plan {
         return best;
     }
     budget = budget.saturating_sub(best.len());
-    let trial = arrange_with(graph, roots, &all);
+    let trial = arrange_with(graph, roots, &all, grouping);
     if trial.cost() < best.cost() {
         (best, opened) = (trial, all);
     }
@@ -35,7 +35,7 @@ pub(crate) fn distribute(graph: &Graph, roots: &[ExprId]) -> Plan {
             }
             let mut other = opened.clone();
             other.insert(candidate);
-            let trial = arrange_with(graph, roots, &other);
+            let trial = arrange_with(graph, roots, &other, grouping);
             if trial.cost() < best.cost() {
                 (best, opened) = (trial, other);
                 continue 'again;
@@ -61,7 +61,8 @@ mod tests {
 
     /// Saved additions and products, in total.
     fn saved(graph: &Graph, roots: &[ExprId]) -> usize {
-        (arrange(graph, roots).cost() - distribute(graph, roots).cost()) / 2
+        let grouping = Grouping::ByLoops;
+        (arrange(graph, roots, grouping).cost() - distribute(graph, roots, grouping).cost()) / 2
     }
 
     #[test]

@@ -3,21 +3,29 @@
 use std::collections::BTreeSet;
 
 use crate::angles::expand_angles;
-use crate::arrange::arrange;
+use crate::arrange::{Grouping, arrange};
+use crate::balance::{Balance, balances};
 use crate::blocks::Block;
 use crate::constant::Constant;
 use crate::distribute::distribute;
 use crate::entry::{Array, Entry};
-use crate::factor::take_out_factors;
+use crate::factor::{BUDGET, take_out_factors};
 use crate::graph::{ExprId, Graph};
+use crate::identities::by_identities;
 use crate::plan::Plan;
 use crate::program::Program;
 use crate::schedule::schedule;
+use crate::signs::with_fewer_negations;
 use crate::writes::settle;
 
-/// Of the drafts, those within this part of the cheapest are followed, and no more than so many: the search for common factors costs most of
-/// the time, and seldom changes their order.
-const WITHIN: usize = 32;
+/// Of the drafts, those that cost no more than so many halves of the cheapest are followed: identities may change their order.
+const WITHIN: usize = 3;
+
+/// Drafts up to this cost are also multiplied out before common factors are sought.
+const MULTIPLIED: usize = 110;
+
+/// In so many plans, the cheapest ones, identities are sought, where they cost no more than so many quarters of the cheapest.
+const CLOSE: usize = 6;
 const FOLLOWED: usize = 2;
 
 /// Entries in their loops, before common factors are sought.
@@ -25,13 +33,22 @@ pub(crate) struct Draft {
     graph: Graph,
     cleared: BTreeSet<Array>,
     block: Block,
+    balances: Vec<Balance>,
     values: Vec<ExprId>,
     cost: usize,
 }
 
+/// A draft with its operations arranged.
+struct Arranged<'a> {
+    draft: &'a Draft,
+    values: Vec<ExprId>,
+    plan: Plan,
+}
+
 impl Draft {
     /// Puts entries into loops and expands sines of sums.
-    pub(crate) fn of(mut graph: Graph, entries: Vec<Entry>) -> Self {
+    pub(crate) fn of(mut graph: Graph, mut entries: Vec<Entry>) -> Self {
+        let balances = balances(&mut graph, &mut entries);
         let values: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
         let values = graph.open_single_sums(&values);
         let entries = entries
@@ -45,11 +62,12 @@ impl Draft {
         let mut values = Vec::new();
         block.for_each_value(&mut |value| values.push(*value));
         let values = expand_angles(&mut graph, values);
-        let cost = arrange(&graph, &values).cost();
+        let cost = arrange(&graph, &values, Grouping::ByLoops).cost();
         Self {
             graph,
             cleared,
             block,
+            balances,
             values,
             cost,
         }
@@ -59,22 +77,58 @@ impl Draft {
     pub(crate) fn best(mut drafts: Vec<Self>) -> Program {
         drafts.sort_by_key(|draft| draft.cost);
         let least = drafts.first().map_or(0, |draft| draft.cost);
-        drafts.retain(|draft| draft.cost <= least + least / WITHIN);
+        drafts.retain(|draft| 2 * draft.cost <= WITHIN * least);
         drafts.dedup_by_key(|draft| draft.cost);
-        drafts.truncate(FOLLOWED);
-        let finished = drafts.into_iter().map(Self::finish);
-        let best = finished.min_by_key(|(plan, ..)| plan.cost());
-        best.map_or_else(Program::default, |(plan, cleared, block)| {
-            schedule(plan, &cleared, &block)
-        })
+        let share = BUDGET / (4 * drafts.len().max(1));
+        let mut arranged: Vec<Arranged> = drafts
+            .iter_mut()
+            .flat_map(|draft| draft.arranged(share))
+            .collect();
+        arranged.sort_by_key(|arranged| arranged.plan.cost());
+        let least = arranged.first().map_or(0, |arranged| arranged.plan.cost());
+        arranged.retain(|arranged| 4 * arranged.plan.cost() <= CLOSE * least);
+        arranged.dedup_by_key(|arranged| (arranged.plan.cost(), arranged.plan.len()));
+        arranged.truncate(FOLLOWED);
+        for Arranged { plan, .. } in &mut arranged {
+            *plan = by_identities(std::mem::take(plan));
+        }
+        let best = arranged
+            .into_iter()
+            .min_by_key(|arranged| (arranged.plan.cost(), arranged.plan.copies()));
+        best.map_or_else(Program::default, Arranged::program)
     }
 
-    /// Takes out common factors and arranges the operations.
-    fn finish(mut self) -> (Plan, BTreeSet<Array>, Block) {
-        let values = take_out_factors(&mut self.graph, self.values);
-        let mut next = values.iter();
-        let mut block = self.block;
+    /// Takes out common factors and arranges the operations, in several ways.
+    fn arranged(&mut self, budget: usize) -> Vec<Arranged<'_>> {
+        let graph = &mut self.graph;
+        let factored = take_out_factors(graph, self.values.clone(), budget);
+        let mut ways = vec![
+            (factored, Grouping::ByLoops),
+            (self.values.clone(), Grouping::ParametersApart),
+        ];
+        if self.cost <= MULTIPLIED && self.block.inner.is_empty() {
+            let values: Option<Vec<ExprId>> =
+                self.values.iter().map(|x| graph.expanded(*x)).collect();
+            if let Some(values) = values {
+                ways.push((take_out_factors(graph, values, budget), Grouping::ByLoops));
+            }
+        }
+        let draft: &Self = self;
+        let plans = ways.into_iter().map(|(values, grouping)| Arranged {
+            draft,
+            plan: distribute(&draft.graph, &values, grouping),
+            values,
+        });
+        plans.collect()
+    }
+}
+
+impl Arranged<'_> {
+    fn program(self) -> Program {
+        let mut next = self.values.iter();
+        let mut block = self.draft.block.clone();
         block.for_each_value(&mut |value| *value = *next.next().unwrap_or(value));
-        (distribute(&self.graph, &values), self.cleared, block)
+        let plan = with_fewer_negations(self.plan, &block.stored());
+        schedule(plan, &self.draft.cleared, &block, &self.draft.balances)
     }
 }

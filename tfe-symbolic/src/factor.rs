@@ -5,13 +5,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::arrange::arrange;
+use crate::arrange::{Grouping, arrange};
 use crate::constant::Constant;
 use crate::graph::{ExprId, Graph, Node};
 use crate::rewrite::{Mapping, Uses};
 
-/// Operations arranged over all trials of one kernel.
-const BUDGET: usize = 50_000;
+/// Operations arranged over all trials of one kernel, in whichever ways it is written.
+pub(crate) const BUDGET: usize = 50_000;
 
 /// A sum and a factor of several of its terms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,10 +23,14 @@ struct Candidate {
     terms: usize,
 }
 
-/// The roots with common factors taken out.
-pub(crate) fn take_out_factors(graph: &mut Graph, roots: Vec<ExprId>) -> Vec<ExprId> {
+/// The roots with common factors taken out; no more operations than this are arranged on the way.
+pub(crate) fn take_out_factors(
+    graph: &mut Graph,
+    roots: Vec<ExprId>,
+    budget: usize,
+) -> Vec<ExprId> {
     let mut best = Trial::of(graph, roots);
-    let mut budget = BUDGET;
+    let mut budget = budget;
     // All at once, as long as that helps: large models get no further.
     while let Some(work) = budget.checked_sub(best.size) {
         budget = work;
@@ -66,7 +70,7 @@ struct Trial {
 
 impl Trial {
     fn of(graph: &Graph, roots: Vec<ExprId>) -> Self {
-        let plan = arrange(graph, &roots);
+        let plan = arrange(graph, &roots, Grouping::ByLoops);
         Self {
             roots,
             cost: plan.cost(),
@@ -182,7 +186,7 @@ mod tests {
             Constant::ZERO,
             &[(Constant::ONE, ab), (Constant::ONE, ac), (Constant::ONE, d)],
         );
-        let out = take_out_factors(&mut g, vec![sum]);
+        let out = take_out_factors(&mut g, vec![sum], BUDGET);
         assert_eq!(g.display(out[0]).to_string(), "x3 + (x0*(x1 + x2))");
     }
 
@@ -192,7 +196,7 @@ mod tests {
         let [a, b, c] = variables(&mut g);
         let (ab, ac) = (g.multiply(a, b), g.multiply(a, c));
         let roots = vec![g.add(ab, ac), ab, ac];
-        assert_eq!(take_out_factors(&mut g, roots.clone()), roots);
+        assert_eq!(take_out_factors(&mut g, roots.clone(), BUDGET), roots);
     }
 
     #[test]
@@ -201,7 +205,7 @@ mod tests {
         let [a, b, c] = variables(&mut g);
         let (ac, bc) = (g.divide(a, c), g.divide(b, c));
         let sum = g.add(ac, bc);
-        let out = take_out_factors(&mut g, vec![sum]);
+        let out = take_out_factors(&mut g, vec![sum], BUDGET);
         let together = g.add(a, b);
         assert_eq!(out[0], g.divide(together, c));
     }

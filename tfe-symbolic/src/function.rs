@@ -183,6 +183,21 @@ impl Function {
         }
     }
 
+    /// Whether it is defined and smooth for all numbers.
+    pub(crate) fn is_entire(self) -> bool {
+        matches!(
+            self,
+            Self::Sin
+                | Self::Cos
+                | Self::Atan
+                | Self::Sinh
+                | Self::Cosh
+                | Self::Tanh
+                | Self::Asinh
+                | Self::Exp
+        )
+    }
+
     /// Its value, by the functions of the standard library that emitted kernels use for `f64`.
     ///
     /// Too few arguments count as NaN.

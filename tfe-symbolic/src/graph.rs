@@ -3,7 +3,7 @@
 //! Nodes are made only by the constructors of [`Graph`], which simplify locally; the rewrites are listed in `simplify.rs`. Every walk is a
 //! forward loop or an explicit stack, so a sum of a million terms cannot overflow the call stack.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 
 use crate::ast::Comparison;
@@ -257,6 +257,22 @@ impl Graph {
         }
         found.sort_unstable();
         found
+    }
+
+    /// The nodes of the roots that are made of more than parameters and numbers.
+    pub(crate) fn moving(&self, roots: &[ExprId]) -> HashSet<ExprId> {
+        let mut moving = HashSet::new();
+        for id in self.reachable(roots) {
+            let moves = match self.node(id) {
+                Node::Input(Input::Parameter(_) | Input::ParameterElement(..)) => false,
+                Node::Input(_) => true,
+                node => node.children().iter().any(|child| moving.contains(child)),
+            };
+            if moves {
+                moving.insert(id);
+            }
+        }
+        moving
     }
 
     /// The distinct leaves of an expression, in order of first making; inside sums their indices mention the loop variable.

@@ -213,6 +213,7 @@ impl Machine<'_> {
                     let place = self.place(output)?;
                     *place = if *accumulate { *place + value } else { value };
                 }
+                Statement::Balance { output, length } => self.balance(output, length)?,
                 Statement::Clear { output } => self.clear(output),
             }
         }
@@ -326,6 +327,18 @@ impl Machine<'_> {
             .get_mut(temporary.0 as usize)
             .ok_or(InterpretError::Unassigned)?;
         *place = Some(value);
+        Ok(())
+    }
+
+    fn balance(&mut self, output: &Output, length: &Affine) -> Result<(), InterpretError> {
+        for k in 0..self.index(length)? {
+            let mut sum = 0.0;
+            for l in (0..self.index(length)?).filter(|l| *l != k) {
+                sum -= *self.place(&output.further(l, k))?;
+            }
+            *self.place(&output.further(k, k))? = sum;
+            *self.place(&output.further(k, k).transposed())? = sum;
+        }
         Ok(())
     }
 

@@ -46,6 +46,9 @@ fn list(statements: &[Statement], depth: usize, f: &mut fmt::Formatter<'_>) -> f
                     if *accumulate { "+=" } else { "=" }
                 )?;
             }
+            Statement::Balance { output, length } => {
+                writeln!(f, "balance {output}, {length} entries")?;
+            }
             Statement::Clear { output } => writeln!(f, "clear {}", array(output))?,
             Statement::Loop {
                 variable,

@@ -90,10 +90,15 @@ impl Plan {
 
     /// Twice the cost in the measure of [`crate::count::Counts::weighted`].
     pub(crate) fn cost(&self) -> usize {
+        self.ids().map(|id| self.cost_of(id)).sum()
+    }
+
+    /// What one operation adds to the cost.
+    pub(crate) fn cost_of(&self, id: OpId) -> usize {
         let has = |function, arguments: &Vec<OpId>| {
             self.find(&Op::Call(function, arguments.clone())).is_some()
         };
-        let cost = |op: &Op| match op {
+        match self.op(id) {
             Op::Constant(_) | Op::Input(_) | Op::Negate(_) => 0,
             Op::Add(..)
             | Op::Subtract(..)
@@ -106,8 +111,28 @@ impl Plan {
             Op::Call(Function::Cos, arguments) if has(Function::Sin, arguments) => 0,
             Op::Call(Function::Sin | Function::Cos, _) => 40,
             Op::IntegerPower(..) | Op::Power(..) | Op::Call(..) => 40,
+        }
+    }
+
+    /// How many operations have no operand that they may overwrite, because each is an input or still needed afterwards.
+    pub(crate) fn copies(&self) -> usize {
+        let mut last = vec![usize::MAX; self.ops.len()];
+        for id in self.ids() {
+            for operand in self.op(id).operands() {
+                if !matches!(self.op(operand), Op::Constant(_) | Op::Input(_)) {
+                    last[operand.index()] = id.index();
+                }
+            }
+        }
+        let copies = |id: &OpId| {
+            let ends = |operand: &OpId| last[operand.index()] == id.index();
+            match self.op(*id) {
+                Op::Add(a, b) | Op::Multiply(a, b) => !ends(a) && !ends(b),
+                Op::Subtract(a, _) | Op::Divide(a, _) | Op::Negate(a) => !ends(a),
+                _ => false,
+            }
         };
-        self.ops.iter().map(cost).sum()
+        self.ids().filter(copies).count()
     }
 
     /// The number of operations.
@@ -123,6 +148,11 @@ impl Plan {
     /// Notes what a root has become.
     pub(crate) fn set_value(&mut self, root: ExprId, value: Value) {
         self.values.insert(root, value);
+    }
+
+    /// All roots and what they have become, in no order.
+    pub(crate) fn values(&self) -> impl Iterator<Item = (ExprId, Value)> + '_ {
+        self.values.iter().map(|(root, value)| (*root, *value))
     }
 
     /// Finds or makes an operation.

@@ -98,6 +98,36 @@ pub enum Output {
     RateV(Affine, Affine),
 }
 
+impl Output {
+    /// The entry so many rows and columns further; of all but the matrices of an energy, the entry itself.
+    pub fn further(&self, rows: i64, columns: i64) -> Self {
+        let sum = |index: &Affine, steps: i64| Affine {
+            constant: index.constant.saturating_add(steps),
+            ..index.clone()
+        };
+        self.mapped(|row, column| (sum(row, rows), sum(column, columns)))
+    }
+
+    /// The entry on the other side of the diagonal; of all but the matrices of an energy, the entry itself.
+    pub fn transposed(&self) -> Self {
+        self.mapped(|row, column| (column.clone(), row.clone()))
+    }
+
+    fn mapped(&self, change: impl Fn(&Affine, &Affine) -> (Affine, Affine)) -> Self {
+        match self {
+            Self::ZZ(row, column) => {
+                let (row, column) = change(row, column);
+                Self::ZZ(row, column)
+            }
+            Self::QQ(row, column) => {
+                let (row, column) = change(row, column);
+                Self::QQ(row, column)
+            }
+            other => other.clone(),
+        }
+    }
+}
+
 /// One step of a program.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Statement {
@@ -157,6 +187,14 @@ pub enum Statement {
         value: Operand,
         /// Add to what is there (the program has stored it before, or cleared the array: see [`Statement::Clear`])
         accumulate: bool,
+    },
+    /// Entries that follow from others: output (k, k) for k in 0..length, counted from the one given, becomes −Σ output (l, k) over l ≠ k, and
+    /// so does the one on the other side of the diagonal of the array
+    Balance {
+        /// The first of the entries
+        output: Output,
+        /// How many
+        length: Affine,
     },
     /// Sets a whole array of results (all its entries) to zero, before loops scatter into it; the indices are ignored
     Clear {

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use crate::balance::Balance;
 use crate::blocks::{Block, Local, Sink, Target};
 use crate::entry::{Array, Place};
 use crate::function::Function;
@@ -11,7 +12,12 @@ use crate::plan::{Op, OpId, Plan, Value};
 use crate::program::{Operand, Operation, Program, Statement, Temporary};
 
 /// Schedules a plan that holds the values of all results; these arrays are cleared first.
-pub(crate) fn schedule(plan: Plan, cleared: &BTreeSet<Array>, root: &Block) -> Program {
+pub(crate) fn schedule(
+    plan: Plan,
+    cleared: &BTreeSet<Array>,
+    root: &Block,
+    balances: &[Balance],
+) -> Program {
     let mut scheduler = Scheduler {
         reductions: plan
             .ids()
@@ -27,7 +33,14 @@ pub(crate) fn schedule(plan: Plan, cleared: &BTreeSet<Array>, root: &Block) -> P
             output: Place::scalar(*array).output(),
         });
     }
+    scheduler.angles();
     scheduler.block(root);
+    for Balance { first, length } in balances {
+        scheduler.append(Statement::Balance {
+            output: first.output(),
+            length: length.clone(),
+        });
+    }
     let statements = scheduler.scopes.swap_remove(0).statements;
     Program {
         statements,
@@ -66,6 +79,21 @@ impl Scheduler {
         }
     }
 
+    /// Sines and cosines before all else: whatever is known across a call has to be kept in memory.
+    fn angles(&mut self) {
+        let angle = |id: &OpId| {
+            let call = matches!(
+                self.plan.op(*id),
+                Op::Call(Function::Sin | Function::Cos, _)
+            );
+            call && self.plan.loops_of(*id) == 0 && !self.plan.reduces(*id)
+        };
+        let angles: Vec<OpId> = self.plan.ids().filter(angle).collect();
+        for id in angles {
+            self.operand(id);
+        }
+    }
+
     fn block(&mut self, block: &Block) {
         for (local, start) in &block.locals {
             let start = match start.and_then(|start| self.plan.value(start)) {
@@ -95,7 +123,10 @@ impl Scheduler {
         let value = match (local, value) {
             (Some(local), Some(value)) => self.onto(local, value),
             (Some(local), None) => Operand::Temporary(local),
-            (None, Some(value)) => self.plain(value),
+            (None, Some(value)) => match &sink.target {
+                Target::Add(local) if value.negative => return self.take_away(*local, value),
+                _ => self.plain(value),
+            },
             (None, None) => return,
         };
         match &sink.target {
@@ -114,6 +145,14 @@ impl Scheduler {
                     self.append(Statement::Assign { target, value });
                 }
             }
+        }
+    }
+
+    /// Subtracts from a running sum what would have to be negated to be added.
+    fn take_away(&mut self, local: Local, value: Value) {
+        if let Some(target) = self.local(local) {
+            let value = self.onto(target, value);
+            self.append(Statement::Assign { target, value });
         }
     }
 

@@ -1,0 +1,66 @@
+//! The diagonals of blocks from what stands beside them, as Rust statements.
+
+use crate::emit::index;
+use proc_macro2::TokenStream;
+use quote::quote;
+use tfe_symbolic::input::Affine;
+use tfe_symbolic::program::Output;
+
+/// The sums of all columns at once where their number is known, else one by one.
+pub(crate) fn balance(second: &TokenStream, output: &Output, length: &Affine) -> TokenStream {
+    let entry = |output: &Output, row: &TokenStream, column: &TokenStream| {
+        let (array, first_row, first_column) = match output {
+            Output::ZZ(a, b) => (quote!(#second zz), a, b),
+            Output::QQ(a, b) => (quote!(#second qq), a, b),
+            _ => return TokenStream::new(),
+        };
+        let from = |first: &Affine, steps: &TokenStream| match first.as_constant() {
+            Some(0) => steps.clone(),
+            _ => {
+                let first = index(first);
+                quote!(#first + #steps)
+            }
+        };
+        let (row, column) = (from(first_row, row), from(first_column, column));
+        quote!(#array[#row][#column])
+    };
+    let (k, l) = (quote!(column), quote!(row));
+    let (off, on) = (entry(output, &l, &k), entry(output, &k, &k));
+    let transposed = output.transposed();
+    let other = (transposed != *output).then(|| {
+        let other = entry(&transposed, &k, &k);
+        quote!(#other = sum;)
+    });
+    match length
+        .as_constant()
+        .and_then(|length| usize::try_from(length).ok())
+    {
+        Some(length) => quote! {
+            let mut sums = [t.like(0.0); #length];
+            for row in 0..#length {
+                for column in 0..#length {
+                    if row != column {
+                        sums[column] = sums[column] - #off;
+                    }
+                }
+            }
+            for (column, sum) in sums.into_iter().enumerate() {
+                #on = sum;
+                #other
+            }
+        },
+        None => {
+            let length = index(length);
+            quote! {
+                for column in 0..#length {
+                    let mut sum = t.like(0.0);
+                    for row in (0..#length).filter(|row| *row != column) {
+                        sum = sum - #off;
+                    }
+                    #on = sum;
+                    #other
+                }
+            }
+        }
+    }
+}
