@@ -5,6 +5,7 @@ use crate::motion::Motion;
 use std::error::Error;
 use std::fmt;
 use tfe_runtime::constrained::Residual;
+use tfe_runtime::family::FamilyError;
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{ElementError, StepError};
 
@@ -14,6 +15,8 @@ use tfe_runtime::{ElementError, StepError};
 pub enum RunErrorKind {
     /// The element does not exist (number of nodes, quadrature).
     Element(ElementError),
+    /// Of a model of run-time length: lengths that do not belong together, or something that such models cannot do yet.
+    Family(FamilyError),
     /// The step is zero, infinite or not a number.
     Step {
         /// The step asked for.
@@ -113,6 +116,7 @@ impl fmt::Display for RunErrorKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Element(error) => error.fmt(f),
+            Self::Family(error) => error.fmt(f),
             Self::Step { step } => {
                 write!(f, "the step is {step}, but it must be finite and not zero")
             }
@@ -167,6 +171,7 @@ impl Error for RunErrorKind {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             Self::Element(error) => Some(error),
+            Self::Family(error) => Some(error),
             Self::Solve { source, .. } => Some(source),
             Self::Transition { source, .. } => Some(source),
             _ => None,

@@ -11,6 +11,7 @@ pub mod continuation;
 mod csv;
 pub mod ensemble;
 pub mod error;
+pub mod family;
 pub mod linearised;
 pub mod motion;
 pub mod periodic;

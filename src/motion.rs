@@ -1,5 +1,7 @@
 //! The result of a run: nodes, dense output, energy, observables, statistics.
 
+pub(crate) mod family;
+
 use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv;
 use crate::error::AtError;

@@ -1,15 +1,18 @@
 //! Runs: a model, an element, a step, a span.
 
+pub(crate) mod family;
 pub(crate) mod mesh;
 mod watch;
 
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
 use crate::motion::{Motion, Node};
+use family::Runs;
 use mesh::Mesh;
 use nalgebra::DMatrix;
 use std::ops::Range;
 use tfe_runtime::constrained::{self, Residual};
+use tfe_runtime::length::Declared;
 use tfe_runtime::step::{Control, Impulse, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
@@ -59,9 +62,23 @@ impl<M, const N: usize> Clone for Simulation<'_, M, N> {
     }
 }
 
+impl<'m, M, const N: usize> Simulation<'m, M, N> {
+    /// A run of `model` with the defaults: this type for a model of fixed size, [`FamilySimulation`](crate::family::FamilySimulation) for one of
+    /// run-time length, which has methods of the same names.
+    #[allow(
+        clippy::new_ret_no_self,
+        reason = "one name for models of both kinds of length"
+    )]
+    pub fn new(model: &'m M) -> <M::Length as Runs<M, N>>::Simulation<'m>
+    where
+        M: Declared<N, Length: Runs<M, N>>,
+    {
+        M::Length::with_defaults(model)
+    }
+}
+
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
-    /// A run of `model` with the defaults.
-    pub fn new(model: &'m M) -> Self {
+    fn with_defaults(model: &'m M) -> Self {
         Self {
             model,
             element: Element::from(Mixed::<4>),

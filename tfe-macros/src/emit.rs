@@ -15,6 +15,8 @@ pub(crate) struct Emitter<'a> {
     coordinates: &'a [String],
     /// Where second derivatives go: `second.`, or nothing where the mass matrix alone is an argument.
     second: TokenStream,
+    /// Second derivatives are told entry by entry, as those of models of run-time length are.
+    by_entries: bool,
     /// What velocities and momenta are called.
     z: Ident,
     /// How often each temporary is read.
@@ -42,6 +44,7 @@ impl<'a> Emitter<'a> {
         Self {
             coordinates,
             second,
+            by_entries: false,
             z: format_ident!("z"),
             reads: BTreeMap::new(),
             indices: BTreeSet::new(),
@@ -56,6 +59,12 @@ impl<'a> Emitter<'a> {
     /// The same with `v` for velocities, as in the kernels of constraints.
     pub(crate) fn with_velocity(mut self) -> Self {
         self.z = format_ident!("v");
+        self
+    }
+
+    /// The same with second derivatives given to `entries`.
+    pub(crate) fn by_entries(mut self) -> Self {
+        self.by_entries = true;
         self
     }
 
@@ -166,6 +175,9 @@ impl<'a> Emitter<'a> {
                 self.value = Some(value);
                 TokenStream::new()
             }
+            Statement::Store { output, .. } if self.by_entries && block(output).is_some() => {
+                self.entry(output, &value)
+            }
             Statement::Store {
                 output,
                 accumulate: false,
@@ -188,6 +200,14 @@ impl<'a> Emitter<'a> {
             }
             _ => TokenStream::new(),
         }
+    }
+
+    fn entry(&self, output: &Output, value: &TokenStream) -> TokenStream {
+        let Some((block, row, column)) = block(output) else {
+            return TokenStream::new();
+        };
+        let (block, row, column) = (format_ident!("{block}"), index(row), index(column));
+        quote!(entries.add(__tfe::Block::#block, #row, #column, #value);)
     }
 
     fn place(&self, output: &Output) -> TokenStream {
@@ -222,6 +242,8 @@ impl<'a> Emitter<'a> {
         let vector = |array: TokenStream| quote!(#array.fill(t.like(0.0)););
         let matrix = |array: TokenStream| quote!(for row in &mut #array { row.fill(t.like(0.0)); });
         match output {
+            // They are sums of what is added from the start.
+            _ if self.by_entries && block(output).is_some() => TokenStream::new(),
             Output::ByZ(_) => vector(quote!(first.z)),
             Output::ByQ(_) => vector(quote!(first.q)),
             Output::Force(_) => vector(quote!(first.force)),
@@ -389,6 +411,7 @@ impl<'a> Emitter<'a> {
             "v",
             "first",
             "second",
+            "entries",
             "zz",
             "values",
             "row",
@@ -416,6 +439,18 @@ impl<'a> Emitter<'a> {
             local = format_ident!("{local}_");
         }
         local
+    }
+}
+
+/// The block and the place of a second derivative.
+fn block(output: &Output) -> Option<(&'static str, &Affine, &Affine)> {
+    match output {
+        Output::ZZ(a, b) => Some(("ZZ", a, b)),
+        Output::ZQ(a, b) => Some(("ZQ", a, b)),
+        Output::QQ(a, b) => Some(("QQ", a, b)),
+        Output::ForceZ(a, b) => Some(("ForceZ", a, b)),
+        Output::ForceQ(a, b) => Some(("ForceQ", a, b)),
+        _ => None,
     }
 }
 
@@ -462,7 +497,7 @@ pub(crate) fn identifier(name: &str) -> Ident {
     syn::parse_str::<Ident>(name).unwrap_or_else(|_| Ident::new_raw(name, Span::call_site()))
 }
 
-fn loop_name(variable: LoopVariable) -> Ident {
+pub(crate) fn loop_name(variable: LoopVariable) -> Ident {
     format_ident!("{}", variable.to_string())
 }
 
@@ -555,7 +590,7 @@ fn symbol_tokens(symbol: &IndexSymbol) -> TokenStream {
     }
 }
 
-fn signed(affine: &Affine) -> TokenStream {
+pub(crate) fn signed(affine: &Affine) -> TokenStream {
     let constant = Literal::i64_unsuffixed(affine.constant);
     let terms = affine.terms.iter().map(|(symbol, coefficient)| {
         let symbol = symbol_tokens(symbol);

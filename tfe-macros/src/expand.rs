@@ -2,7 +2,7 @@
 
 use crate::emit::{self, Emitter};
 use crate::source_map::SourceMap;
-use crate::{constraint, fallback, input, page, solver};
+use crate::{constraint, fallback, family, input, page, solver};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;
@@ -54,6 +54,10 @@ fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
         .any(|attribute| attribute.path().is_ident("doc"));
     for line in page::lines(declared, &derivation, documented) {
         item.attrs.push(syn::parse_quote!(#[doc = #line]));
+    }
+    if declared.is_of_run_time_length() {
+        let family = family::expand(declared, &derivation, &item, &path);
+        return quote!(#item #family);
     }
     let kernels = Kernels::new(declared, &derivation, &item, &path);
     let implementation = kernels.implementation();
@@ -252,8 +256,10 @@ impl<'a> Kernels<'a> {
             .coordinates
             .iter()
             .map(|array| {
-                let (name, first) = (&array.name, Literal::usize_unsuffixed(array.first));
-                let element = match array.first {
+                let first = array.first.as_constant().unwrap_or(0);
+                let start = usize::try_from(first).unwrap_or(0);
+                let (name, first) = (&array.name, Literal::usize_unsuffixed(start));
+                let element = match start {
                     0 => quote!(index),
                     _ => quote!(index - #first),
                 };
@@ -261,7 +267,7 @@ impl<'a> Kernels<'a> {
                 match array.length.as_ref().map(Affine::as_constant) {
                     None => quote!(#first => __tfe::CoordinateName::single(#name),),
                     Some(Some(length)) => {
-                        let end = array.first + usize::try_from(length).unwrap_or(0);
+                        let end = start + usize::try_from(length).unwrap_or(0);
                         let end = Literal::usize_unsuffixed(end);
                         quote!(#first..#end => #element,)
                     }

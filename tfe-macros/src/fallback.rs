@@ -1,11 +1,13 @@
 //! What is emitted when the declaration is wrong: every mistake as a `compile_error!`, and stubs that keep rustc from reporting follow-ups.
 
+mod family;
+
 use crate::emit::identifier;
 use crate::source_map::SourceMap;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{quote, quote_spanned};
 use std::collections::BTreeSet;
-use syn::{DeriveInput, ItemStruct};
+use syn::{Data, DeriveInput, ItemStruct};
 use tfe_symbolic::ast::{Array, ExprKind, Item};
 use tfe_symbolic::diagnostic::{Bag, Diagnostic};
 use tfe_symbolic::parse;
@@ -57,6 +59,10 @@ pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
         .solvers
         .iter()
         .map(|solver| solver_stub(solver, item, path));
+    if guess.run_time {
+        let family = family::stubs(item, path, &form, outputs);
+        return quote!(#family #(#solvers)*);
+    }
     quote! {
         const _: () = {
             use #path::__private as __tfe;
@@ -169,6 +175,8 @@ fn solver_stub(solver: &Ident, item: &DeriveInput, path: &TokenStream) -> TokenS
 struct Guess {
     path: TokenStream,
     dof: TokenStream,
+    /// The number of coordinates is known at run time only.
+    run_time: bool,
     hamiltonian: bool,
     outputs: Vec<Ident>,
     solvers: Vec<Ident>,
@@ -179,6 +187,7 @@ impl Guess {
         let mut guess = Self {
             path: quote!(::tfe),
             dof: quote!(1),
+            run_time: false,
             hamiltonian: false,
             outputs: Vec::new(),
             solvers: Vec::new(),
@@ -189,7 +198,10 @@ impl Guess {
             // The mistakes have been reported; this bag is emptied, not read.
             let _ = bag.finish(());
             match argument.map(|argument| argument.node) {
-                Some(Item::Coordinates(arrays)) => guess.dof = count(&arrays, item),
+                Some(Item::Coordinates(arrays)) => {
+                    guess.dof = count(&arrays, item);
+                    guess.run_time = has_field_as_length(&arrays, item);
+                }
                 Some(Item::Hamiltonian(_)) => guess.hamiltonian = true,
                 Some(Item::Output { name, .. }) => guess.outputs.push(identifier(&name.node)),
                 Some(Item::Solver { name, .. }) => guess.solvers.push(identifier(&name.node)),
@@ -208,6 +220,20 @@ impl Guess {
         guess.solvers.retain(|name| seen.insert(name.to_string()));
         guess
     }
+}
+
+/// Whether the length of some array is a field of type `usize`.
+fn has_field_as_length(arrays: &[Array], item: &DeriveInput) -> bool {
+    let Data::Struct(data) = &item.data else {
+        return false;
+    };
+    let lengths = arrays.iter().filter_map(|array| array.length.as_ref());
+    lengths
+        .filter_map(|length| match &length.node {
+            ExprKind::Name(name) => Some(name),
+            _ => None,
+        })
+        .any(|name| crate::input::is_length(&data.fields, name))
 }
 
 /// The number of coordinates, as a const expression.

@@ -84,6 +84,17 @@ pub(crate) fn context(item: &ItemStruct) -> Context {
     }
 }
 
+/// Whether this field is there and of type `usize`.
+pub(crate) fn is_length(fields: &Fields, name: &str) -> bool {
+    fields.iter().any(|field| {
+        let named = field
+            .ident
+            .as_ref()
+            .is_some_and(|ident| plain(ident) == name);
+        named && is_named(&field.ty, "usize")
+    })
+}
+
 /// An identifier without the `r#` of raw identifiers.
 pub(crate) fn plain(ident: &syn::Ident) -> String {
     let text = ident.to_string();

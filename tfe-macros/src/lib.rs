@@ -8,6 +8,7 @@ mod constraint;
 mod emit;
 mod expand;
 mod fallback;
+mod family;
 mod input;
 mod page;
 mod solver;
@@ -23,6 +24,9 @@ use proc_macro::TokenStream;
 /// `let`, `force(...)`, `dissipation`, `constraint(...)`, `output(...)` and `solver(...)` as the model needs. `sensitivity(omega, k[2])` asks for the derivatives by
 /// parameters, that is by fields of type `f64` and by elements of array fields, and by the time. Everything is differentiated symbolically while
 /// the crate compiles; mistakes are reported under the token that is wrong, all of them at once.
+///
+/// `coordinates(q[n])` with `n` a field of type `usize` declares a model of run-time length: sums stay loops, state and parameters (`Vec<f64>`) live on the heap, and the
+/// code is the same for every length. `Simulation::new` runs both kinds.
 ///
 /// The attribute keeps the struct as it is, implements the kernels that the elements of `tfe` integrate, and adds the methods
 /// `state(q, v)`, `structure()` and one for each `output`.

@@ -77,6 +77,29 @@ fn a_hamiltonian() {
 }
 
 #[test]
+fn a_family_of_run_time_length() {
+    check(
+        "family",
+        quote!(
+            coordinates(s, q[n]),
+            lagrangian = dot(s)^2/2 + sum(i in 0..n, m[i]/2*dot(q[i])^2)
+                - sum(i in 0..w, k/2*(q[i+1] - q[i])^2 + a/3*(q[i+1] - q[i])^3) - k/2*(q[0] - s)^2,
+            force(q[n-1]) = -dot(q[n-1]),
+            output(extension) = q[n-1] - q[0],
+        ),
+        quote! {
+            struct Family {
+                n: usize,
+                w: usize,
+                m: Vec<f64>,
+                k: f64,
+                a: f64,
+            }
+        },
+    );
+}
+
+#[test]
 fn loops_over_a_chain_of_any_length() {
     check(
         "chain",

@@ -29,7 +29,10 @@ mod dual;
 pub mod element;
 mod equations;
 pub mod error;
+#[cfg(feature = "alloc")]
+pub mod family;
 pub mod legendre;
+pub mod length;
 pub mod lu;
 pub mod model;
 mod newton;
@@ -74,6 +77,12 @@ pub use structure::{Operations, Structure};
 pub mod __private {
     pub use crate::element::{Element, EnergyConserving, Mixed, Primal, Radau, Rule, ThreeField};
     pub use crate::error::StepError;
+    #[cfg(feature = "alloc")]
+    pub use crate::family::{
+        Block, Entries, FamilyError, FamilyModel, FamilyState, Gradient, checks,
+        observable as family_observable, state as family_state,
+    };
+    pub use crate::length::{Declared, RunTimeLength};
     pub use crate::model::{
         By, Constraint, ConstraintKind, ConstraintSecond, CoordinateName, Facts, First, Form,
         Model, Second, State,
@@ -85,6 +94,10 @@ pub mod __private {
     pub use crate::step::{Impulse, Interval, Memory, Method};
     pub use crate::structure::{Operations, Structure};
     pub use crate::workspace::{Workspace, numbers_len, pivots_len};
+
+    /// Coordinates or velocities of a model of run-time length.
+    #[cfg(feature = "alloc")]
+    pub type List = alloc::vec::Vec<f64>;
 
     /// The state of coordinates and velocities; a momentum that does not exist is NaN, which the
     /// first step refuses.

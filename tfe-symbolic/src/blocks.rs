@@ -98,7 +98,7 @@ impl Block {
             let value = graph.linear(Constant::ZERO, &values);
             root.insert(&nest, place, value, &mut locals);
         }
-        root.carry(&mut locals);
+        root.carry(&mut locals, graph.ranges_are_checked);
         root
     }
 
@@ -181,13 +181,15 @@ impl Block {
     }
 
     /// Keeps in variables what a loop adds to the places of its next turns.
-    fn carry(&mut self, locals: &mut Locals) {
+    fn carry(&mut self, locals: &mut Locals, checked: bool) {
         for at in 0..self.inner.len() {
             let (range, inner) = &mut self.inner[at];
-            inner.carry(locals);
+            inner.carry(locals, checked);
             // A loop without turns would leave its variables at the places of others.
             let bounds = range.start.as_constant().zip(range.end.as_constant());
-            if bounds.is_none_or(|(start, end)| start >= end) {
+            let is_known = bounds.is_some_and(|(start, end)| start < end);
+            let is_checked = checked && is_of_fields(&range.start) && is_of_fields(&range.end);
+            if !(is_known || is_checked) {
                 continue;
             }
             let range = range.clone();
@@ -257,6 +259,12 @@ impl Block {
             self.after.push(Sink::store(place, Some(local), value));
         }
     }
+}
+
+/// Whether a bound is the same on all turns of all loops, and known at run time.
+fn is_of_fields(bound: &Affine) -> bool {
+    let field = |(symbol, _): &(IndexSymbol, i64)| matches!(symbol, IndexSymbol::Field(_));
+    bound.terms.iter().all(field)
 }
 
 /// The place some turns later.

@@ -77,8 +77,8 @@ impl Symbol {
 pub struct Slots {
     /// The name.
     pub name: Name,
-    /// The flat index of its first element.
-    pub first: usize,
+    /// The flat index of its first element: affine in the lengths of the arrays before it.
+    pub first: Affine,
     /// The length of an array.
     pub length: Option<Affine>,
 }
@@ -257,7 +257,7 @@ impl Seen {
 
 /// Gives each array its place in the flat vector.
 fn slots(arrays: Vec<Array>, context: &Context, bag: &mut Bag) -> Vec<Slots> {
-    let mut first = 0usize;
+    let mut first = Affine::default();
     let mut slots = Vec::new();
     for Array { name, length } in arrays {
         let length = length.map(|length| array_length(&name, &length, context, bag));
@@ -268,7 +268,8 @@ fn slots(arrays: Vec<Array>, context: &Context, bag: &mut Bag) -> Vec<Slots> {
                 .and_then(|n| usize::try_from(n).ok())
                 .unwrap_or(0),
         };
-        if size > MAX_COORDINATES || first + size > MAX_COORDINATES {
+        let before = usize::try_from(first.constant).unwrap_or(usize::MAX);
+        if size > MAX_COORDINATES || before.saturating_add(size) > MAX_COORDINATES {
             bag.push(
                 name.span,
                 Kind::TooManyCoordinates {
@@ -279,16 +280,17 @@ fn slots(arrays: Vec<Array>, context: &Context, bag: &mut Bag) -> Vec<Slots> {
             slots.push(Slots {
                 length: Some(unknown_length(&name.node)),
                 name,
-                first,
+                first: first.clone(),
             });
             continue;
         }
+        let next = first.plus_scaled(length.as_ref().unwrap_or(&Affine::constant(1)), 1);
         slots.push(Slots {
             name,
-            first,
+            first: first.clone(),
             length,
         });
-        first += size;
+        first = next.unwrap_or(first);
     }
     slots
 }
@@ -330,19 +332,14 @@ fn array_length(name: &Name, length: &Expr, context: &Context, bag: &mut Bag) ->
         }
         ExprKind::Name(symbol) => match context.field(symbol).map(|field| &field.kind) {
             Some(FieldKind::Length) => {
-                let (name, length_name) = (name.node.clone(), symbol.clone());
-                bag.push(
-                    length.span,
-                    Kind::RunTimeLength {
-                        name,
-                        length: length_name,
-                    },
-                );
                 return Affine::symbol(IndexSymbol::Field(symbol.clone()));
             }
             Some(_) => bag.push(length.span, Kind::LengthNotSimple),
             None => {
-                let lengths = context.const_parameters.iter().map(String::as_str);
+                let fields = context.fields.iter();
+                let fields = fields.filter(|field| field.kind == FieldKind::Length);
+                let parameters = context.const_parameters.iter().map(String::as_str);
+                let lengths = parameters.chain(fields.map(|field| field.name.as_str()));
                 let nearest = nearest(symbol, lengths);
                 bag.push(
                     length.span,
@@ -461,7 +458,9 @@ impl Model {
             }
             dof = dof.plus_scaled(&length, 1).unwrap_or(dof);
         }
-        if let Some((IndexSymbol::ConstParameter(length), _)) = dof.terms.first() {
+        if let Some((IndexSymbol::ConstParameter(length) | IndexSymbol::Field(length), _)) =
+            dof.terms.first()
+        {
             for span in &self.solver_spans {
                 bag.push(
                     *span,
@@ -472,6 +471,28 @@ impl Model {
             }
         }
         self.dof = dof;
+        self.only_at_fixed_length(bag);
+    }
+
+    /// Whether some array of coordinates has a length known at run time only.
+    pub(crate) fn is_of_run_time_length(&self) -> bool {
+        // A length with a mistake looks like a field, too.
+        let known = |slots: &Slots| !slots.has_wrong_length();
+        self.dof.is_of_run_time() && self.coordinates.iter().all(known)
+    }
+
+    /// Arguments that need the number of coordinates.
+    fn only_at_fixed_length(&self, bag: &mut Bag) {
+        if !self.is_of_run_time_length() {
+            return;
+        }
+        let constraint = self.constraints.first().map(|(name, ..)| name.span);
+        let parameter = self.sensitivities.first().map(|parameter| parameter.span);
+        for (argument, span) in [("constraint", constraint), ("sensitivity", parameter)] {
+            if let Some(span) = span {
+                bag.push(span, Kind::RunTimeLength { argument });
+            }
+        }
     }
 
     fn momenta_match(&self, span: Span, bag: &mut Bag) {

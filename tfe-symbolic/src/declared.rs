@@ -38,10 +38,59 @@ impl Form {
 pub struct CoordinateArray {
     /// The name.
     pub name: String,
-    /// The flat index of its first element.
-    pub first: usize,
+    /// The flat index of its first element: affine in the lengths of the arrays before it.
+    pub first: Affine,
     /// The length of an array; `None` for a single coordinate.
     pub length: Option<Affine>,
+}
+
+/// What must hold of a model of run-time length before it is evaluated; `text` and `ranges` are in the user's words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Requirement {
+    /// An index stays inside its array on all turns of a nest of loops.
+    Index {
+        /// The array.
+        array: String,
+        /// The index as written, `i+1`.
+        text: String,
+        /// The ranges that it depends on, `i in 0..n-1`.
+        ranges: String,
+        /// The loops, outermost first.
+        nest: Vec<SumRange>,
+        /// The index.
+        place: Affine,
+        /// The length of the array.
+        length: Extent,
+    },
+    /// A field of type `Vec<f64>` is exactly as long as its largest index asks for.
+    FieldLength {
+        /// The field.
+        field: String,
+        /// The index as written.
+        text: String,
+        /// The ranges that it depends on.
+        ranges: String,
+        /// The length that it must have at least; the largest of all counts.
+        length: Affine,
+    },
+    /// A range holds something.
+    Turns {
+        /// The range, `i in 0..n-1`.
+        ranges: String,
+        /// Its first value.
+        start: Affine,
+        /// One past its last value.
+        end: Affine,
+    },
+}
+
+/// The length of an array.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Of coordinates, or of a field of type `[f64; K]`.
+    Known(Affine),
+    /// Of a field of type `Vec<f64>`.
+    OfField(String),
 }
 
 /// A generalized force on one coordinate, or on each coordinate of a range.
@@ -186,8 +235,17 @@ pub struct Declared {
     pub crate_path: Option<String>,
     /// The fields that formulas use, in the order of the struct.
     pub used_fields: Vec<String>,
+    /// What must hold of lengths that are known at run time only; empty unless [`Declared::is_of_run_time_length`].
+    pub requirements: Vec<Requirement>,
     /// The formulas as the user wrote them, in mathematical notation.
     pub notation: Notation,
+}
+
+impl Declared {
+    /// Whether the number of coordinates is known at run time only.
+    pub fn is_of_run_time_length(&self) -> bool {
+        self.dof.is_of_run_time()
+    }
 }
 
 /// The model on one line per formula:

@@ -113,6 +113,7 @@ impl Derivation {
             observables,
             sensitivities,
         } = model;
+        graph.ranges_are_checked = dof.is_of_run_time();
         let mut deriver = Deriver {
             form,
             graph: &mut graph,
@@ -146,10 +147,17 @@ impl Derivation {
 
     /// The program of a kernel.
     pub fn program(&self, request: Request) -> Program {
+        self.program_of(|array| array.is_wanted(request))
+    }
+
+    /// The program of ∂/∂q and of the forces alone: what the equations M q̈ = f ask for.
+    pub fn forces(&self) -> Program {
+        self.program_of(|array| matches!(array, Array::ByQ | Array::Force))
+    }
+
+    fn program_of(&self, is_wanted: impl Fn(Array) -> bool) -> Program {
         let draft = |entries: &Vec<Entry>| {
-            let wanted = entries
-                .iter()
-                .filter(|entry| entry.place.array.is_wanted(request));
+            let wanted = entries.iter().filter(|entry| is_wanted(entry.place.array));
             Draft::of(self.graph.clone(), wanted.cloned().collect())
         };
         let plain = std::iter::once(&self.entries);
@@ -195,6 +203,16 @@ impl Derivation {
         let mut graph = self.graph.clone();
         let entries = entries_by(&mut graph, &self.entries, leaf);
         Draft::best(vec![Draft::of(graph, entries)])
+    }
+
+    /// Whether ∂/∂z of the energy function holds the time.
+    pub fn momenta_move(&self) -> bool {
+        let momenta = self
+            .entries
+            .iter()
+            .filter(|entry| entry.place.array == Array::ByZ);
+        let mut inputs = momenta.flat_map(|entry| self.graph.inputs_of(entry.value));
+        inputs.any(|input| input == Input::Time)
     }
 
     /// What is known about the model.

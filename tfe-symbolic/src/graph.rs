@@ -80,6 +80,8 @@ pub struct Graph {
     nodes: Vec<Node>,
     facts: Vec<Facts>,
     known: Interner,
+    /// Ranges whose bounds are the same on all turns of the loops around hold something: models of run-time length are checked for it.
+    pub(crate) ranges_are_checked: bool,
 }
 
 /// A sum is too long to be written out.

@@ -86,6 +86,12 @@ impl Affine {
         Some(sum)
     }
 
+    /// Whether it depends on a field of the struct, so that it is known at run time only.
+    pub fn is_of_run_time(&self) -> bool {
+        let field = |(symbol, _): &(IndexSymbol, i64)| matches!(symbol, IndexSymbol::Field(_));
+        self.terms.iter().any(field)
+    }
+
     /// What the loop variable is multiplied by.
     pub(crate) fn factor_of(&self, variable: LoopVariable) -> i64 {
         let own = self

@@ -11,6 +11,7 @@ mod constraints;
 mod forces;
 mod names;
 mod rates;
+mod requirements;
 mod scalar;
 mod sensitivity;
 mod sums;
@@ -22,7 +23,7 @@ use std::collections::HashMap;
 use crate::ast::{Expr, ExprKind};
 use crate::check::Model;
 use crate::context::Context;
-use crate::declared::{CoordinateArray, Declared, Form};
+use crate::declared::{CoordinateArray, Declared, Form, Requirement};
 use crate::diagnostic::{Bag, Kind, Span};
 use crate::graph::{ExprId, Graph};
 use crate::input::{Affine, LoopVariable};
@@ -74,11 +75,12 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     }
     lowerer.check_usage(form, energy, &constraints);
     let used_fields = lowerer.used_fields();
+    let requirements = std::mem::take(&mut lowerer.requirements);
     let graph = lowerer.graph;
     let arrays = |slots: &[crate::check::Slots]| {
         let array = |slots: &crate::check::Slots| CoordinateArray {
             name: slots.name.node.clone(),
-            first: slots.first,
+            first: slots.first.clone(),
             length: slots.length.clone(),
         };
         slots.iter().map(array).collect()
@@ -99,6 +101,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         solvers: model.solvers.clone(),
         crate_path: model.crate_path.clone(),
         used_fields,
+        requirements,
         notation: Notation::of(model),
     })
 }
@@ -167,6 +170,8 @@ struct Lowerer<'a> {
     extents: HashMap<Affine, Option<(i64, i64)>>,
     /// Which fields formulas use.
     fields: Vec<bool>,
+    /// What must hold of lengths that are known at run time only.
+    requirements: Vec<Requirement>,
 }
 
 impl<'a> Lowerer<'a> {
@@ -191,6 +196,7 @@ impl<'a> Lowerer<'a> {
             loops: HashMap::new(),
             extents: HashMap::new(),
             fields: vec![false; context.fields.len()],
+            requirements: Vec::new(),
         };
         // A length is a use of the field.
         for slots in model.coordinates.iter().chain(&model.momenta) {

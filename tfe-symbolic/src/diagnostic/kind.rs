@@ -125,12 +125,10 @@ kinds! {
         /// The array.
         name: String,
     },
-    /// `q[n]` with `n` a field.
+    /// `q[n]` with `n` a field, beside an argument that needs the number of coordinates.
     RunTimeLength {
-        /// The array.
-        name: String,
-        /// The field.
-        length: String,
+        /// The argument.
+        argument: &'static str,
     },
     /// A constraint in which velocities stand other than linearly.
     ConstraintNotAffine {

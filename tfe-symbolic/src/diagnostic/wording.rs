@@ -33,7 +33,9 @@ impl Kind {
             Self::ZeroLength { name, .. } => format!("array `{name}` has no elements"),
             Self::UnknownLength { name, .. } => format!("unknown length `{name}`"),
             Self::LengthNotSimple => {
-                "the length of an array must be a number or the name of a const parameter".into()
+                "the length of an array must be a number, or the name of a const parameter or of a \
+                 field of type `usize`"
+                    .into()
             }
             Self::TooManyCoordinates { limit } => {
                 format!("the model has more than {limit} coordinates")
@@ -41,8 +43,8 @@ impl Kind {
             Self::FamilyNotAlone { name } => {
                 format!("array `{name}` has a generic length and is not the only coordinate")
             }
-            Self::RunTimeLength { .. } => {
-                "coordinate arrays of a length known at run time only are not supported yet".into()
+            Self::RunTimeLength { argument } => {
+                format!("`{argument}` in a model of run-time length is not supported yet")
             }
             Self::ConstraintNotAffine { name } => {
                 format!("constraint `{name}` is not affine in the velocities")
@@ -273,7 +275,10 @@ impl Kind {
                 nearest: None,
                 name,
             } => {
-                format!("declare `const {name}: usize` on the struct, or write a number")
+                format!(
+                    "declare `const {name}: usize` on the struct, or a field `{name}: usize`, or \
+                     write a number"
+                )
             }
             Self::NoCoordinates => "add `coordinates(x)`".into(),
             Self::NameClash { .. } | Self::ReservedName { .. } | Self::ReservedPrefix { .. } => {
@@ -282,10 +287,9 @@ impl Kind {
             Self::FamilyNotAlone { name } => {
                 format!("make the others elements of `{name}`, or give all arrays literal lengths")
             }
-            Self::RunTimeLength { name, length } => format!(
-                "use a const parameter, as in `struct Model<const N: usize>` with `{name}[N]`, \
-                 instead of the field `{length}`"
-            ),
+            Self::RunTimeLength { .. } => {
+                "give the coordinates a length known here, such as `q[10]`".into()
+            }
             Self::ConstraintNotAffine { .. } => {
                 "write a condition on positions, or one in which velocities stand linearly, such \
                  as `dot(x)*sin(phi) - dot(y)*cos(phi)`"

@@ -4,6 +4,7 @@ use super::{Index, Lowerer};
 use crate::ast::{BinaryOperator, Expr, ExprKind};
 use crate::check::Symbol;
 use crate::context::FieldKind;
+use crate::declared::Extent;
 use crate::diagnostic::{Kind, Span};
 use crate::input::{Affine, IndexSymbol};
 
@@ -180,6 +181,9 @@ impl Lowerer<'_> {
         }
         let outside = SIZES.iter().map(|size| self.outside(place, length, *size));
         let Some(sides) = outside.collect::<Option<Vec<Side>>>() else {
+            if let Some(length) = length {
+                self.require_index(array, place, Extent::Known(length.clone()));
+            }
             return true;
         };
         // The extremes say it more plainly than the index itself, where they are attained.
@@ -200,7 +204,7 @@ impl Lowerer<'_> {
     }
 
     /// The ranges that an index depends on, as the user wrote them.
-    fn ranges_of(&self, place: &Affine) -> String {
+    pub(super) fn ranges_of(&self, place: &Affine) -> String {
         let shown = self
             .indices
             .iter()

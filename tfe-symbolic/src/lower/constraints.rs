@@ -7,7 +7,7 @@ use crate::constraint::{holds_state, is_affine, kind, normal};
 use crate::declared::{Constraint, ConstraintKind, Family, Parameter, Rule, Solver};
 use crate::diagnostic::{Kind, Span};
 use crate::graph::ExprId;
-use crate::input::{Affine, IndexSymbol, Input};
+use crate::input::{Affine, Input};
 
 /// One scalar equation of a declaration.
 struct Row {
@@ -94,8 +94,7 @@ impl Lowerer<'_> {
         range: String,
         whole: Span,
     ) -> std::ops::Range<i64> {
-        // Coordinates of a run-time length have been reported, and with them every range over them.
-        let reported = |(symbol, _): &(IndexSymbol, i64)| matches!(symbol, IndexSymbol::Field(_));
+        // In a model of run-time length the constraint itself has been reported.
         let kind = match (start.as_constant(), end.as_constant()) {
             (Some(start), Some(end)) if end <= start => Kind::EmptyRange { range },
             (Some(start), Some(end)) if end.abs_diff(start) > LONGEST_WRITTEN_OUT => {
@@ -103,7 +102,7 @@ impl Lowerer<'_> {
                 Kind::TooManyConstraints { limit }
             }
             (Some(start), Some(end)) => return start..end,
-            _ if self.model.dof.terms.iter().any(reported) => return 0..0,
+            _ if self.is_of_run_time_length() => return 0..0,
             _ => Kind::ConstraintRange { range },
         };
         self.report(whole, kind);

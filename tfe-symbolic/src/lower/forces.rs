@@ -25,28 +25,25 @@ impl Lowerer<'_> {
             return match &index.node {
                 ExprKind::Name(index_name) if self.symbol(index_name).is_none() => {
                     self.index_name(index_name, index.span);
-                    self.force_on_each(index_name, first, length, value)
+                    self.force_on_each(index_name, &first, length, value)
                 }
-                _ => self.force_on_one((name, index), first, &length, value),
+                _ => self.force_on_one((name, index), &first, &length, value),
             };
         }
         let slots = match &target.node {
             ExprKind::Name(name) => self.coordinate(name),
             _ => None,
         };
-        let force = |target: i64, value: ExprId| {
-            let target = Affine::constant(target);
-            Force {
-                ranges: Vec::new(),
-                target,
-                value,
-            }
+        let force = |target: Affine, value: ExprId| Force {
+            ranges: Vec::new(),
+            target,
+            value,
         };
         match slots {
             Some((first, None)) => self
                 .scalar(value)
                 .into_iter()
-                .map(|value| force(first, value))
+                .map(|value| force(first.clone(), value))
                 .collect(),
             Some((first, Some(_))) => {
                 // The whole array; a generic one is reported as it would be in a formula.
@@ -64,9 +61,12 @@ impl Lowerer<'_> {
                     self.report(value.span, kind);
                     return Vec::new();
                 }
-                (first..)
+                (0..)
                     .zip(values)
-                    .map(|(target, value)| force(target, value))
+                    .filter_map(|(at, value)| {
+                        let target = first.plus_scaled(&Affine::constant(at), 1)?;
+                        Some(force(target, value))
+                    })
                     .collect()
             }
             None => {
@@ -87,11 +87,11 @@ impl Lowerer<'_> {
     }
 
     /// The first flat index of a coordinate and the length of an array.
-    fn coordinate(&self, name: &str) -> Option<(i64, Option<Affine>)> {
+    fn coordinate(&self, name: &str) -> Option<(Affine, Option<Affine>)> {
         match self.symbol(name)? {
             Symbol::Coordinate(at) => {
                 let slots = &self.model.coordinates[*at];
-                Some((slots.first as i64, slots.length.clone()))
+                Some((slots.first.clone(), slots.length.clone()))
             }
             _ => None,
         }
@@ -101,7 +101,7 @@ impl Lowerer<'_> {
     fn force_on_one(
         &mut self,
         (array, index): (&str, &Expr),
-        first: i64,
+        first: &Affine,
         length: &Affine,
         value: &Expr,
     ) -> Vec<Force> {
@@ -113,7 +113,7 @@ impl Lowerer<'_> {
         if !self.in_bounds(array, &place, Some(length), index.span) {
             return Vec::new();
         }
-        let target = place.plus_scaled(&Affine::constant(first), 1);
+        let target = place.plus_scaled(first, 1);
         let (Some(target), Some(value)) = (target, value) else {
             return Vec::new();
         };
@@ -128,7 +128,7 @@ impl Lowerer<'_> {
     fn force_on_each(
         &mut self,
         index: &str,
-        first: i64,
+        first: &Affine,
         length: Affine,
         value: &Expr,
     ) -> Vec<Force> {
@@ -152,23 +152,19 @@ impl Lowerer<'_> {
         };
         match range.end.as_constant() {
             Some(length) if length.unsigned_abs() <= SHORT_SUM => (0..length)
-                .map(|at| {
-                    let value = self
-                        .graph
-                        .substitute_loop(value, variable, &Affine::constant(at));
-                    let target = Affine::constant(first + at);
-                    Force {
+                .filter_map(|at| {
+                    let at = Affine::constant(at);
+                    let value = self.graph.substitute_loop(value, variable, &at);
+                    Some(Force {
                         ranges: Vec::new(),
-                        target,
+                        target: first.plus_scaled(&at, 1)?,
                         value,
-                    }
+                    })
                 })
                 .collect(),
             _ => {
                 let index = Affine::symbol(crate::input::IndexSymbol::Loop(variable));
-                let target = index
-                    .plus_scaled(&Affine::constant(first), 1)
-                    .unwrap_or(index);
+                let target = index.plus_scaled(first, 1).unwrap_or(index);
                 vec![Force {
                     ranges: vec![range],
                     target,

@@ -139,13 +139,14 @@ impl Lowerer<'_> {
 
     /// A coordinate or momentum, or all of a literal array of them.
     fn slots(&mut self, slots: &Slots, input: fn(Affine) -> Input, span: Span) -> Value {
-        let first = slots.first as i64;
+        let first = &slots.first;
         match &slots.length {
-            None => Value::Scalar(self.graph.input(input(Affine::constant(first)))),
+            None => Value::Scalar(self.graph.input(input(first.clone()))),
             Some(length) => match length.as_constant() {
                 Some(length) => Value::Vector(
-                    (first..first + length)
-                        .map(|at| self.graph.input(input(Affine::constant(at))))
+                    (0..length)
+                        .filter_map(|at| first.plus_scaled(&Affine::constant(at), 1))
+                        .map(|at| self.graph.input(input(at)))
                         .collect(),
                 ),
                 None => {
@@ -252,7 +253,12 @@ impl Lowerer<'_> {
             if !self.in_bounds(name, &place, length.as_ref(), index.span) {
                 return Value::Error;
             }
-            let Some(flat) = place.plus_scaled(&Affine::constant(first as i64), 1) else {
+            if let Array::Field(field) = &array
+                && length.is_none()
+            {
+                self.require_length(field, &place);
+            }
+            let Some(flat) = place.plus_scaled(&first, 1) else {
                 self.report(
                     span,
                     Kind::NumberTooLarge {
@@ -303,15 +309,17 @@ impl Lowerer<'_> {
     }
 
     /// The array of this name, where its elements begin and its length, if the macro can name it.
-    fn array(&mut self, name: &str) -> Option<(Array, usize, Option<Affine>)> {
+    fn array(&mut self, name: &str) -> Option<(Array, Affine, Option<Affine>)> {
         match self.symbol(name).cloned()? {
             Symbol::Coordinate(at) => {
                 let slots = &self.model.coordinates[at];
-                Some((Array::Coordinate, slots.first, Some(slots.length.clone()?)))
+                let first = slots.first.clone();
+                Some((Array::Coordinate, first, Some(slots.length.clone()?)))
             }
             Symbol::Momentum(at) => {
                 let slots = &self.model.momenta[at];
-                Some((Array::Momentum, slots.first, Some(slots.length.clone()?)))
+                let first = slots.first.clone();
+                Some((Array::Momentum, first, Some(slots.length.clone()?)))
             }
             Symbol::Field(at) => {
                 let length = match &self.context.fields[at].kind {
@@ -327,7 +335,7 @@ impl Lowerer<'_> {
                     _ => return None,
                 };
                 self.fields[at] = true;
-                Some((Array::Field(name.to_owned()), 0, length))
+                Some((Array::Field(name.to_owned()), Affine::default(), length))
             }
             Symbol::Let(_) | Symbol::ConstParameter => None,
         }

@@ -57,6 +57,9 @@ impl Lowerer<'_> {
             start,
             end,
         });
+        if known {
+            self.require_turns(&range);
+        }
         let before = self.terms.replace(1);
         let value = self.value(body);
         let terms = count

@@ -145,7 +145,12 @@ impl Lowerer<'_> {
             }
             let length = slots.length.as_ref().and_then(Affine::as_constant);
             for at in 0..length.map_or(1, |length| length as usize) {
-                let flat = slots.first + at;
+                // In a model of run-time length one place stands for all.
+                let first = slots.first.as_constant();
+                let flat = first
+                    .and_then(|first| usize::try_from(first).ok())
+                    .unwrap_or(0)
+                    + at;
                 // A constraint may determine what the Lagrangian leaves open.
                 if form == Form::Lagrangian && !inputs.is_empty() && constrained.has(flat) {
                     continue;

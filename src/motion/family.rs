@@ -1,0 +1,212 @@
+//! The result of a run of a model of run-time length.
+
+use super::{Outputs, larger};
+use crate::csv;
+use crate::error::AtError;
+use std::fmt;
+use std::io;
+use std::path::Path;
+use tfe_runtime::family::{self, FamilyDense, FamilyModel, FamilyState};
+use tfe_runtime::{CoordinateName, Form, Statistics};
+
+/// A state of a family with its time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FamilyNode {
+    /// Time.
+    pub t: f64,
+    /// Generalized coordinates.
+    pub q: Vec<f64>,
+    /// Generalized momenta p = ∂L/∂v.
+    pub p: Vec<f64>,
+}
+
+impl FamilyNode {
+    pub(crate) fn new(t: f64, state: FamilyState) -> Self {
+        let FamilyState { q, p } = state;
+        Self { t, q, p }
+    }
+
+    /// The point of phase space, without the time.
+    pub fn state(&self) -> FamilyState {
+        FamilyState {
+            q: self.q.clone(),
+            p: self.p.clone(),
+        }
+    }
+}
+
+/// A recorded motion of a model of run-time length: what [`Motion`](crate::Motion) is for models of fixed size, by the same names.
+///
+/// A node keeps 3 n numbers for n coordinates, the polynomial of an element of s stages 2 s n more: for long chains and long runs,
+/// [`record_every`](crate::family::FamilySimulation::record_every) leaves nodes and polynomials out.
+#[derive(Clone)]
+pub struct FamilyMotion {
+    nodes: Vec<FamilyNode>,
+    velocities: Vec<Vec<f64>>,
+    energies: Vec<f64>,
+    outputs: Outputs,
+    elements: Vec<FamilyDense>,
+    statistics: Statistics,
+    names: Vec<CoordinateName>,
+}
+
+impl FamilyMotion {
+    /// The motion that has only its start, which is as long as the model.
+    pub(crate) fn from_start<M: FamilyModel>(model: &M, t: f64, start: &FamilyState) -> Self {
+        let mut motion = Self::empty(model, t, start);
+        motion.nodes.clear();
+        motion.names = (0..model.len()).map(|a| model.coordinate_name(a)).collect();
+        motion.record(model, t, start);
+        motion
+    }
+
+    /// The start of a run that never began: nothing of the model is asked.
+    pub(crate) fn empty<M: FamilyModel>(_: &M, t: f64, start: &FamilyState) -> Self {
+        Self {
+            nodes: vec![FamilyNode::new(t, start.clone())],
+            velocities: Vec::new(),
+            energies: Vec::new(),
+            outputs: Outputs {
+                names: M::OBSERVABLES,
+                values: Vec::new(),
+            },
+            elements: Vec::new(),
+            statistics: Statistics::default(),
+            names: Vec::new(),
+        }
+    }
+
+    /// Appends a node, with its velocity, energy and observables; NaN where no velocity belongs to the momentum.
+    pub(crate) fn record<M: FamilyModel>(&mut self, model: &M, t: f64, state: &FamilyState) {
+        let velocity = family::velocity(model, t, state);
+        let velocity = velocity.unwrap_or_else(|_| vec![f64::NAN; state.q.len()]);
+        self.energies
+            .push(family::energy(model, t, state, &velocity));
+        if !M::OBSERVABLES.is_empty() {
+            let z = match M::FORM {
+                Form::Lagrangian => &velocity,
+                Form::Hamiltonian => &state.p,
+            };
+            let start = self.outputs.values.len();
+            let length = start + M::OBSERVABLES.len();
+            self.outputs.values.resize(length, 0.0);
+            model.observables(t, &state.q, z, &mut self.outputs.values[start..]);
+        }
+        self.nodes.push(FamilyNode::new(t, state.clone()));
+        self.velocities.push(velocity);
+    }
+
+    pub(crate) fn keep_element(&mut self, element: FamilyDense) {
+        self.elements.push(element);
+    }
+
+    pub(crate) fn set_statistics(&mut self, statistics: Statistics) {
+        self.statistics = statistics;
+    }
+
+    /// The last recorded node: the end of the span after a complete run.
+    pub fn last(&self) -> &FamilyNode {
+        self.nodes.last().expect("a motion is made with its start")
+    }
+
+    /// The recorded nodes, in the order of time.
+    pub fn states(&self) -> &[FamilyNode] {
+        &self.nodes
+    }
+
+    /// The velocities dq/dt at the recorded nodes.
+    pub fn velocities(&self) -> &[Vec<f64>] {
+        &self.velocities
+    }
+
+    /// The energy H = p·v − L at the recorded nodes.
+    pub fn energies(&self) -> &[f64] {
+        &self.energies
+    }
+
+    /// The state at a time between the nodes, from the element's own polynomial.
+    ///
+    /// # Errors
+    /// [`AtError::Outside`] beyond the span, [`AtError::NotRecorded`] where `record_every` left the element out.
+    pub fn at(&self, time: f64) -> Result<FamilyNode, AtError> {
+        let (start, end) = (self.nodes[0].t, self.last().t);
+        if !((start.min(end)..=start.max(end)).contains(&time)) {
+            return Err(AtError::Outside { time, start, end });
+        }
+        let direction = if end < start { -1.0 } else { 1.0 };
+        let before = |t: f64| direction * t < direction * time;
+        let node = self.nodes.partition_point(|node| before(node.t));
+        if let Some(node) = self.nodes.get(node).filter(|node| node.t == time) {
+            return Ok(node.clone());
+        }
+        let after = self.elements.partition_point(|one| before(one.start()));
+        let element = after.checked_sub(1).and_then(|at| self.elements.get(at));
+        match element {
+            Some(element) if direction * element.end() >= direction * time => {
+                Ok(FamilyNode::new(time, element.at_time(time)))
+            }
+            _ => Err(AtError::NotRecorded { time }),
+        }
+    }
+
+    /// Largest change of the energy over the recorded nodes, relative to the energy at the start (absolute where that is zero):
+    ///
+    /// ```text
+    /// max |H(t) − H(t₀)| / |H(t₀)|
+    /// ```
+    pub fn energy_error(&self) -> f64 {
+        let Some(&start) = self.energies.first() else {
+            return 0.0;
+        };
+        let scale = if start == 0.0 { 1.0 } else { start.abs() };
+        let changes = self.energies.iter().map(|energy| (energy - start).abs());
+        changes.map(|change| change / scale).fold(0.0, larger)
+    }
+
+    /// What the run cost.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// The observables at the recorded nodes.
+    pub fn outputs(&self) -> &Outputs {
+        &self.outputs
+    }
+
+    /// Writes the recorded nodes as CSV: time, coordinates, velocities, momenta, energy, observables, with a header line. Numbers are written
+    /// so that they read back exactly.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn write_csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        let mut header = vec!["t".to_owned()];
+        header.extend(self.names.iter().map(ToString::to_string));
+        header.extend(self.names.iter().map(|name| format!("{name}_dot")));
+        header.extend(self.names.iter().map(|name| format!("p_{name}")));
+        header.push("energy".to_owned());
+        header.extend(self.outputs.names.iter().map(|name| (*name).to_owned()));
+        let rows = self.nodes.iter().enumerate().map(|(k, node)| {
+            let mut row = vec![node.t];
+            row.extend(&node.q);
+            row.extend(self.velocities.get(k).into_iter().flatten());
+            row.extend(&node.p);
+            row.extend(self.energies.get(k));
+            row.extend(self.outputs.row(k).unwrap_or_default());
+            row
+        });
+        csv::write(path.as_ref(), &header, rows)
+    }
+}
+
+impl fmt::Debug for FamilyMotion {
+    /// The extent of the motion, not its thousands of numbers.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FamilyMotion")
+            .field("coordinates", &self.nodes[0].q.len())
+            .field("nodes", &self.nodes.len())
+            .field("start", &self.nodes[0].t)
+            .field("end", &self.last().t)
+            .field("statistics", &self.statistics)
+            .finish_non_exhaustive()
+    }
+}

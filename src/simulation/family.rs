@@ -1,0 +1,359 @@
+//! Runs of models of run-time length, and which kind of run `Simulation::new` gives.
+
+use super::mesh::Mesh;
+use super::{Simulation, progress};
+use crate::error::RunErrorKind;
+use crate::motion::family::{FamilyMotion, FamilyNode};
+use std::error::Error;
+use std::fmt;
+use std::ops::Range;
+use tfe_runtime::family::{FamilyError, FamilyModel, FamilyState, FamilyStepper};
+use tfe_runtime::length::{FixedLength, RunTimeLength};
+use tfe_runtime::step::Control;
+use tfe_runtime::{Element, Mixed, Model, Solve};
+
+/// The kind of run that models of one kind of length have; what [`Simulation::new`] returns.
+pub trait Runs<M, const N: usize> {
+    /// The run to be.
+    type Simulation<'m>
+    where
+        M: 'm;
+
+    /// With the defaults.
+    fn with_defaults(model: &M) -> Self::Simulation<'_>;
+}
+
+impl<M: Model<N>, const N: usize> Runs<M, N> for FixedLength {
+    type Simulation<'m>
+        = Simulation<'m, M, N>
+    where
+        M: 'm;
+
+    fn with_defaults(model: &M) -> Simulation<'_, M, N> {
+        Simulation::with_defaults(model)
+    }
+}
+
+impl<M: FamilyModel> Runs<M, 0> for RunTimeLength {
+    type Simulation<'m>
+        = FamilySimulation<'m, M>
+    where
+        M: 'm;
+
+    fn with_defaults(model: &M) -> FamilySimulation<'_, M> {
+        FamilySimulation::new(model)
+    }
+}
+
+/// A run to be of a model of run-time length; made by [`Simulation::new`].
+///
+/// A family costs the same to compile at any length. A step takes time and memory linear in the number of coordinates and terms: one fixed-point iteration for the forces
+/// at all points of the element, four points to a register.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(
+///     coordinates(q[n]),
+///     lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3),
+/// )]
+/// struct Chain { n: usize, m: f64, k: f64, a: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let chain = Chain { n: 100, m: 1.0, k: 1.0, a: 0.25 };
+/// let q: Vec<f64> = (0..chain.n).map(|i| (0.03 * i as f64).cos()).collect();
+/// let start = chain.state(q, vec![0.0; chain.n])?;
+/// let motion = Simulation::new(&chain)
+///     .element(Mixed::<4>)
+///     .step(0.1)
+///     .run(start, 0.0..10.0)?;
+/// assert!(motion.energy_error() < 1e-7); // order 6 at this step
+/// let total: f64 = motion.last().p.iter().sum();
+/// assert!(total.abs() < 1e-12); // no force from outside
+/// # Ok(())
+/// # }
+/// ```
+///
+/// The kinetic energy must be ½ Σ m v² with constant masses so far (one for each coordinate), the potential energy and the forces may be any.
+#[derive(Debug)]
+pub struct FamilySimulation<'m, M> {
+    model: &'m M,
+    element: Element,
+    step: Option<f64>,
+    control: Control,
+    record_every: usize,
+    breaks: Vec<f64>,
+    progress: bool,
+}
+
+// Not derived: the model is borrowed, it need not be `Clone`.
+impl<M> Clone for FamilySimulation<'_, M> {
+    fn clone(&self) -> Self {
+        Self {
+            breaks: self.breaks.clone(),
+            ..*self
+        }
+    }
+}
+
+impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
+    /// A run of `model` with the defaults: what [`Simulation::new`] gives, for code that is generic over the model.
+    pub fn new(model: &'m M) -> Self {
+        Self {
+            model,
+            element: Element::from(Mixed::<4>),
+            step: None,
+            control: Control::default(),
+            record_every: 1,
+            breaks: Vec::new(),
+            progress: false,
+        }
+    }
+
+    /// The element: `Mixed::<4>`, `Primal::<3>.reduced()`, `Element::mixed(n)`, …; those that are Runge–Kutta methods.
+    #[must_use]
+    pub fn element(mut self, element: impl Into<Element>) -> Self {
+        self.element = element.into();
+        self
+    }
+
+    /// The step h, in the units of time. Where the span is no whole number of steps the last one is shorter.
+    #[must_use]
+    pub fn step(mut self, step: f64) -> Self {
+        self.step = Some(step);
+        self
+    }
+
+    /// When the iteration inside an element is done: the relative size of the last increment. The default iterates to round-off.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.control.tolerance = tolerance;
+        self
+    }
+
+    /// The most iterations an element may take before the run stops with an error.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: u32) -> Self {
+        self.control.max_iterations = iterations;
+        self
+    }
+
+    /// How the element's equations are solved. `Solve::Auto`, the default, begins with the fixed point; with the feature `sparse`, steps that contract badly go to Newton's
+    /// method with a sparse factorisation, without it they are errors, and so is `Solve::Newton`.
+    #[must_use]
+    pub fn solver(mut self, solve: Solve) -> Self {
+        self.control.solve = solve;
+        self
+    }
+
+    /// Records every `k`-th node (and always the first and the last). With `k` > 1 the elements' polynomials are not kept, so a long run takes
+    /// little memory but [`FamilyMotion::at`] knows the recorded nodes only. 0 counts as 1.
+    #[must_use]
+    pub fn record_every(mut self, k: usize) -> Self {
+        self.record_every = k.max(1);
+        self
+    }
+
+    /// Makes an element end at `time`: where a force jumps, an element across the jump would lose its order.
+    #[must_use]
+    pub fn break_at(mut self, time: f64) -> Self {
+        self.breaks.push(time);
+        self
+    }
+
+    /// Shows the progress of long runs on standard error, once a second.
+    #[must_use]
+    pub fn progress(mut self) -> Self {
+        self.progress = true;
+        self
+    }
+
+    /// Runs over the span, backwards where it ends before it starts. The last node is exactly at the end of the span.
+    ///
+    /// # Errors
+    /// [`FamilyRunError`] says where and why the run stopped and holds the motion so far.
+    pub fn run(
+        &self,
+        start: FamilyState,
+        span: Range<f64>,
+    ) -> Result<FamilyMotion, FamilyRunError> {
+        let refused = |kind| {
+            let partial = FamilyMotion::empty(self.model, span.start, &start);
+            FamilyRunError::new(kind, partial)
+        };
+        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        let mut stepper = self.stepper(&start).map_err(refused)?;
+        let mesh = Mesh::<0>::new(&span, step, &self.breaks, &[]).map_err(refused)?;
+        let mut motion = FamilyMotion::from_start(self.model, span.start, &start);
+        let mut bar = progress::Bar::new(self.progress, mesh.steps());
+        let mut failure = None;
+        let mut state = start;
+        for (element, (t, next, h)) in mesh.elements().enumerate() {
+            if let Err(source) = stepper.advance(t, h, &mut state) {
+                if motion.last().t != t {
+                    motion.record(self.model, t, &state);
+                }
+                failure = Some(RunErrorKind::Solve {
+                    element,
+                    time: t,
+                    step: h,
+                    source,
+                });
+                break;
+            }
+            if self.record_every == 1 {
+                motion.keep_element(stepper.dense(t, next));
+            }
+            let last = element + 1 == mesh.steps();
+            if last || (element + 1) % self.record_every == 0 {
+                motion.record(self.model, next, &state);
+            }
+            bar.advance();
+        }
+        motion.set_statistics(*stepper.statistics());
+        match failure {
+            None => Ok(motion),
+            Some(kind) => Err(FamilyRunError::new(kind, motion)),
+        }
+    }
+
+    /// The states that follow `start`, one a step, without end and in constant memory. After an error the iterator is finished.
+    pub fn steps(&self, start: FamilyState, t0: f64) -> FamilySteps<'m, M> {
+        let step = self.step.unwrap_or(f64::NAN);
+        let stepper = self.stepper(&start).and_then(|stepper| {
+            if !(step.is_finite() && step != 0.0) {
+                return Err(RunErrorKind::Step { step });
+            }
+            if !t0.is_finite() {
+                let (start, end) = (t0, f64::INFINITY);
+                return Err(RunErrorKind::Span { start, end });
+            }
+            Ok(stepper)
+        });
+        let (stepper, failure) = match stepper {
+            Ok(stepper) => (Some(stepper), None),
+            Err(kind) => (None, Some(kind)),
+        };
+        FamilySteps {
+            stepper,
+            failure,
+            state: start,
+            t0,
+            step,
+            element: 0,
+        }
+    }
+
+    /// A stepper, if model, element and start are good.
+    fn stepper(&self, start: &FamilyState) -> Result<FamilyStepper<'m, M>, RunErrorKind> {
+        self.model.check().map_err(RunErrorKind::Family)?;
+        // Before memory is asked for: a wrong length may be any number.
+        let expected = self.model.len();
+        for (vector, values) in [("q", &start.q), ("p", &start.p)] {
+            let length = values.len();
+            if length != expected {
+                return Err(RunErrorKind::Family(FamilyError::StateLength {
+                    vector,
+                    length,
+                    expected,
+                }));
+            }
+        }
+        for (coordinate, (&q, &p)) in start.q.iter().zip(&start.p).enumerate() {
+            if !(q.is_finite() && p.is_finite()) {
+                return Err(RunErrorKind::Start { coordinate, q, p });
+            }
+        }
+        FamilyStepper::new(self.model, self.element, self.control).map_err(RunErrorKind::Family)
+    }
+}
+
+/// The endless sequence of states of [`FamilySimulation::steps`].
+#[derive(Debug)]
+pub struct FamilySteps<'m, M> {
+    stepper: Option<FamilyStepper<'m, M>>,
+    failure: Option<RunErrorKind>,
+    state: FamilyState,
+    t0: f64,
+    step: f64,
+    element: usize,
+}
+
+impl<M: FamilyModel> Iterator for FamilySteps<'_, M> {
+    type Item = Result<FamilyNode, RunErrorKind>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if let Some(kind) = self.failure.take() {
+            self.stepper = None;
+            return Some(Err(kind));
+        }
+        let stepper = self.stepper.as_mut()?;
+        // Times are products, not sums: a million additions of 0.1 are off by 1e-6.
+        let time = |element: usize| self.t0 + element as f64 * self.step;
+        let (t, next) = (time(self.element), time(self.element + 1));
+        match stepper.advance(t, self.step, &mut self.state) {
+            Ok(()) => {
+                self.element += 1;
+                Some(Ok(FamilyNode::new(next, self.state.clone())))
+            }
+            Err(source) => {
+                self.stepper = None;
+                Some(Err(RunErrorKind::Solve {
+                    element: self.element,
+                    time: t,
+                    step: self.step,
+                    source,
+                }))
+            }
+        }
+    }
+}
+
+/// A run of a family that stopped before its end: why, and the motion up to the last good state.
+#[derive(Clone, Debug)]
+pub struct FamilyRunError {
+    kind: RunErrorKind,
+    partial: Box<FamilyMotion>,
+}
+
+impl FamilyRunError {
+    fn new(kind: RunErrorKind, partial: FamilyMotion) -> Self {
+        Self {
+            kind,
+            partial: Box::new(partial),
+        }
+    }
+
+    /// Why the run stopped.
+    pub fn kind(&self) -> &RunErrorKind {
+        &self.kind
+    }
+
+    /// The motion up to the last good state; the start alone, without energy, where the run never began.
+    pub fn partial(&self) -> &FamilyMotion {
+        &self.partial
+    }
+
+    /// The motion up to the last good state, by value.
+    pub fn into_partial(self) -> FamilyMotion {
+        *self.partial
+    }
+}
+
+impl fmt::Display for FamilyRunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.kind.fmt(f)?;
+        match self.partial.states().last() {
+            Some(node) if self.partial.states().len() > 1 => {
+                write!(f, "; the motion up to t = {} is in `partial()`", node.t)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Error for FamilyRunError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.kind.source()
+    }
+}

@@ -1,0 +1,271 @@
+//! Lengths that do not belong together, and what families cannot do yet: typed errors that name the sum and the index.
+
+use tfe::RunErrorKind;
+use tfe::family::{FamilyError, FamilyModel, FamilyMotion, FamilyRunError, FamilyState};
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(q[n], r[w]),
+    lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2) + sum(i in 0..w, dot(r[i])^2/2)
+        - sum(i in 0..n-1, k[i]/2*(q[i+1]-q[i])^2) - sum(j in 0..n, (q[j]-r[j])^4),
+)]
+struct Coupled {
+    n: usize,
+    w: usize,
+    m: Vec<f64>,
+    k: Vec<f64>,
+}
+
+fn coupled(n: usize, w: usize, m: usize, k: usize) -> Coupled {
+    Coupled {
+        n,
+        w,
+        m: vec![1.0; m],
+        k: vec![1.0; k],
+    }
+}
+
+#[track_caller]
+fn check(model: &Coupled, expected: FamilyError, message: &str) {
+    assert_eq!(model.check(), Err(expected.clone()));
+    assert_eq!(expected.to_string(), message);
+    let (q, v) = (vec![0.0; model.n + model.w], vec![0.0; model.n + model.w]);
+    assert_eq!(model.state(q.clone(), v.clone()), Err(expected.clone()));
+    let start = FamilyState { q, p: v };
+    let error = Simulation::new(model)
+        .run(start, 0.0..1.0)
+        .expect_err("a wrong model");
+    assert_eq!(error.kind(), &RunErrorKind::Family(expected));
+}
+
+#[test]
+fn lengths_are_checked_before_anything_else() {
+    assert_eq!(coupled(3, 3, 3, 2).check(), Ok(()));
+    assert_eq!(coupled(3, 5, 3, 2).check(), Ok(()));
+    let error = FamilyError::NoElements { array: "q[n]" };
+    check(
+        &coupled(0, 3, 0, 0),
+        error,
+        "the array `q[n]` has no elements",
+    );
+    let error = FamilyError::NoElements { array: "r[w]" };
+    check(
+        &coupled(3, 0, 3, 2),
+        error,
+        "the array `r[w]` has no elements",
+    );
+    let error = FamilyError::EmptyRange {
+        ranges: "i in 0..n-1",
+        start: 0,
+        end: 0,
+    };
+    check(
+        &coupled(1, 3, 1, 0),
+        error,
+        "the sum over `i in 0..n-1` is empty: its range is 0..0",
+    );
+    let (field, index, ranges) = ("m", "i", "i in 0..n");
+    let error = FamilyError::FieldLength {
+        field,
+        length: 4,
+        expected: 3,
+        index,
+        ranges,
+    };
+    check(
+        &coupled(3, 3, 4, 2),
+        error,
+        "`m` has 4 elements, but `m[i]` in the sum over `i in 0..n` asks for 3",
+    );
+    let (field, ranges) = ("k", "i in 0..n-1");
+    let error = FamilyError::FieldLength {
+        field,
+        length: 1,
+        expected: 2,
+        index,
+        ranges,
+    };
+    check(
+        &coupled(3, 3, 3, 1),
+        error,
+        "`k` has 1 elements, but `k[i]` in the sum over `i in 0..n-1` asks for 2",
+    );
+    let (array, index, ranges) = ("r", "j", "j in 0..n");
+    let error = FamilyError::Index {
+        array,
+        index,
+        ranges,
+        value: 2,
+        length: 2,
+    };
+    check(
+        &coupled(3, 2, 3, 2),
+        error,
+        "the index of `r[j]` in the sum over `j in 0..n` becomes 2, but `r` has 2 elements",
+    );
+}
+
+/// An index outside of any sum is named without one.
+#[test]
+fn a_single_index_is_checked_too() {
+    #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2) - q[2]^4)]
+    struct Third {
+        n: usize,
+    }
+    assert_eq!(Third { n: 3 }.check(), Ok(()));
+    let error = Third { n: 2 }.check().expect_err("no third");
+    let message = "the index of `q[2]` becomes 2, but `q` has 2 elements";
+    assert_eq!(error.to_string(), message);
+}
+
+#[test]
+fn states_of_another_length_are_refused() {
+    let model = coupled(3, 3, 3, 2);
+    let error = |vector, length| FamilyError::StateLength {
+        vector,
+        length,
+        expected: 6,
+    };
+    assert_eq!(model.state([0.0; 5], [0.0; 6]), Err(error("q", 5)));
+    assert_eq!(model.state([0.0; 6], [0.0; 7]), Err(error("v", 7)));
+    let start = FamilyState {
+        q: vec![0.0; 6],
+        p: vec![0.0; 4],
+    };
+    let run = Simulation::new(&model).run(start.clone(), 0.0..1.0);
+    let kind = run.expect_err("a wrong start").kind().clone();
+    assert_eq!(kind, RunErrorKind::Family(error("p", 4)));
+    let mut steps = Simulation::new(&model).step(0.1).steps(start, 0.0);
+    assert_eq!(steps.next(), Some(Err(RunErrorKind::Family(error("p", 4)))));
+    assert_eq!(steps.next(), None);
+}
+
+/// A length that no memory holds is compared with the vectors before any memory is asked for.
+#[test]
+fn an_absurd_length_is_an_error() {
+    #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2 - q[i]^4))]
+    struct Free {
+        n: usize,
+    }
+    for n in [1 << 60, usize::MAX] {
+        let model = Free { n };
+        let start = FamilyState {
+            q: vec![0.0; 2],
+            p: vec![0.0; 2],
+        };
+        let error = Simulation::new(&model).run(start, 0.0..1.0);
+        let error = error.expect_err("a wrong length");
+        assert!(matches!(error.kind(), RunErrorKind::Family(_)), "{error}");
+        assert!(model.state([0.0; 2], [0.0; 2]).is_err());
+    }
+}
+
+#[test]
+fn bad_starts_steps_and_spans_are_refused() {
+    let model = coupled(3, 3, 3, 2);
+    let start = model.state([0.1; 6], [0.0; 6]).expect("lengths that fit");
+    let mut infinite = start.clone();
+    infinite.q[4] = f64::INFINITY;
+    let kind = |start: &FamilyState, step: f64, end: f64| {
+        let run = Simulation::new(&model)
+            .step(step)
+            .run(start.clone(), 0.0..end);
+        run.expect_err("a mistake").kind().clone()
+    };
+    assert!(matches!(
+        kind(&infinite, 0.1, 1.0),
+        RunErrorKind::Start { coordinate: 4, .. }
+    ));
+    assert!(matches!(kind(&start, 0.0, 1.0), RunErrorKind::Step { .. }));
+    assert!(matches!(
+        kind(&start, 0.1, f64::NAN),
+        RunErrorKind::Span { .. }
+    ));
+}
+
+/// A step far too long for the fixed point: the error says so and holds the motion until then.
+#[cfg(not(feature = "sparse"))]
+#[test]
+fn a_stiff_chain_says_that_the_fixed_point_failed() {
+    let model = Coupled {
+        k: vec![1e8; 2],
+        ..coupled(3, 3, 3, 2)
+    };
+    let start = model
+        .state([0.1, 0.0, 0.2, 0.0, 0.0, 0.0], [0.0; 6])
+        .expect("lengths that fit");
+    let error = Simulation::new(&model)
+        .step(0.1)
+        .run(start.clone(), 0.0..1.0);
+    let error = error.expect_err("no contraction");
+    let RunErrorKind::Solve {
+        element: 0, source, ..
+    } = error.kind()
+    else {
+        panic!("{error}");
+    };
+    assert!(
+        matches!(
+            source,
+            tfe::StepError::FixedPointStalled { .. } | tfe::StepError::NonFinite
+        ),
+        "{error}"
+    );
+    assert_eq!(error.partial().last().state(), start);
+}
+
+#[track_caller]
+fn kind(run: Result<FamilyMotion, FamilyRunError>) -> RunErrorKind {
+    run.expect_err("not yet").kind().clone()
+}
+
+#[test]
+fn what_families_cannot_do_yet_is_said() {
+    #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n-1, dot(q[i])*dot(q[i+1])) - sum(i in 0..n, q[i]^2))]
+    struct OffDiagonal {
+        n: usize,
+    }
+    #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, (1 + q[i]^2)*dot(q[i])^2 - q[i]^2))]
+    struct Varying {
+        n: usize,
+    }
+    #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n-1, dot(q[i])^2) - sum(i in 0..n, q[i]^2))]
+    struct Singular {
+        n: usize,
+    }
+    let error = OffDiagonal { n: 3 }.state([0.0; 3], [0.0; 3]).map(|_| ());
+    assert_eq!(error, Ok(()));
+    let start = FamilyState {
+        q: vec![0.1; 3],
+        p: vec![0.0; 3],
+    };
+    let run = Simulation::new(&OffDiagonal { n: 3 }).run(start.clone(), 0.0..1.0);
+    let expected = FamilyError::MassNotDiagonal { row: 0, column: 1 };
+    assert_eq!(kind(run), RunErrorKind::Family(expected));
+    let run = Simulation::new(&Varying { n: 3 }).run(start.clone(), 0.0..1.0);
+    assert_eq!(kind(run), RunErrorKind::Family(FamilyError::NotSecondOrder));
+    let run = Simulation::new(&Singular { n: 3 }).run(start.clone(), 0.0..1.0);
+    let expected = FamilyError::SingularMass { coordinate: 2 };
+    assert_eq!(kind(run), RunErrorKind::Family(expected));
+    let model = coupled(3, 3, 3, 2);
+    let start = model.state([0.1; 6], [0.0; 6]).expect("lengths that fit");
+    if cfg!(not(feature = "sparse")) {
+        let run = Simulation::new(&model).solver(Solve::Newton);
+        let kind = kind(run.run(start.clone(), 0.0..1.0));
+        assert_eq!(kind, RunErrorKind::Family(FamilyError::NoNewton));
+    }
+    let run = Simulation::new(&model)
+        .element(Primal::<3>)
+        .run(start.clone(), 0.0..1.0);
+    assert!(matches!(
+        kind(run),
+        RunErrorKind::Family(FamilyError::ElementNotSupported { .. })
+    ));
+    let run = Simulation::new(&model)
+        .element(Element::mixed(13))
+        .run(start, 0.0..1.0);
+    assert!(matches!(
+        kind(run),
+        RunErrorKind::Family(FamilyError::Element(_))
+    ));
+}

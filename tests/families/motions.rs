@@ -1,0 +1,307 @@
+//! Motions of families against fixed-size models and against what is known of them.
+
+use nalgebra::DMatrix;
+use tfe::family::FamilyState;
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3),
+)]
+struct Chain {
+    n: usize,
+    m: f64,
+    k: f64,
+    a: f64,
+}
+
+#[dynamics(
+    coordinates(q[5]),
+    lagrangian = sum(i in 0..5, m/2*dot(q[i])^2) - sum(i in 0..4, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3),
+)]
+struct FiveMasses {
+    m: f64,
+    k: f64,
+    a: f64,
+}
+
+const START: [f64; 5] = [0.4, -0.1, 0.3, 0.0, -0.5];
+const PUSH: [f64; 5] = [0.1, 0.2, -0.3, 0.4, 0.0];
+
+/// Elements of one, two and four groups of points; forwards and backwards.
+#[test]
+fn a_chain_moves_as_the_same_model_of_fixed_size() {
+    let (m, k, a) = (1.3, 0.9, 0.25);
+    let (chain, five) = (Chain { n: 5, m, k, a }, FiveMasses { m, k, a });
+    for element in [
+        Element::mixed(3),
+        Element::mixed(4),
+        Element::mixed(7),
+        Element::mixed(12),
+    ] {
+        for end in [20.0, -20.0] {
+            let start = chain.state(START, PUSH).expect("lengths that fit");
+            let simulation = Simulation::new(&chain).element(element).step(0.1);
+            let family = simulation.run(start, 0.0..end).expect("a run");
+            let simulation = Simulation::new(&five).element(element).step(0.1);
+            let fixed = simulation
+                .run(five.state(START, PUSH), 0.0..end)
+                .expect("a run");
+            for (one, other) in family.states().iter().zip(fixed.states()) {
+                for j in 0..5 {
+                    // Some hundred roundings of numbers of size one.
+                    let (q, p) = (one.q[j] - other.q[j], one.p[j] - other.p[j]);
+                    assert!(
+                        q.abs() < 1e-13 && p.abs() < 1e-13,
+                        "{element} t = {}: {q:e} {p:e}",
+                        one.t
+                    );
+                }
+            }
+            assert_eq!(family.states().len(), fixed.states().len());
+            assert!((family.energy_error() - fixed.energy_error()).abs() < 1e-14);
+            let time = 0.377 * end;
+            let (one, other) = (
+                family.at(time).expect("inside"),
+                fixed.at(time).expect("inside"),
+            );
+            for j in 0..5 {
+                assert!(
+                    (one.q[j] - other.q[j]).abs() < 1e-12 && (one.p[j] - other.p[j]).abs() < 1e-12
+                );
+            }
+        }
+    }
+}
+
+/// Flaschka's variables a_i = ½ e^((q_i − q_{i+1})/2), b_i = −½ p_i: the eigenvalues of the tridiagonal matrix with diagonal b and off-diagonal a
+/// do not move.
+#[dynamics(
+    coordinates(q[n]), momenta(p[n]),
+    hamiltonian = sum(i in 0..n, p[i]^2/2) + sum(i in 0..n-1, exp(q[i]-q[i+1])),
+)]
+struct Toda {
+    n: usize,
+}
+
+fn lax_eigenvalues(state: &FamilyState) -> Vec<f64> {
+    let n = state.q.len();
+    let mut lax = DMatrix::zeros(n, n);
+    for i in 0..n {
+        lax[(i, i)] = -0.5 * state.p[i];
+        if i + 1 < n {
+            let a = 0.5 * (0.5 * (state.q[i] - state.q[i + 1])).exp();
+            (lax[(i, i + 1)], lax[(i + 1, i)]) = (a, a);
+        }
+    }
+    let mut values: Vec<f64> = lax.symmetric_eigenvalues().iter().copied().collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+#[test]
+fn the_invariants_of_a_toda_chain_stay() {
+    let toda = Toda { n: 200 };
+    let q: Vec<f64> = (0..200).map(|i| 0.3 * (0.2 * f64::from(i)).sin()).collect();
+    let v: Vec<f64> = (0..200).map(|i| 0.5 * (0.7 * f64::from(i)).cos()).collect();
+    let start = toda.state(q, v).expect("lengths that fit");
+    let before = lax_eigenvalues(&start);
+    let simulation = Simulation::new(&toda)
+        .element(Mixed::<8>)
+        .step(0.25)
+        .record_every(100);
+    let motion = simulation.run(start, 0.0..1000.0).expect("a run");
+    let after = lax_eigenvalues(&motion.last().state());
+    let change = before.iter().zip(&after).map(|(a, b)| (a - b).abs());
+    let change = change.fold(0.0, f64::max);
+    assert!(change < 1e-10, "{change:e}");
+    assert!(motion.energy_error() < 1e-12, "{:e}", motion.energy_error());
+}
+
+/// Six bodies in space: families of x, y and z, masses as a list, all pairs.
+#[dynamics(
+    coordinates(x[n], y[n], z[n]),
+    lagrangian = sum(i in 0..n, m[i]/2*(dot(x[i])^2 + dot(y[i])^2 + dot(z[i])^2))
+        + sum(i in 0..n, sum(j in 0..i, g*m[i]*m[j]/sqrt((x[i]-x[j])^2 + (y[i]-y[j])^2 + (z[i]-z[j])^2))),
+    output(middle) = sum(i in 0..n, m[i]*x[i]),
+)]
+struct Bodies {
+    n: usize,
+    m: Vec<f64>,
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(x[6], y[6], z[6]),
+    lagrangian = sum(i in 0..6, m[i]/2*(dot(x[i])^2 + dot(y[i])^2 + dot(z[i])^2))
+        + sum(i in 0..6, sum(j in 0..i, g*m[i]*m[j]/sqrt((x[i]-x[j])^2 + (y[i]-y[j])^2 + (z[i]-z[j])^2))),
+)]
+struct SixBodies {
+    m: [f64; 6],
+    g: f64,
+}
+
+/// Bodies on circles about the first, which holds nearly all mass.
+fn planets(n: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let (mut m, mut q, mut v) = (vec![1.0], vec![0.0; 3 * n], vec![0.0; 3 * n]);
+    for i in 1..n {
+        m.push(1e-4 / i as f64);
+        let (radius, angle) = (1.0 + 0.7 * i as f64, 2.1 * i as f64);
+        let speed = radius.sqrt().recip();
+        (q[i], q[n + i], q[2 * n + i]) = (
+            radius * angle.cos(),
+            radius * angle.sin(),
+            0.02 * angle.sin(),
+        );
+        (v[i], v[n + i]) = (-speed * angle.sin(), speed * angle.cos());
+    }
+    (m, q, v)
+}
+
+#[test]
+fn pairs_of_bodies_move_as_those_of_fixed_size() {
+    let (m, q, v) = planets(6);
+    let masses: [f64; 6] = m.clone().try_into().expect("six");
+    let (bodies, six) = (Bodies { n: 6, m, g: 1.0 }, SixBodies { m: masses, g: 1.0 });
+    let fixed_start = six.state(
+        q.clone().try_into().expect("18"),
+        v.clone().try_into().expect("18"),
+    );
+    let start = bodies.state(q, v).expect("lengths that fit");
+    assert_eq!(start.p, fixed_start.p);
+    let simulation = Simulation::new(&bodies).element(Mixed::<6>).step(0.05);
+    let family = simulation.run(start, 0.0..20.0).expect("a run");
+    let fixed = Simulation::new(&six).element(Mixed::<6>).step(0.05);
+    let fixed = fixed.run(fixed_start, 0.0..20.0).expect("a run");
+    for a in 0..18 {
+        // Coordinates up to 5, 400 steps of one rounding each; on circles errors along the orbit grow with the time.
+        let off = family.last().q[a] - fixed.last().q[a];
+        assert!(off.abs() < 2e-12, "{a}: {off:e}");
+    }
+    let middle = family.outputs().column("middle").expect("declared");
+    let last = bodies.middle(20.0, &family.last().q, &family.velocities()[400]);
+    assert_eq!(last, Ok(middle[400]));
+}
+
+#[test]
+fn two_hundred_bodies_run() {
+    let (m, q, v) = planets(200);
+    let bodies = Bodies { n: 200, m, g: 1.0 };
+    let start = bodies.state(q, v).expect("lengths that fit");
+    let simulation = Simulation::new(&bodies).element(Mixed::<4>).step(0.02);
+    let motion = simulation.run(start, 0.0..0.2).expect("a run");
+    assert!(motion.energy_error() < 1e-12, "{:e}", motion.energy_error());
+    assert_eq!(motion.last().q.len(), 600);
+}
+
+/// Forces by site, at one site, of the time and of velocities, beside a coordinate of its own; Lagrangian and Hamiltonian.
+#[dynamics(
+    coordinates(s, q[n]),
+    lagrangian = dot(s)^2/2 - s^4/4 + sum(i in 0..n, m[i]/2*dot(q[i])^2 - k/2*(q[i]-s)^2),
+    force(q[i]) = -c[i]*dot(q[i]),
+    force(q[n-1]) = f*cos(t),
+    force(s) = -dot(q[0]),
+)]
+struct Driven {
+    n: usize,
+    m: Vec<f64>,
+    c: Vec<f64>,
+    k: f64,
+    f: f64,
+}
+
+#[dynamics(
+    coordinates(s, q[3]), momenta(ps, p[3]),
+    hamiltonian = ps^2/2 + s^4/4 + sum(i in 0..3, p[i]^2/2/m[i] + k/2*(q[i]-s)^2),
+    force(q[i]) = -c[i]*p[i]/m[i],
+    force(q[2]) = f*cos(t),
+    force(s) = -p[0]/m[0],
+)]
+struct DrivenOfFixedSize {
+    m: [f64; 3],
+    c: [f64; 3],
+    k: f64,
+    f: f64,
+}
+
+#[test]
+fn forces_by_site_and_a_coordinate_of_its_own() {
+    let (m, c, k, f) = ([1.0, 2.0, 0.5], [0.1, 0.2, 0.05], 0.7, 0.4);
+    let family = Driven {
+        n: 3,
+        m: m.to_vec(),
+        c: c.to_vec(),
+        k,
+        f,
+    };
+    let fixed = DrivenOfFixedSize { m, c, k, f };
+    let (q, v) = ([0.3, 0.1, -0.4, 0.2], [0.0, 0.5, -0.1, 0.3]);
+    for element in [Element::mixed(4), Element::mixed(9), Element::radau(3)] {
+        let start = family.state(q, v).expect("lengths that fit");
+        let run = Simulation::new(&family).element(element).step(0.05);
+        let one = run.run(start, 0.0..5.0).expect("a run");
+        let run = Simulation::new(&fixed).element(element).step(0.05);
+        let other = run.run(fixed.state(q, v), 0.0..5.0).expect("a run");
+        for a in 0..4 {
+            let (q, p) = (
+                one.last().q[a] - other.last().q[a],
+                one.last().p[a] - other.last().p[a],
+            );
+            assert!(q.abs() < 1e-13 && p.abs() < 1e-13, "{element}: {q:e} {p:e}");
+        }
+    }
+}
+
+/// The endless sequence is the same motion, and so is a run that goes through a break.
+#[test]
+fn steps_are_those_of_a_run() {
+    let chain = Chain {
+        n: 5,
+        m: 1.0,
+        k: 1.0,
+        a: 0.2,
+    };
+    let start = chain.state(START, PUSH).expect("lengths that fit");
+    let simulation = Simulation::new(&chain).step(0.1);
+    let motion = simulation
+        .clone()
+        .run(start.clone(), 0.0..1.0)
+        .expect("a run");
+    for (node, other) in simulation
+        .steps(start.clone(), 0.0)
+        .zip(&motion.states()[1..])
+    {
+        let node = node.expect("a step");
+        assert_eq!((node.q, node.p), (other.q.clone(), other.p.clone()));
+    }
+    let broken = simulation
+        .break_at(0.55)
+        .run(start, 0.0..1.0)
+        .expect("a run");
+    assert_eq!(broken.states().len(), 12);
+    let off = broken.last().q[0] - motion.last().q[0];
+    assert!(off.abs() < 1e-9, "{off:e}");
+}
+
+#[test]
+fn a_motion_is_written_with_the_names_of_its_coordinates() {
+    let (m, q, v) = planets(2);
+    let bodies = Bodies { n: 2, m, g: 1.0 };
+    let start = bodies.state(q, v).expect("lengths that fit");
+    let motion = Simulation::new(&bodies)
+        .step(0.1)
+        .run(start, 0.0..0.2)
+        .expect("a run");
+    let path = std::env::temp_dir().join(format!("tfe-families-{}.csv", std::process::id()));
+    motion.write_csv(&path).expect("a file");
+    let text = std::fs::read_to_string(&path).expect("what was written");
+    std::fs::remove_file(&path).expect("a file");
+    let header = text.lines().next().expect("a header");
+    assert!(
+        header.starts_with("t,x[0],x[1],y[0],y[1],z[0],z[1],x[0]_dot,"),
+        "{header}"
+    );
+    assert!(header.ends_with("p_z[1],energy,middle"), "{header}");
+    let columns = |line: &str| line.split(',').count();
+    assert_eq!(text.lines().map(columns).collect::<Vec<_>>(), [21; 4]);
+}

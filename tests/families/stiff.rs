@@ -1,0 +1,155 @@
+//! Stiff families by Newton's method with a sparse factorisation.
+
+use tfe::family::FamilyState;
+use tfe::prelude::*;
+
+/// A rod of masses: stiff springs, a soft anharmonic bed, damping by site and between neighbours, a driven end.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2 - b/4*q[i]^4) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + k/4*(q[i+1]-q[i])^4),
+    dissipation = sum(i in 0..n, c/2*dot(q[i])^2) + sum(i in 0..n-1, c*(dot(q[i+1]) - dot(q[i]))^2),
+    force(q[n-1]) = sin(t),
+)]
+struct Rod {
+    n: usize,
+    m: Vec<f64>,
+    b: f64,
+    c: f64,
+    k: f64,
+}
+
+#[dynamics(
+    coordinates(q[4]),
+    lagrangian = sum(i in 0..4, m[i]/2*dot(q[i])^2 - b/4*q[i]^4) - sum(i in 0..3, k/2*(q[i+1]-q[i])^2 + k/4*(q[i+1]-q[i])^4),
+    dissipation = sum(i in 0..4, c/2*dot(q[i])^2) + sum(i in 0..3, c*(dot(q[i+1]) - dot(q[i]))^2),
+    force(q[3]) = sin(t),
+)]
+struct RodOfFour {
+    m: [f64; 4],
+    b: f64,
+    c: f64,
+    k: f64,
+}
+
+/// The same by momenta.
+#[dynamics(
+    coordinates(q[n]), momenta(p[n]),
+    hamiltonian = sum(i in 0..n, p[i]^2/2/m[i] + b/4*q[i]^4) + sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + k/4*(q[i+1]-q[i])^4),
+    force(q[i]) = -c*p[i]/m[i],
+)]
+struct RodByMomenta {
+    n: usize,
+    m: Vec<f64>,
+    b: f64,
+    c: f64,
+    k: f64,
+}
+
+const MASSES: [f64; 4] = [1.0, 0.5, 2.0, 1.5];
+
+#[test]
+fn stiff_rods_move_as_those_of_fixed_size() {
+    for (k, solve, step) in [
+        (1e6, Solve::Auto, 0.05),
+        (1.0, Solve::Newton, 0.1),
+        (1e6, Solve::Newton, 0.05),
+    ] {
+        let (b, c) = (0.3, 0.2);
+        let long = Rod {
+            n: 4,
+            m: MASSES.to_vec(),
+            b,
+            c,
+            k,
+        };
+        let four = RodOfFour { m: MASSES, b, c, k };
+        let (q, v) = ([0.5, 0.5, 0.5, 0.501], [0.1; 4]);
+        for element in [
+            Element::mixed(3),
+            Element::mixed(4),
+            Element::mixed(6),
+            Element::radau(3),
+        ] {
+            let start = long.state(q, v).expect("lengths that fit");
+            let run = Simulation::new(&long)
+                .element(element)
+                .step(step)
+                .solver(solve);
+            let one = run
+                .run(start, 0.0..3.0)
+                .unwrap_or_else(|error| panic!("{element} {k:e}: {error}"));
+            let run = Simulation::new(&four)
+                .element(element)
+                .step(step)
+                .solver(solve);
+            let other = run.run(four.state(q, v), 0.0..3.0).expect("a run");
+            for a in 0..4 {
+                let (q, p) = (
+                    one.last().q[a] - other.last().q[a],
+                    one.last().p[a] - other.last().p[a],
+                );
+                // Roundings of forces of size k times a stretch, over 60 steps.
+                assert!(
+                    q.abs() < 1e-10 && p.abs() < 1e-7,
+                    "{element} {k:e} {solve:?}: {q:e} {p:e}"
+                );
+            }
+            assert!(one.statistics().newton_iterations > 0);
+        }
+    }
+}
+
+/// One factorisation serves many steps, and one ordering all of them.
+#[test]
+fn factors_serve_many_steps() {
+    let n = 1000;
+    let rod = RodByMomenta {
+        n,
+        m: vec![1.0; n],
+        b: 0.1,
+        c: 0.5,
+        k: 1e6,
+    };
+    let q: Vec<f64> = (0..n).map(|i| 1e-3 * (0.01 * i as f64).sin()).collect();
+    let start = rod.state(q, vec![0.0; n]).expect("lengths that fit");
+    let run = Simulation::new(&rod)
+        .element(Mixed::<3>)
+        .step(0.1)
+        .record_every(10);
+    let motion = run.run(start, 0.0..10.0).expect("a run");
+    let statistics = motion.statistics();
+    assert_eq!(statistics.steps, 100);
+    assert!(statistics.factorizations < 50, "{statistics:?}");
+    // Damped: the energy falls.
+    assert!(
+        motion.energies().windows(2).all(|pair| pair[1] < pair[0]),
+        "{:?}",
+        motion.energies()
+    );
+}
+
+/// Newton's iteration and the fixed point find the same states.
+#[test]
+fn both_iterations_end_at_the_same_state() {
+    let rod = RodByMomenta {
+        n: 50,
+        m: vec![1.0; 50],
+        b: 1.0,
+        c: 0.1,
+        k: 2.0,
+    };
+    let q: Vec<f64> = (0..50).map(|i| (0.3 * f64::from(i)).sin()).collect();
+    let start = rod.state(q, vec![0.2; 50]).expect("lengths that fit");
+    let end = |solve: Solve| -> FamilyState {
+        let run = Simulation::new(&rod).step(0.1).solver(solve);
+        run.run(start.clone(), 0.0..5.0)
+            .expect("a run")
+            .last()
+            .state()
+    };
+    let (one, other) = (end(Solve::FixedPoint), end(Solve::Newton));
+    for a in 0..50 {
+        // Fifty steps of a few roundings.
+        assert!((one.q[a] - other.q[a]).abs() < 1e-13 && (one.p[a] - other.p[a]).abs() < 1e-13);
+    }
+}

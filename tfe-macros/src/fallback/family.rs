@@ -1,0 +1,115 @@
+//! Stubs of a model of run-time length whose declaration is wrong.
+
+use proc_macro2::{Ident, TokenStream};
+use quote::quote;
+use syn::DeriveInput;
+
+/// The implementations that uses of the type need to type-check.
+pub(super) fn stubs(
+    item: &DeriveInput,
+    path: &TokenStream,
+    form: &TokenStream,
+    outputs: &[Ident],
+) -> TokenStream {
+    let (name, vis) = (&item.ident, &item.vis);
+    let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+    let names = outputs.iter().map(crate::input::plain);
+    let private = quote!(#path::__private);
+    quote! {
+        const _: () = {
+            use #path::__private as __tfe;
+
+            #[automatically_derived]
+            impl #impl_generics __tfe::Declared<0> for #name #type_generics #where_clause {
+                type Length = __tfe::RunTimeLength;
+            }
+
+            #[automatically_derived]
+            #[allow(clippy::all)]
+            impl #impl_generics __tfe::FamilyModel for #name #type_generics #where_clause {
+                const FORM: __tfe::Form = __tfe::Form::#form;
+                const FACTS: __tfe::Facts = __tfe::Facts::UNKNOWN;
+                const MOMENTA_MOVE: bool = true;
+                const OBSERVABLES: &'static [&'static str] = &[#(#names),*];
+
+                fn len(&self) -> usize {
+                    0
+                }
+
+                fn check(&self) -> ::core::result::Result<(), __tfe::FamilyError> {
+                    ::core::result::Result::Ok(())
+                }
+
+                fn energy_function<__R: __tfe::Real>(&self, t: __R, _: &[__R], _: &[__R]) -> __R {
+                    t
+                }
+
+                fn first<__R: __tfe::Real>(
+                    &self,
+                    _: __R,
+                    _: &[__R],
+                    _: &[__R],
+                    _: __tfe::Gradient<'_, __R>,
+                ) {
+                }
+
+                fn forces_inline<__R: __tfe::Real>(
+                    &self,
+                    _: __R,
+                    _: &[__R],
+                    _: &[__R],
+                    _: __tfe::Gradient<'_, __R>,
+                ) {
+                }
+
+                fn mass<__R: __tfe::Real, __E: __tfe::Entries<__R>>(
+                    &self,
+                    _: __R,
+                    _: &[__R],
+                    _: &[__R],
+                    _: &mut __E,
+                ) {
+                }
+
+                fn second<__R: __tfe::Real, __E: __tfe::Entries<__R>>(
+                    &self,
+                    _: __R,
+                    _: &[__R],
+                    _: &[__R],
+                    _: __tfe::Gradient<'_, __R>,
+                    _: &mut __E,
+                ) {
+                }
+
+                fn coordinate_name(&self, index: usize) -> __tfe::CoordinateName {
+                    __tfe::CoordinateName::element("", index)
+                }
+            }
+        };
+
+        #[automatically_derived]
+        #[allow(dead_code, missing_docs, clippy::all)]
+        impl #impl_generics #name #type_generics #where_clause {
+            #vis fn state(
+                &self,
+                q: impl ::core::convert::Into<#private::List>,
+                v: impl ::core::convert::Into<#private::List>,
+            ) -> ::core::result::Result<#private::FamilyState, #private::FamilyError> {
+                ::core::result::Result::Ok(#private::FamilyState { q: q.into(), p: v.into() })
+            }
+
+            #vis fn structure() -> #private::Structure {
+                ::core::unimplemented!()
+            }
+
+            #(#vis fn #outputs(
+                &self,
+                _: f64,
+                _: &[f64],
+                _: &[f64],
+            ) -> ::core::result::Result<f64, #private::FamilyError> {
+                ::core::result::Result::Ok(0.0)
+            })*
+        }
+    }
+}

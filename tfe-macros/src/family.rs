@@ -1,0 +1,386 @@
+//! Models of run-time length: kernels over slices, and the checks of lengths.
+
+use crate::emit::{self, Body, Emitter};
+use crate::page;
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+use std::collections::BTreeMap;
+use syn::ItemStruct;
+use tfe_symbolic::declared::{Declared, Extent, Form, Requirement};
+use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::input::Affine;
+use tfe_symbolic::program::{Program, Request};
+
+/// `impl FamilyModel for Name`, and the methods.
+pub(crate) fn expand(
+    declared: &Declared,
+    derivation: &Derivation,
+    item: &ItemStruct,
+    path: &TokenStream,
+) -> TokenStream {
+    let kernels = Kernels {
+        declared,
+        derivation,
+        dof: length(&declared.dof),
+    };
+    let implementation = kernels.implementation(item, path);
+    let methods = kernels.methods(item, path);
+    quote!(#implementation #methods)
+}
+
+struct Kernels<'a> {
+    declared: &'a Declared,
+    derivation: &'a Derivation,
+    /// The number of coordinates.
+    dof: TokenStream,
+}
+
+/// Which slices a kernel is given.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Given {
+    Nothing,
+    /// Derivatives by coordinates, and forces.
+    Forces,
+    /// All first derivatives.
+    First,
+}
+
+impl Kernels<'_> {
+    /// The body of a kernel, with its slices cut to the length of the model so that the compiler knows it.
+    fn body(&self, program: &Program, given: Given) -> Body {
+        let dof = &self.dof;
+        let forced = self.derivation.structure().forced;
+        let cut = |array: TokenStream, is_written: bool| match is_written {
+            true => quote!(&mut first.#array[..#dof]),
+            false => quote!(first.#array),
+        };
+        let (z, force) = (
+            cut(quote!(z), given == Given::First),
+            cut(quote!(force), forced),
+        );
+        let cut = match given {
+            Given::Nothing => TokenStream::new(),
+            _ => quote! {
+                let first = __tfe::Gradient { z: #z, q: &mut first.q[..#dof], force: #force };
+            },
+        };
+        let body = Emitter::new(&[], TokenStream::new())
+            .by_entries()
+            .body(program);
+        let statements = body.statements;
+        Body {
+            statements: quote! {
+                let (q, z) = (&q[..#dof], &z[..#dof]);
+                #cut
+                #statements
+            },
+            ..body
+        }
+    }
+
+    fn program(&self, request: Request) -> Program {
+        self.derivation.program(request)
+    }
+
+    fn implementation(&self, item: &ItemStruct, path: &TokenStream) -> TokenStream {
+        let name = &item.ident;
+        let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+        let nothing = Request::default();
+        let value = Request {
+            value: true,
+            ..nothing
+        };
+        let value = self.body(&self.program(value), Given::Nothing);
+        let (value_statements, value) = (value.statements, value.value);
+        let value = value.unwrap_or_else(|| quote!(t.like(0.0)));
+        let first = Request {
+            first: true,
+            ..nothing
+        };
+        let mass = Request {
+            mass: true,
+            ..nothing
+        };
+        let second = Request {
+            second: true,
+            ..first
+        };
+        let first = self.body(&self.program(first), Given::First).statements;
+        let forces = self
+            .body(&self.derivation.forces(), Given::Forces)
+            .statements;
+        let mass = self.body(&self.program(mass), Given::Nothing).statements;
+        let second = self.body(&self.program(second), Given::First).statements;
+        let form = match self.declared.form {
+            Form::Lagrangian => quote!(Lagrangian),
+            Form::Hamiltonian => quote!(Hamiltonian),
+        };
+        let facts = page::facts(self.derivation, &quote!(__tfe));
+        let momenta_move = self.derivation.momenta_move();
+        let (dof, check) = (&self.dof, self.check());
+        let coordinate_name = self.coordinate_name();
+        let observables = self.observables();
+        quote! {
+            const _: () = {
+                use #path::__private as __tfe;
+
+                #[automatically_derived]
+                impl #impl_generics __tfe::Declared<0> for #name #type_generics #where_clause {
+                    type Length = __tfe::RunTimeLength;
+                }
+
+                #[automatically_derived]
+                #[allow(unused_variables, non_snake_case)]
+                impl #impl_generics __tfe::FamilyModel for #name #type_generics #where_clause {
+                    const FORM: __tfe::Form = __tfe::Form::#form;
+                    const FACTS: __tfe::Facts = #facts;
+                    const MOMENTA_MOVE: bool = #momenta_move;
+
+                    fn len(&self) -> usize {
+                        #dof
+                    }
+
+                    fn check(&self) -> ::core::result::Result<(), __tfe::FamilyError> {
+                        #check
+                        ::core::result::Result::Ok(())
+                    }
+
+                    fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R]) -> R {
+                        #value_statements
+                        #value
+                    }
+
+                    fn first<R: __tfe::Real>(
+                        &self,
+                        t: R,
+                        q: &[R],
+                        z: &[R],
+                        first: __tfe::Gradient<'_, R>,
+                    ) {
+                        #first
+                    }
+
+                    #[inline(always)]
+                    fn forces_inline<R: __tfe::Real>(
+                        &self,
+                        t: R,
+                        q: &[R],
+                        z: &[R],
+                        first: __tfe::Gradient<'_, R>,
+                    ) {
+                        #forces
+                    }
+
+                    fn mass<R: __tfe::Real, __E: __tfe::Entries<R>>(
+                        &self,
+                        t: R,
+                        q: &[R],
+                        z: &[R],
+                        entries: &mut __E,
+                    ) {
+                        #mass
+                    }
+
+                    fn second<R: __tfe::Real, __E: __tfe::Entries<R>>(
+                        &self,
+                        t: R,
+                        q: &[R],
+                        z: &[R],
+                        first: __tfe::Gradient<'_, R>,
+                        entries: &mut __E,
+                    ) {
+                        #second
+                    }
+
+                    #coordinate_name
+                    #observables
+                }
+            };
+        }
+    }
+
+    /// The statements of `check`.
+    fn check(&self) -> TokenStream {
+        let elements = self.declared.coordinates.iter().filter_map(|array| {
+            let length = array
+                .length
+                .as_ref()
+                .filter(|length| length.is_of_run_time())?;
+            let name = format!("{}[{length}]", array.name);
+            let length = emit::index(length);
+            Some(quote!(__tfe::checks::elements(#name, #length)?;))
+        });
+        let mut lengths: BTreeMap<&str, Vec<TokenStream>> = BTreeMap::new();
+        let mut rest = Vec::new();
+        for requirement in &self.declared.requirements {
+            match requirement {
+                Requirement::FieldLength {
+                    field,
+                    text,
+                    ranges,
+                    length,
+                } => {
+                    let length = emit::signed(length);
+                    let one = quote!((#length, #text, #ranges));
+                    lengths.entry(field).or_default().push(one);
+                }
+                Requirement::Turns { ranges, start, end } => {
+                    let (start, end) = (emit::signed(start), emit::signed(end));
+                    rest.push(quote!(__tfe::checks::turns(#ranges, #start, #end)?;));
+                }
+                Requirement::Index {
+                    array,
+                    text,
+                    ranges,
+                    nest,
+                    place,
+                    length,
+                } => {
+                    let place = emit::signed(place);
+                    let length = match length {
+                        Extent::Known(length) => emit::index(length),
+                        Extent::OfField(field) => {
+                            let field = emit::identifier(field);
+                            quote!(self.#field.len())
+                        }
+                    };
+                    let one =
+                        quote!(__tfe::checks::index((#array, #text, #ranges), #place, #length)?;);
+                    let nested = nest.iter().rev().fold(one, |inner, range| {
+                        let variable = emit::loop_name(range.variable);
+                        let (start, end) = (emit::index(&range.start), emit::index(&range.end));
+                        quote!(for #variable in #start..#end { #inner })
+                    });
+                    rest.push(nested);
+                }
+            }
+        }
+        let lengths = lengths.iter().map(|(name, uses)| {
+            let field = emit::identifier(name);
+            quote!(__tfe::checks::field_length(#name, self.#field.len(), &[#(#uses),*])?;)
+        });
+        quote!(#(#elements)* #(#lengths)* #(#rest)*)
+    }
+
+    fn coordinate_name(&self) -> TokenStream {
+        let arrays = self.declared.coordinates.iter().map(|array| {
+            let name = &array.name;
+            match &array.length {
+                None => quote! {
+                    if index == 0 {
+                        return __tfe::CoordinateName::single(#name);
+                    }
+                    let index = index - 1;
+                },
+                Some(array_length) => {
+                    let end = length(array_length);
+                    quote! {
+                        let end = #end;
+                        if index < end {
+                            return __tfe::CoordinateName::element(#name, index);
+                        }
+                        let index = index - end;
+                    }
+                }
+            }
+        });
+        quote! {
+            fn coordinate_name(&self, index: usize) -> __tfe::CoordinateName {
+                #(#arrays)*
+                __tfe::CoordinateName::element("", index)
+            }
+        }
+    }
+
+    fn observables(&self) -> TokenStream {
+        if self.declared.observables.is_empty() {
+            return TokenStream::new();
+        }
+        let names = self.declared.observables.iter().map(|(name, _)| name);
+        let request = Request {
+            observables: true,
+            ..Request::default()
+        };
+        let body = self.body(&self.program(request), Given::Nothing).statements;
+        quote! {
+            const OBSERVABLES: &'static [&'static str] = &[#(#names),*];
+
+            fn observables<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R], values: &mut [R]) {
+                #body
+            }
+        }
+    }
+
+    /// `state`, `structure`, and one method for each observable.
+    fn methods(&self, item: &ItemStruct, path: &TokenStream) -> TokenStream {
+        let (name, vis) = (&item.ident, &item.vis);
+        let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+        let (second, second_doc) = match self.declared.form {
+            Form::Lagrangian => (quote!(v), "velocities"),
+            Form::Hamiltonian => (quote!(p), "momenta"),
+        };
+        let observables = self.declared.observables.iter().enumerate().map(|(k, (name, _))| {
+            let (method, k) = (emit::identifier(name), Literal::usize_unsuffixed(k));
+            let doc = format!(" The observable `{name}` at time `t`, coordinates `q` and {second_doc} `{second}`.");
+            quote! {
+                #[doc = #doc]
+                ///
+                /// # Errors
+                /// Vectors of another length than the model's, and lengths of the model that do not fit together.
+                #vis fn #method(
+                    &self,
+                    t: f64,
+                    q: &[f64],
+                    #second: &[f64],
+                ) -> ::core::result::Result<f64, #path::__private::FamilyError> {
+                    #path::__private::family_observable(self, t, q, #second, #k)
+                }
+            }
+        });
+        let structure = page::structure(self.declared, self.derivation, path);
+        quote! {
+            #[automatically_derived]
+            #[allow(dead_code)]
+            impl #impl_generics #name #type_generics #where_clause {
+                /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+                ///
+                /// # Errors
+                /// Vectors of another length than the model's, lengths of the model that do not fit together, velocities that determine no momenta.
+                #vis fn state(
+                    &self,
+                    q: impl ::core::convert::Into<#path::__private::List>,
+                    v: impl ::core::convert::Into<#path::__private::List>,
+                ) -> ::core::result::Result<#path::__private::FamilyState, #path::__private::FamilyError> {
+                    #path::__private::family_state(self, 0.0, q.into(), v.into())
+                }
+
+                /// What was derived from the declaration: a page when printed.
+                #vis fn structure() -> #path::__private::Structure {
+                    #structure
+                }
+
+                #(#observables)*
+            }
+        }
+    }
+}
+
+/// A number of coordinates, which saturates rather than overflows.
+fn length(affine: &Affine) -> TokenStream {
+    if affine.constant == 0 && affine.terms.len() == 1 {
+        return emit::index(affine);
+    }
+    let constant = Literal::usize_suffixed(usize::try_from(affine.constant).unwrap_or(0));
+    // Each array brings its length once, so that a factor counts arrays of one length.
+    affine
+        .terms
+        .iter()
+        .fold(quote!(#constant), |sum, (symbol, factor)| {
+            let symbol = emit::index(&Affine::symbol(symbol.clone()));
+            if *factor == 1 {
+                return quote!(#sum.saturating_add(#symbol));
+            }
+            let factor = Literal::usize_unsuffixed(usize::try_from(*factor).unwrap_or(0));
+            quote!(#sum.saturating_add(#symbol.saturating_mul(#factor)))
+        })
+}

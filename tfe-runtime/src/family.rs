@@ -1,0 +1,296 @@
+//! Models of run-time length: what a generated family gives the runtime, and how it steps.
+//!
+//! A family is a model whose number of coordinates is a field of its struct. Its kernels are loops over slices, compiled once for all lengths;
+//! second derivatives are told entry by entry, so that nobody holds a matrix of zeros. [`FamilyStepper`] moves a [`FamilyState`] with all points
+//! of an element four to a register, as the stepper of fixed-size models does, in time and memory linear in the length.
+
+mod dense;
+mod error;
+mod inertia;
+mod lanes;
+#[cfg(feature = "sparse")]
+mod newton;
+mod pattern;
+mod space;
+mod stepper;
+
+pub use dense::FamilyDense;
+pub use error::FamilyError;
+pub use pattern::{Pattern, Values};
+pub use stepper::FamilyStepper;
+
+use crate::model::{CoordinateName, Facts, Form};
+use crate::real::Real;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// A point of phase space of a family: coordinates and their momenta p = ∂L/∂v, on the heap.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FamilyState {
+    /// Generalized coordinates.
+    pub q: Vec<f64>,
+    /// Generalized momenta.
+    pub p: Vec<f64>,
+}
+
+/// Where a kernel writes first derivatives: slices as long as the model.
+#[derive(Debug)]
+pub struct Gradient<'a, R> {
+    /// L_v, or H_p.
+    pub z: &'a mut [R],
+    /// L_q, or H_q.
+    pub q: &'a mut [R],
+    /// Generalized force Q; written only where [`Facts::forced`] says so.
+    pub force: &'a mut [R],
+}
+
+/// The blocks of second derivatives; z stands for velocities or momenta.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Block {
+    /// ∂²/∂z∂z
+    ZZ,
+    /// ∂²/∂z∂q; row: z.
+    ZQ,
+    /// ∂²/∂q∂q
+    QQ,
+    /// ∂Q/∂z; row: the coordinate that the force acts on.
+    ForceZ,
+    /// ∂Q/∂q
+    ForceQ,
+}
+
+/// Takes second derivatives as a kernel computes them: contributions to entries, in an order that depends on lengths alone.
+pub trait Entries<R> {
+    /// Adds to one entry of one block.
+    fn add(&mut self, block: Block, row: usize, column: usize, value: R);
+}
+
+/// The kernels of a model of run-time length.
+///
+/// Implemented by `#[dynamics]` for models with `coordinates(q[n])`, n a field of type `usize`. All slices are as long as the model. Kernels may be
+/// called after [`check`](Self::check) has succeeded; before, they may panic or leave results out.
+pub trait FamilyModel {
+    /// By which function it was declared.
+    const FORM: Form;
+    /// What is known about its structure.
+    const FACTS: Facts;
+    /// Whether ∂/∂z of the energy function holds the time.
+    const MOMENTA_MOVE: bool;
+
+    /// The number of coordinates.
+    fn len(&self) -> usize;
+
+    /// Whether there is no coordinate.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether lengths, ranges and array fields belong together.
+    ///
+    /// # Errors
+    /// [`FamilyError`] names the array, the sum and the index.
+    fn check(&self) -> Result<(), FamilyError>;
+
+    /// L(q, v, t), or H(q, p, t).
+    fn energy_function<R: Real>(&self, t: R, q: &[R], z: &[R]) -> R;
+
+    /// Its first derivatives, and the generalized force.
+    fn first<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>);
+
+    /// L_q (or H_q) and Q alone, written into the place of the call, so that it is compiled for the instruction set of that place.
+    fn forces_inline<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>);
+
+    /// The contributions to ∂²/∂z∂z.
+    fn mass<R: Real, E: Entries<R>>(&self, t: R, q: &[R], z: &[R], entries: &mut E);
+
+    /// First derivatives and the contributions to all second ones.
+    fn second<R: Real, E: Entries<R>>(
+        &self,
+        t: R,
+        q: &[R],
+        z: &[R],
+        first: Gradient<'_, R>,
+        entries: &mut E,
+    );
+
+    /// The name of a coordinate: `q[0]`, `q[1]`, …
+    fn coordinate_name(&self, index: usize) -> CoordinateName;
+
+    /// The names of the observables.
+    const OBSERVABLES: &'static [&'static str] = &[];
+
+    /// The observables, one for each name.
+    fn observables<R: Real>(&self, _t: R, _q: &[R], _z: &[R], _values: &mut [R]) {}
+}
+
+/// The state of coordinates and velocities at time `t`.
+///
+/// # Errors
+/// [`FamilyError`] where the model does not fit together, a vector has another length, or no momentum belongs to the velocities.
+pub fn state<M: FamilyModel>(
+    model: &M,
+    t: f64,
+    q: Vec<f64>,
+    v: Vec<f64>,
+) -> Result<FamilyState, FamilyError> {
+    model.check()?;
+    let expected = model.len();
+    for (vector, length) in [("q", q.len()), ("v", v.len())] {
+        if length != expected {
+            return Err(FamilyError::StateLength {
+                vector,
+                length,
+                expected,
+            });
+        }
+    }
+    let p = match M::FORM {
+        Form::Lagrangian => slope(model, t, &q, &v),
+        Form::Hamiltonian => inertia::other(model, t, &q, &v)?,
+    };
+    Ok(FamilyState { q, p })
+}
+
+/// The velocities dq/dt at a state.
+///
+/// # Errors
+/// [`FamilyError::MassNotDiagonal`], [`FamilyError::SingularMass`] of a Lagrangian.
+pub fn velocity<M: FamilyModel>(
+    model: &M,
+    t: f64,
+    state: &FamilyState,
+) -> Result<Vec<f64>, FamilyError> {
+    match M::FORM {
+        Form::Lagrangian => inertia::other(model, t, &state.q, &state.p),
+        Form::Hamiltonian => Ok(slope(model, t, &state.q, &state.p)),
+    }
+}
+
+/// The energy H = p·v − L, or H itself, at a state with its velocities.
+#[must_use]
+pub fn energy<M: FamilyModel>(model: &M, t: f64, state: &FamilyState, v: &[f64]) -> f64 {
+    match M::FORM {
+        Form::Lagrangian => {
+            let work: f64 = state.p.iter().zip(v).map(|(p, v)| p * v).sum();
+            work - model.energy_function(t, &state.q, v)
+        }
+        Form::Hamiltonian => model.energy_function(t, &state.q, &state.p),
+    }
+}
+
+/// L_v, or H_p.
+fn slope<M: FamilyModel>(model: &M, t: f64, q: &[f64], z: &[f64]) -> Vec<f64> {
+    let n = model.len();
+    let (mut by_z, mut by_q, mut force) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let first = Gradient {
+        z: &mut by_z,
+        q: &mut by_q,
+        force: &mut force,
+    };
+    model.first(t, q, z, first);
+    by_z
+}
+
+/// One of the observables.
+///
+/// # Errors
+/// [`FamilyError`] where the model does not fit together or a vector has another length.
+#[doc(hidden)]
+pub fn observable<M: FamilyModel>(
+    model: &M,
+    t: f64,
+    q: &[f64],
+    z: &[f64],
+    number: usize,
+) -> Result<f64, FamilyError> {
+    model.check()?;
+    let second = match M::FORM {
+        Form::Lagrangian => "v",
+        Form::Hamiltonian => "p",
+    };
+    let expected = model.len();
+    for (vector, length) in [("q", q.len()), (second, z.len())] {
+        if length != expected {
+            return Err(FamilyError::StateLength {
+                vector,
+                length,
+                expected,
+            });
+        }
+    }
+    let mut values = vec![0.0; M::OBSERVABLES.len()];
+    model.observables(t, q, z, &mut values);
+    Ok(values.get(number).copied().unwrap_or(f64::NAN))
+}
+
+/// What generated code checks.
+#[doc(hidden)]
+pub mod checks {
+    use super::FamilyError;
+
+    /// A coordinate array has elements.
+    ///
+    /// # Errors
+    /// [`FamilyError::NoElements`].
+    pub fn elements(array: &'static str, length: usize) -> Result<(), FamilyError> {
+        if length == 0 {
+            return Err(FamilyError::NoElements { array });
+        }
+        Ok(())
+    }
+
+    /// A range has turns.
+    ///
+    /// # Errors
+    /// [`FamilyError::EmptyRange`].
+    pub fn turns(ranges: &'static str, start: i64, end: i64) -> Result<(), FamilyError> {
+        if start >= end {
+            return Err(FamilyError::EmptyRange { ranges, start, end });
+        }
+        Ok(())
+    }
+
+    /// An index stays inside its array.
+    ///
+    /// # Errors
+    /// [`FamilyError::Index`].
+    pub fn index(
+        (array, index, ranges): (&'static str, &'static str, &'static str),
+        value: i64,
+        length: usize,
+    ) -> Result<(), FamilyError> {
+        if usize::try_from(value).is_ok_and(|value| value < length) {
+            return Ok(());
+        }
+        Err(FamilyError::Index {
+            array,
+            index,
+            ranges,
+            value,
+            length,
+        })
+    }
+
+    /// An array field is as long as the largest of its indices asks for: (length, index, ranges) of each.
+    ///
+    /// # Errors
+    /// [`FamilyError::FieldLength`].
+    pub fn field_length(
+        field: &'static str,
+        length: usize,
+        uses: &[(i64, &'static str, &'static str)],
+    ) -> Result<(), FamilyError> {
+        match uses.iter().max_by_key(|(expected, ..)| *expected) {
+            Some((expected, index, ranges)) if usize::try_from(*expected) != Ok(length) => {
+                Err(FamilyError::FieldLength {
+                    field,
+                    length,
+                    expected: *expected,
+                    index,
+                    ranges,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+}

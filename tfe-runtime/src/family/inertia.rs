@@ -1,0 +1,105 @@
+//! Mass matrices of families.
+
+use super::{Block, Entries, FamilyError, FamilyModel, slope};
+use crate::double_double::DoubleDouble;
+use crate::model::Form;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// A constant diagonal mass matrix.
+#[derive(Clone, Debug)]
+pub(super) struct Inertia {
+    /// m
+    pub(super) mass: Vec<f64>,
+    /// 1/m
+    pub(super) inverse: Vec<f64>,
+    /// What rounding took from 1/m.
+    pub(super) inverse_low: Vec<f64>,
+}
+
+impl Inertia {
+    /// The masses of a model whose equations are M q̈ = f.
+    pub(super) fn of<M: FamilyModel>(model: &M) -> Result<Self, FamilyError> {
+        let facts = M::FACTS;
+        if !(facts.constant_mass && facts.separable) || M::MOMENTA_MOVE {
+            return Err(FamilyError::NotSecondOrder);
+        }
+        let zero = vec![0.0; model.len()];
+        // Momenta have to be multiples of velocities.
+        if slope(model, 0.0, &zero, &zero).iter().any(|p| *p != 0.0) {
+            return Err(FamilyError::NotSecondOrder);
+        }
+        let second = diagonal(model, 0.0, &zero, &zero)?;
+        let over = |x: f64| DoubleDouble::ONE.over(DoubleDouble::new(x));
+        let (mass, inverse): (Vec<f64>, Vec<f64>) = match M::FORM {
+            Form::Lagrangian => second.iter().map(|m| (*m, 1.0 / m)).unzip(),
+            Form::Hamiltonian => second
+                .iter()
+                .map(|inverse| (1.0 / inverse, *inverse))
+                .unzip(),
+        };
+        let low = |(m, inverse): (&f64, &f64)| over(*m).minus(DoubleDouble::new(*inverse)).high;
+        let inverse_low = mass.iter().zip(&inverse).map(low).collect();
+        Ok(Self {
+            mass,
+            inverse,
+            inverse_low,
+        })
+    }
+}
+
+/// The momentum that belongs to a velocity of a Hamiltonian, or the velocity that belongs to a momentum of a Lagrangian: one step of Newton's
+/// method, from zero, where the energy is quadratic.
+pub(super) fn other<M: FamilyModel>(
+    model: &M,
+    t: f64,
+    q: &[f64],
+    wanted: &[f64],
+) -> Result<Vec<f64>, FamilyError> {
+    if !M::FACTS.quadratic_in_z {
+        return Err(FamilyError::NotSecondOrder);
+    }
+    let zero = vec![0.0; model.len()];
+    let offset = slope(model, t, q, &zero);
+    let second = diagonal(model, t, q, &zero)?;
+    let all = wanted.iter().zip(&offset).zip(&second);
+    Ok(all
+        .map(|((wanted, offset), second)| (wanted - offset) / second)
+        .collect())
+}
+
+/// The diagonal of ∂²/∂z∂z, of which nothing may be zero, and which may be all there is.
+fn diagonal<M: FamilyModel>(
+    model: &M,
+    t: f64,
+    q: &[f64],
+    z: &[f64],
+) -> Result<Vec<f64>, FamilyError> {
+    let mut found = Diagonal {
+        entries: vec![0.0; model.len()],
+        off: None,
+    };
+    model.mass(t, q, z, &mut found);
+    if let Some((row, column)) = found.off {
+        return Err(FamilyError::MassNotDiagonal { row, column });
+    }
+    match found.entries.iter().position(|m| !(m.abs() > 0.0)) {
+        Some(coordinate) => Err(FamilyError::SingularMass { coordinate }),
+        None => Ok(found.entries),
+    }
+}
+
+struct Diagonal {
+    entries: Vec<f64>,
+    off: Option<(usize, usize)>,
+}
+
+impl Entries<f64> for Diagonal {
+    fn add(&mut self, _: Block, row: usize, column: usize, value: f64) {
+        if row == column {
+            self.entries[row] += value;
+        } else if value != 0.0 {
+            self.off = self.off.or(Some((row, column)));
+        }
+    }
+}

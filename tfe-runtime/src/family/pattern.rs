@@ -1,0 +1,92 @@
+//! Second derivatives of families: places found once, values each time.
+
+use super::{Block, Entries, FamilyModel, Gradient};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// The places of second derivatives that can be other than zero, sorted by block, column and row.
+///
+/// Found by one run of the kernel: which entries it adds to, and in which order, depends on lengths alone. Another run scatters by that record.
+///
+/// ```text
+/// (block, row, column)     one for each place, and for each contribution of the kernel the number of its place
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Pattern {
+    places: Vec<(Block, usize, usize)>,
+    /// The place of each contribution, in the order of the kernel.
+    contributions: Vec<usize>,
+}
+
+/// Records places.
+struct Recorder(Vec<(Block, usize, usize)>);
+
+impl Entries<f64> for Recorder {
+    fn add(&mut self, block: Block, row: usize, column: usize, _: f64) {
+        self.0.push((block, row, column));
+    }
+}
+
+/// Adds values to the places of a [`Pattern`].
+#[derive(Debug)]
+pub struct Values<'a> {
+    contributions: core::slice::Iter<'a, usize>,
+    values: &'a mut [f64],
+}
+
+impl Entries<f64> for Values<'_> {
+    #[inline]
+    fn add(&mut self, _: Block, _: usize, _: usize, value: f64) {
+        // A model whose lengths have changed since brings more or other contributions than were recorded: those are dropped.
+        if let Some(place) = self.contributions.next()
+            && let Some(entry) = self.values.get_mut(*place)
+        {
+            *entry += value;
+        }
+    }
+}
+
+impl Pattern {
+    /// Of all second derivatives of a model that has been [checked](FamilyModel::check).
+    ///
+    /// Memory and time are linear in the number of contributions.
+    pub fn of<M: FamilyModel>(model: &M) -> Self {
+        let n = model.len();
+        let (mut z, mut q, mut force) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let mut recorder = Recorder(Vec::new());
+        let first = Gradient {
+            z: &mut z,
+            q: &mut q,
+            force: &mut force,
+        };
+        let zero = vec![0.0; n];
+        model.second(0.0, &zero, &zero, first, &mut recorder);
+        let Recorder(recorded) = recorder;
+        let by_column = |(block, row, column): &(Block, usize, usize)| (*block, *column, *row);
+        let mut places = recorded.clone();
+        places.sort_unstable_by_key(by_column);
+        places.dedup();
+        let place = |one| places.binary_search_by_key(&by_column(one), by_column);
+        let contributions = recorded.iter().map(|one| place(one).unwrap_or(0));
+        let contributions = contributions.collect();
+        Self {
+            places,
+            contributions,
+        }
+    }
+
+    /// The places, sorted by block, column and row.
+    #[must_use]
+    pub fn places(&self) -> &[(Block, usize, usize)] {
+        &self.places
+    }
+
+    /// What a kernel adds to, one value a place: `values` is set to zero first.
+    pub fn scatter<'a>(&'a self, values: &'a mut [f64]) -> Values<'a> {
+        values.fill(0.0);
+        Values {
+            contributions: self.contributions.iter(),
+            values,
+        }
+    }
+}

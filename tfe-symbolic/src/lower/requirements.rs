@@ -1,0 +1,90 @@
+//! What must hold of lengths that are known at run time only: checked once for each model, before it is evaluated.
+
+use super::Lowerer;
+use crate::declared::{Extent, Requirement};
+use crate::graph::SumRange;
+use crate::input::{Affine, IndexSymbol};
+
+impl Lowerer<'_> {
+    /// Whether some array of coordinates has a length known at run time only.
+    pub(super) fn is_of_run_time_length(&self) -> bool {
+        self.model.is_of_run_time_length()
+    }
+
+    /// Notes that an index of which nothing can be said here has to stay inside its array.
+    pub(super) fn require_index(&mut self, array: &str, place: &Affine, length: Extent) {
+        let nest = self.needed(place);
+        let requirement = Requirement::Index {
+            array: array.to_owned(),
+            text: self.in_words(place),
+            ranges: self.ranges_of(place),
+            nest,
+            place: place.clone(),
+            length,
+        };
+        self.require(requirement);
+    }
+
+    /// Notes that an array field has to be as long as its largest index asks for.
+    pub(super) fn require_length(&mut self, field: &str, place: &Affine) {
+        let one = Affine::constant(1);
+        let Some(length) = self
+            .extreme(place, true)
+            .and_then(|high| high.plus_scaled(&one, 1))
+        else {
+            return;
+        };
+        let low = self.extreme(place, false).and_then(|low| low.as_constant());
+        if low.is_none_or(|low| low < 0) {
+            self.require_index(field, place, Extent::OfField(field.to_owned()));
+        }
+        let requirement = Requirement::FieldLength {
+            field: field.to_owned(),
+            text: self.in_words(place),
+            ranges: self.ranges_of(place),
+            length,
+        };
+        self.require(requirement);
+    }
+
+    /// Notes that the range of the innermost sum has to hold something, where it is the same on all turns of the sums around.
+    pub(super) fn require_turns(&mut self, range: &SumRange) {
+        let varies = |(symbol, _): &(IndexSymbol, i64)| matches!(symbol, IndexSymbol::Loop(_));
+        let mut bounds = range.start.terms.iter().chain(&range.end.terms);
+        let length = range.end.plus_scaled(&range.start, -1);
+        let known = length.and_then(|length| length.as_constant());
+        if bounds.any(varies) || known.is_some_and(|length| length > 0) {
+            return;
+        }
+        let index = Affine::symbol(IndexSymbol::Loop(range.variable));
+        let requirement = Requirement::Turns {
+            ranges: self.ranges_of(&index),
+            start: range.start.clone(),
+            end: range.end.clone(),
+        };
+        self.require(requirement);
+    }
+
+    fn require(&mut self, requirement: Requirement) {
+        if self.is_of_run_time_length() && !self.requirements.contains(&requirement) {
+            self.requirements.push(requirement);
+        }
+    }
+
+    /// The loops around that say where an index goes, outermost first.
+    fn needed(&self, place: &Affine) -> Vec<SumRange> {
+        let mut needed: Vec<SumRange> = Vec::new();
+        for index in self.indices.iter().rev() {
+            let asks = |affine: &Affine| affine.depends_on(index.variable);
+            if asks(place) || needed.iter().any(|r| asks(&r.start) || asks(&r.end)) {
+                needed.push(SumRange {
+                    variable: index.variable,
+                    start: index.start.clone(),
+                    end: index.end.clone(),
+                });
+            }
+        }
+        needed.reverse();
+        needed
+    }
+}

@@ -1,0 +1,203 @@
+//! Models of run-time length: the same programs at any length, equal to the models written out, and what lengths must obey.
+
+use tfe_symbolic::compile::declare;
+use tfe_symbolic::context::{Context, Field, FieldKind};
+use tfe_symbolic::declared::{Declared, Requirement};
+use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::program::Request;
+
+const ALL: Request = Request {
+    value: true,
+    first: true,
+    mass: true,
+    second: true,
+    observables: true,
+    constraint_values: false,
+    constraint_rows: false,
+    constraint_second: false,
+};
+
+/// The fields that the text uses, of these: lengths n and w, numbers k and a, lists m and c.
+fn context(text: &str) -> Context {
+    let kinds = [
+        ("n", FieldKind::Length),
+        ("w", FieldKind::Length),
+        ("k", FieldKind::Scalar),
+        ("a", FieldKind::Scalar),
+        ("m", FieldKind::Vector),
+        ("c", FieldKind::Vector),
+    ];
+    let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).collect();
+    let used = kinds
+        .into_iter()
+        .filter(|(name, _)| words.contains(name))
+        .map(|(name, kind)| Field {
+            name: name.to_owned(),
+            kind,
+        });
+    Context {
+        struct_name: "Model".to_owned(),
+        fields: used.collect(),
+        const_parameters: Vec::new(),
+    }
+}
+
+#[track_caller]
+fn declared(text: &str) -> Declared {
+    declare(text, &context(text)).unwrap_or_else(|problems| panic!("{text}\n{problems:?}"))
+}
+
+fn environment(dof: usize, n: usize, w: usize) -> Environment {
+    let list = |scale: f64| {
+        (0..dof)
+            .map(|i| 1.0 + scale * i as f64)
+            .collect::<Vec<f64>>()
+    };
+    Environment {
+        time: 0.4,
+        q: (0..dof).map(|i| (1.7 * i as f64 + 0.3).sin()).collect(),
+        z: (0..dof).map(|i| (0.9 * i as f64 - 0.2).cos()).collect(),
+        parameters: [("k", 0.7), ("a", 0.25)]
+            .map(|(name, value)| (name.to_owned(), value))
+            .into(),
+        arrays: [("m", list(0.1)), ("c", list(0.3))]
+            .map(|(name, values)| (name.to_owned(), values))
+            .into(),
+        sizes: [("n", n as i64), ("w", w as i64)]
+            .map(|(name, size)| (name.to_owned(), size))
+            .into(),
+        ..Environment::default()
+    }
+}
+
+/// A family with n and w sites against the same model written out.
+#[track_caller]
+fn check(n: usize, w: usize, family: &str, written: &str) {
+    let (family, written) = (declared(family), declared(written));
+    assert!(family.is_of_run_time_length() && !written.is_of_run_time_length());
+    let dof = written.dof.as_constant().expect("a literal length") as usize;
+    let run = |declared: &Declared| {
+        let program = Derivation::of(declared).program(ALL);
+        interpret(&program, &environment(dof, n, w)).unwrap_or_else(|e| panic!("{e}\n{program}"))
+    };
+    let numbers = |r: &Results| {
+        let blocks = [&r.zz, &r.zq, &r.qq, &r.force_z, &r.force_q].map(|block| block.concat());
+        [
+            vec![r.value],
+            r.z.clone(),
+            r.q.clone(),
+            r.force.clone(),
+            blocks.concat(),
+        ]
+        .concat()
+    };
+    let (family, written) = (numbers(&run(&family)), numbers(&run(&written)));
+    assert_eq!(family.len(), written.len());
+    for (at, (x, y)) in family.iter().zip(&written).enumerate() {
+        // Sums of some ten terms of size one in another order.
+        assert!((x - y).abs() < 1e-13 * 1f64.max(y.abs()), "{at}: {x} {y}");
+    }
+}
+
+fn joined(range: std::ops::Range<usize>, term: impl Fn(usize) -> String) -> String {
+    range.map(term).collect::<Vec<_>>().join(" + ")
+}
+
+#[test]
+fn a_chain_of_run_time_length() {
+    let looped = "coordinates(q[n]), lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2) \
+        - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3) - k*q[0]^2 - k*q[n-1]^4, \
+        force(q[i]) = -c[i]*dot(q[i]), force(q[n-1]) = sin(t)";
+    for n in [2, 3, 7] {
+        let mass = joined(0..n, |i| format!("m[{i}]/2*dot(q[{i}])^2"));
+        let spring = joined(0..n - 1, |i| {
+            let j = i + 1;
+            format!("k/2*(q[{j}]-q[{i}])^2 + a/3*(q[{j}]-q[{i}])^3")
+        });
+        let forces: Vec<String> = (0..n)
+            .map(|i| format!("force(q[{i}]) = -c[{i}]*dot(q[{i}])"))
+            .collect();
+        let last = n - 1;
+        let written = format!(
+            "coordinates(q[{n}]), lagrangian = {mass} - ({spring}) - k*q[0]^2 - k*q[{last}]^4, {}, \
+             force(q[{last}]) = sin(t)",
+            forces.join(", ")
+        );
+        check(n, 0, looped, &written);
+    }
+}
+
+#[test]
+fn pairs_and_several_families() {
+    let looped = "coordinates(s, x[n], y[w]), momenta(ps, px[n], py[w]), hamiltonian = ps^2/2 + k*s^2*x[0]^2 \
+        + sum(i in 0..n, px[i]^2/2/m[i] + sum(j in 0..i, a*m[i]*m[j]/sqrt(1 + (x[i]-x[j])^2))) \
+        + sum(i in 0..w, py[i]^2/2 + k/4*y[i]^4*s^2)";
+    let (n, w) = (4, 3);
+    let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let pairs: Vec<String> = pairs
+        .map(|(i, j)| format!("a*m[{i}]*m[{j}]/sqrt(1 + (x[{i}]-x[{j}])^2)"))
+        .collect();
+    let written = format!(
+        "coordinates(s, x[{n}], y[{w}]), momenta(ps, px[{n}], py[{w}]), hamiltonian = ps^2/2 + k*s^2*x[0]^2 + {} + {} + {}",
+        joined(0..n, |i| format!("px[{i}]^2/2/m[{i}]")),
+        pairs.join(" + "),
+        joined(0..w, |i| format!("py[{i}]^2/2 + k/4*y[{i}]^4*s^2")),
+    );
+    check(n, w, looped, &written);
+}
+
+/// What neighbours share is kept in a variable: each place is written once.
+#[test]
+fn a_chain_stores_each_force_once() {
+    let text = "coordinates(q[n]), lagrangian = sum(i in 0..n, 1/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^4)";
+    let first = Request {
+        first: true,
+        ..Request::default()
+    };
+    let program = Derivation::of(&declared(text)).program(first).to_string();
+    assert!(
+        !program.contains("+= ") && !program.contains("clear"),
+        "{program}"
+    );
+}
+
+fn told(requirement: &Requirement) -> String {
+    match requirement {
+        Requirement::Index {
+            array,
+            text,
+            ranges,
+            nest,
+            ..
+        } => format!("{array}[{text}] for {ranges}, {} loops", nest.len()),
+        Requirement::FieldLength {
+            field,
+            text,
+            ranges,
+            length,
+        } => format!("{field}: {length} by [{text}] for {ranges}"),
+        Requirement::Turns { ranges, .. } => format!("turns of {ranges}"),
+    }
+}
+
+/// What can be decided is decided here, what cannot is left to the run time, and nothing else is.
+#[test]
+fn requirements_of_lengths() {
+    let text = "coordinates(q[n], r[w]), lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2) + sum(i in 0..w, dot(r[i])^2/2) \
+        - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2) - sum(i in 1..n, sum(j in 0..i, c[i-1]*q[j]*r[j]))";
+    let mut all: Vec<String> = declared(text).requirements.iter().map(told).collect();
+    all.sort();
+    assert_eq!(
+        all,
+        [
+            "c: n-1 by [i-1] for i in 1..n",
+            "m: n by [i] for i in 0..n",
+            "r[j] for j in 0..i, 2 loops",
+            "turns of i in 0..n",
+            "turns of i in 0..n-1",
+            "turns of i in 0..w",
+            "turns of i in 1..n",
+        ]
+    );
+}
