@@ -98,7 +98,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for n in [10, 100, 1000, 10_000, 100_000] {
         let chain = Chain { n, ..chain };
         let q: Vec<f64> = (0..n).map(|i| (0.1 * i as f64).sin()).collect();
-        let mut state = chain.state(q, vec![0.0; n])?;
+        let mut state = chain.state(q, vec![0.0; n]);
         let mut stepper = FamilyStepper::new(&chain, Mixed::<4>.into(), Control::default())?;
         for step in 0..5 {
             stepper.advance(0.1 * f64::from(step), 0.1, &mut state)?;

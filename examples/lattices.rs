@@ -89,7 +89,7 @@ fn sweep<M: FamilyModel>(model: impl Fn(usize) -> M) -> Result<Vec<Row>, Box<dyn
     for n in LENGTHS {
         let model = model(n);
         let q = (0..n).map(|i| (0.1 * i as f64).sin()).collect();
-        let start = family::state(&model, 0.0, q, vec![0.0; n])?;
+        let start = family::state(&model, 0.0, q, vec![0.0; n]);
         let runs = (300_000 / n).clamp(2, 500);
         let simulation = FamilySimulation::new(&model).element(Mixed::<4>).step(STEP);
         let simulation = simulation.record_every(usize::MAX);
@@ -132,7 +132,7 @@ fn invariants() -> Result<(), Box<dyn Error>> {
     let toda = Toda { n: 200 };
     let q: Vec<f64> = (0..200).map(|i| 0.3 * (0.2 * f64::from(i)).sin()).collect();
     let v: Vec<f64> = (0..200).map(|i| 0.5 * (0.7 * f64::from(i)).cos()).collect();
-    let start = toda.state(q, v)?;
+    let start = toda.state(q, v);
     let before = eigenvalues(&start);
     let simulation = Simulation::new(&toda)
         .element(Mixed::<8>)

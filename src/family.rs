@@ -7,6 +7,6 @@ pub use crate::motion::family::{FamilyMotion, FamilyNode};
 pub use crate::simulation::family::{FamilyRunError, FamilySimulation, FamilySteps, Runs};
 pub use tfe_runtime::family::{
     Block, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, Gradient, Pattern,
-    energy, state, velocity,
+    energy, momenta, state, velocity,
 };
 pub use tfe_runtime::length::{Declared, FixedLength, RunTimeLength};

@@ -62,7 +62,7 @@ impl<M: FamilyModel> Runs<M, 0> for RunTimeLength {
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let chain = Chain { n: 100, m: 1.0, k: 1.0, a: 0.25 };
 /// let q: Vec<f64> = (0..chain.n).map(|i| (0.03 * i as f64).cos()).collect();
-/// let start = chain.state(q, vec![0.0; chain.n])?;
+/// let start = chain.state(q, vec![0.0; chain.n]);
 /// let motion = Simulation::new(&chain)
 ///     .element(Mixed::<4>)
 ///     .step(0.1)

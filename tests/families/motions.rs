@@ -40,7 +40,7 @@ fn a_chain_moves_as_the_same_model_of_fixed_size() {
         Element::mixed(12),
     ] {
         for end in [20.0, -20.0] {
-            let start = chain.state(START, PUSH).expect("lengths that fit");
+            let start = chain.state(START, PUSH);
             let simulation = Simulation::new(&chain).element(element).step(0.1);
             let family = simulation.run(start, 0.0..end).expect("a run");
             let simulation = Simulation::new(&five).element(element).step(0.1);
@@ -104,7 +104,7 @@ fn the_invariants_of_a_toda_chain_stay() {
     let toda = Toda { n: 200 };
     let q: Vec<f64> = (0..200).map(|i| 0.3 * (0.2 * f64::from(i)).sin()).collect();
     let v: Vec<f64> = (0..200).map(|i| 0.5 * (0.7 * f64::from(i)).cos()).collect();
-    let start = toda.state(q, v).expect("lengths that fit");
+    let start = toda.state(q, v);
     let before = lax_eigenvalues(&start);
     let simulation = Simulation::new(&toda)
         .element(Mixed::<8>)
@@ -167,7 +167,7 @@ fn pairs_of_bodies_move_as_those_of_fixed_size() {
         q.clone().try_into().expect("18"),
         v.clone().try_into().expect("18"),
     );
-    let start = bodies.state(q, v).expect("lengths that fit");
+    let start = bodies.state(q, v);
     assert_eq!(start.p, fixed_start.p);
     let simulation = Simulation::new(&bodies).element(Mixed::<6>).step(0.05);
     let family = simulation.run(start, 0.0..20.0).expect("a run");
@@ -187,7 +187,7 @@ fn pairs_of_bodies_move_as_those_of_fixed_size() {
 fn two_hundred_bodies_run() {
     let (m, q, v) = planets(200);
     let bodies = Bodies { n: 200, m, g: 1.0 };
-    let start = bodies.state(q, v).expect("lengths that fit");
+    let start = bodies.state(q, v);
     let simulation = Simulation::new(&bodies).element(Mixed::<4>).step(0.02);
     let motion = simulation.run(start, 0.0..0.2).expect("a run");
     assert!(motion.energy_error() < 1e-12, "{:e}", motion.energy_error());
@@ -237,7 +237,7 @@ fn forces_by_site_and_a_coordinate_of_its_own() {
     let fixed = DrivenOfFixedSize { m, c, k, f };
     let (q, v) = ([0.3, 0.1, -0.4, 0.2], [0.0, 0.5, -0.1, 0.3]);
     for element in [Element::mixed(4), Element::mixed(9), Element::radau(3)] {
-        let start = family.state(q, v).expect("lengths that fit");
+        let start = family.state(q, v);
         let run = Simulation::new(&family).element(element).step(0.05);
         let one = run.run(start, 0.0..5.0).expect("a run");
         let run = Simulation::new(&fixed).element(element).step(0.05);
@@ -261,7 +261,7 @@ fn steps_are_those_of_a_run() {
         k: 1.0,
         a: 0.2,
     };
-    let start = chain.state(START, PUSH).expect("lengths that fit");
+    let start = chain.state(START, PUSH);
     let simulation = Simulation::new(&chain).step(0.1);
     let motion = simulation
         .clone()
@@ -287,7 +287,7 @@ fn steps_are_those_of_a_run() {
 fn a_motion_is_written_with_the_names_of_its_coordinates() {
     let (m, q, v) = planets(2);
     let bodies = Bodies { n: 2, m, g: 1.0 };
-    let start = bodies.state(q, v).expect("lengths that fit");
+    let start = bodies.state(q, v);
     let motion = Simulation::new(&bodies)
         .step(0.1)
         .run(start, 0.0..0.2)

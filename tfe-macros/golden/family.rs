@@ -277,16 +277,12 @@ const _: () = {
 impl Family {
     /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
     ///
-    /// # Errors
-    /// Vectors of another length than the model's, lengths of the model that do not fit together, velocities that determine no momenta.
+    /// Vectors of another length than the model's, and lengths of the model that do not fit together, are errors of the run.
     fn state(
         &self,
         q: impl ::core::convert::Into<::tfe::__private::List>,
         v: impl ::core::convert::Into<::tfe::__private::List>,
-    ) -> ::core::result::Result<
-        ::tfe::__private::FamilyState,
-        ::tfe::__private::FamilyError,
-    > {
+    ) -> ::tfe::__private::FamilyState {
         ::tfe::__private::family_state(self, 0.0, q.into(), v.into())
     }
     /// What was derived from the declaration: a page when printed.

@@ -344,13 +344,12 @@ impl Kernels<'_> {
             impl #impl_generics #name #type_generics #where_clause {
                 /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
                 ///
-                /// # Errors
-                /// Vectors of another length than the model's, lengths of the model that do not fit together, velocities that determine no momenta.
+                /// Vectors of another length than the model's, and lengths of the model that do not fit together, are errors of the run.
                 #vis fn state(
                     &self,
                     q: impl ::core::convert::Into<#path::__private::List>,
                     v: impl ::core::convert::Into<#path::__private::List>,
-                ) -> ::core::result::Result<#path::__private::FamilyState, #path::__private::FamilyError> {
+                ) -> #path::__private::FamilyState {
                     #path::__private::family_state(self, 0.0, q.into(), v.into())
                 }
 

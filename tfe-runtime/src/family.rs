@@ -125,14 +125,24 @@ pub trait FamilyModel {
 
 /// The state of coordinates and velocities at time `t`.
 ///
+/// Where there is none the velocities stand for the momenta: a run from there says what [`momenta`] would say.
+pub fn state<M: FamilyModel>(model: &M, t: f64, q: Vec<f64>, v: Vec<f64>) -> FamilyState {
+    match momenta(model, t, &q, &v) {
+        Ok(p) => FamilyState { q, p },
+        Err(_) => FamilyState { q, p: v },
+    }
+}
+
+/// The momenta of coordinates and velocities at time `t`.
+///
 /// # Errors
 /// [`FamilyError`] where the model does not fit together, a vector has another length, or no momentum belongs to the velocities.
-pub fn state<M: FamilyModel>(
+pub fn momenta<M: FamilyModel>(
     model: &M,
     t: f64,
-    q: Vec<f64>,
-    v: Vec<f64>,
-) -> Result<FamilyState, FamilyError> {
+    q: &[f64],
+    v: &[f64],
+) -> Result<Vec<f64>, FamilyError> {
     model.check()?;
     let expected = model.len();
     for (vector, length) in [("q", q.len()), ("v", v.len())] {
@@ -144,11 +154,10 @@ pub fn state<M: FamilyModel>(
             });
         }
     }
-    let p = match M::FORM {
-        Form::Lagrangian => slope(model, t, &q, &v),
-        Form::Hamiltonian => inertia::other(model, t, &q, &v)?,
-    };
-    Ok(FamilyState { q, p })
+    match M::FORM {
+        Form::Lagrangian => Ok(slope(model, t, q, v)),
+        Form::Hamiltonian => inertia::other(model, t, q, v),
+    }
 }
 
 /// The velocities dq/dt at a state.

@@ -48,6 +48,16 @@ struct Chain<const N: usize> {
     a: f64,
 }
 
+/// Free ends, any number of masses known at run time.
+#[dynamics(coordinates(q[n]),
+           lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3))]
+struct LongChain {
+    n: usize,
+    m: f64,
+    k: f64,
+    a: f64,
+}
+
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - alpha/2*x^2 - beta/4*x^4,
            force(x) = f*cos(omega*t) - delta*dot(x), sensitivity(omega))]
 #[derive(Clone)]
@@ -205,6 +215,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .step(0.1)
         .run(chain.state(q, [0.0; 20]), 0.0..10.0)?;
     println!("chain: energy error {:.1e}", motion.energy_error());
+    let long = LongChain {
+        n: 500,
+        m: 1.0,
+        k: 1.0,
+        a: 0.25,
+    };
+    let mut q = vec![0.0; long.n];
+    q[250] = 0.5;
+    let motion = Simulation::new(&long)
+        .element(Mixed::<4>)
+        .step(0.1)
+        .run(long.state(q, vec![0.0; long.n]), 0.0..10.0)?;
+    println!("500 masses: energy error {:.1e}", motion.energy_error());
 
     let last = Simulation::new(&pendulum)
         .step(0.01)

@@ -10,7 +10,7 @@ struct Chain { n: usize, m: f64, k: f64 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let chain = Chain { n: 10, m: 1.0, k: 1.0 };
-    let start = chain.state([0.0; 10], vec![0.0; 10])?;
+    let start = chain.state([0.0; 10], vec![0.0; 10]);
     let motion = Simulation::new(&chain).step(0.1).run(start, 0.0..1.0)?;
     println!("{}", motion.energy_error());
     Ok(())

@@ -94,8 +94,8 @@ pub(super) fn stubs(
                 &self,
                 q: impl ::core::convert::Into<#private::List>,
                 v: impl ::core::convert::Into<#private::List>,
-            ) -> ::core::result::Result<#private::FamilyState, #private::FamilyError> {
-                ::core::result::Result::Ok(#private::FamilyState { q: q.into(), p: v.into() })
+            ) -> #private::FamilyState {
+                #private::FamilyState { q: q.into(), p: v.into() }
             }
 
             #vis fn structure() -> #private::Structure {
