@@ -28,7 +28,6 @@ use crate::scheme::{SchemeRef, SchemeTable, Tables as _};
 use crate::step::{cold_phase, cold_velocity};
 use alloc::vec;
 use alloc::vec::Vec;
-use four::Four;
 use step::Job;
 use tables::Tables;
 
@@ -312,25 +311,6 @@ where
         Form::Lagrangian => element.is_collocated(),
         Form::Hamiltonian => element.has_phase_form(),
     }
-}
-
-/// Four of the numbers; zeros beyond the last.
-#[inline(always)]
-fn block<V: Four, const N: usize>(like: V, numbers: &[f64; N], at: usize) -> V {
-    if let Some(four) = numbers[at..].first_chunk() {
-        return like.with(*four);
-    }
-    let mut four = [0.0; 4];
-    four[..N - at].copy_from_slice(&numbers[at..]);
-    like.with(four)
-}
-
-/// Writes them back.
-#[inline(always)]
-fn put<V: Four, const N: usize>(four: V, numbers: &mut [f64; N], at: usize) {
-    let four = four.lanes();
-    let end = N.min(at + 4);
-    numbers[at..end].copy_from_slice(&four[..end - at]);
 }
 
 /// The largest magnitude.

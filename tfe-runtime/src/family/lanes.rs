@@ -5,6 +5,7 @@ use super::space::{Leg, Problem};
 use crate::equations::Increment;
 use crate::model::Form;
 use crate::points::four::Four;
+use crate::points::sweep::relative;
 use crate::points::tables::Matrix;
 
 /// L_q + Q, or Q − H_q.
@@ -78,40 +79,6 @@ pub(super) fn add_exactly<V: Four>(sum: &mut (V, V), (weight, weight_low): (f64,
     *sum = (high, sum.1 + rest);
 }
 
-/// start + h · rate, each a number and what rounding took from it.
-#[inline(always)]
-pub(super) fn moved_exactly<V: Four>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
-    let (product, rest) = h.product(rate.0);
-    let rest = (rest + h * rate.1) + start.1;
-    let (sum, lost) = start.0.exact_sum(product);
-    sum.exact_sum(lost + rest)
-}
-
-/// Four of the numbers; zeros beyond the last.
-#[inline(always)]
-pub(super) fn four<V: Four>(like: V, numbers: &[f64], at: usize) -> V {
-    if let Some(four) = numbers[at..].first_chunk::<4>() {
-        return like.with(*four);
-    }
-    let mut four = [0.0; 4];
-    four[..numbers.len() - at].copy_from_slice(&numbers[at..]);
-    like.with(four)
-}
-
-/// Four of the numbers, as far as there are so many.
-#[inline(always)]
-pub(super) fn put<V: Four>(four: V, numbers: &mut [f64], at: usize) {
-    let last = numbers.len().min(at + 4);
-    numbers[at..last].copy_from_slice(&four.lanes()[..last - at]);
-}
-
-/// The largest of four; NaN if one is.
-#[inline(always)]
-pub(super) fn over_lanes<V: Four>(four: V) -> f64 {
-    let [a, b, c, d] = four.lanes();
-    a.max(b).max(c.max(d)) + 0.0 * ((a + b) + (c + d))
-}
-
 /// What increments are compared with.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
@@ -139,14 +106,6 @@ impl Scale {
         let relative = velocity.max(position);
         Increment { relative, position }
     }
-}
-
-/// |h δ| over the larger one of start and |h x|; zero over zero is zero, NaN stays NaN.
-pub(super) fn relative(h: f64, start: f64, x: f64, step: f64) -> f64 {
-    if step == 0.0 {
-        return 0.0;
-    }
-    h.abs() * step / start.max(h.abs() * x)
 }
 
 /// The largest magnitude; NaN if one is.

@@ -8,22 +8,17 @@
 //! loops of a kernel run through memory once.
 
 use super::inertia::Inertia;
-use super::lanes::{
-    Scale, add_exactly, alone, at_points, four, moved_exactly, over_lanes, product, put, rows,
-    total,
-};
+use super::lanes::{Scale, add_exactly, alone, at_points, product, rows, total};
 use super::{FamilyModel, FamilyState, Gradient};
 use crate::double_double::DoubleDouble;
 use crate::model::Form;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
-use crate::points::four::Four;
+use crate::points::end::moved;
+use crate::points::four::{Four, block, put};
 use crate::points::sweep::Largest;
-use crate::points::tables::Tables;
+use crate::points::tables::{MAX_GROUPS, Tables};
 use alloc::vec;
 use alloc::vec::Vec;
-
-/// Groups of four points that an element may have.
-const MAX_GROUPS: usize = 4;
 
 /// Everything that does not depend on the kind of register.
 #[derive(Clone, Debug)]
@@ -338,7 +333,7 @@ impl<V: Four> Space<V> {
                 forces[a] = force;
             }
         }
-        (over_lanes(changed.by_lane()), over_lanes(size.by_lane()))
+        (changed.get(), size.get())
     }
 
     #[inline(always)]
@@ -406,19 +401,19 @@ impl<V: Four> Space<V> {
         for at in (0..n).step_by(4) {
             let (force, lever) = self.integrals(&problem.tables, at);
             // Times 1/m, which has a low word of its own: one rounding of it would be the same in every step.
-            let inverse = four(like, &inertia.inverse, at);
-            let inverse_low = four(like, &inertia.inverse_low, at);
+            let inverse = block(like, &inertia.inverse, at);
+            let inverse_low = block(like, &inertia.inverse_low, at);
             let (acceleration, rest) = inverse.product(lever.0);
             let rest = rest + (inverse * lever.1 + inverse_low * lever.0);
             let start = (
-                four(like, &problem.velocity, at),
-                four(like, &problem.velocity_low, at),
+                block(like, &problem.velocity, at),
+                block(like, &problem.velocity_low, at),
             );
-            let velocity = moved_exactly(h, (acceleration, rest), start);
-            let start = (four(like, &leg.start.q, at), four(like, &leg.low.q, at));
-            let (q, q_low) = moved_exactly(h, velocity, start);
-            let start = (four(like, &leg.start.p, at), four(like, &leg.low.p, at));
-            let (p, p_low) = moved_exactly(h, force, start);
+            let velocity = moved::<_, true>(h, (acceleration, rest), start);
+            let start = (block(like, &leg.start.q, at), block(like, &leg.low.q, at));
+            let (q, q_low) = moved::<_, true>(h, velocity, start);
+            let start = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
+            let (p, p_low) = moved::<_, true>(h, force, start);
             // Zero times what is not finite is a NaN.
             zero += (q + p) * like.like(0.0);
             put(q, &mut end.q, at);

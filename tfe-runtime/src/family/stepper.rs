@@ -15,7 +15,7 @@ use crate::newton::{Control, Preference, Solve};
 #[cfg(feature = "sparse")]
 use crate::newton::{Monitor, Verdict};
 use crate::points::four::Four;
-use crate::points::tables::Tables;
+use crate::points::tables::{MAX_GROUPS, Tables};
 use crate::real::Lanes;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::{Contraction, Statistics};
@@ -24,9 +24,6 @@ use alloc::vec;
 /// Factors serve while increments shrink at least as fast.
 #[cfg(feature = "sparse")]
 const SERVES: f64 = 0.3;
-
-/// Points that an element may have.
-const MAX_POINTS: usize = 16;
 
 /// Steps a model of run-time length with one element, on memory of its own: linear in the number of coordinates, and so is the time of a step.
 ///
@@ -74,7 +71,7 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
             Form::Lagrangian => element.is_collocated(),
             Form::Hamiltonian => element.has_phase_form(),
         };
-        if !has_form || table.view().points() > MAX_POINTS {
+        if !has_form || table.view().points() > 4 * MAX_GROUPS {
             return Err(FamilyError::ElementNotSupported { element });
         }
         if control.solve == Solve::Newton && !cfg!(feature = "sparse") {

@@ -1,7 +1,7 @@
 //! The end of an element, to more than the working precision where that is asked for.
 
-use super::four::{Four, Precise};
-use super::{Leg, Points, block, put};
+use super::four::{Four, Precise, block, put};
+use super::{Leg, Points};
 use crate::model::State;
 
 impl<const N: usize> Points<N> {

@@ -60,6 +60,24 @@ pub(crate) trait Four: Precise {
         M: Model<N>;
 }
 
+/// Four of the numbers; zeros beyond the last.
+#[inline(always)]
+pub(crate) fn block<V: Four>(like: V, numbers: &[f64], at: usize) -> V {
+    if let Some(four) = numbers[at..].first_chunk() {
+        return like.with(*four);
+    }
+    let mut four = [0.0; 4];
+    four[..numbers.len() - at].copy_from_slice(&numbers[at..]);
+    like.with(four)
+}
+
+/// Writes them back, as far as there are so many.
+#[inline(always)]
+pub(crate) fn put<V: Four>(four: V, numbers: &mut [f64], at: usize) {
+    let end = numbers.len().min(at + 4);
+    numbers[at..end].copy_from_slice(&four.lanes()[..end - at]);
+}
+
 impl Precise for Lanes<4> {
     #[inline(always)]
     fn product(self, other: Self) -> (Self, Self) {

@@ -1,8 +1,8 @@
 //! M q̈ = f(q, q̇): forces are the only unknowns.
 
-use super::four::Four;
+use super::four::{Four, block, put};
 use super::sweep::{Largest, no_derivatives, relative};
-use super::{Leg, Points, block, put};
+use super::{Leg, Points};
 use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
 use crate::model::{Form, Model};

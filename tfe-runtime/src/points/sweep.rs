@@ -38,7 +38,7 @@ impl<V: Precise> Largest<V> {
 
     /// Of all lanes; NaN if one value was not finite.
     #[inline(always)]
-    pub(super) fn get(self) -> f64
+    pub(crate) fn get(self) -> f64
     where
         V: Four,
     {
@@ -52,7 +52,7 @@ impl<V: Precise> Largest<V> {
 
 /// |h δ| over the larger one of start and |h x|; zero over zero is zero, NaN stays NaN.
 #[inline(always)]
-pub(super) fn relative(h: f64, start: f64, x: f64, step: f64) -> f64 {
+pub(crate) fn relative(h: f64, start: f64, x: f64, step: f64) -> f64 {
     let scale = start.max(h.abs() * x);
     if step == 0.0 {
         0.0
