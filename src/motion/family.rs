@@ -35,6 +35,15 @@ impl FamilyNode {
     }
 }
 
+/// What a run of a family leaves of its constraints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FamilyResidual {
+    /// max |φ|
+    pub position: f64,
+    /// max |A v + a|
+    pub velocity: f64,
+}
+
 /// A recorded motion of a model of run-time length: what [`Motion`](crate::Motion) is for models of fixed size, by the same names.
 ///
 /// A node keeps 3 n numbers for n coordinates, the polynomial of an element of s stages 2 s n more: for long chains and long runs,
@@ -45,6 +54,7 @@ pub struct FamilyMotion {
     velocities: Vec<Vec<f64>>,
     energies: Vec<f64>,
     outputs: Outputs,
+    residual: (f64, f64),
     elements: Vec<FamilyDense>,
     statistics: Statistics,
     names: Vec<CoordinateName>,
@@ -70,6 +80,7 @@ impl FamilyMotion {
                 names: M::OBSERVABLES,
                 values: Vec::new(),
             },
+            residual: (0.0, 0.0),
             elements: Vec::new(),
             statistics: Statistics::default(),
             names: Vec::new(),
@@ -91,6 +102,11 @@ impl FamilyMotion {
             let length = start + M::OBSERVABLES.len();
             self.outputs.values.resize(length, 0.0);
             model.observables(t, &state.q, z, &mut self.outputs.values[start..]);
+        }
+        if M::CONSTRAINED {
+            let (position, velocity) = family::constraint_residual(model, t, &state.q, &velocity);
+            let before = self.residual;
+            self.residual = (larger(before.0, position), larger(before.1, velocity));
         }
         self.nodes.push(FamilyNode::new(t, state.clone()));
         self.velocities.push(velocity);
@@ -161,6 +177,12 @@ impl FamilyMotion {
         let scale = if start == 0.0 { 1.0 } else { start.abs() };
         let changes = self.energies.iter().map(|energy| (energy - start).abs());
         changes.map(|change| change / scale).fold(0.0, larger)
+    }
+
+    /// What the run leaves of its constraints: the largest |φ| and |A v + a| over all recorded nodes; zeros for models without any.
+    pub fn constraint_residual(&self) -> FamilyResidual {
+        let (position, velocity) = self.residual;
+        FamilyResidual { position, velocity }
     }
 
     /// What the run cost.

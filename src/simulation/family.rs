@@ -7,7 +7,7 @@ use crate::motion::family::{FamilyMotion, FamilyNode};
 use std::error::Error;
 use std::fmt;
 use std::ops::Range;
-use tfe_runtime::family::{FamilyError, FamilyModel, FamilyState, FamilyStepper};
+use tfe_runtime::family::{self, FamilyError, FamilyModel, FamilyState, FamilyStepper};
 use tfe_runtime::length::{FixedLength, RunTimeLength};
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Model, Solve};
@@ -74,7 +74,8 @@ impl<M: FamilyModel> Runs<M, 0> for RunTimeLength {
 /// # }
 /// ```
 ///
-/// The kinetic energy must be ½ Σ m v² with constant masses so far (one for each coordinate), the potential energy and the forces may be any.
+/// Without the feature `sparse` the kinetic energy must be ½ Σ m v² with constant masses, one for each coordinate; the potential energy and the forces may be any. With it a
+/// Lagrangian may have any kinetic energy and holonomic constraints: `constraint(rod[i in 0..n-1]) = …`.
 #[derive(Debug)]
 pub struct FamilySimulation<'m, M> {
     model: &'m M,
@@ -110,7 +111,8 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         }
     }
 
-    /// The element: `Mixed::<4>`, `Primal::<3>.reduced()`, `Element::mixed(n)`, …; those that are Runge–Kutta methods.
+    /// The element: `Mixed::<4>`, `Primal::<3>.reduced()`, `Element::mixed(n)`, …; without the feature `sparse` those that are Runge–Kutta methods, with constraints those of them
+    /// with Gauss points.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.element = element.into();
@@ -182,7 +184,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             FamilyRunError::new(kind, partial)
         };
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
-        let mut stepper = self.stepper(&start).map_err(refused)?;
+        let mut stepper = self.stepper(span.start, &start).map_err(refused)?;
         let mesh = Mesh::<0>::new(&span, step, &self.breaks, &[]).map_err(refused)?;
         let mut motion = FamilyMotion::from_start(self.model, span.start, &start);
         let mut bar = progress::Bar::new(self.progress, mesh.steps());
@@ -220,7 +222,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     /// The states that follow `start`, one a step, without end and in constant memory. After an error the iterator is finished.
     pub fn steps(&self, start: FamilyState, t0: f64) -> FamilySteps<'m, M> {
         let step = self.step.unwrap_or(f64::NAN);
-        let stepper = self.stepper(&start).and_then(|stepper| {
+        let stepper = self.stepper(t0, &start).and_then(|stepper| {
             if !(step.is_finite() && step != 0.0) {
                 return Err(RunErrorKind::Step { step });
             }
@@ -245,7 +247,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     }
 
     /// A stepper, if model, element and start are good.
-    fn stepper(&self, start: &FamilyState) -> Result<FamilyStepper<'m, M>, RunErrorKind> {
+    fn stepper(&self, t: f64, start: &FamilyState) -> Result<FamilyStepper<'m, M>, RunErrorKind> {
         self.model.check().map_err(RunErrorKind::Family)?;
         // Before memory is asked for: a wrong length may be any number.
         let expected = self.model.len();
@@ -264,7 +266,11 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
                 return Err(RunErrorKind::Start { coordinate, q, p });
             }
         }
-        FamilyStepper::new(self.model, self.element, self.control).map_err(RunErrorKind::Family)
+        let stepper = FamilyStepper::new(self.model, self.element, self.control);
+        let stepper = stepper.map_err(RunErrorKind::Family)?;
+        // A run records velocities: what has none is refused before it begins.
+        family::velocity(self.model, t, start).map_err(RunErrorKind::Family)?;
+        Ok(stepper)
     }
 }
 

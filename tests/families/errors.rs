@@ -250,10 +250,21 @@ fn what_families_cannot_do_yet_is_said() {
         p: vec![0.0; 3],
     };
     let run = Simulation::new(&OffDiagonal { n: 3 }).run(start.clone(), 0.0..1.0);
-    let expected = FamilyError::MassNotDiagonal { row: 0, column: 1 };
+    // Three masses in a row, each coupled to its neighbours alone: singular, too.
+    let expected = if cfg!(feature = "sparse") {
+        FamilyError::NoVelocity
+    } else {
+        FamilyError::MassNotDiagonal { row: 0, column: 1 }
+    };
     assert_eq!(kind(run), RunErrorKind::Family(expected));
-    let run = Simulation::new(&Varying { n: 3 }).run(start.clone(), 0.0..1.0);
-    assert_eq!(kind(run), RunErrorKind::Family(FamilyError::NotSecondOrder));
+    let run = Simulation::new(&Varying { n: 3 });
+    if cfg!(feature = "sparse") {
+        let run = run.solver(Solve::FixedPoint).run(start.clone(), 0.0..1.0);
+        assert_eq!(kind(run), RunErrorKind::Family(FamilyError::NeedsNewton));
+    } else {
+        let run = run.run(start.clone(), 0.0..1.0);
+        assert_eq!(kind(run), RunErrorKind::Family(FamilyError::NotSecondOrder));
+    }
     let run = Simulation::new(&Singular { n: 3 }).run(start.clone(), 0.0..1.0);
     let expected = FamilyError::SingularMass { coordinate: 2 };
     assert_eq!(kind(run), RunErrorKind::Family(expected));
@@ -264,13 +275,13 @@ fn what_families_cannot_do_yet_is_said() {
         let kind = kind(run.run(start.clone(), 0.0..1.0));
         assert_eq!(kind, RunErrorKind::Family(FamilyError::NoNewton));
     }
-    let run = Simulation::new(&model)
-        .element(Primal::<3>)
-        .run(start.clone(), 0.0..1.0);
-    assert!(matches!(
-        kind(run),
-        RunErrorKind::Family(FamilyError::ElementNotSupported { .. })
-    ));
+    if cfg!(not(feature = "sparse")) {
+        let run = Simulation::new(&model).element(Primal::<3>);
+        assert!(matches!(
+            kind(run.run(start.clone(), 0.0..1.0)),
+            RunErrorKind::Family(FamilyError::ElementNotSupported { .. })
+        ));
+    }
     let run = Simulation::new(&model)
         .element(Element::mixed(13))
         .run(start, 0.0..1.0);

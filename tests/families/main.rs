@@ -1,7 +1,12 @@
 //! Models of run-time length.
 
+#[cfg(feature = "sparse")]
+mod constrained;
+mod constraints;
 mod errors;
 mod kernels;
 mod motions;
+#[cfg(feature = "sparse")]
+mod rates;
 #[cfg(feature = "sparse")]
 mod stiff;

@@ -234,6 +234,10 @@ impl<'a> Emitter<'a> {
             Output::Bend(a, b) => at(&quote!(#second bend), &[a, b]),
             Output::RateQ(a, b) => at(&quote!(#second rate_q), &[a, b]),
             Output::RateV(a, b) => at(&quote!(#second rate_v), &[a, b]),
+            Output::SitePhi(a) => at(&quote!(values), &[a]),
+            Output::SiteDrift(a) => at(&quote!(drift), &[a]),
+            // Told entry by entry.
+            Output::SiteRow(..) => TokenStream::new(),
         }
     }
 
@@ -262,6 +266,9 @@ impl<'a> Emitter<'a> {
             Output::Bend(..) => matrix(quote!(#second bend)),
             Output::RateQ(..) => matrix(quote!(#second rate_q)),
             Output::RateV(..) => matrix(quote!(#second rate_v)),
+            Output::SitePhi(_) => vector(quote!(values)),
+            Output::SiteDrift(_) => vector(quote!(drift)),
+            Output::SiteRow(..) => TokenStream::new(),
             Output::Value | Output::Observable(_) | Output::Phi(_) | Output::Drift(_) => {
                 TokenStream::new()
             }
@@ -342,7 +349,7 @@ impl<'a> Emitter<'a> {
                 let z = &self.z;
                 at(&quote!(#z), &[a])
             }
-            Input::Multiplier(k) => one(&quote!(mu), *k),
+            Input::Multiplier(a) => at(&quote!(mu), &[a]),
             Input::Parameter(name) => {
                 let local = match self.parameters.get(name) {
                     Some(local) => local.clone(),
@@ -450,6 +457,8 @@ fn block(output: &Output) -> Option<(&'static str, &Affine, &Affine)> {
         Output::QQ(a, b) => Some(("QQ", a, b)),
         Output::ForceZ(a, b) => Some(("ForceZ", a, b)),
         Output::ForceQ(a, b) => Some(("ForceQ", a, b)),
+        Output::SiteRow(a, b) => Some(("Row", a, b)),
+        Output::Bend(a, b) => Some(("Bend", a, b)),
         _ => None,
     }
 }

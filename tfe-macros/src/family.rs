@@ -1,5 +1,7 @@
 //! Models of run-time length: kernels over slices, and the checks of lengths.
 
+mod constraint;
+
 use crate::emit::{self, Body, Emitter};
 use crate::page;
 use proc_macro2::{Literal, TokenStream};
@@ -120,6 +122,7 @@ impl Kernels<'_> {
         let (dof, check) = (&self.dof, self.check());
         let coordinate_name = self.coordinate_name();
         let observables = self.observables();
+        let constraints = constraint::members(self.declared, self.derivation, &self.dof);
         quote! {
             const _: () = {
                 use #path::__private as __tfe;
@@ -193,6 +196,7 @@ impl Kernels<'_> {
                     }
 
                     #coordinate_name
+                    #constraints
                     #observables
                 }
             };

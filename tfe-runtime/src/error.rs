@@ -1,6 +1,7 @@
 //! Why a step failed.
 
 use crate::element::Element;
+use crate::model::CoordinateName;
 use core::fmt;
 
 /// Why the pointwise change between velocity and momentum failed.
@@ -60,7 +61,7 @@ pub enum ConstraintError {
     /// The start is not on the constraints.
     Start {
         /// The constraint that is violated most.
-        constraint: &'static str,
+        constraint: CoordinateName,
         /// Whether positions violate it, or velocities.
         position: bool,
         /// By how much: |φ| or |A v + a| over the length of its row.

@@ -2,17 +2,29 @@
 //!
 //! A family is a model whose number of coordinates is a field of its struct. Its kernels are loops over slices, compiled once for all lengths;
 //! second derivatives are told entry by entry, so that nobody holds a matrix of zeros. [`FamilyStepper`] moves a [`FamilyState`] with all points
-//! of an element four to a register, as the stepper of fixed-size models does, in time and memory linear in the length.
+//! of an element four to a register, as the stepper of fixed-size models does, in time and memory linear in the length; with the feature `sparse` it solves
+//! other kinetic energies and constraints with one sparse matrix for the rates at all points.
 
+#[cfg(feature = "sparse")]
+mod blocked;
 mod dense;
 mod error;
+mod forces;
 mod inertia;
 mod lanes;
 #[cfg(feature = "sparse")]
 mod newton;
+#[cfg(feature = "sparse")]
+mod node;
 mod pattern;
+#[cfg(feature = "sparse")]
+mod rates;
+#[cfg(feature = "sparse")]
+mod rows;
 mod space;
 mod stepper;
+#[cfg(feature = "sparse")]
+mod tangent;
 
 pub use dense::FamilyDense;
 pub use error::FamilyError;
@@ -57,6 +69,10 @@ pub enum Block {
     ForceZ,
     /// ∂Q/∂q
     ForceQ,
+    /// A = ∂φ/∂q; row: the number of the constraint.
+    Row,
+    /// Σ μ ∂²φ/∂q∂q
+    Bend,
 }
 
 /// Takes second derivatives as a kernel computes them: contributions to entries, in an order that depends on lengths alone.
@@ -115,6 +131,48 @@ pub trait FamilyModel {
 
     /// The name of a coordinate: `q[0]`, `q[1]`, …
     fn coordinate_name(&self, index: usize) -> CoordinateName;
+
+    /// Whether there are constraints: holonomic ones, φ(q, t) = 0.
+    const CONSTRAINED: bool = false;
+
+    /// The number of constraints, each a row of A.
+    ///
+    /// They are numbered in order of declaration; one by site has its rows in order of the sites.
+    ///
+    /// ```text
+    /// row = rows of the declarations before it + (i − start)
+    /// ```
+    fn constraints(&self) -> usize {
+        0
+    }
+
+    /// The name of a constraint: `rod[0]`, `rod[1]`, …, or `rod` of a single one.
+    fn constraint_name(&self, row: usize) -> CoordinateName {
+        CoordinateName::element("", row)
+    }
+
+    /// φ(q, t), one value a row.
+    fn constraint_values<R: Real>(&self, _t: R, _q: &[R], _values: &mut [R]) {}
+
+    /// The contributions to A = ∂φ/∂q in [`Block::Row`], and a = ∂φ/∂t in `drift`, one value a row: zero where the time does not appear.
+    fn constraint_rows<R: Real, E: Entries<R>>(
+        &self,
+        _t: R,
+        _q: &[R],
+        _drift: &mut [R],
+        _entries: &mut E,
+    ) {
+    }
+
+    /// The contributions to Σ μ ∂²φ/∂q∂q in [`Block::Bend`], those on both sides of the diagonal; one multiplier μ a row.
+    fn constraint_second<R: Real, E: Entries<R>>(
+        &self,
+        _t: R,
+        _q: &[R],
+        _mu: &[R],
+        _entries: &mut E,
+    ) {
+    }
 
     /// The names of the observables.
     const OBSERVABLES: &'static [&'static str] = &[];
@@ -185,6 +243,30 @@ pub fn energy<M: FamilyModel>(model: &M, t: f64, state: &FamilyState, v: &[f64])
         }
         Form::Hamiltonian => model.energy_function(t, &state.q, &state.p),
     }
+}
+
+/// The largest |φ| and the largest |A v + a| over the constraints; zeros where there are none.
+#[must_use]
+pub fn constraint_residual<M: FamilyModel>(model: &M, t: f64, q: &[f64], v: &[f64]) -> (f64, f64) {
+    struct Rates<'a> {
+        v: &'a [f64],
+        rates: Vec<f64>,
+    }
+    impl Entries<f64> for Rates<'_> {
+        fn add(&mut self, _: Block, row: usize, column: usize, value: f64) {
+            self.rates[row] += value * self.v[column];
+        }
+    }
+    let count = model.constraints();
+    let (mut values, mut drift) = (vec![0.0; count], vec![0.0; count]);
+    let rates = vec![0.0; count];
+    let mut rates = Rates { v, rates };
+    model.constraint_values(t, q, &mut values);
+    model.constraint_rows(t, q, &mut drift, &mut rates);
+    for (rate, drift) in rates.rates.iter_mut().zip(&drift) {
+        *rate += drift;
+    }
+    (lanes::largest(&values), lanes::largest(&rates.rates))
 }
 
 /// L_v, or H_p.

@@ -294,12 +294,12 @@ pub enum By {
     Parameter(usize),
 }
 
-/// The name of a coordinate: `theta1`, or `q[3]`.
+/// The name of a coordinate, `theta1` or `q[3]`, or in models of run-time length of a constraint, `rod[3]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CoordinateName {
     /// The name as declared.
     pub name: &'static str,
-    /// The position in an array of coordinates.
+    /// The position in an array of coordinates, or the site of a constraint.
     pub index: Option<usize>,
 }
 

@@ -57,6 +57,10 @@ pub(crate) const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
 /// The same where Newton's method is ill-conditioned, if they have not fallen for some time.
 pub(crate) const ROUGH_ROUND_OFF: f64 = 1e-10;
 
+/// The same of large stiff models, where residuals are differences of forces many orders larger.
+#[cfg(feature = "sparse")]
+const STIFF_ROUND_OFF: f64 = 1e-6;
+
 /// Fixed-point iterations that cost as much as Newton's way.
 pub(crate) const PATIENCE: u32 = 24;
 
@@ -100,6 +104,10 @@ impl Preference {
     }
 }
 
+/// Factors of a large sparse matrix serve while increments shrink at least as fast.
+#[cfg(feature = "sparse")]
+pub(crate) const SERVES: f64 = 0.3;
+
 /// Unknowns of an element up to which factors of its matrix are not worth keeping.
 const SMALL: usize = 8;
 
@@ -112,6 +120,9 @@ pub(crate) struct Monitor {
     last: f64,
     rate: f64,
     risen: u32,
+    /// Increments in a row that a fresh matrix did not make smaller.
+    #[cfg(feature = "sparse")]
+    noise: u32,
     /// The smallest increment so far, and for how many iterations it has not been halved.
     best: f64,
     idle: u32,
@@ -132,6 +143,8 @@ impl Monitor {
             last: f64::INFINITY,
             rate: 1.0,
             risen: 0,
+            #[cfg(feature = "sparse")]
+            noise: 0,
             best: f64::INFINITY,
             idle: 0,
         }
@@ -187,6 +200,15 @@ impl Monitor {
         } else {
             Verdict::GoOn
         })
+    }
+
+    /// Whether the last increment is the rounding of a stiff residual: with a matrix made just before it, Newton's method would have halved anything else.
+    /// Twice in a row, so that one unlucky step does not end the iteration.
+    #[cfg(feature = "sparse")]
+    pub(crate) fn is_noise(&mut self, fresh: bool) -> bool {
+        let idle = fresh && self.rate > 0.5 && self.last <= STIFF_ROUND_OFF;
+        self.noise = if idle { self.noise + 1 } else { 0 };
+        self.noise >= 2
     }
 
     /// Whether so many more iterations would not do, at the present rate.

@@ -524,7 +524,10 @@ fn what_cannot_be_is_told() {
     assert!(matches!(
         error,
         StepError::Constraint(ConstraintError::Start {
-            constraint: "wire",
+            constraint: CoordinateName {
+                name: "wire",
+                index: None
+            },
             position: true,
             ..
         })

@@ -486,12 +486,9 @@ impl Model {
         if !self.is_of_run_time_length() {
             return;
         }
-        let constraint = self.constraints.first().map(|(name, ..)| name.span);
-        let parameter = self.sensitivities.first().map(|parameter| parameter.span);
-        for (argument, span) in [("constraint", constraint), ("sensitivity", parameter)] {
-            if let Some(span) = span {
-                bag.push(span, Kind::RunTimeLength { argument });
-            }
+        if let Some(parameter) = self.sensitivities.first() {
+            let argument = "sensitivity";
+            bag.push(parameter.span, Kind::RunTimeLength { argument });
         }
     }
 

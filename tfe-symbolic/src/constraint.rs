@@ -8,6 +8,8 @@
 //! The velocity v is a leaf of its own in models of both forms. The rate Ȧ = ∂A/∂q v + ∂A/∂t is taken with v as the rate of q, so that
 //! ∂Ȧ/∂v = ∂A/∂q and ∂Ȧ/∂q is the rate of ∂A/∂q: three of the five arrays of second derivatives come from one.
 
+mod sites;
+
 use crate::constant::Constant;
 use crate::declared::{Constraint, ConstraintKind};
 use crate::differentiate::{Forward, derivative, gradient};
@@ -16,6 +18,7 @@ use crate::function::Function;
 use crate::graph::{ExprId, Graph, Node};
 use crate::input::{Affine, Input};
 use crate::rewrite::Mapping;
+pub(crate) use sites::entries as entries_by_site;
 
 /// A and a of one constraint.
 pub(crate) struct Row {
@@ -71,7 +74,7 @@ pub(crate) fn entries(graph: &mut Graph, constraints: &[Constraint]) -> Vec<Entr
         collected.push(graph, Place::scalar(Array::Drift(number)), row.drift);
         collected.rates(graph, number, constraint, &row);
         if is_holonomic(constraint) {
-            let mu = graph.input(Input::Multiplier(number));
+            let mu = graph.input(Input::Multiplier(constraint.row.clone()));
             collected.bends(graph, mu, &row.entries, true);
         }
     }
@@ -111,9 +114,9 @@ impl Collected {
     /// The derivatives of Aᵀμ = ∂(Σ μ ψ)/∂v over all velocity constraints: rolling contacts share long rotations.
     fn contacts(&mut self, graph: &mut Graph, constraints: &[Constraint]) {
         let mut terms = Vec::new();
-        for (number, constraint) in constraints.iter().enumerate() {
+        for constraint in constraints {
             if !is_holonomic(constraint) {
-                let mu = graph.input(Input::Multiplier(number));
+                let mu = graph.input(Input::Multiplier(constraint.row.clone()));
                 terms.push((Constant::ONE, graph.multiply(mu, constraint.value)));
             }
         }

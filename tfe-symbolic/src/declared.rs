@@ -123,11 +123,15 @@ impl fmt::Display for Parameter {
     }
 }
 
-/// A constraint: one scalar equation.
+/// A constraint: one scalar equation; in models of run-time length one for each site of a range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Constraint {
-    /// Its name; with its place where a declaration makes several, `rod[2]`.
+    /// Its name; with its place where a declaration makes several equations that are written out, `rod[2]`.
     pub name: String,
+    /// The range of the sites; empty for one equation.
+    pub ranges: Vec<SumRange>,
+    /// The number of the equation: of all sites, those of the declarations before it come first.
+    pub row: Affine,
     /// What kind of equation it is.
     pub kind: ConstraintKind,
     /// What vanishes: φ(q, t), or ψ(q, v, t) = A(q, t) v + a(q, t). In Hamiltonian models v stands for the velocities too.

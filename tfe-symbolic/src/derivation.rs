@@ -38,7 +38,7 @@ pub struct Model {
     pub dissipation: Option<ExprId>,
     /// The generalized forces.
     pub forces: Vec<Force>,
-    /// The constraints, free of sums over ranges.
+    /// The constraints, free of sums over ranges; those by site of models of run-time length are holonomic.
     pub constraints: Vec<Constraint>,
     /// The observables by name.
     pub observables: Vec<(String, ExprId)>,
@@ -130,7 +130,11 @@ impl Derivation {
             deriver.push(&[], Place::scalar(Array::Observable(number)), *value);
         }
         let mut entries = deriver.entries;
-        entries.extend(constraint::entries(&mut graph, &constraints));
+        let constrain = match dof.is_of_run_time() {
+            true => constraint::entries_by_site,
+            false => constraint::entries,
+        };
+        entries.extend(constrain(&mut graph, &constraints));
         let structure = Structure::of(&graph, form, &dof, &entries);
         let by_matrix = [Writing::AsDerived, Writing::Expanded]
             .into_iter()

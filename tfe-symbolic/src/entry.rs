@@ -26,6 +26,9 @@ pub(crate) enum Array {
     Bend,
     RateQ,
     RateV,
+    SitePhi,
+    SiteRow,
+    SiteDrift,
 }
 
 /// One entry of an array of results; vectors and numbers leave indices unused.
@@ -45,8 +48,10 @@ impl Array {
             Self::ZZ => request.mass || request.second,
             Self::ZQ | Self::QQ | Self::ForceZ | Self::ForceQ => request.second,
             Self::Observable(_) => request.observables,
-            Self::Phi(_) => request.constraint_values,
-            Self::Row(_) | Self::Drift(_) => request.constraint_rows,
+            Self::Phi(_) | Self::SitePhi => request.constraint_values,
+            Self::Row(_) | Self::Drift(_) | Self::SiteRow | Self::SiteDrift => {
+                request.constraint_rows
+            }
             Self::PsiQ(_) | Self::RowRate(_) | Self::Bend | Self::RateQ | Self::RateV => {
                 request.constraint_second
             }
@@ -91,6 +96,9 @@ impl Place {
             Array::Bend => Output::Bend(row, column),
             Array::RateQ => Output::RateQ(row, column),
             Array::RateV => Output::RateV(row, column),
+            Array::SitePhi => Output::SitePhi(row),
+            Array::SiteRow => Output::SiteRow(row, column),
+            Array::SiteDrift => Output::SiteDrift(row),
         }
     }
 

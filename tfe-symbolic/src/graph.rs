@@ -314,10 +314,11 @@ impl Input {
     /// The index of an element, or the number itself.
     pub(crate) fn index(&self) -> Option<&Affine> {
         match self {
-            Self::Time | Self::Multiplier(_) | Self::Parameter(_) => None,
+            Self::Time | Self::Parameter(_) => None,
             Self::Coordinate(index)
             | Self::Velocity(index)
             | Self::Momentum(index)
+            | Self::Multiplier(index)
             | Self::ParameterElement(_, index)
             | Self::Integer(index) => Some(index),
         }
@@ -326,10 +327,11 @@ impl Input {
     /// The same leaf with another index.
     pub(crate) fn with_index(&self, index: Affine) -> Self {
         match self {
-            Self::Time | Self::Multiplier(_) | Self::Parameter(_) => self.clone(),
+            Self::Time | Self::Parameter(_) => self.clone(),
             Self::Coordinate(_) => Self::Coordinate(index),
             Self::Velocity(_) => Self::Velocity(index),
             Self::Momentum(_) => Self::Momentum(index),
+            Self::Multiplier(_) => Self::Multiplier(index),
             Self::ParameterElement(name, _) => Self::ParameterElement(name.clone(), index),
             Self::Integer(_) => Self::Integer(index),
         }

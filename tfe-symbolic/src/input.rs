@@ -38,7 +38,7 @@ pub enum Input {
     /// Its momentum (models declared by a Hamiltonian).
     Momentum(Affine),
     /// The multiplier of the constraint of this number.
-    Multiplier(usize),
+    Multiplier(Affine),
     /// A scalar field of the struct.
     Parameter(String),
     /// An element of an array field of the struct.

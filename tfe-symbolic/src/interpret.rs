@@ -268,10 +268,7 @@ impl Machine<'_> {
             Input::Velocity(index) | Input::Momentum(index) => {
                 self.element("z", &environment.z, index)
             }
-            Input::Multiplier(number) => {
-                let number = i64::try_from(*number).map_err(|_| InterpretError::Overflow)?;
-                self.element("mu", &environment.mu, &Affine::constant(number))
-            }
+            Input::Multiplier(index) => self.element("mu", &environment.mu, index),
             Input::Parameter(name) => environment
                 .parameters
                 .get(name)
@@ -351,12 +348,14 @@ impl Machine<'_> {
             Output::Bend(a, _) | Output::RateQ(a, _) | Output::RateV(a, _) => self.index(a)?,
             Output::Phi(k) | Output::Drift(k) => number(*k)?,
             Output::Row(k, _) | Output::PsiQ(k, _) | Output::RowRate(k, _) => number(*k)?,
+            Output::SitePhi(a) | Output::SiteRow(a, _) | Output::SiteDrift(a) => self.index(a)?,
         };
         let column = match output {
             Output::ZZ(_, b) | Output::ZQ(_, b) | Output::QQ(_, b) => self.index(b)?,
             Output::ForceZ(_, b) | Output::ForceQ(_, b) => self.index(b)?,
             Output::Bend(_, b) | Output::RateQ(_, b) | Output::RateV(_, b) => self.index(b)?,
             Output::Row(_, b) | Output::PsiQ(_, b) | Output::RowRate(_, b) => self.index(b)?,
+            Output::SiteRow(_, b) => self.index(b)?,
             _ => 0,
         };
         let results = &mut self.results;
@@ -376,9 +375,9 @@ impl Machine<'_> {
             Output::QQ(..) => entry(entry(&mut results.qq, row)?, column),
             Output::ForceZ(..) => entry(entry(&mut results.force_z, row)?, column),
             Output::ForceQ(..) => entry(entry(&mut results.force_q, row)?, column),
-            Output::Phi(_) => entry(&mut results.phi, row),
-            Output::Row(..) => entry(entry(&mut results.rows, row)?, column),
-            Output::Drift(_) => entry(&mut results.drift, row),
+            Output::Phi(_) | Output::SitePhi(_) => entry(&mut results.phi, row),
+            Output::Row(..) | Output::SiteRow(..) => entry(entry(&mut results.rows, row)?, column),
+            Output::Drift(_) | Output::SiteDrift(_) => entry(&mut results.drift, row),
             Output::PsiQ(..) => entry(entry(&mut results.psi_q, row)?, column),
             Output::RowRate(..) => entry(entry(&mut results.row_rates, row)?, column),
             Output::Bend(..) => entry(entry(&mut results.bend, row)?, column),
@@ -405,8 +404,9 @@ impl Machine<'_> {
             Output::QQ(..) => results.qq.iter_mut().for_each(|row| row.fill(0.0)),
             Output::ForceZ(..) => results.force_z.iter_mut().for_each(|row| row.fill(0.0)),
             Output::ForceQ(..) => results.force_q.iter_mut().for_each(|row| row.fill(0.0)),
-            Output::Phi(_) => results.phi.fill(0.0),
-            Output::Drift(_) => results.drift.fill(0.0),
+            Output::Phi(_) | Output::SitePhi(_) => results.phi.fill(0.0),
+            Output::Drift(_) | Output::SiteDrift(_) => results.drift.fill(0.0),
+            Output::SiteRow(..) => results.rows.iter_mut().for_each(|row| row.fill(0.0)),
             Output::Row(number, _) => row(&mut results.rows, *number),
             Output::PsiQ(number, _) => row(&mut results.psi_q, *number),
             Output::RowRate(number, _) => row(&mut results.row_rates, *number),

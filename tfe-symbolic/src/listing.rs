@@ -78,9 +78,9 @@ fn array(output: &Output) -> &'static str {
         Output::ForceZ(..) => "Q_z",
         Output::ForceQ(..) => "Q_q",
         Output::Observable(_) => "output",
-        Output::Phi(_) => "phi",
-        Output::Row(..) => "A",
-        Output::Drift(_) => "a",
+        Output::Phi(_) | Output::SitePhi(_) => "phi",
+        Output::Row(..) | Output::SiteRow(..) => "A",
+        Output::Drift(_) | Output::SiteDrift(_) => "a",
         Output::PsiQ(..) => "psi_q",
         Output::RowRate(..) => "A_rate",
         Output::Bend(..) => "bend",
@@ -94,7 +94,11 @@ impl fmt::Display for Output {
         f.write_str(array(self))?;
         match self {
             Self::Value => Ok(()),
-            Self::ByZ(a) | Self::ByQ(a) | Self::Force(a) => write!(f, "[{a}]"),
+            Self::ByZ(a)
+            | Self::ByQ(a)
+            | Self::Force(a)
+            | Self::SitePhi(a)
+            | Self::SiteDrift(a) => write!(f, "[{a}]"),
             Self::ZZ(a, b)
             | Self::ZQ(a, b)
             | Self::QQ(a, b)
@@ -102,7 +106,8 @@ impl fmt::Display for Output {
             | Self::ForceQ(a, b)
             | Self::Bend(a, b)
             | Self::RateQ(a, b)
-            | Self::RateV(a, b) => {
+            | Self::RateV(a, b)
+            | Self::SiteRow(a, b) => {
                 write!(f, "[{a}, {b}]")
             }
             Self::Row(number, a) | Self::PsiQ(number, a) | Self::RowRate(number, a) => {

@@ -14,6 +14,7 @@ mod rates;
 mod requirements;
 mod scalar;
 mod sensitivity;
+mod sites;
 mod sums;
 mod usage;
 mod vector;
@@ -142,6 +143,15 @@ struct Index {
     end: Affine,
 }
 
+/// A declaration whose formula may have an index of its own.
+#[derive(Clone, Debug)]
+struct DeclaredPlace {
+    /// `constraint(rod[i in 0..n-1])`
+    text: String,
+    /// How many of the indices around are its own.
+    own: usize,
+}
+
 struct Lowerer<'a> {
     model: &'a Model,
     context: &'a Context,
@@ -160,6 +170,8 @@ struct Lowerer<'a> {
     visible_lets: usize,
     /// The sums around it, outermost first.
     indices: Vec<Index>,
+    /// The declaration around it, where that is one that messages name.
+    place: Option<DeclaredPlace>,
     /// Loops around the `let` at hand that its formula does not see.
     hidden_loops: u32,
     /// The largest number of terms of the sums met since it was last cleared; `None`: generic.
@@ -191,6 +203,7 @@ impl<'a> Lowerer<'a> {
             rates: rates::lets_with_rates(model),
             visible_lets: model.lets.len(),
             indices: Vec::new(),
+            place: None,
             hidden_loops: 0,
             terms: Some(1),
             loops: HashMap::new(),

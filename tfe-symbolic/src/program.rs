@@ -96,6 +96,12 @@ pub enum Output {
     RateQ(Affine, Affine),
     /// ∂(Ȧᵀμ)/∂v
     RateV(Affine, Affine),
+    /// φ of one constraint of a model of run-time length
+    SitePhi(Affine),
+    /// A of a model of run-time length (row: constraint, column: coordinate)
+    SiteRow(Affine, Affine),
+    /// a of one constraint of a model of run-time length
+    SiteDrift(Affine),
 }
 
 impl Output {

@@ -131,7 +131,12 @@ fn constraints(graph: &Graph, entries: &[Entry]) -> (bool, bool) {
     let rows = entries.iter().filter(|entry| {
         matches!(
             entry.place.array,
-            Array::Phi(_) | Array::Row(_) | Array::Drift(_)
+            Array::Phi(_)
+                | Array::Row(_)
+                | Array::Drift(_)
+                | Array::SitePhi
+                | Array::SiteRow
+                | Array::SiteDrift
         )
     });
     let values: Vec<ExprId> = rows.map(|entry| entry.value).collect();

@@ -8,7 +8,7 @@ use crate::constrained::{START_TOLERANCE, refused, relative_residual};
 use crate::equations::Span;
 use crate::error::{ConstraintError, StepError};
 use crate::legendre::largest;
-use crate::model::{Model, State};
+use crate::model::{CoordinateName, Model, State};
 use crate::newton::{Solve, newton};
 use crate::scheme::{SchemeRef, Tables};
 use crate::step::{Interval, Last, Memory, Method, set_kicks, total};
@@ -198,7 +198,7 @@ where
         for (residual, is_position) in [(position, true), (velocity, false)] {
             if !(residual <= START_TOLERANCE) {
                 return Err(ConstraintError::Start {
-                    constraint: constraint.name,
+                    constraint: CoordinateName::single(constraint.name),
                     position: is_position,
                     residual,
                 }

@@ -1,7 +1,7 @@
 //! The solution of a family between the nodes: integrated rates (T-69).
 
 use super::FamilyState;
-use crate::basis::{MAX_NODES, legendre_integrals};
+use crate::basis::{MAX_NODES, legendre, legendre_integrals};
 use crate::scheme::SchemeRef;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,8 +14,18 @@ pub struct FamilyDense {
     times: (f64, f64),
     start: FamilyState,
     end: FamilyState,
-    /// Legendre coefficients of h dq/dt, a row of n each, then those of h dp/dt.
+    /// Legendre coefficients of h dq/dt, a row of n each.
     rates: Vec<f64>,
+    momenta: Momenta,
+}
+
+/// Legendre coefficients, a row of n each.
+#[derive(Clone, Debug, PartialEq)]
+enum Momenta {
+    /// Of h dp/dt.
+    Rates(Vec<f64>),
+    /// Of p itself.
+    Values(Vec<f64>),
 }
 
 impl FamilyDense {
@@ -26,10 +36,11 @@ impl FamilyDense {
             start: state.clone(),
             end: state,
             rates: Vec::new(),
+            momenta: Momenta::Rates(Vec::new()),
         }
     }
 
-    /// From rates of coordinates and momenta at the points, as functions of point and coordinate.
+    /// From rates of coordinates at the unknowns and of momenta at the points, as functions of unknown (point) and coordinate.
     pub(super) fn of(
         scheme: &SchemeRef<'_>,
         times: (f64, f64),
@@ -38,31 +49,46 @@ impl FamilyDense {
         rate: impl Fn(usize, usize) -> f64,
         force: impl Fn(usize, usize) -> f64,
     ) -> Self {
-        let (count, n) = (scheme.rates(), start.q.len());
-        let mut rates = vec![0.0; 2 * count * n];
-        let (q, p) = rates.split_at_mut(count * n);
-        let points = scheme.points();
-        for (m, row) in q.chunks_exact_mut(n).enumerate() {
-            for point in 0..points {
-                let weight = h * scheme.rate[m * points + point];
-                for (a, entry) in row.iter_mut().enumerate() {
-                    *entry += weight * rate(point, a);
-                }
-            }
-        }
-        for (m, row) in p.chunks_exact_mut(n).enumerate() {
-            for point in 0..points {
-                let weight = h * scheme.force_rate[m * points + point];
-                for (a, entry) in row.iter_mut().enumerate() {
-                    *entry += weight * force(point, a);
-                }
-            }
-        }
+        let n = start.q.len();
+        let force_rates = coefficients(scheme.force_rate, scheme.points(), (h, n), force);
         Self {
             times,
             start,
             end,
-            rates,
+            rates: coefficients(scheme.rate, scheme.unknowns(), (h, n), rate),
+            momenta: Momenta::Rates(force_rates),
+        }
+    }
+
+    /// From rates and momenta at the points of a collocated element, where momenta jump at its ends (T-79).
+    #[cfg(feature = "sparse")]
+    pub(super) fn with_jumps(
+        scheme: &SchemeRef<'_>,
+        times: (f64, f64),
+        h: f64,
+        (start, end): (FamilyState, FamilyState),
+        rate: impl Fn(usize, usize) -> f64,
+        momentum: impl Fn(usize, usize) -> f64,
+    ) -> Self {
+        let (n, s) = (start.q.len(), scheme.rates());
+        let mut values = coefficients(scheme.rate, scheme.unknowns(), (1.0, n), momentum);
+        // P_j is one at the end and (−1)^j at the start.
+        let sign = |j: usize| if j.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let mut last = vec![0.0; n];
+        for a in 0..n {
+            let at = |j: usize| values[j * n + a];
+            let to_end = end.p[a] - (0..s).map(at).sum::<f64>();
+            let to_start = start.p[a] - (0..s).map(|j| sign(j) * at(j)).sum::<f64>();
+            last[a] = 0.5 * (to_end + sign(s) * to_start);
+            values[(s - 1) * n + a] += 0.5 * (to_end - sign(s) * to_start);
+        }
+        values.extend(last);
+        Self {
+            times,
+            start,
+            end,
+            rates: coefficients(scheme.rate, scheme.unknowns(), (h, n), rate),
+            momenta: Momenta::Values(values),
         }
     }
 
@@ -88,15 +114,43 @@ impl FamilyDense {
         let mut integrals = [0.0; MAX_NODES];
         legendre_integrals(tau, &mut integrals);
         let mut state = self.start.clone();
-        let n = state.q.len();
-        let (q, p) = self.rates.split_at(self.rates.len() / 2);
-        for (target, rates) in [(&mut state.q, q), (&mut state.p, p)] {
-            for (row, integral) in rates.chunks_exact(n.max(1)).zip(integrals) {
-                for (value, rate) in target.iter_mut().zip(row) {
-                    *value += integral * rate;
-                }
+        add(&self.rates, &integrals, &mut state.q);
+        match &self.momenta {
+            Momenta::Rates(rates) => add(rates, &integrals, &mut state.p),
+            Momenta::Values(values) => {
+                let mut polynomials = [0.0; MAX_NODES];
+                legendre(tau, &mut polynomials);
+                state.p.fill(0.0);
+                add(values, &polynomials, &mut state.p);
             }
         }
         state
+    }
+}
+
+/// factor · Σ_l matrix_ml value(l, a): a row of n for each row of the matrix.
+fn coefficients(
+    matrix: &[f64],
+    columns: usize,
+    (factor, n): (f64, usize),
+    value: impl Fn(usize, usize) -> f64,
+) -> Vec<f64> {
+    let mut rows = vec![0.0; matrix.len() / columns * n];
+    for (row, weights) in rows.chunks_exact_mut(n).zip(matrix.chunks_exact(columns)) {
+        for (l, weight) in weights.iter().enumerate() {
+            for (a, entry) in row.iter_mut().enumerate() {
+                *entry += factor * weight * value(l, a);
+            }
+        }
+    }
+    rows
+}
+
+/// Adds Σ_m weights_m rows_m.
+fn add(rows: &[f64], weights: &[f64], sum: &mut [f64]) {
+    for (row, weight) in rows.chunks_exact(sum.len().max(1)).zip(weights) {
+        for (value, entry) in sum.iter_mut().zip(row) {
+            *value += weight * entry;
+        }
     }
 }

@@ -12,9 +12,9 @@ pub enum FamilyError {
         /// The array as declared, `q[n]`.
         array: &'static str,
     },
-    /// A sum over nothing.
+    /// A sum over nothing, or a constraint of no site.
     EmptyRange {
-        /// The range of the sum, `i in 0..n-1`.
+        /// The range of the sum, `i in 0..n-1`; of a constraint, the declaration, `constraint(rod[i in 0..n-1])`.
         ranges: &'static str,
         /// Its first value.
         start: i64,
@@ -27,7 +27,7 @@ pub enum FamilyError {
         array: &'static str,
         /// The index as declared, `i+1`.
         index: &'static str,
-        /// The ranges of the sums that it depends on.
+        /// The ranges of the sums that it depends on, after the constraint that it stands in.
         ranges: &'static str,
         /// The first value that is outside.
         value: i64,
@@ -44,7 +44,7 @@ pub enum FamilyError {
         expected: i64,
         /// That index as declared.
         index: &'static str,
-        /// The ranges of the sums that it depends on.
+        /// The ranges of the sums that it depends on, after the constraint that it stands in.
         ranges: &'static str,
     },
     /// A vector of a state that is not as long as the model.
@@ -68,6 +68,8 @@ pub enum FamilyError {
         /// The coordinate.
         coordinate: usize,
     },
+    /// No velocity belongs to a momentum, or no momentum to a velocity: ∂²/∂z∂z is singular, or values are not finite.
+    NoVelocity,
     /// The equations are not of the form M q̈ = f with a constant diagonal M: not supported yet.
     NotSecondOrder,
     /// The element does not exist.
@@ -79,6 +81,20 @@ pub enum FamilyError {
     },
     /// Newton's method was asked for, but the feature `sparse` is off.
     NoNewton,
+    /// The fixed-point iteration was asked for, but the model is solved by Newton's method.
+    NeedsNewton,
+    /// Constraints without the feature `sparse`, or of a Hamiltonian.
+    ConstraintsNotSupported,
+    /// No ordering of its equations fits into memory.
+    TooLarge,
+}
+
+/// What is said before the place of an index: a declaration has parentheses, ranges of sums have none.
+fn sum_over(ranges: &str) -> &'static str {
+    match ranges.contains('(') {
+        true => "",
+        false => "the sum over ",
+    }
 }
 
 impl fmt::Display for FamilyError {
@@ -86,7 +102,8 @@ impl fmt::Display for FamilyError {
         match self {
             Self::NoElements { array } => write!(f, "the array `{array}` has no elements"),
             Self::EmptyRange { ranges, start, end } => {
-                write!(f, "the sum over `{ranges}` is empty: its range is {start}..{end}")
+                let sum = sum_over(ranges);
+                write!(f, "{sum}`{ranges}` is empty: its range is {start}..{end}")
             }
             Self::Index {
                 array,
@@ -97,7 +114,8 @@ impl fmt::Display for FamilyError {
             } => {
                 write!(f, "the index of `{array}[{index}]`")?;
                 if !ranges.is_empty() {
-                    write!(f, " in the sum over `{ranges}`")?;
+                    let sum = sum_over(ranges);
+                    write!(f, " in {sum}`{ranges}`")?;
                 }
                 write!(f, " becomes {value}, but `{array}` has {length} elements")
             }
@@ -110,7 +128,8 @@ impl fmt::Display for FamilyError {
             } => {
                 write!(f, "`{field}` has {length} elements, but `{field}[{index}]`")?;
                 if !ranges.is_empty() {
-                    write!(f, " in the sum over `{ranges}`")?;
+                    let sum = sum_over(ranges);
+                    write!(f, " in {sum}`{ranges}`")?;
                 }
                 write!(f, " asks for {expected}")
             }
@@ -124,14 +143,15 @@ impl fmt::Display for FamilyError {
             ),
             Self::MassNotDiagonal { row, column } => write!(
                 f,
-                "the mass matrix has an entry off its diagonal, ({row}, {column}); models of run-time length need a diagonal one so far"
+                "the mass matrix has an entry off its diagonal, ({row}, {column}); models of run-time length need a diagonal one without the feature `sparse`"
             ),
             Self::SingularMass { coordinate } => write!(
                 f,
                 "the kinetic energy does not depend on the velocity of coordinate {coordinate}"
             ),
+            Self::NoVelocity => f.write_str("no velocity belongs to the momentum there"),
             Self::NotSecondOrder => f.write_str(
-                "models of run-time length need a kinetic energy ½ Σ m v² with constant masses so far",
+                "models of run-time length need a kinetic energy ½ Σ m v² with constant masses; with the feature `sparse` a Lagrangian may have any",
             ),
             Self::Element(error) => error.fmt(f),
             Self::ElementNotSupported { element } => write!(
@@ -141,6 +161,13 @@ impl fmt::Display for FamilyError {
             Self::NoNewton => f.write_str(
                 "Newton's method for models of run-time length needs the feature `sparse`",
             ),
+            Self::NeedsNewton => f.write_str(
+                "constraints, and kinetic energies other than ½ Σ m v², are solved by Newton's method, not by the fixed-point iteration",
+            ),
+            Self::ConstraintsNotSupported => f.write_str(
+                "constraints of models of run-time length need the feature `sparse` and a Lagrangian",
+            ),
+            Self::TooLarge => f.write_str("the equations do not fit into memory"),
         }
     }
 }

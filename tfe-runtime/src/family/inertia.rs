@@ -49,23 +49,52 @@ impl Inertia {
 }
 
 /// The momentum that belongs to a velocity of a Hamiltonian, or the velocity that belongs to a momentum of a Lagrangian: one step of Newton's
-/// method, from zero, where the energy is quadratic.
+/// method, from zero, where the energy is quadratic with a diagonal mass matrix; else (with the feature `sparse`) as many as it takes.
 pub(super) fn other<M: FamilyModel>(
     model: &M,
     t: f64,
     q: &[f64],
     wanted: &[f64],
 ) -> Result<Vec<f64>, FamilyError> {
-    if !M::FACTS.quadratic_in_z {
-        return Err(FamilyError::NotSecondOrder);
-    }
     let zero = vec![0.0; model.len()];
+    let second = match M::FACTS.quadratic_in_z {
+        true => diagonal(model, t, q, &zero),
+        false => Err(FamilyError::NotSecondOrder),
+    };
+    let second = match second {
+        Err(FamilyError::NotSecondOrder | FamilyError::MassNotDiagonal { .. })
+            if cfg!(feature = "sparse") =>
+        {
+            return by_newton(model, t, q, wanted);
+        }
+        second => second?,
+    };
     let offset = slope(model, t, q, &zero);
-    let second = diagonal(model, t, q, &zero)?;
     let all = wanted.iter().zip(&offset).zip(&second);
     Ok(all
         .map(|((wanted, offset), second)| (wanted - offset) / second)
         .collect())
+}
+
+#[cfg(feature = "sparse")]
+fn by_newton<M: FamilyModel>(
+    model: &M,
+    t: f64,
+    q: &[f64],
+    wanted: &[f64],
+) -> Result<Vec<f64>, FamilyError> {
+    use super::{node::Node, rows::Rows};
+    let free = Rows::none();
+    let mut node = Node::new(model, &free).ok_or(FamilyError::TooLarge)?;
+    let mut z = vec![0.0; model.len()];
+    node.solve(model, (t, q), wanted, &free, &mut z)
+        .map_err(|_| FamilyError::NoVelocity)?;
+    Ok(z)
+}
+
+#[cfg(not(feature = "sparse"))]
+fn by_newton<M: FamilyModel>(_: &M, _: f64, _: &[f64], _: &[f64]) -> Result<Vec<f64>, FamilyError> {
+    Err(FamilyError::NotSecondOrder)
 }
 
 /// The diagonal of ∂²/∂z∂z, of which nothing may be zero, and which may be all there is.

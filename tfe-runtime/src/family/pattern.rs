@@ -53,14 +53,39 @@ impl Pattern {
     pub fn of<M: FamilyModel>(model: &M) -> Self {
         let n = model.len();
         let (mut z, mut q, mut force) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        let mut recorder = Recorder(Vec::new());
         let first = Gradient {
             z: &mut z,
             q: &mut q,
             force: &mut force,
         };
         let zero = vec![0.0; n];
-        model.second(0.0, &zero, &zero, first, &mut recorder);
+        Self::recorded(|recorder| model.second(0.0, &zero, &zero, first, recorder))
+    }
+
+    /// Of ∂²/∂z∂z alone.
+    #[cfg(feature = "sparse")]
+    pub(super) fn of_mass<M: FamilyModel>(model: &M) -> Self {
+        let zero = vec![0.0; model.len()];
+        Self::recorded(|recorder| model.mass(0.0, &zero, &zero, recorder))
+    }
+
+    /// Of the rows of constraints.
+    #[cfg(feature = "sparse")]
+    pub(super) fn of_rows<M: FamilyModel>(model: &M) -> Self {
+        let (zero, mut drift) = (vec![0.0; model.len()], vec![0.0; model.constraints()]);
+        Self::recorded(|recorder| model.constraint_rows(0.0, &zero, &mut drift, recorder))
+    }
+
+    /// Of the second derivatives of constraints.
+    #[cfg(feature = "sparse")]
+    pub(super) fn of_bends<M: FamilyModel>(model: &M) -> Self {
+        let (zero, mu) = (vec![0.0; model.len()], vec![0.0; model.constraints()]);
+        Self::recorded(|recorder| model.constraint_second(0.0, &zero, &mu, recorder))
+    }
+
+    fn recorded(run: impl FnOnce(&mut Recorder)) -> Self {
+        let mut recorder = Recorder(Vec::new());
+        run(&mut recorder);
         let Recorder(recorded) = recorder;
         let by_column = |(block, row, column): &(Block, usize, usize)| (*block, *column, *row);
         let mut places = recorded.clone();

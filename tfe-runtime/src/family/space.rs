@@ -151,7 +151,6 @@ impl<V: Four> Space<V> {
     }
 
     /// f(q, z) − f at the points, the points of one coordinate next to each other.
-    #[cfg(feature = "sparse")]
     #[inline(always)]
     pub(super) fn rest<M: FamilyModel>(
         &mut self,
@@ -175,7 +174,6 @@ impl<V: Four> Space<V> {
     }
 
     /// Coordinates and velocities (momenta) at all points, a row of n for each.
-    #[cfg(feature = "sparse")]
     pub(super) fn positions<M: FamilyModel>(
         &mut self,
         problem: &Problem,

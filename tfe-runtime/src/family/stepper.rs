@@ -1,109 +1,85 @@
-//! Steps of families.
+//! Steps of families: which unknowns a model gets.
 
-use super::inertia::Inertia;
-#[cfg(feature = "sparse")]
-use super::lanes::Scale;
+use super::forces::Forces;
 use super::lanes::largest;
 #[cfg(feature = "sparse")]
-use super::newton::Tangent;
-use super::space::{Leg, Outcome, Problem, Space};
+use super::rates::Rates;
 use super::{FamilyDense, FamilyError, FamilyModel, FamilyState};
 use crate::element::Element;
 use crate::error::StepError;
 use crate::model::Form;
-use crate::newton::{Control, Preference, Solve};
-#[cfg(feature = "sparse")]
-use crate::newton::{Monitor, Verdict};
-use crate::points::four::Four;
-use crate::points::tables::{MAX_GROUPS, Tables};
-use crate::real::Lanes;
+use crate::newton::Control;
+use crate::points::tables::MAX_GROUPS;
 use crate::scheme::{SchemeTable, Tables as _};
-use crate::statistics::{Contraction, Statistics};
-use alloc::vec;
+use crate::statistics::Statistics;
+use alloc::boxed::Box;
 
-/// Factors serve while increments shrink at least as fast.
-#[cfg(feature = "sparse")]
-const SERVES: f64 = 0.3;
-
-/// Steps a model of run-time length with one element, on memory of its own: linear in the number of coordinates, and so is the time of a step.
+/// Steps a model of run-time length with one element, on memory of its own.
 ///
-/// The equations M q̈ = f(q, q̇, t) with a constant diagonal M, solved for the forces at all points: by a fixed-point iteration, and where that contracts badly (with
-/// the feature `sparse`) by Newton's method with a sparse factorisation.
+/// Equations M q̈ = f(q, q̇, t) with a constant diagonal M are solved for the forces at all points, in time and memory linear in the number of coordinates: by a
+/// fixed-point iteration, and where that contracts badly (with the feature `sparse`) by Newton's method with a sparse factorisation. With the feature `sparse`
+/// Lagrangians of any other kinetic energy and holonomic constraints are solved for rates and multipliers, by Newton's method alone (T-45, T-72, T-73).
 ///
 /// # Example
 /// The example is at [`Simulation::new`](https://docs.rs/tfe), with which families are run.
 #[derive(Clone, Debug)]
 pub struct FamilyStepper<'m, M> {
-    model: &'m M,
-    table: SchemeTable,
-    control: Control,
-    problem: Problem,
-    registers: Registers,
-    statistics: Statistics,
-    preference: Preference,
-    #[cfg(feature = "sparse")]
-    tangent: Option<Tangent>,
-    /// Time, length and ends of the last step.
-    last: Option<(f64, f64)>,
-    start: FamilyState,
-    end: FamilyState,
-    low: FamilyState,
-    next_low: FamilyState,
+    length: usize,
+    way: Way<'m, M>,
 }
 
-/// The unknowns in the widest registers of the processor.
+/// What is solved for.
 #[derive(Clone, Debug)]
-enum Registers {
-    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-    Quads(Space<crate::quad::Quad>, pulp::x86::V3),
-    Lanes(Space<Lanes<4>>),
+enum Way<'m, M> {
+    Forces(Box<Forces<'m, M>>),
+    #[cfg(feature = "sparse")]
+    Rates(Box<Rates<'m, M>>),
 }
 
 impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
     /// A stepper at rest.
     ///
     /// # Errors
-    /// [`FamilyError`]: lengths that do not fit together, an element that does not exist, and what families cannot do yet.
+    /// [`FamilyError`]: lengths that do not fit together, an element that does not exist, and what families cannot do.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, FamilyError> {
         model.check()?;
         let table = SchemeTable::new(element).map_err(FamilyError::Element)?;
+        let way = Self::way(model, element, table, control)?;
+        let length = model.len();
+        Ok(Self { length, way })
+    }
+
+    fn way(
+        model: &'m M,
+        element: Element,
+        table: SchemeTable,
+        control: Control,
+    ) -> Result<Way<'m, M>, FamilyError> {
+        let by_rates = cfg!(feature = "sparse") && M::FORM == Form::Lagrangian;
         let has_form = match M::FORM {
             Form::Lagrangian => element.is_collocated(),
             Form::Hamiltonian => element.has_phase_form(),
         };
-        if !has_form || table.view().points() > 4 * MAX_GROUPS {
+        if M::CONSTRAINED {
+            if !by_rates {
+                return Err(FamilyError::ConstraintsNotSupported);
+            }
+            if !(element.is_collocated() && admits(&element)) {
+                return Err(FamilyError::ElementNotSupported { element });
+            }
+        } else if has_form && table.view().points() <= 4 * MAX_GROUPS {
+            match Forces::new(model, table.clone(), control) {
+                Err(FamilyError::NotSecondOrder | FamilyError::MassNotDiagonal { .. })
+                    if by_rates => {}
+                forces => return Ok(Way::Forces(Box::new(forces?))),
+            }
+        } else if !by_rates {
             return Err(FamilyError::ElementNotSupported { element });
         }
-        if control.solve == Solve::Newton && !cfg!(feature = "sparse") {
-            return Err(FamilyError::NoNewton);
-        }
-        let n = model.len();
-        let problem = Problem {
-            inertia: Inertia::of(model)?,
-            tables: Tables::new(&table.view()),
-            velocity: vec![0.0; n],
-            velocity_low: vec![0.0; n],
-        };
-        let zero = FamilyState {
-            q: vec![0.0; n],
-            p: vec![0.0; n],
-        };
-        Ok(Self {
-            model,
-            registers: Registers::new::<M>(n, problem.tables.groups),
-            table,
-            control,
-            problem,
-            statistics: Statistics::NONE,
-            preference: Preference::NONE,
-            #[cfg(feature = "sparse")]
-            tangent: None,
-            last: None,
-            start: zero.clone(),
-            end: zero.clone(),
-            low: zero.clone(),
-            next_low: zero,
-        })
+        #[cfg(feature = "sparse")]
+        return Ok(Way::Rates(Box::new(Rates::new(model, table, control)?)));
+        #[cfg(not(feature = "sparse"))]
+        Err(FamilyError::NotSecondOrder)
     }
 
     /// Moves `state` from t to t + h. The first iterate continues the last step if `state` is where that ended; a state of one's own is as
@@ -115,311 +91,41 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
         if !(h.is_finite() && h != 0.0) {
             return Err(StepError::InvalidStep { step: h });
         }
-        let n = self.start.q.len();
-        let is_right = state.q.len() == n && state.p.len() == n;
+        let is_right = state.q.len() == self.length && state.p.len() == self.length;
         if !(is_right && largest(&state.q).is_finite() && largest(&state.p).is_finite()) {
             return Err(StepError::NonFinite);
         }
-        let last = self.last.take().filter(|_| self.end == *state);
-        match last {
-            Some((_, length)) => self.problem.tables.set_ratio(&self.table, h / length),
-            None => {
-                self.low.q.fill(0.0);
-                self.low.p.fill(0.0);
-            }
-        }
-        self.start.q.copy_from_slice(&state.q);
-        self.start.p.copy_from_slice(&state.p);
-        self.solve(t, h, last.is_some())?;
-        self.statistics.steps += 1;
-        self.last = Some((t, h));
-        core::mem::swap(&mut self.low, &mut self.next_low);
-        state.q.copy_from_slice(&self.end.q);
-        state.p.copy_from_slice(&self.end.p);
-        Ok(())
-    }
-
-    /// The equations of one element: the fixed point while it contracts well, else Newton's method.
-    fn solve(&mut self, t: f64, h: f64, is_warm: bool) -> Result<(), StepError> {
-        let solve = self.control.solve;
-        let yielding = cfg!(feature = "sparse") && solve == Solve::Auto;
-        self.dispatch(t, h, Task::Prepare { is_warm });
-        if solve != Solve::Newton && (!yielding || self.preference.is_fixed_point()) {
-            let outcome = self.dispatch(t, h, Task::Iterate { yielding });
-            let iterations = u64::from(outcome.iterations);
-            self.statistics.iterations += iterations;
-            self.statistics.fixed_point_iterations += iterations;
-            self.statistics.contraction = Contraction::of(outcome.contraction);
-            self.count_evaluations(iterations);
-            if outcome.converged && self.dispatch(t, h, Task::End).converged {
-                self.preference.confirm_fixed_point();
-                return Ok(());
-            }
-            if !yielding {
-                return Err(self.stalled(&outcome, false));
-            }
-            self.preference.leave_fixed_point();
-            self.statistics.fallbacks += 1;
-            self.dispatch(t, h, Task::Prepare { is_warm: false });
-        } else {
-            self.preference.count_newton();
-        }
-        self.newton(t, h)
-    }
-
-    #[cfg(not(feature = "sparse"))]
-    fn newton(&mut self, _: f64, _: f64) -> Result<(), StepError> {
-        // Refused when the stepper is made.
-        Err(StepError::NonFinite)
-    }
-
-    /// Newton's method; the factors are kept while they serve, also from step to step.
-    #[cfg(feature = "sparse")]
-    fn newton(&mut self, t: f64, h: f64) -> Result<(), StepError> {
-        let mut tangent = match self.tangent.take() {
-            Some(tangent) => tangent,
-            None => Tangent::new(self.model, self.table.view().points())
-                .ok_or(StepError::SingularTangent { unknown: 0 })?,
-        };
-        let outcome = self.newton_with(&mut tangent, t, h);
-        self.tangent = Some(tangent);
-        let outcome = outcome?;
-        if outcome.converged && self.dispatch(t, h, Task::End).converged {
-            return Ok(());
-        }
-        Err(self.stalled(&outcome, true))
-    }
-
-    #[cfg(feature = "sparse")]
-    fn newton_with(&mut self, tangent: &mut Tangent, t: f64, h: f64) -> Result<Outcome, StepError> {
-        let mut monitor = Monitor::new(self.control.tolerance);
-        let known = tangent.serves(h);
-        let mut fresh = !known;
-        let mut outcome = Outcome {
-            converged: false,
-            iterations: 0,
-            residual: f64::INFINITY,
-            contraction: 1.0,
-        };
-        while outcome.iterations < self.control.max_iterations {
-            if fresh {
-                let (q, z) = (&mut tangent.q[..], &mut tangent.z[..]);
-                self.dispatch(t, h, Task::Positions { q, z });
-                let scheme = self.table.view();
-                self.statistics.tangent_evaluations += scheme.points() as u64;
-                tangent.factor(self.model, &scheme, &self.problem, t, h)?;
-                self.statistics.factorizations += 1;
-            }
-            let rest = &mut tangent.rest[..];
-            self.dispatch(t, h, Task::Rest { rest });
-            self.count_evaluations(1);
-            tangent.solve();
-            let leg = Leg {
-                t,
-                h,
-                start: &self.start,
-                low: &self.low,
-            };
-            let (changed, size) = self.registers.correct(&self.problem, &tangent.rest);
-            let increment = Scale::of(&self.problem, &leg).increment(changed, size);
-            outcome.iterations += 1;
-            self.statistics.iterations += 1;
-            self.statistics.newton_iterations += 1;
-            let verdict = monitor.judge(increment);
-            outcome.residual = monitor.last();
-            outcome.contraction = monitor.rate();
-            match verdict {
-                Ok(Verdict::Converged) => {
-                    outcome.converged = true;
-                    return Ok(outcome);
-                }
-                Ok(Verdict::GoOn) => {}
-                Err(error) => {
-                    tangent.forget();
-                    return Err(error);
-                }
-            }
-            // The first increment alone tells no rate: an old matrix may show a second one.
-            let untried = known && outcome.iterations == 1;
-            fresh = !untried && monitor.rate() > SERVES;
-        }
-        tangent.forget();
-        Ok(outcome)
-    }
-
-    fn count_evaluations(&mut self, iterations: u64) {
-        let points = self.table.view().points() as u64;
-        self.statistics.residual_evaluations += iterations * points;
-    }
-
-    fn stalled(&self, outcome: &Outcome, newton: bool) -> StepError {
-        let (iterations, residual) = (outcome.iterations, outcome.residual);
-        let tolerance = self.control.tolerance;
-        match (residual.is_finite() && !outcome.converged, newton) {
-            (false, _) => StepError::NonFinite,
-            (true, true) => StepError::NewtonStalled {
-                iterations,
-                residual,
-                tolerance,
-            },
-            (true, false) => StepError::FixedPointStalled {
-                iterations,
-                residual,
-                tolerance,
-            },
-        }
-    }
-
-    fn dispatch(&mut self, t: f64, h: f64, task: Task<'_>) -> Outcome {
-        let leg = Leg {
-            t,
-            h,
-            start: &self.start,
-            low: &self.low,
-        };
-        let job = Job {
-            model: self.model,
-            problem: &mut self.problem,
-            control: &self.control,
-            leg,
-            end: (&mut self.end, &mut self.next_low),
-            task,
-        };
-        match &mut self.registers {
-            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            Registers::Quads(space, isa) => isa.vectorize(InRegisters { space, job }),
-            Registers::Lanes(space) => job.run(space),
+        match &mut self.way {
+            Way::Forces(forces) => forces.advance(t, h, state),
+            #[cfg(feature = "sparse")]
+            Way::Rates(rates) => rates.advance(t, h, state),
         }
     }
 
     /// The polynomial of the last step, from time `start` to time `end`; before the first step, and after a failed one, a constant.
     #[must_use]
     pub fn dense(&self, start: f64, end: f64) -> FamilyDense {
-        let Some((_, h)) = self.last else {
-            return FamilyDense::constant((start, end), self.start.clone());
-        };
-        let scheme = self.table.view();
-        let points = scheme.points();
-        let force = |point: usize, a: usize| self.registers.force_at(point, a);
-        let rate = |point: usize, a: usize| {
-            let integral: f64 = (0..points)
-                .map(|j| scheme.position[point * points + j] * force(j, a))
-                .sum();
-            self.problem.velocity[a] + h * self.problem.inertia.inverse[a] * integral
-        };
-        let ends = (self.start.clone(), self.end.clone());
-        FamilyDense::of(&scheme, (start, end), h, ends, rate, force)
+        match &self.way {
+            Way::Forces(forces) => forces.dense(start, end),
+            #[cfg(feature = "sparse")]
+            Way::Rates(rates) => rates.dense(start, end),
+        }
     }
 
     /// What the steps so far have cost.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
-        &self.statistics
-    }
-}
-
-impl Registers {
-    fn new<M: FamilyModel>(n: usize, groups: usize) -> Self {
-        #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-        if let Some(isa) = pulp::x86::V3::try_new() {
-            let like = crate::quad::Quad::of(isa, [0.0; 4]);
-            return Self::Quads(Space::new::<M>(like, n, groups), isa);
-        }
-        Self::Lanes(Space::new::<M>(Lanes([0.0; 4]), n, groups))
-    }
-
-    #[cfg(feature = "sparse")]
-    fn correct(&mut self, problem: &Problem, steps: &[f64]) -> (f64, f64) {
-        match self {
-            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            Self::Quads(space, _) => space.correct(problem, steps),
-            Self::Lanes(space) => space.correct(problem, steps),
-        }
-    }
-
-    fn force_at(&self, point: usize, a: usize) -> f64 {
-        match self {
-            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            Self::Quads(space, _) => space.force_at(point, a),
-            Self::Lanes(space) => space.force_at(point, a),
-        }
-    }
-}
-
-/// A part of a step.
-enum Task<'a> {
-    /// Forces to begin with.
-    Prepare { is_warm: bool },
-    /// The fixed-point iteration.
-    Iterate { yielding: bool },
-    /// What is left of the equations.
-    #[cfg(feature = "sparse")]
-    Rest { rest: &'a mut [f64] },
-    /// Where the points are.
-    #[cfg(feature = "sparse")]
-    Positions { q: &'a mut [f64], z: &'a mut [f64] },
-    /// The end of the element.
-    End,
-    #[cfg(not(feature = "sparse"))]
-    #[allow(dead_code, reason = "holds the lifetime")]
-    Nothing(core::marker::PhantomData<&'a ()>),
-}
-
-/// A part of a step, with what it needs.
-struct Job<'a, M> {
-    model: &'a M,
-    problem: &'a mut Problem,
-    control: &'a Control,
-    leg: Leg<'a>,
-    end: (&'a mut FamilyState, &'a mut FamilyState),
-    task: Task<'a>,
-}
-
-impl<M: FamilyModel> Job<'_, M> {
-    #[inline(always)]
-    fn run<V: Four>(self, space: &mut Space<V>) -> Outcome {
-        let Self {
-            model,
-            problem,
-            control,
-            leg,
-            ..
-        } = self;
-        let mut outcome = Outcome {
-            converged: true,
-            iterations: 0,
-            residual: 0.0,
-            contraction: 0.0,
-        };
-        match self.task {
-            Task::Prepare { is_warm } => space.prepare(model, problem, leg, is_warm),
-            Task::Iterate { yielding } => {
-                outcome = space.iterate(model, problem, control, leg, yielding);
-            }
+        match &self.way {
+            Way::Forces(forces) => &forces.statistics,
             #[cfg(feature = "sparse")]
-            Task::Rest { rest } => space.rest(model, problem, leg, rest),
-            #[cfg(feature = "sparse")]
-            Task::Positions { q, z } => space.positions::<M>(problem, leg, q, z),
-            Task::End => outcome.converged = space.end(problem, leg, self.end.0, self.end.1),
-            #[cfg(not(feature = "sparse"))]
-            Task::Nothing(_) => {}
+            Way::Rates(rates) => &rates.statistics,
         }
-        outcome
     }
 }
 
-/// The same in code for one instruction set.
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-struct InRegisters<'a, M> {
-    space: &'a mut Space<crate::quad::Quad>,
-    job: Job<'a, M>,
-}
-
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl<M: FamilyModel> pulp::NullaryFnOnce for InRegisters<'_, M> {
-    type Output = Outcome;
-    #[inline(always)]
-    fn call(self) -> Outcome {
-        self.job.run(self.space)
-    }
+/// Whether an element can hold holonomic constraints.
+fn admits(element: &Element) -> bool {
+    use crate::constrained::layout::admits;
+    use crate::model::ConstraintKind;
+    admits(element, ConstraintKind::Holonomic { quadratic: false })
 }

@@ -149,6 +149,11 @@ kinds! {
     },
     /// A momentum in a constraint.
     MomentumInConstraint,
+    /// A velocity in a constraint of a model of run-time length.
+    VelocityConstraintOfFamily {
+        /// The constraint.
+        name: String,
+    },
     /// `constraint(rod[i in 0..n])`
     ConstraintRange {
         /// The range as written.

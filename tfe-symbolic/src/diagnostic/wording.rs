@@ -56,6 +56,9 @@ impl Kind {
                 format!("constraint `{name}` repeats `{other}`")
             }
             Self::MomentumInConstraint => "momenta cannot be used in a constraint".into(),
+            Self::VelocityConstraintOfFamily { name } => format!(
+                "constraint `{name}` holds velocities, which models of run-time length do not support yet"
+            ),
             Self::ConstraintRange { range } => {
                 format!("a family of constraints needs a range known here, found `{range}`")
             }
@@ -300,6 +303,11 @@ impl Kind {
             }
             Self::RepeatedConstraint { name, .. } => format!("remove `{name}`"),
             Self::MomentumInConstraint => "write the velocity instead, such as `dot(x)`".into(),
+            Self::VelocityConstraintOfFamily { .. } => {
+                "write a condition on positions, or give the coordinates a length known here, such \
+                 as `q[10]`"
+                    .into()
+            }
             Self::ConstraintRange { .. } => {
                 "write the constraints out, or give the array and the range literal lengths".into()
             }

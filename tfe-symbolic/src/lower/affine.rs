@@ -205,9 +205,25 @@ impl Lowerer<'_> {
 
     /// The ranges that an index depends on, as the user wrote them.
     pub(super) fn ranges_of(&self, place: &Affine) -> String {
+        self.ranges_from(0, place)
+    }
+
+    /// The declaration around, where messages name it, and the ranges of the sums that an index depends on.
+    pub(super) fn stands_in(&self, place: &Affine) -> String {
+        let Some(declaration) = &self.place else {
+            return self.ranges_of(place);
+        };
+        let ranges = self.ranges_from(declaration.own, place);
+        let parts = [declaration.text.clone(), ranges];
+        let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+        parts.join(", ")
+    }
+
+    fn ranges_from(&self, first: usize, place: &Affine) -> String {
         let shown = self
             .indices
             .iter()
+            .skip(first)
             .filter(|index| place.depends_on(index.variable));
         let ranges: Vec<String> = shown
             .map(

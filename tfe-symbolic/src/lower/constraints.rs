@@ -10,12 +10,12 @@ use crate::graph::ExprId;
 use crate::input::{Affine, Input};
 
 /// One scalar equation of a declaration.
-struct Row {
+pub(super) struct Row {
     /// What follows the name: nothing, `[2]`, `[2][0]`.
-    place: String,
-    value: ExprId,
+    pub(super) place: String,
+    pub(super) value: ExprId,
     /// Where it stands.
-    span: Span,
+    pub(super) span: Span,
 }
 
 /// What is known of the constraints before the one at hand.
@@ -32,6 +32,9 @@ impl Lowerer<'_> {
             dot: DotRule::Velocity,
             linear_loops: false,
         };
+        if self.is_of_run_time_length() {
+            return self.within(setting, Self::constraints_by_site);
+        }
         let model = self.model;
         let mut known = Known::default();
         for (name, range, value) in &model.constraints {
@@ -94,7 +97,6 @@ impl Lowerer<'_> {
         range: String,
         whole: Span,
     ) -> std::ops::Range<i64> {
-        // In a model of run-time length the constraint itself has been reported.
         let kind = match (start.as_constant(), end.as_constant()) {
             (Some(start), Some(end)) if end <= start => Kind::EmptyRange { range },
             (Some(start), Some(end)) if end.abs_diff(start) > LONGEST_WRITTEN_OUT => {
@@ -102,7 +104,6 @@ impl Lowerer<'_> {
                 Kind::TooManyConstraints { limit }
             }
             (Some(start), Some(end)) => return start..end,
-            _ if self.is_of_run_time_length() => return 0..0,
             _ => Kind::ConstraintRange { range },
         };
         self.report(whole, kind);
@@ -155,19 +156,21 @@ impl Lowerer<'_> {
             known.normals.push(normal);
             known.constraints.push(Constraint {
                 name: name_of_row,
+                ranges: Vec::new(),
+                row: Affine::constant(known.constraints.len() as i64),
                 kind,
                 value: row,
             });
         }
     }
 
-    fn holds_momentum(&self, id: ExprId) -> bool {
+    pub(super) fn holds_momentum(&self, id: ExprId) -> bool {
         let momentum = |input: &Input| matches!(input, Input::Momentum(_));
         self.graph.inputs_of(id).iter().any(momentum)
     }
 
     /// The first name that stands for a momentum, or for a `let` that holds one.
-    fn momentum_in(&self, expr: &Expr) -> Option<Span> {
+    pub(super) fn momentum_in(&self, expr: &Expr) -> Option<Span> {
         if let ExprKind::Name(name) = &expr.node
             && self.index(name).is_none()
         {
@@ -215,7 +218,8 @@ impl Lowerer<'_> {
 
     /// Refuses solvers whose elements do not admit the constraints.
     pub(super) fn check_solvers(&mut self, constraints: &[Constraint]) {
-        if constraints.is_empty() {
+        // Solvers of a model of run-time length have been reported.
+        if constraints.is_empty() || self.is_of_run_time_length() {
             return;
         }
         let velocity = constraints
@@ -273,7 +277,7 @@ fn admits(solver: &Solver, velocity: bool) -> bool {
 }
 
 /// The equations of a value: one, or one for each component.
-fn components(value: Value, expr: &Expr) -> Vec<Row> {
+pub(super) fn components(value: Value, expr: &Expr) -> Vec<Row> {
     match value {
         Value::Scalar(value) => vec![Row {
             place: String::new(),

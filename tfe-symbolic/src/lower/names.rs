@@ -223,13 +223,13 @@ impl Lowerer<'_> {
 
     fn named_here(&mut self, at: usize, loops: u32) -> Value {
         let model = self.model;
-        let indices = std::mem::take(&mut self.indices);
+        let (indices, place) = (std::mem::take(&mut self.indices), self.place.take());
         let hidden = std::mem::replace(&mut self.hidden_loops, loops);
         let visible = std::mem::replace(&mut self.visible_lets, at);
         let value = self.value(&model.lets[at].1);
         self.visible_lets = visible;
         self.hidden_loops = hidden;
-        self.indices = indices;
+        (self.indices, self.place) = (indices, place);
         value
     }
 

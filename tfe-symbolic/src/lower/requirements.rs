@@ -17,7 +17,7 @@ impl Lowerer<'_> {
         let requirement = Requirement::Index {
             array: array.to_owned(),
             text: self.in_words(place),
-            ranges: self.ranges_of(place),
+            ranges: self.stands_in(place),
             nest,
             place: place.clone(),
             length,
@@ -41,7 +41,7 @@ impl Lowerer<'_> {
         let requirement = Requirement::FieldLength {
             field: field.to_owned(),
             text: self.in_words(place),
-            ranges: self.ranges_of(place),
+            ranges: self.stands_in(place),
             length,
         };
         self.require(requirement);
@@ -58,7 +58,7 @@ impl Lowerer<'_> {
         }
         let index = Affine::symbol(IndexSymbol::Loop(range.variable));
         let requirement = Requirement::Turns {
-            ranges: self.ranges_of(&index),
+            ranges: self.stands_in(&index),
             start: range.start.clone(),
             end: range.end.clone(),
         };

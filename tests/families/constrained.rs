@@ -1,0 +1,249 @@
+//! Motions of families on constraints.
+
+use tfe::error::RunErrorKind;
+use tfe::prelude::*;
+use tfe::runtime::ConstraintError;
+use tfe::{StepError, family::FamilyError};
+
+/// A chain of rods whose first one hangs on a support that swings, with damping and springs between next but one neighbours.
+#[dynamics(
+    coordinates(x[n], y[n]),
+    lagrangian = sum(i in 0..n, m[i]/2*(dot(x[i])^2 + dot(y[i])^2) - m[i]*g*y[i])
+        - sum(i in 0..n-2, k/2*((x[i+2] - x[i])^2 + (y[i+2] - y[i])^2)),
+    constraint(first) = (x[0] - a*sin(t))^2 + y[0]^2 - 1,
+    constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - l[i]^2,
+    force(x[i]) = -c*dot(x[i]),
+)]
+struct Rods {
+    n: usize,
+    m: Vec<f64>,
+    l: Vec<f64>,
+    g: f64,
+    k: f64,
+    c: f64,
+    a: f64,
+}
+
+#[dynamics(
+    coordinates(x[4], y[4]),
+    lagrangian = sum(i in 0..4, m[i]/2*(dot(x[i])^2 + dot(y[i])^2) - m[i]*g*y[i])
+        - sum(i in 0..2, k/2*((x[i+2] - x[i])^2 + (y[i+2] - y[i])^2)),
+    constraint(first) = (x[0] - a*sin(t))^2 + y[0]^2 - 1,
+    constraint(rod[i in 0..3]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - l[i]^2,
+    force(x[0]) = -c*dot(x[0]),
+    force(x[1]) = -c*dot(x[1]),
+    force(x[2]) = -c*dot(x[2]),
+    force(x[3]) = -c*dot(x[3]),
+)]
+struct FourRods {
+    m: [f64; 4],
+    l: [f64; 3],
+    g: f64,
+    k: f64,
+    c: f64,
+    a: f64,
+}
+
+const MASSES: [f64; 4] = [1.0, 0.5, 2.0, 1.5];
+const LENGTHS: [f64; 3] = [0.8, 1.0, 0.6];
+const G: f64 = 9.81;
+const K: f64 = 0.7;
+const C: f64 = 0.1;
+const A: f64 = 0.2;
+
+fn rods() -> Rods {
+    Rods {
+        n: 4,
+        m: MASSES.to_vec(),
+        l: LENGTHS.to_vec(),
+        g: G,
+        k: K,
+        c: C,
+        a: A,
+    }
+}
+
+/// A bent chain; the support moves with `a` to the right, and so does the chain.
+fn start() -> ([f64; 8], [f64; 8]) {
+    let (mut q, mut v) = ([0.0; 8], [0.0; 8]);
+    let (mut x, mut y) = (0.0, 0.0);
+    for i in 0..4 {
+        let length = if i == 0 { 1.0 } else { LENGTHS[i - 1] };
+        let angle = 0.4 + 0.3 * i as f64;
+        x += length * f64::sin(angle);
+        y -= length * f64::cos(angle);
+        (q[i], q[4 + i], v[i]) = (x, y, A);
+    }
+    (q, v)
+}
+
+#[test]
+fn rods_move_as_those_of_fixed_size() {
+    let four = FourRods {
+        m: MASSES,
+        l: LENGTHS,
+        g: G,
+        k: K,
+        c: C,
+        a: A,
+    };
+    let (long, (q, v)) = (rods(), start());
+    for element in [
+        Element::mixed(2),
+        Element::mixed(3),
+        Element::mixed(5),
+        Element::primal(4).reduced(),
+    ] {
+        let run = Simulation::new(&long).element(element).step(0.02);
+        let one = run
+            .run(long.state(q, v), 0.0..1.0)
+            .unwrap_or_else(|error| panic!("{element}: {error}"));
+        let run = Simulation::new(&four).element(element).step(0.02);
+        let other = run.run(four.state(q, v), 0.0..1.0).expect("a run");
+        for time in [0.013, 0.5, 0.777, 1.0] {
+            let (one, other) = (
+                one.at(time).expect("inside"),
+                other.at(time).expect("inside"),
+            );
+            for a in 0..8 {
+                // Roundings over fifty steps.
+                assert!((one.q[a] - other.q[a]).abs() < 1e-12, "{element} {time}");
+                assert!((one.p[a] - other.p[a]).abs() < 1e-11, "{element} {time}");
+            }
+        }
+        // Roundings of squares of size one, and of their rates.
+        let residual = one.constraint_residual();
+        assert!(residual.position < 1e-14, "{element}: {residual:?}");
+        assert!(residual.velocity < 1e-13, "{element}: {residual:?}");
+    }
+}
+
+/// 2 (n − 1) in coordinates and momenta, on a nonlinear problem.
+#[test]
+fn the_order_on_constraints_is_that_of_the_element() {
+    let (model, (q, v)) = (rods(), start());
+    let end = |element: Element, step: f64| {
+        let run = Simulation::new(&model).element(element).step(step);
+        run.run(model.state(q, v), 0.0..0.5)
+            .expect("a run")
+            .last()
+            .state()
+    };
+    let exact = end(Element::mixed(8), 0.01);
+    let error = |element: Element, step: f64| {
+        let state = end(element, step);
+        let off = |one: &[f64], other: &[f64]| {
+            let all = one
+                .iter()
+                .zip(other)
+                .map(|(one, other)| (one - other).abs());
+            all.fold(0.0, f64::max)
+        };
+        (off(&state.q, &exact.q), off(&state.p, &exact.p))
+    };
+    for (n, step) in [(2, 0.01), (3, 0.05), (4, 0.05)] {
+        let (coarse, fine) = (
+            error(Element::mixed(n), step),
+            error(Element::mixed(n), 0.5 * step),
+        );
+        let expected = 2.0 * (n as f64 - 1.0);
+        for order in [(coarse.0 / fine.0).log2(), (coarse.1 / fine.1).log2()] {
+            assert!((order - expected).abs() < 0.5, "{n}: {order}");
+        }
+    }
+}
+
+#[test]
+fn starts_off_the_constraints_are_refused() {
+    let (model, (mut q, mut v)) = (rods(), start());
+    q[3] += 1e-3;
+    let error = Simulation::new(&model)
+        .step(0.01)
+        .run(model.state(q, v), 0.0..1.0);
+    let error = error.expect_err("a rod too long");
+    assert!(
+        matches!(
+            error.kind(),
+            RunErrorKind::Solve {
+                element: 0,
+                source: StepError::Constraint(ConstraintError::Start {
+                    constraint,
+                    position: true,
+                    ..
+                }),
+                ..
+            } if constraint.to_string() == "rod[2]"
+        ),
+        "{error}"
+    );
+    let (q, _) = start();
+    v[0] += 1e-3;
+    let error = Simulation::new(&model)
+        .step(0.01)
+        .run(model.state(q, v), 0.0..1.0);
+    let error = error.expect_err("rods that grow");
+    assert!(
+        matches!(
+            error.kind(),
+            RunErrorKind::Solve {
+                element: 0,
+                source: StepError::Constraint(ConstraintError::Start {
+                    position: false,
+                    ..
+                }),
+                ..
+            }
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_cannot_hold_constraints_is_refused() {
+    let (model, (q, v)) = (rods(), start());
+    let kind = |simulation: tfe::family::FamilySimulation<'_, Rods>| {
+        let run = simulation.run(model.state(q, v), 0.0..1.0);
+        run.expect_err("no constraints").kind().clone()
+    };
+    for element in [Element::radau(3), Element::mixed(3).quadrature(4)] {
+        let run = Simulation::new(&model).element(element);
+        assert_eq!(
+            kind(run),
+            RunErrorKind::Family(FamilyError::ElementNotSupported { element })
+        );
+    }
+    let run = Simulation::new(&model).solver(Solve::FixedPoint);
+    assert_eq!(kind(run), RunErrorKind::Family(FamilyError::NeedsNewton));
+}
+
+/// A closed ring has a row for each rod and two pins: more rows than a chain, and none that follows from others.
+#[test]
+fn a_hanging_ring_keeps_its_energy() {
+    #[dynamics(
+        coordinates(x[n], y[n]),
+        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - g*y[i]),
+        constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - l^2,
+        constraint(last) = (x[0] - x[n-1])^2 + (y[0] - y[n-1])^2 - l^2,
+        constraint(pin) = [x[0], y[0]],
+    )]
+    struct Ring {
+        n: usize,
+        g: f64,
+        l: f64,
+    }
+    let n = 12;
+    let turn = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
+    let l = 2.0 * (0.5 * turn(1)).sin();
+    let model = Ring { n, g: 9.81, l };
+    let q = (0..n)
+        .map(|i| turn(i).sin())
+        .chain((0..n).map(|i| turn(i).cos() - 1.0));
+    let start = model.state(q.collect::<Vec<_>>(), vec![0.0; 2 * n]);
+    let motion = Simulation::new(&model)
+        .element(Mixed::<4>)
+        .step(0.005)
+        .run(start, 0.0..1.0)
+        .expect("a run");
+    assert!(motion.energy_error() < 1e-7, "{:e}", motion.energy_error());
+    assert!(motion.constraint_residual().position < 1e-13);
+}

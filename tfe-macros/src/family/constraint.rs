@@ -1,0 +1,160 @@
+//! The constraints of a model of run-time length: how many there are, their names, and their kernels.
+
+use crate::emit::{self, Emitter};
+use proc_macro2::TokenStream;
+use quote::quote;
+use tfe_symbolic::declared::{Constraint, Declared};
+use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::input::Affine;
+use tfe_symbolic::program::{Program, Request};
+
+/// What an implementation of `FamilyModel` holds of constraints: nothing where there are none.
+pub(super) fn members(
+    declared: &Declared,
+    derivation: &Derivation,
+    dof: &TokenStream,
+) -> TokenStream {
+    let constraints = &declared.constraints;
+    if constraints.is_empty() {
+        return TokenStream::new();
+    }
+    let rows = constraints
+        .iter()
+        .map(|constraint| match sites(constraint) {
+            None => quote!(1),
+            Some((_, count)) => count,
+        });
+    let names = constraints.iter().map(name);
+    let kernels = Kernels { derivation, dof };
+    let (values, rows_and_drift, second) = (kernels.values(), kernels.rows(), kernels.second());
+    quote! {
+        const CONSTRAINED: bool = true;
+
+        fn constraints(&self) -> usize {
+            0usize #(.saturating_add(#rows))*
+        }
+
+        fn constraint_name(&self, row: usize) -> __tfe::CoordinateName {
+            #(#names)*
+            __tfe::CoordinateName::element("", row)
+        }
+
+        #values
+        #rows_and_drift
+        #second
+    }
+}
+
+/// The first site and the number of sites of a constraint by site.
+fn sites(constraint: &Constraint) -> Option<(TokenStream, TokenStream)> {
+    let range = constraint.ranges.first()?;
+    let start = emit::index(&range.start);
+    let count = match range.end.plus_scaled(&range.start, -1) {
+        Some(count) => emit::index(&count),
+        None => emit::index(&Affine::default()),
+    };
+    Some((start, count))
+}
+
+/// Returns the name of one of its rows, or counts them off.
+fn name(constraint: &Constraint) -> TokenStream {
+    let name = &constraint.name;
+    match sites(constraint) {
+        None => quote! {
+            if row == 0 {
+                return __tfe::CoordinateName::single(#name);
+            }
+            let row = row - 1;
+        },
+        Some((start, count)) => quote! {
+            let count = #count;
+            if row < count {
+                return __tfe::CoordinateName::element(#name, #start + row);
+            }
+            let row = row - count;
+        },
+    }
+}
+
+struct Kernels<'a> {
+    derivation: &'a Derivation,
+    /// The number of coordinates.
+    dof: &'a TokenStream,
+}
+
+impl Kernels<'_> {
+    fn program(&self, request: Request) -> Program {
+        self.derivation.program(request)
+    }
+
+    /// The body of a kernel, with its slices cut to their lengths so that the compiler knows them.
+    fn body(&self, program: &Program) -> TokenStream {
+        let dof = self.dof;
+        let statements = Emitter::new(&[], TokenStream::new())
+            .by_entries()
+            .body(program)
+            .statements;
+        quote! {
+            let q = &q[..#dof];
+            #statements
+        }
+    }
+
+    fn values(&self) -> TokenStream {
+        let body = self.body(&self.program(Request {
+            constraint_values: true,
+            ..Request::default()
+        }));
+        quote! {
+            fn constraint_values<R: __tfe::Real>(&self, t: R, q: &[R], values: &mut [R]) {
+                let values = &mut values[..__tfe::FamilyModel::constraints(self)];
+                #body
+            }
+        }
+    }
+
+    fn rows(&self) -> TokenStream {
+        let body = self.body(&self.program(Request {
+            constraint_rows: true,
+            ..Request::default()
+        }));
+        quote! {
+            fn constraint_rows<R: __tfe::Real, __E: __tfe::Entries<R>>(
+                &self,
+                t: R,
+                q: &[R],
+                drift: &mut [R],
+                entries: &mut __E,
+            ) {
+                let drift = &mut drift[..__tfe::FamilyModel::constraints(self)];
+                // Rows without the time write nothing.
+                drift.fill(t.like(0.0));
+                #body
+            }
+        }
+    }
+
+    /// `constraint_second`, unless all constraints are affine.
+    fn second(&self) -> TokenStream {
+        let program = self.program(Request {
+            constraint_second: true,
+            ..Request::default()
+        });
+        if program.statements.is_empty() {
+            return TokenStream::new();
+        }
+        let body = self.body(&program);
+        quote! {
+            fn constraint_second<R: __tfe::Real, __E: __tfe::Entries<R>>(
+                &self,
+                t: R,
+                q: &[R],
+                mu: &[R],
+                entries: &mut __E,
+            ) {
+                let mu = &mu[..__tfe::FamilyModel::constraints(self)];
+                #body
+            }
+        }
+    }
+}

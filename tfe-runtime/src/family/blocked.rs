@@ -1,0 +1,126 @@
+//! A sparse matrix of small dense blocks: places known once, ordered once, factored when asked.
+
+use crate::error::StepError;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+use faer::linalg::solvers::Solve as _;
+use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+
+/// Where a block stands: entry (i, j) of it is the value number `first + j · stride + i`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) first: usize,
+    pub(super) stride: usize,
+}
+
+/// A square matrix of b × b blocks, by columns. Unknowns are ordered by block, those of one block next to each other.
+#[derive(Clone)]
+pub(super) struct Blocked {
+    block: usize,
+    /// (column, row) of the blocks, sorted.
+    pairs: Vec<(usize, usize)>,
+    /// Where the pairs of each column begin.
+    starts: Vec<usize>,
+    structure: SymbolicSparseColMat<usize>,
+    symbolic: SymbolicLu<usize>,
+    pub(super) values: Vec<f64>,
+    factors: Option<Lu<usize, f64>>,
+}
+
+impl fmt::Debug for Blocked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Blocked")
+            .field("unknowns", &self.size())
+            .field("entries", &self.values.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Blocked {
+    /// `count` rows of blocks of size `block`, at the given (row, column); nothing where memory does not suffice for an ordering.
+    pub(super) fn new(
+        count: usize,
+        block: usize,
+        places: impl Iterator<Item = (usize, usize)>,
+    ) -> Option<Self> {
+        let mut pairs: Vec<(usize, usize)> = places.map(|(row, column)| (column, row)).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let starts: Vec<usize> = (0..=count)
+            .map(|column| pairs.partition_point(|(other, _)| *other < column))
+            .collect();
+        let mut column_starts = Vec::with_capacity(count * block + 1);
+        column_starts.push(0);
+        let mut rows = Vec::with_capacity(pairs.len() * block * block);
+        for column in 0..count {
+            for _ in 0..block {
+                for (_, row) in &pairs[starts[column]..starts[column + 1]] {
+                    rows.extend(row * block..(row + 1) * block);
+                }
+                column_starts.push(rows.len());
+            }
+        }
+        let (entries, size) = (rows.len(), count * block);
+        let structure = SymbolicSparseColMat::new_checked(size, size, column_starts, None, rows);
+        let symbolic = SymbolicLu::try_new(structure.as_ref()).ok()?;
+        Some(Self {
+            block,
+            pairs,
+            starts,
+            structure,
+            symbolic,
+            values: vec![0.0; entries],
+            factors: None,
+        })
+    }
+
+    /// The number of unknowns.
+    pub(super) fn size(&self) -> usize {
+        self.structure.ncols()
+    }
+
+    /// Where the block of a row and a column stands, which must be among those the matrix was made with.
+    pub(super) fn place(&self, row: usize, column: usize) -> Place {
+        let at = self.pairs.binary_search(&(column, row)).unwrap_or(0);
+        let (start, end) = (self.starts[column], self.starts[column + 1]);
+        let block = self.block;
+        Place {
+            first: (start * block + (at - start)) * block,
+            stride: (end - start) * block,
+        }
+    }
+
+    /// Whether there are factors.
+    pub(super) fn is_factored(&self) -> bool {
+        self.factors.is_some()
+    }
+
+    /// Says that the factors serve no longer.
+    pub(super) fn forget(&mut self) {
+        self.factors = None;
+    }
+
+    /// Factors the values.
+    ///
+    /// # Errors
+    /// [`StepError::NonFinite`], [`StepError::SingularTangent`]; the unknown at which elimination stopped is not told, and stands as the first.
+    pub(super) fn factor(&mut self) -> Result<(), StepError> {
+        self.factors = None;
+        if !self.values.iter().all(|value| value.is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        let matrix = SparseColMatRef::new(self.structure.as_ref(), &self.values);
+        let factors = Lu::try_new_with_symbolic(self.symbolic.clone(), matrix);
+        self.factors = Some(factors.map_err(|_| StepError::SingularTangent { unknown: 0 })?);
+        Ok(())
+    }
+
+    /// The solution in place of the right-hand side; unchanged without factors. A matrix that is singular by its numbers gives what is not finite.
+    pub(super) fn solve(&self, vector: &mut [f64]) {
+        if let Some(factors) = &self.factors {
+            factors.solve_in_place(faer::ColMut::from_slice_mut(vector).as_mat_mut());
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! The velocity of a momentum at one instant, under constraints, by a sparse factorisation (T-74).
+
+use super::blocked::{Blocked, Place};
+use super::lanes::largest;
+use super::rows::Rows;
+use super::{FamilyModel, Gradient, Pattern};
+use crate::error::{ConstraintError, LegendreError, StepError};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// The most iterations of Newton's method; one is enough where the energy is quadratic in z.
+const MOST: u32 = 50;
+
+/// How often a step is halved.
+const MOST_HALVINGS: u32 = 20;
+
+/// Solves, for z = v of a Lagrangian or z = p of a Hamiltonian,
+///
+/// ```text
+/// ∂E/∂z (q, z, t) + Aᵀη = wanted ,     A z + a = 0 .
+/// ```
+#[derive(Clone, Debug)]
+pub(super) struct Node {
+    pattern: Pattern,
+    matrix: Blocked,
+    masses: Vec<Place>,
+    rows: Vec<(Place, Place)>,
+    derivatives: Vec<f64>,
+    /// ∂E/∂z at the solution.
+    pub(super) slope: Vec<f64>,
+    unused: [Vec<f64>; 2],
+    rate: Vec<f64>,
+    vector: Vec<f64>,
+}
+
+impl Node {
+    /// Finds the places and orders them; nothing where memory does not suffice.
+    pub(super) fn new<M: FamilyModel>(model: &M, rows: &Rows) -> Option<Self> {
+        let (n, m) = (model.len(), rows.phi.len());
+        let pattern = Pattern::of_mass(model);
+        let masses = || pattern.places().iter().map(|(_, a, b)| (*a, *b));
+        let borders = rows.places().flat_map(|(c, a)| [(n + c, a), (a, n + c)]);
+        let matrix = Blocked::new(n + m, 1, masses().chain(borders))?;
+        Some(Self {
+            masses: masses().map(|(a, b)| matrix.place(a, b)).collect(),
+            rows: rows
+                .places()
+                .map(|(c, a)| (matrix.place(n + c, a), matrix.place(a, n + c)))
+                .collect(),
+            derivatives: vec![0.0; pattern.places().len()],
+            pattern,
+            matrix,
+            slope: vec![0.0; n],
+            unused: [vec![0.0; n], vec![0.0; n]],
+            rate: vec![0.0; m],
+            vector: vec![0.0; n + m],
+        })
+    }
+
+    /// Moves `z` from a guess to the solution. The rows have been evaluated at (t, q).
+    ///
+    /// # Errors
+    /// [`StepError`] where there is none.
+    pub(super) fn solve<M: FamilyModel>(
+        &mut self,
+        model: &M,
+        (t, q): (f64, &[f64]),
+        wanted: &[f64],
+        rows: &Rows,
+        z: &mut [f64],
+    ) -> Result<(), StepError> {
+        let n = z.len();
+        let mut last = f64::INFINITY;
+        for _ in 0..MOST {
+            self.slope(model, t, q, z);
+            let mut entries = self.pattern.scatter(&mut self.derivatives);
+            model.mass(t, q, z, &mut entries);
+            self.matrix.values.fill(0.0);
+            for (place, value) in self.masses.iter().zip(&self.derivatives) {
+                self.matrix.values[place.first] = *value;
+            }
+            for ((place, transposed), value) in self.rows.iter().zip(&rows.values) {
+                self.matrix.values[place.first] = *value;
+                self.matrix.values[transposed.first] = *value;
+            }
+            self.matrix.factor().map_err(|error| match error {
+                StepError::NonFinite => error,
+                _ if rows.phi.is_empty() => LegendreError::Singular { coordinate: 0 }.into(),
+                _ => ConstraintError::SingularMass.into(),
+            })?;
+            for a in 0..n {
+                self.vector[a] = wanted[a] - self.slope[a];
+            }
+            rows.rate(z, &mut self.rate);
+            for (entry, rate) in self.vector[n..].iter_mut().zip(&self.rate) {
+                *entry = -rate;
+            }
+            // The multiplier is solved for anew each time: it enters linearly.
+            self.matrix.solve(&mut self.vector);
+            let step = largest(&self.vector[..n]);
+            self.walk(model, (t, q), wanted, z);
+            let scale = largest(z);
+            if !(step + scale).is_finite() {
+                return Err(StepError::NonFinite);
+            }
+            let settled =
+                step <= 4.0 * f64::EPSILON * scale || (step >= last && step <= 1e-10 * scale);
+            if settled || (M::FACTS.quadratic_in_z && last.is_finite()) {
+                self.slope(model, t, q, z);
+                return Ok(());
+            }
+            last = step;
+        }
+        Err(LegendreError::Stalled {
+            iterations: MOST,
+            residual: last,
+        }
+        .into())
+    }
+
+    /// Adds the step, or as much of it as brings ∂E/∂z nearer to what is wanted: functions like −m√(1 − v²) end where Newton's step may land.
+    fn walk<M: FamilyModel>(
+        &mut self,
+        model: &M,
+        (t, q): (f64, &[f64]),
+        wanted: &[f64],
+        z: &mut [f64],
+    ) {
+        let n = z.len();
+        let distance = |node: &Self| {
+            let off = wanted.iter().zip(&node.slope).map(|(w, slope)| w - slope);
+            off.fold(0.0, |sum, off| sum + off * off)
+        };
+        let before = distance(self);
+        let mut fraction = 1.0;
+        for _ in 0..MOST_HALVINGS {
+            for (z, step) in z.iter_mut().zip(&self.vector[..n]) {
+                *z += fraction * step;
+            }
+            if M::FACTS.quadratic_in_z || !self.rate.is_empty() {
+                return;
+            }
+            self.slope(model, t, q, z);
+            let after = distance(self);
+            // Near the solution roundings decide.
+            if after <= before || largest(&self.vector[..n]) <= 1e-8 * largest(z) {
+                return;
+            }
+            for (z, step) in z.iter_mut().zip(&self.vector[..n]) {
+                *z -= fraction * step;
+            }
+            fraction *= 0.5;
+        }
+    }
+
+    /// η of the last solution.
+    pub(super) fn multipliers(&self) -> &[f64] {
+        &self.vector[self.slope.len()..]
+    }
+
+    /// The largest entry of ∂²E/∂z∂z at the last iterate.
+    pub(super) fn largest_mass(&self) -> f64 {
+        largest(&self.derivatives)
+    }
+
+    fn slope<M: FamilyModel>(&mut self, model: &M, t: f64, q: &[f64], z: &[f64]) {
+        let [by_q, force] = &mut self.unused;
+        let first = Gradient {
+            z: &mut self.slope,
+            q: by_q,
+            force,
+        };
+        model.first(t, q, z, first);
+    }
+}

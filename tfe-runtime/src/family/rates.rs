@@ -1,0 +1,463 @@
+//! Steps of families whose rates are the unknowns: any kinetic energy, any element, constraints (T-45, T-72, T-73).
+//!
+//! ```text
+//! v_l = Σ_j E_lj ν_j ,     q_l = q₀ + h Σ_j C_lj ν_j
+//! Σ_l P_il L_v,l − p₀ + h A₀ᵀ m₀ − h Σ_l G_il F_l = 0 ,     F = L_q + Q − Aᵀμ̇ ,     μ̇_l = Σ_j m_j P_j′(2c_l − 1)
+//! φ(q₁)/h = 0 ,     Σ_l b_l P_j′(2c_l − 1) φ(q_l)/h = 0
+//! ```
+//!
+//! Newton's method with one sparse matrix for rates and multipliers; its factors are kept while they serve, also from step to step.
+
+use super::blocked::Blocked;
+use super::lanes::largest;
+use super::node::Node;
+use super::rows::Rows;
+use super::tangent::Parts;
+use super::{FamilyDense, FamilyError, FamilyModel, FamilyState, Gradient};
+use crate::constrained::{START_TOLERANCE, element::slopes};
+use crate::double_double::DoubleDouble;
+use crate::equations::{Increment, relative};
+use crate::error::{ConstraintError, StepError};
+use crate::newton::{Control, Monitor, SERVES, Solve, Verdict};
+use crate::scheme::{SchemeTable, Tables as _};
+use crate::statistics::Statistics;
+use crate::step::set_extrapolation;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Velocities that move so small a part of the positions in one step are rest.
+const REST: f64 = 1e-5;
+
+/// A stepper of this kind.
+#[derive(Clone, Debug)]
+pub(super) struct Rates<'m, M> {
+    model: &'m M,
+    table: SchemeTable,
+    control: Control,
+    pub(super) statistics: Statistics,
+    constraints: usize,
+    matrix: Blocked,
+    parts: Parts,
+    node: Node,
+    /// The unknowns: the rates of each coordinate, then the multipliers of each constraint.
+    unknowns: Vec<f64>,
+    step: Vec<f64>,
+    /// The step that the factors belong to.
+    factored: f64,
+    pub(super) points: Vec<Point>,
+    rows: Rows,
+    /// A at the start.
+    start_rows: Vec<f64>,
+    q_end: Vec<f64>,
+    v_end: Vec<f64>,
+    /// Length of the last step.
+    last: Option<f64>,
+    pub(super) start: FamilyState,
+    pub(super) end: FamilyState,
+    low: FamilyState,
+    impulse: Vec<f64>,
+    force: Vec<f64>,
+}
+
+/// The model at one point of the element.
+#[derive(Clone, Debug)]
+pub(super) struct Point {
+    pub(super) q: Vec<f64>,
+    pub(super) v: Vec<f64>,
+    /// L_v
+    pub(super) momentum: Vec<f64>,
+    /// F
+    pub(super) force: Vec<f64>,
+    /// A
+    pub(super) rows: Vec<f64>,
+    phi: Vec<f64>,
+    /// μ̇
+    pub(super) mu_rate: Vec<f64>,
+}
+
+impl Point {
+    fn new(n: usize, rows: usize, constraints: usize) -> Self {
+        Self {
+            q: vec![0.0; n],
+            v: vec![0.0; n],
+            momentum: vec![0.0; n],
+            force: vec![0.0; n],
+            rows: vec![0.0; rows],
+            phi: vec![0.0; constraints],
+            mu_rate: vec![0.0; constraints],
+        }
+    }
+}
+
+impl<'m, M: FamilyModel> Rates<'m, M> {
+    /// A stepper at rest; the model has been checked.
+    ///
+    /// # Errors
+    /// [`FamilyError`]
+    pub(super) fn new(
+        model: &'m M,
+        table: SchemeTable,
+        control: Control,
+    ) -> Result<Self, FamilyError> {
+        if control.solve == Solve::FixedPoint {
+            return Err(FamilyError::NeedsNewton);
+        }
+        let (n, m) = (model.len(), model.constraints());
+        let (unknowns, points) = (table.view().unknowns(), table.view().points());
+        let rows = Rows::new(model);
+        let (parts, matrix) = Parts::new(model, &rows, unknowns).ok_or(FamilyError::TooLarge)?;
+        let node = Node::new(model, &rows).ok_or(FamilyError::TooLarge)?;
+        let zero = || FamilyState {
+            q: vec![0.0; n],
+            p: vec![0.0; n],
+        };
+        let size = matrix.size();
+        Ok(Self {
+            model,
+            control,
+            statistics: Statistics::NONE,
+            constraints: m,
+            matrix,
+            parts,
+            node,
+            unknowns: vec![0.0; size],
+            step: vec![0.0; size],
+            factored: f64::NAN,
+            points: vec![Point::new(n, rows.values.len(), m); points],
+            start_rows: vec![0.0; rows.values.len()],
+            rows,
+            q_end: vec![0.0; n],
+            v_end: vec![0.0; n],
+            last: None,
+            start: zero(),
+            end: zero(),
+            low: zero(),
+            impulse: vec![0.0; n],
+            force: vec![0.0; n],
+            table,
+        })
+    }
+
+    /// As [`FamilyStepper::advance`](super::FamilyStepper::advance), for a state that is finite and as long as the model.
+    pub(super) fn advance(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut FamilyState,
+    ) -> Result<(), StepError> {
+        let last = self.last.take().filter(|_| self.end == *state);
+        self.start.clone_from(state);
+        self.rows.evaluate(self.model, t, &self.start.q);
+        self.start_rows.copy_from_slice(&self.rows.values);
+        match last {
+            Some(length) => self.continue_rates(h / length),
+            None => {
+                self.low.q.fill(0.0);
+                self.low.p.fill(0.0);
+                self.begin(t)?;
+                self.check_start(h)?;
+            }
+        }
+        let outcome = self.newton(t, h);
+        if let Err(error) = outcome {
+            if last.is_none() {
+                return Err(error);
+            }
+            // The continued polynomial may be a worse start than none.
+            self.rows.evaluate(self.model, t, &self.start.q);
+            self.begin(t)?;
+            self.newton(t, h)?;
+        }
+        self.finish(t, h)?;
+        self.statistics.steps += 1;
+        self.last = Some(h);
+        state.clone_from(&self.end);
+        Ok(())
+    }
+
+    /// The polynomial of the last step, continued.
+    fn continue_rates(&mut self, ratio: f64) {
+        let scheme = self.table.view();
+        let count = scheme.unknowns();
+        let mut extrapolation = vec![0.0; count * count];
+        set_extrapolation(&scheme, ratio, &mut extrapolation);
+        let rates = self.start.q.len() * count;
+        let mut new = vec![0.0; count];
+        for old in self.unknowns[..rates].chunks_exact_mut(count) {
+            for (new, row) in new.iter_mut().zip(extrapolation.chunks_exact(count)) {
+                *new = row.iter().zip(&*old).map(|(x, old)| x * old).sum();
+            }
+            old.copy_from_slice(&new);
+        }
+    }
+
+    /// Constant velocities and no reactions. The rows are those of the start.
+    fn begin(&mut self, t: f64) -> Result<(), StepError> {
+        let count = self.table.view().unknowns();
+        self.matrix.forget();
+        self.unknowns.fill(0.0);
+        self.v_end.fill(0.0);
+        let FamilyState { q, p } = &self.start;
+        self.node
+            .solve(self.model, (t, q), p, &self.rows, &mut self.v_end)?;
+        let rates = self.unknowns.chunks_exact_mut(count);
+        for (rates, v) in rates.zip(&self.v_end) {
+            rates.fill(*v);
+        }
+        Ok(())
+    }
+
+    /// Refuses a start that is not on the constraints.
+    fn check_start(&mut self, h: f64) -> Result<(), StepError> {
+        if self.constraints == 0 {
+            return Ok(());
+        }
+        let extent = largest(&self.start.q);
+        let lengths = self.rows.lengths();
+        let refused = |row: usize, position: bool, residual: f64| {
+            let constraint = self.model.constraint_name(row);
+            Err(ConstraintError::Start {
+                constraint,
+                position,
+                residual,
+            }
+            .into())
+        };
+        for (row, (phi, length)) in self.rows.phi.iter().zip(&lengths).enumerate() {
+            let distance = phi.abs() / if *length > 0.0 { *length } else { 1.0 };
+            if !(distance <= START_TOLERANCE * extent || distance == 0.0) {
+                return refused(row, true, distance / extent);
+            }
+        }
+        // The velocity that constraints leave has another momentum where the start does not keep them.
+        let off = self.start.p.iter().zip(&self.node.slope);
+        let off = off.fold(0.0_f64, |off, (p, slope)| off.max((p - slope).abs()));
+        let impulse =
+            largest(&self.start.p).max(REST * extent / h.abs() * self.node.largest_mass());
+        if !(off <= START_TOLERANCE * impulse || off == 0.0) {
+            let shares = self.node.multipliers().iter().zip(&lengths);
+            let (row, _) = shares
+                .map(|(eta, length)| (eta * length).abs())
+                .enumerate()
+                .fold(
+                    (0, 0.0),
+                    |most, one| if one.1 > most.1 { one } else { most },
+                );
+            return refused(row, false, off / impulse);
+        }
+        Ok(())
+    }
+
+    fn newton(&mut self, t: f64, h: f64) -> Result<(), StepError> {
+        let mut monitor = Monitor::new(self.control.tolerance);
+        let known = self.matrix.is_factored() && self.factored == h;
+        let mut fresh = !known;
+        for iteration in 0..self.control.max_iterations {
+            self.evaluate(t, h);
+            if fresh {
+                let scheme = self.table.view();
+                let element = super::tangent::Element {
+                    scheme: &scheme,
+                    t,
+                    h,
+                    points: &self.points,
+                    start_rows: &self.start_rows,
+                    end_rows: &self.rows.values,
+                };
+                self.parts.fill(self.model, &element, &mut self.matrix);
+                self.statistics.tangent_evaluations += self.points.len() as u64;
+                self.matrix.factor()?;
+                self.factored = h;
+                self.statistics.factorizations += 1;
+            }
+            self.residual(h);
+            self.matrix.solve(&mut self.step);
+            for (unknown, step) in self.unknowns.iter_mut().zip(&self.step) {
+                *unknown -= step;
+            }
+            self.statistics.iterations += 1;
+            self.statistics.newton_iterations += 1;
+            match monitor.judge(self.measure(h)) {
+                Ok(Verdict::Converged) => return Ok(()),
+                Ok(Verdict::GoOn) if monitor.is_noise(fresh) => return Ok(()),
+                Ok(Verdict::GoOn) => {}
+                Err(error) => {
+                    self.matrix.forget();
+                    return Err(error);
+                }
+            }
+            // The first increment alone tells no rate: an old matrix may show a second one.
+            let untried = known && iteration == 0;
+            fresh = !untried && monitor.rate() > SERVES;
+        }
+        self.matrix.forget();
+        Err(StepError::NewtonStalled {
+            iterations: self.control.max_iterations,
+            residual: monitor.last(),
+            tolerance: self.control.tolerance,
+        })
+    }
+
+    /// How large the last increment of the rates is beside the state.
+    fn measure(&self, h: f64) -> Increment {
+        let rates = self.start.q.len() * self.table.view().unknowns();
+        let (x, step) = (&self.unknowns[..rates], &self.step[..rates]);
+        let position = relative(h, &self.start.q, x, step);
+        // The momentum at the end is as good as the velocities, whatever the step; what is left of an increment reaches it through forces only.
+        let velocity = 0.25 * relative(1.0, &[], x, step);
+        // Both are NaN, or none is; a multiplier that is no number spoils the rates in the next iteration.
+        let relative = velocity.max(position);
+        Increment { relative, position }
+    }
+
+    /// The model at the points, and the constraints at the end.
+    fn evaluate(&mut self, t: f64, h: f64) {
+        let scheme = self.table.view();
+        let (n, m, count) = (self.start.q.len(), self.constraints, scheme.unknowns());
+        let (rates, multipliers) = self.unknowns.split_at(n * count);
+        for (l, point) in self.points.iter_mut().enumerate() {
+            let time = t + h * scheme.nodes[l];
+            let velocity = &scheme.velocity[l * count..(l + 1) * count];
+            let position = &scheme.position[l * count..(l + 1) * count];
+            for (a, rates) in rates.chunks_exact(count).enumerate() {
+                point.v[a] = product(velocity, rates);
+                point.q[a] = self.start.q[a] + (h * product(position, rates) + self.low.q[a]);
+            }
+            // What a model never writes is zero; forces were added to.
+            point.force.fill(0.0);
+            let first = Gradient {
+                z: &mut point.momentum,
+                q: &mut point.force,
+                force: &mut self.force,
+            };
+            self.model.first(time, &point.q, &point.v, first);
+            if M::FACTS.forced {
+                for (force, more) in point.force.iter_mut().zip(&self.force) {
+                    *force += more;
+                }
+            }
+            if m > 0 {
+                let slopes = slopes(scheme.nodes[l], count);
+                for (rate, m) in point
+                    .mu_rate
+                    .iter_mut()
+                    .zip(multipliers.chunks_exact(count))
+                {
+                    *rate = product(&slopes[1..count], &m[1..]);
+                }
+                self.rows.evaluate(self.model, time, &point.q);
+                self.rows
+                    .add_reaction(&self.rows.values, -1.0, &point.mu_rate, &mut point.force);
+                point.rows.copy_from_slice(&self.rows.values);
+                point.phi.copy_from_slice(&self.rows.phi);
+            }
+        }
+        self.statistics.residual_evaluations += self.points.len() as u64;
+        if m > 0 {
+            for (a, rates) in rates.chunks_exact(count).enumerate() {
+                let advance = h * product(scheme.advance, rates);
+                self.q_end[a] = self.start.q[a] + (advance + self.low.q[a]);
+            }
+            self.rows.evaluate(self.model, t + h, &self.q_end);
+        }
+    }
+
+    /// What is left of the equations, in `step`.
+    fn residual(&mut self, h: f64) {
+        self.set_impulse_of_start(h);
+        let scheme = self.table.view();
+        let (n, count, points) = (self.start.q.len(), scheme.unknowns(), scheme.points());
+        let (motion, constraints) = self.step.split_at_mut(n * count);
+        for (a, rest) in motion.chunks_exact_mut(count).enumerate() {
+            let start = self.start.p[a] - (self.impulse[a] - self.low.p[a]);
+            for (i, rest) in rest.iter_mut().enumerate() {
+                let (mut momentum, mut force) = (0.0, 0.0);
+                for (l, point) in self.points.iter().enumerate() {
+                    momentum += scheme.momentum[i * points + l] * point.momentum[a];
+                    force += scheme.force[i * points + l] * point.force[a];
+                }
+                *rest = (momentum - start) - h * force;
+            }
+        }
+        for (c, rest) in constraints.chunks_exact_mut(count).enumerate() {
+            rest.fill(0.0);
+            for (l, point) in self.points.iter().enumerate() {
+                let slopes = slopes(scheme.nodes[l], count);
+                for (rest, slope) in rest.iter_mut().zip(slopes).skip(1) {
+                    *rest += scheme.weights[l] * slope * point.phi[c] / h;
+                }
+            }
+            rest[0] = self.rows.phi[c] / h;
+        }
+    }
+
+    /// h A₀ᵀ m₀, in `impulse`.
+    fn set_impulse_of_start(&mut self, h: f64) {
+        self.impulse.fill(0.0);
+        let (n, count) = (self.start.q.len(), self.table.view().unknowns());
+        let multipliers = &self.unknowns[n * count..];
+        for ((constraint, coordinate), value) in self.rows.places().zip(&self.start_rows) {
+            self.impulse[coordinate] += h * (value * multipliers[constraint * count]);
+        }
+    }
+
+    /// The end of the element.
+    fn finish(&mut self, t: f64, h: f64) -> Result<(), StepError> {
+        // The end needs the forces at the final rates, not at the last but one.
+        self.evaluate(t, h);
+        self.set_impulse_of_start(h);
+        let scheme = self.table.view();
+        let count = scheme.unknowns();
+        for a in 0..self.start.q.len() {
+            let rates = &self.unknowns[a * count..(a + 1) * count];
+            let rate = product(scheme.advance, rates) + product(scheme.advance_low, rates);
+            (self.end.q[a], self.low.q[a]) = moved(self.start.q[a], h * rate, self.low.q[a]);
+            let points = self.points.iter().zip(scheme.weights);
+            let force: f64 = points.map(|(point, weight)| weight * point.force[a]).sum();
+            let change = h * force - self.impulse[a];
+            (self.end.p[a], self.low.p[a]) = moved(self.start.p[a], change, self.low.p[a]);
+        }
+        if self.constraints > 0 {
+            if let Some(point) = self.points.last() {
+                self.v_end.copy_from_slice(&point.v);
+            }
+            let at = (t + h, &self.end.q[..]);
+            self.rows.evaluate(self.model, at.0, at.1);
+            self.node
+                .solve(self.model, at, &self.end.p, &self.rows, &mut self.v_end)?;
+            self.end.p.copy_from_slice(&self.node.slope);
+            self.low.p.fill(0.0);
+        }
+        if !(largest(&self.end.q) + largest(&self.end.p)).is_finite() {
+            return Err(StepError::NonFinite);
+        }
+        Ok(())
+    }
+
+    /// The polynomial of the last step.
+    pub(super) fn dense(&self, start: f64, end: f64) -> FamilyDense {
+        let Some(h) = self.last else {
+            return FamilyDense::constant((start, end), self.start.clone());
+        };
+        let scheme = self.table.view();
+        let count = scheme.unknowns();
+        let ends = (self.start.clone(), self.end.clone());
+        let rate = |unknown: usize, a: usize| self.unknowns[a * count + unknown];
+        if self.constraints > 0 {
+            let momentum = |point: usize, a: usize| self.points[point].momentum[a];
+            return FamilyDense::with_jumps(&scheme, (start, end), h, ends, rate, momentum);
+        }
+        let force = |point: usize, a: usize| self.points[point].force[a];
+        FamilyDense::of(&scheme, (start, end), h, ends, rate, force)
+    }
+}
+
+fn product(weights: &[f64], values: &[f64]) -> f64 {
+    weights.iter().zip(values).map(|(w, value)| w * value).sum()
+}
+
+/// start + (change + low), and what rounding took.
+fn moved(start: f64, change: f64, low: f64) -> (f64, f64) {
+    let sum = DoubleDouble::sum(start, change + low);
+    (sum.high, sum.low)
+}

@@ -1,0 +1,185 @@
+//! Declarations by site of models of run-time length: one formula for all sites of a range.
+
+use super::constraints::{Row, components};
+use super::{DeclaredPlace, Index, LONGEST_WRITTEN_OUT, Lowerer};
+use crate::ast::{Expr, Name, Range};
+use crate::constraint::{holds_state, holds_velocity, kind, normal};
+use crate::declared::Constraint;
+use crate::diagnostic::Kind;
+use crate::graph::{ExprId, SumRange};
+use crate::input::{Affine, IndexSymbol};
+
+/// What is known of the constraints before the one at hand.
+#[derive(Default)]
+struct Known {
+    constraints: Vec<Constraint>,
+    /// The equations without constant factors, and their ranges.
+    normals: Vec<(Vec<SumRange>, ExprId)>,
+    /// How many rows there are.
+    rows: Affine,
+}
+
+impl Lowerer<'_> {
+    /// The constraints of a model of run-time length.
+    pub(super) fn constraints_by_site(&mut self) -> Vec<Constraint> {
+        let model = self.model;
+        let mut known = Known::default();
+        for (name, range, value) in &model.constraints {
+            let formula = |lowerer: &mut Self| match range {
+                Some(_) => {
+                    let one = lowerer.scalar(value).into_iter();
+                    one.map(|equation| Row {
+                        place: String::new(),
+                        value: equation,
+                        span: value.span,
+                    })
+                    .collect()
+                }
+                None => components(lowerer.value(value), value),
+            };
+            let Some((ranges, rows)) = self.by_site("constraint", name, range.as_ref(), formula)
+            else {
+                continue;
+            };
+            for row in rows {
+                if !self.add_by_site((name, value), &ranges, row, &mut known) {
+                    break;
+                }
+            }
+        }
+        known.constraints
+    }
+
+    /// Lowers the formula of a declaration with the index of its sites around it; nothing where the range is wrong.
+    pub(super) fn by_site<T>(
+        &mut self,
+        argument: &str,
+        name: &Name,
+        range: Option<&Range>,
+        formula: impl FnOnce(&mut Self) -> T,
+    ) -> Option<(Vec<SumRange>, T)> {
+        let Some(range) = range else {
+            let text = format!("{argument}({name})");
+            self.place = Some(DeclaredPlace { text, own: 0 });
+            let value = formula(self);
+            self.place = None;
+            return Some((Vec::new(), value));
+        };
+        let bounds = (self.affine(&range.start), self.affine(&range.end));
+        self.index_name(&range.variable.node, range.variable.span);
+        let (Some(start), Some(end)) = bounds else {
+            return None;
+        };
+        let whole = range.start.span.join(range.end.span);
+        let length = end.plus_scaled(&start, -1);
+        if length.is_none_or(|length| length.as_constant().is_some_and(|length| length <= 0)) {
+            let range = format!("{}..{}", range.start, range.end);
+            self.report(whole, Kind::EmptyRange { range });
+            return None;
+        }
+        let index = &range.variable.node;
+        let text = format!("{argument}({name}[{index} in {start}..{end}])");
+        self.place = Some(DeclaredPlace { text, own: 1 });
+        let variable = self.depth();
+        let sites = SumRange {
+            variable,
+            start: start.clone(),
+            end: end.clone(),
+        };
+        self.indices.push(Index {
+            name: index.clone(),
+            variable,
+            start,
+            end,
+        });
+        self.require_turns(&sites);
+        let value = formula(self);
+        self.indices.pop();
+        self.place = None;
+        Some((vec![sites], value))
+    }
+
+    /// Checks one equation and adds it; whether it was right.
+    fn add_by_site(
+        &mut self,
+        (name, value): (&Name, &Expr),
+        ranges: &[SumRange],
+        row: Row,
+        known: &mut Known,
+    ) -> bool {
+        let Row {
+            place,
+            value: row,
+            span,
+        } = row;
+        let own = name.node.clone();
+        if self.holds_momentum(row) {
+            let span = self.momentum_in(value).unwrap_or(span);
+            self.report(span, Kind::MomentumInConstraint);
+            return false;
+        }
+        let Some(row) = self.written_out(row) else {
+            let limit = LONGEST_WRITTEN_OUT as usize;
+            self.report(span, Kind::SumInConstraint { name: own, limit });
+            return false;
+        };
+        if !holds_state(&self.graph, row) {
+            self.report(span, Kind::ConstraintWithoutCoordinate { name: own });
+            return false;
+        }
+        if holds_velocity(&self.graph, row) {
+            self.report(span, Kind::VelocityConstraintOfFamily { name: own });
+            return false;
+        }
+        let Some(kind) = kind(&mut self.graph, row) else {
+            return false;
+        };
+        let equation = (ranges.to_vec(), normal(&mut self.graph, row));
+        let repeated = known.normals.iter().position(|other| *other == equation);
+        let name = format!("{own}{place}");
+        let repetition = match (repeated, ranges.first()) {
+            (Some(at), _) => Some((name.clone(), known.constraints[at].name.clone())),
+            // All sites say the same.
+            (None, Some(SumRange { start, .. })) if self.graph.loops_of(row) == 0 => {
+                let second = start.plus_scaled(&Affine::constant(1), 1);
+                second.map(|second| (format!("{own}[{second}]"), format!("{own}[{start}]")))
+            }
+            _ => None,
+        };
+        if let Some((name, other)) = repetition {
+            self.report(span, Kind::RepeatedConstraint { name, other });
+            return false;
+        }
+        let first = known.rows.clone();
+        let (number, next) = match ranges.first() {
+            None => (
+                Some(first.clone()),
+                first.plus_scaled(&Affine::constant(1), 1),
+            ),
+            Some(sites) => {
+                let before = first.plus_scaled(&sites.start, -1);
+                let site = Affine::symbol(IndexSymbol::Loop(sites.variable));
+                let number = before
+                    .as_ref()
+                    .and_then(|before| before.plus_scaled(&site, 1));
+                let next = before.and_then(|before| before.plus_scaled(&sites.end, 1));
+                (number, next)
+            }
+        };
+        let (Some(number), Some(next)) = (number, next) else {
+            let number = format!("{first}");
+            self.report(span, Kind::NumberTooLarge { number });
+            return false;
+        };
+        known.rows = next;
+        known.normals.push(equation);
+        known.constraints.push(Constraint {
+            name,
+            ranges: ranges.to_vec(),
+            row: number,
+            kind,
+            value: row,
+        });
+        true
+    }
+}
