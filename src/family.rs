@@ -2,8 +2,39 @@
 //!
 //! [`Simulation::new`](crate::Simulation::new) runs them as it runs models of fixed size; the types here are those that it gives. The example is
 //! at [`FamilySimulation`].
+//!
+//! Who is joined to whom may be a list, and an output may be one number for each site:
+//!
+//! ```
+//! use tfe::prelude::*;
+//!
+//! #[dynamics(
+//!     coordinates(q[n]),
+//!     lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(b in 0..bonds, k/2*(q[left[b]] - q[right[b]])^2),
+//!     output(stretch[b in 0..bonds]) = q[left[b]] - q[right[b]],
+//! )]
+//! struct Network { n: usize, bonds: usize, k: f64, left: Vec<usize>, right: Vec<usize> }
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A ring of three, and a fourth at one of them.
+//! let (left, right) = (vec![0, 1, 2, 2], vec![1, 2, 0, 3]);
+//! let network = Network { n: 4, bonds: 4, k: 1.0, left, right };
+//! let motion = Simulation::new(&network)
+//!     .step(0.1)
+//!     .run(network.state([0.1, 0.0, 0.0, 0.0], [0.0; 4]), 0.0..10.0)?;
+//! let last = motion.last();
+//! let column = motion.outputs().column("stretch[3]").unwrap_or_default();
+//! assert_eq!(column.last(), Some(&(last.q[2] - last.q[3])));
+//!
+//! let wrong = Network { left: vec![0, 1, 2, 7], ..network };
+//! let error = Simulation::new(&wrong).run(wrong.state([0.0; 4], [0.0; 4]), 0.0..1.0);
+//! let message = error.expect_err("there is no site 7").to_string();
+//! assert!(message.contains("`left[3]` is 7"), "{message}");
+//! # Ok(())
+//! # }
+//! ```
 
-pub use crate::motion::family::{FamilyMotion, FamilyNode, FamilyResidual};
+pub use crate::motion::family::{FamilyMotion, FamilyNode, FamilyOutputs, FamilyResidual};
 pub use crate::simulation::family::{FamilyRunError, FamilySimulation, FamilySteps, Runs};
 pub use tfe_runtime::family::{
     Block, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, Gradient, Pattern,

@@ -116,14 +116,14 @@ impl Error for ContinuationErrorKind {
 /// A branch that stopped before its end: why, and the branch so far.
 #[derive(Clone)]
 pub struct ContinuationError<M, const N: usize> {
-    kind: ContinuationErrorKind,
+    kind: Box<ContinuationErrorKind>,
     partial: Box<Branch<M, N>>,
 }
 
 impl<M: Model<N>, const N: usize> ContinuationError<M, N> {
     pub(super) fn new(kind: ContinuationErrorKind, partial: Branch<M, N>) -> Self {
         Self {
-            kind,
+            kind: Box::new(kind),
             partial: Box::new(partial),
         }
     }

@@ -1,6 +1,6 @@
 //! The result of a run of a model of run-time length.
 
-use super::{Outputs, larger};
+use super::larger;
 use crate::csv;
 use crate::error::AtError;
 use std::fmt;
@@ -44,6 +44,35 @@ pub struct FamilyResidual {
     pub velocity: f64,
 }
 
+/// The observables that a family declares by `output(name) = …` or `output(name[i in a..b]) = …`: one column each, or one for each site, `strain[0]`, `strain[1]`, …; one row a
+/// recorded node.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FamilyOutputs {
+    names: Vec<CoordinateName>,
+    values: Vec<f64>,
+}
+
+impl FamilyOutputs {
+    /// The names of the columns, in the order of declaration and of sites.
+    pub fn names(&self) -> &[CoordinateName] {
+        &self.names
+    }
+
+    /// The values of one column, `"extension"` or `"strain[2]"`, at the recorded nodes; `None` where there is no such column.
+    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let is_it = |candidate: &CoordinateName| candidate.to_string() == name;
+        let at = self.names.iter().position(is_it)?;
+        let values = self.values.iter().skip(at);
+        Some(values.step_by(self.names.len()).copied().collect())
+    }
+
+    /// All columns at one recorded node, in the order of [`names`](Self::names).
+    pub fn row(&self, node: usize) -> Option<&[f64]> {
+        let columns = self.names.len();
+        self.values.get(node * columns..(node + 1) * columns)
+    }
+}
+
 /// A recorded motion of a model of run-time length: what [`Motion`](crate::Motion) is for models of fixed size, by the same names.
 ///
 /// A node keeps 3 n numbers for n coordinates, the polynomial of an element of s stages 2 s n more: for long chains and long runs,
@@ -53,7 +82,7 @@ pub struct FamilyMotion {
     nodes: Vec<FamilyNode>,
     velocities: Vec<Vec<f64>>,
     energies: Vec<f64>,
-    outputs: Outputs,
+    outputs: FamilyOutputs,
     residual: (f64, f64),
     elements: Vec<FamilyDense>,
     statistics: Statistics,
@@ -66,6 +95,8 @@ impl FamilyMotion {
         let mut motion = Self::empty(model, t, start);
         motion.nodes.clear();
         motion.names = (0..model.len()).map(|a| model.coordinate_name(a)).collect();
+        let columns = 0..model.columns();
+        motion.outputs.names = columns.map(|at| model.column_name(at)).collect();
         motion.record(model, t, start);
         motion
     }
@@ -76,10 +107,7 @@ impl FamilyMotion {
             nodes: vec![FamilyNode::new(t, start.clone())],
             velocities: Vec::new(),
             energies: Vec::new(),
-            outputs: Outputs {
-                names: M::OBSERVABLES,
-                values: Vec::new(),
-            },
+            outputs: FamilyOutputs::default(),
             residual: (0.0, 0.0),
             elements: Vec::new(),
             statistics: Statistics::default(),
@@ -93,14 +121,14 @@ impl FamilyMotion {
         let velocity = velocity.unwrap_or_else(|_| vec![f64::NAN; state.q.len()]);
         self.energies
             .push(family::energy(model, t, state, &velocity));
-        if !M::OBSERVABLES.is_empty() {
+        let columns = self.outputs.names.len();
+        if columns > 0 {
             let z = match M::FORM {
                 Form::Lagrangian => &velocity,
                 Form::Hamiltonian => &state.p,
             };
             let start = self.outputs.values.len();
-            let length = start + M::OBSERVABLES.len();
-            self.outputs.values.resize(length, 0.0);
+            self.outputs.values.resize(start + columns, 0.0);
             model.observables(t, &state.q, z, &mut self.outputs.values[start..]);
         }
         if M::CONSTRAINED {
@@ -191,7 +219,7 @@ impl FamilyMotion {
     }
 
     /// The observables at the recorded nodes.
-    pub fn outputs(&self) -> &Outputs {
+    pub fn outputs(&self) -> &FamilyOutputs {
         &self.outputs
     }
 
@@ -206,7 +234,7 @@ impl FamilyMotion {
         header.extend(self.names.iter().map(|name| format!("{name}_dot")));
         header.extend(self.names.iter().map(|name| format!("p_{name}")));
         header.push("energy".to_owned());
-        header.extend(self.outputs.names.iter().map(|name| (*name).to_owned()));
+        header.extend(self.outputs.names.iter().map(ToString::to_string));
         let rows = self.nodes.iter().enumerate().map(|(k, node)| {
             let mut row = vec![node.t];
             row.extend(&node.q);

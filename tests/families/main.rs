@@ -5,7 +5,9 @@ mod constrained;
 mod constraints;
 mod errors;
 mod kernels;
+mod lists;
 mod motions;
+mod outputs;
 #[cfg(feature = "sparse")]
 mod rates;
 #[cfg(feature = "sparse")]

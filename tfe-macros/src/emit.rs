@@ -234,7 +234,7 @@ impl<'a> Emitter<'a> {
             Output::Bend(a, b) => at(&quote!(#second bend), &[a, b]),
             Output::RateQ(a, b) => at(&quote!(#second rate_q), &[a, b]),
             Output::RateV(a, b) => at(&quote!(#second rate_v), &[a, b]),
-            Output::SitePhi(a) => at(&quote!(values), &[a]),
+            Output::SitePhi(a) | Output::SiteObservable(a) => at(&quote!(values), &[a]),
             Output::SiteDrift(a) => at(&quote!(drift), &[a]),
             // Told entry by entry.
             Output::SiteRow(..) => TokenStream::new(),
@@ -266,7 +266,7 @@ impl<'a> Emitter<'a> {
             Output::Bend(..) => matrix(quote!(#second bend)),
             Output::RateQ(..) => matrix(quote!(#second rate_q)),
             Output::RateV(..) => matrix(quote!(#second rate_v)),
-            Output::SitePhi(_) => vector(quote!(values)),
+            Output::SitePhi(_) | Output::SiteObservable(_) => vector(quote!(values)),
             Output::SiteDrift(_) => vector(quote!(drift)),
             Output::SiteRow(..) => TokenStream::new(),
             Output::Value | Output::Observable(_) | Output::Phi(_) | Output::Drift(_) => {
@@ -362,6 +362,11 @@ impl<'a> Emitter<'a> {
                 let field = identifier(name);
                 let element = at(&quote!(self.#field), &[a]);
                 quote!(t.like(#element))
+            }
+            // Entries of lists may be any numbers.
+            Input::Integer(a) if a.holds_entry() => {
+                let value = real(a);
+                quote!(t.like(#value))
             }
             Input::Integer(a) => {
                 let value = signed(a);
@@ -596,18 +601,39 @@ fn symbol_tokens(symbol: &IndexSymbol) -> TokenStream {
             let name = identifier(name);
             quote!(self.#name)
         }
+        IndexSymbol::Entry(list, place) => {
+            let list = identifier(list);
+            at(&quote!(self.#list), &[place])
+        }
     }
 }
 
 pub(crate) fn signed(affine: &Affine) -> TokenStream {
     let constant = Literal::i64_unsuffixed(affine.constant);
     let terms = affine.terms.iter().map(|(symbol, coefficient)| {
-        let symbol = symbol_tokens(symbol);
+        let symbol = match symbol {
+            // Whatever a list holds, sums of entries do not overflow.
+            IndexSymbol::Entry(..) => {
+                let entry = symbol_tokens(symbol);
+                quote!(__tfe::checks::small(#entry))
+            }
+            symbol => symbol_tokens(symbol),
+        };
         if *coefficient == -1 {
             return quote!(- (#symbol as i64));
         }
         let coefficient = Literal::i64_unsuffixed(*coefficient);
         quote!(+ #coefficient * (#symbol as i64))
+    });
+    quote!(#constant #(#terms)*)
+}
+
+/// An integer as a number.
+fn real(affine: &Affine) -> TokenStream {
+    let constant = number(affine.constant as f64);
+    let terms = affine.terms.iter().map(|(symbol, coefficient)| {
+        let (symbol, coefficient) = (symbol_tokens(symbol), number(*coefficient as f64));
+        quote!(+ #coefficient * (#symbol as f64))
     });
     quote!(#constant #(#terms)*)
 }

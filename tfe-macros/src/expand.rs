@@ -8,7 +8,7 @@ use quote::quote;
 use syn::ItemStruct;
 use tfe_symbolic::compile;
 use tfe_symbolic::context::{FieldKind, Length};
-use tfe_symbolic::declared::{Declared, Form, Parameter};
+use tfe_symbolic::declared::{Declared, Form, Observable, Parameter};
 use tfe_symbolic::derivation::Derivation;
 use tfe_symbolic::input::Affine;
 use tfe_symbolic::program::{By, Program, Request};
@@ -295,7 +295,7 @@ impl<'a> Kernels<'a> {
             return TokenStream::new();
         }
         let dof = &self.dof;
-        let names = self.declared.observables.iter().map(|(name, _)| name);
+        let names = self.declared.observables.iter().map(|one| &one.name);
         let request = Request {
             observables: true,
             ..Request::default()
@@ -403,7 +403,7 @@ impl<'a> Kernels<'a> {
             Form::Hamiltonian => (quote!(p), "momenta"),
         };
         let count = Literal::usize_unsuffixed(self.declared.observables.len());
-        let observables = self.declared.observables.iter().enumerate().map(|(k, (name, _))| {
+        let observables = self.declared.observables.iter().enumerate().map(|(k, Observable { name, .. })| {
             let (method, k) = (emit::identifier(name), Literal::usize_unsuffixed(k));
             let doc = format!(" The observable `{name}` at time `t`, coordinates `q` and {second_doc} `{second}`.");
             quote! {

@@ -60,7 +60,7 @@ pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
         .iter()
         .map(|solver| solver_stub(solver, item, path));
     if guess.run_time {
-        let family = family::stubs(item, path, &form, outputs);
+        let family = family::stubs(item, path, &form, outputs, &guess.by_site);
         return quote!(#family #(#solvers)*);
     }
     quote! {
@@ -179,6 +179,8 @@ struct Guess {
     run_time: bool,
     hamiltonian: bool,
     outputs: Vec<Ident>,
+    /// Which of them are declared by site.
+    by_site: BTreeSet<String>,
     solvers: Vec<Ident>,
 }
 
@@ -190,6 +192,7 @@ impl Guess {
             run_time: false,
             hamiltonian: false,
             outputs: Vec::new(),
+            by_site: BTreeSet::new(),
             solvers: Vec::new(),
         };
         for range in parse::split_arguments(text) {
@@ -203,7 +206,12 @@ impl Guess {
                     guess.run_time = has_field_as_length(&arrays, item);
                 }
                 Some(Item::Hamiltonian(_)) => guess.hamiltonian = true,
-                Some(Item::Output { name, .. }) => guess.outputs.push(identifier(&name.node)),
+                Some(Item::Output { name, range, .. }) => {
+                    guess.outputs.push(identifier(&name.node));
+                    if range.is_some() {
+                        guess.by_site.insert(name.node);
+                    }
+                }
                 Some(Item::Solver { name, .. }) => guess.solvers.push(identifier(&name.node)),
                 Some(Item::Crate(path)) => {
                     if let Ok(path) = syn::parse_str::<syn::Path>(&path.node) {

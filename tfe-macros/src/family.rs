@@ -1,6 +1,8 @@
 //! Models of run-time length: kernels over slices, and the checks of lengths.
 
 mod constraint;
+mod observable;
+mod sites;
 
 use crate::emit::{self, Body, Emitter};
 use crate::page;
@@ -121,7 +123,7 @@ impl Kernels<'_> {
         let momenta_move = self.derivation.momenta_move();
         let (dof, check) = (&self.dof, self.check());
         let coordinate_name = self.coordinate_name();
-        let observables = self.observables();
+        let observables = observable::members(self);
         let constraints = constraint::members(self.declared, self.derivation, &self.dof);
         quote! {
             const _: () = {
@@ -240,7 +242,8 @@ impl Kernels<'_> {
                     place,
                     length,
                 } => {
-                    let place = emit::signed(place);
+                    let entries: Vec<(&str, &Affine)> = place.entries().collect();
+                    let value = emit::signed(place);
                     let length = match length {
                         Extent::Known(length) => emit::index(length),
                         Extent::OfField(field) => {
@@ -248,8 +251,16 @@ impl Kernels<'_> {
                             quote!(self.#field.len())
                         }
                     };
-                    let one =
-                        quote!(__tfe::checks::index((#array, #text, #ranges), #place, #length)?;);
+                    let index = quote!((#array, #text, #ranges));
+                    let one = match entries[..] {
+                        // Of one entry the message names the list and the place.
+                        [(list, at)] => {
+                            let (field, at) = (emit::identifier(list), emit::index(at));
+                            let entry = quote!((#list, &self.#field, #at));
+                            quote!(__tfe::checks::entry(#index, #entry, #value, #length)?;)
+                        }
+                        _ => quote!(__tfe::checks::index(#index, #value, #length)?;),
+                    };
                     let nested = nest.iter().rev().fold(one, |inner, range| {
                         let variable = emit::loop_name(range.variable);
                         let (start, end) = (emit::index(&range.start), emit::index(&range.end));
@@ -296,25 +307,6 @@ impl Kernels<'_> {
         }
     }
 
-    fn observables(&self) -> TokenStream {
-        if self.declared.observables.is_empty() {
-            return TokenStream::new();
-        }
-        let names = self.declared.observables.iter().map(|(name, _)| name);
-        let request = Request {
-            observables: true,
-            ..Request::default()
-        };
-        let body = self.body(&self.program(request), Given::Nothing).statements;
-        quote! {
-            const OBSERVABLES: &'static [&'static str] = &[#(#names),*];
-
-            fn observables<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R], values: &mut [R]) {
-                #body
-            }
-        }
-    }
-
     /// `state`, `structure`, and one method for each observable.
     fn methods(&self, item: &ItemStruct, path: &TokenStream) -> TokenStream {
         let (name, vis) = (&item.ident, &item.vis);
@@ -323,24 +315,9 @@ impl Kernels<'_> {
             Form::Lagrangian => (quote!(v), "velocities"),
             Form::Hamiltonian => (quote!(p), "momenta"),
         };
-        let observables = self.declared.observables.iter().enumerate().map(|(k, (name, _))| {
-            let (method, k) = (emit::identifier(name), Literal::usize_unsuffixed(k));
-            let doc = format!(" The observable `{name}` at time `t`, coordinates `q` and {second_doc} `{second}`.");
-            quote! {
-                #[doc = #doc]
-                ///
-                /// # Errors
-                /// Vectors of another length than the model's, and lengths of the model that do not fit together.
-                #vis fn #method(
-                    &self,
-                    t: f64,
-                    q: &[f64],
-                    #second: &[f64],
-                ) -> ::core::result::Result<f64, #path::__private::FamilyError> {
-                    #path::__private::family_observable(self, t, q, #second, #k)
-                }
-            }
-        });
+        let observables = self.declared.observables.iter();
+        let observables =
+            observables.map(|one| observable::method(one, vis, &second, second_doc, path));
         let structure = page::structure(self.declared, self.derivation, path);
         quote! {
             #[automatically_derived]

@@ -125,6 +125,9 @@ fn field_kind(ty: &Type, const_parameters: &[String]) -> FieldKind {
                     Some(GenericArgument::Type(element)) if is_named(element, "f64") => {
                         FieldKind::Vector
                     }
+                    Some(GenericArgument::Type(element)) if is_named(element, "usize") => {
+                        FieldKind::Indices
+                    }
                     _ => other(ty),
                 },
                 _ => other(ty),

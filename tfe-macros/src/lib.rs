@@ -26,7 +26,8 @@ use proc_macro::TokenStream;
 /// the crate compiles; mistakes are reported under the token that is wrong, all of them at once.
 ///
 /// `coordinates(q[n])` with `n` a field of type `usize` declares a model of run-time length: sums stay loops, state and parameters (`Vec<f64>`) live on the heap, and the
-/// code is the same for every length. `Simulation::new` runs both kinds.
+/// code is the same for every length. `Simulation::new` runs both kinds. There, `constraint(rod[i in 0..n-1]) = ...` (of positions and the time) and `output(strain[i in 0..n-1]) = ...`
+/// stand for one equation or one number for each site, and a field `left` of type `Vec<usize>` is a list of indices, `q[left[b]]`.
 ///
 /// The attribute keeps the struct as it is, implements the kernels that the elements of `tfe` integrate, and adds the methods
 /// `state(q, v)`, `structure()` and one for each `output`.

@@ -174,10 +174,23 @@ pub trait FamilyModel {
     ) {
     }
 
-    /// The names of the observables.
+    /// The names of the observables as declared.
     const OBSERVABLES: &'static [&'static str] = &[];
 
-    /// The observables, one for each name.
+    /// The number of observables: one for each name, or for each site of a name that is declared by site.
+    fn columns(&self) -> usize {
+        Self::OBSERVABLES.len()
+    }
+
+    /// The name of an observable: `strain[0]`, `strain[1]`, …, or `extension` of a single one.
+    fn column_name(&self, column: usize) -> CoordinateName {
+        match Self::OBSERVABLES.get(column) {
+            Some(name) => CoordinateName::single(name),
+            None => CoordinateName::element("", column),
+        }
+    }
+
+    /// The observables, in order of declaration and of sites.
     fn observables<R: Real>(&self, _t: R, _q: &[R], _z: &[R], _values: &mut [R]) {}
 }
 
@@ -294,6 +307,22 @@ pub fn observable<M: FamilyModel>(
     z: &[f64],
     number: usize,
 ) -> Result<f64, FamilyError> {
+    let values = observables(model, t, q, z, || (number, 1))?;
+    Ok(values.first().copied().unwrap_or(f64::NAN))
+}
+
+/// Some observables in a row: `place` says from which one on and how many, once lengths are known to fit.
+///
+/// # Errors
+/// [`FamilyError`] where the model does not fit together or a vector has another length.
+#[doc(hidden)]
+pub fn observables<M: FamilyModel>(
+    model: &M,
+    t: f64,
+    q: &[f64],
+    z: &[f64],
+    place: impl Fn() -> (usize, usize),
+) -> Result<Vec<f64>, FamilyError> {
     model.check()?;
     let second = match M::FORM {
         Form::Lagrangian => "v",
@@ -309,9 +338,10 @@ pub fn observable<M: FamilyModel>(
             });
         }
     }
-    let mut values = vec![0.0; M::OBSERVABLES.len()];
+    let mut values = vec![0.0; model.columns()];
     model.observables(t, q, z, &mut values);
-    Ok(values.get(number).copied().unwrap_or(f64::NAN))
+    let (first, count) = place();
+    Ok(values.into_iter().skip(first).take(count).collect())
 }
 
 /// What generated code checks.
@@ -360,6 +390,37 @@ pub mod checks {
             value,
             length,
         })
+    }
+
+    /// An index made of an entry of a list (its name, the list, the place) stays inside its array.
+    ///
+    /// # Errors
+    /// [`FamilyError::ListEntry`].
+    pub fn entry(
+        (array, index, ranges): (&'static str, &'static str, &'static str),
+        (list, entries, place): (&'static str, &[usize], usize),
+        value: i64,
+        length: usize,
+    ) -> Result<(), FamilyError> {
+        if usize::try_from(value).is_ok_and(|value| value < length) {
+            return Ok(());
+        }
+        Err(FamilyError::ListEntry {
+            list,
+            place,
+            entry: entries.get(place).copied().unwrap_or(usize::MAX),
+            array,
+            index,
+            ranges,
+            length,
+        })
+    }
+
+    /// An entry of a list as a summand: larger ones than any array is long count as that.
+    #[must_use]
+    pub fn small(entry: usize) -> i64 {
+        const LONGEST: i64 = 1 << 40;
+        i64::try_from(entry).map_or(LONGEST, |entry| entry.min(LONGEST))
     }
 
     /// An array field is as long as the largest of its indices asks for: (length, index, ranges) of each.

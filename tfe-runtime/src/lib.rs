@@ -80,7 +80,7 @@ pub mod __private {
     #[cfg(feature = "alloc")]
     pub use crate::family::{
         Block, Entries, FamilyError, FamilyModel, FamilyState, Gradient, checks,
-        observable as family_observable, state as family_state,
+        observable as family_observable, observables as family_observables, state as family_state,
     };
     pub use crate::length::{Declared, RunTimeLength};
     pub use crate::model::{

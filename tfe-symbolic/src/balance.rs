@@ -100,7 +100,11 @@ impl Pairs {
                 _ => return None,
             };
             let own = Affine::symbol(IndexSymbol::Loop(self.variables[of]));
-            minus(index, &own).map(|offset| Offset { of, offset })
+            // The rest may hold entries of lists.
+            let varies = |offset: &Affine| self.variables.iter().any(|x| offset.depends_on(*x));
+            minus(index, &own)
+                .filter(|offset| !varies(offset))
+                .map(|offset| Offset { of, offset })
         };
         offset(&place.row).zip(offset(&place.column))
     }

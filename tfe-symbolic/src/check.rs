@@ -111,8 +111,8 @@ pub struct Model {
     pub dissipation: Option<Expr>,
     /// The constraints: name, range of a family, value.
     pub constraints: Vec<(Name, Option<Range>, Expr)>,
-    /// The observables.
-    pub outputs: Vec<(Name, Expr)>,
+    /// The observables: name, range of the sites, value.
+    pub outputs: Vec<(Name, Option<Range>, Expr)>,
     /// The parameters by which derivatives are wanted.
     pub sensitivities: Vec<Expr>,
     /// The solvers.
@@ -186,17 +186,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
             Item::Constraint { name, range, value } => {
                 model.constraints.push((name, range, value));
             }
-            Item::Output {
-                name,
-                range: None,
-                value,
-            } => model.outputs.push((name, value)),
-            Item::Output {
-                range: Some(range), ..
-            } => {
-                bag.push(range.variable.span.join(range.end.span), Kind::OutputFamily);
-                model.incomplete = true;
-            }
+            Item::Output { name, range, value } => model.outputs.push((name, range, value)),
             Item::Sensitivity(parameters) => {
                 if parameters.is_empty() {
                     bag.push(span, Kind::NoSensitivity);
@@ -511,7 +501,12 @@ impl Model {
 
     fn outputs(&self, bag: &mut Bag) {
         let mut names: Vec<&str> = Vec::new();
-        for (Spanned { node: name, span }, _) in &self.outputs {
+        for (Spanned { node: name, span }, range, _) in &self.outputs {
+            if let Some(range) = range
+                && !self.dof.is_of_run_time()
+            {
+                bag.push(range.variable.span.join(range.end.span), Kind::OutputFamily);
+            }
             if let Some(kind) = reserved(name, false) {
                 bag.push(*span, kind);
             }
@@ -543,7 +538,7 @@ impl Model {
                 Some(Role::Constraint)
             } else {
                 let mut outputs = self.outputs.iter();
-                let output = outputs.any(|(output, _)| output.node == *name);
+                let output = outputs.any(|(output, ..)| output.node == *name);
                 output.then_some(Role::Output)
             };
             if let Some(taken) = taken {

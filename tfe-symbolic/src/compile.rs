@@ -2,7 +2,7 @@
 
 use crate::ast::{ExprKind, Item, Spanned};
 use crate::check::{self, Arguments};
-use crate::context::Context;
+use crate::context::{Context, FieldKind};
 use crate::declared::Declared;
 use crate::diagnostic::{Bag, Diagnostic, Span};
 use crate::lower::lower;
@@ -18,13 +18,38 @@ use crate::parse::{first_word, parse_item, split_arguments};
 pub fn declare(arguments: &str, context: &Context) -> Result<Declared, Vec<Diagnostic>> {
     let mut bag = Bag::new();
     let arguments = parse(arguments, &mut bag);
-    let model = check::model(arguments, context, &mut bag);
-    let declared = lower(&model, context, &mut bag);
+    let context = understood(context, &arguments.items);
+    let model = check::model(arguments, &context, &mut bag);
+    let declared = lower(&model, &context, &mut bag);
     match bag.finish(declared)? {
         Some(declared) => Ok(declared),
         // Lowering without a result has left its reason in the bag.
         None => Err(Vec::new()),
     }
+}
+
+/// Lists of indices are for models of run-time length; elsewhere they are fields that formulas cannot use.
+fn understood(context: &Context, items: &[Spanned<Item>]) -> Context {
+    let is_length = |name: &String| {
+        let kind = context.field(name).map(|field| &field.kind);
+        kind == Some(&FieldKind::Length)
+    };
+    let of_run_time = items.iter().any(|item| match &item.node {
+        Item::Coordinates(arrays) => arrays.iter().any(|array| {
+            let length = array.length.as_ref().map(|length| &length.node);
+            matches!(length, Some(ExprKind::Name(name)) if is_length(name))
+        }),
+        _ => false,
+    });
+    let mut context = context.clone();
+    if !of_run_time {
+        for field in &mut context.fields {
+            if field.kind == FieldKind::Indices {
+                field.kind = FieldKind::Other("Vec<usize>".to_owned());
+            }
+        }
+    }
+    context
 }
 
 fn parse(text: &str, bag: &mut Bag) -> Arguments {

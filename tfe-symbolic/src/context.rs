@@ -29,6 +29,8 @@ pub enum FieldKind {
     Array(Length),
     /// `Vec<f64>`
     Vector,
+    /// `Vec<usize>`: a list of indices, of models of run-time length
+    Indices,
     /// `usize`
     Length,
     /// Any other type, as written; an error only where a formula uses the field.

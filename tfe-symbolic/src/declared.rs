@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::graph::{ExprId, Graph, SumRange};
-use crate::input::Affine;
+use crate::input::{Affine, IndexSymbol};
 use crate::notation::Notation;
 
 /// Which energy function declares the model.
@@ -62,7 +62,7 @@ pub enum Requirement {
         /// The length of the array.
         length: Extent,
     },
-    /// A field of type `Vec<f64>` is exactly as long as its largest index asks for.
+    /// A field of type `Vec<f64>` or `Vec<usize>` is exactly as long as its largest index asks for.
     FieldLength {
         /// The field.
         field: String,
@@ -89,7 +89,7 @@ pub enum Requirement {
 pub enum Extent {
     /// Of coordinates, or of a field of type `[f64; K]`.
     Known(Affine),
-    /// Of a field of type `Vec<f64>`.
+    /// Of a field of type `Vec<f64>` or `Vec<usize>`.
     OfField(String),
 }
 
@@ -102,6 +102,32 @@ pub struct Force {
     pub target: Affine,
     /// Its value.
     pub value: ExprId,
+}
+
+/// What a motion shows beside its state; in models of run-time length one number for each site of a range.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Observable {
+    /// Its name as declared.
+    pub name: String,
+    /// The range of the sites; empty for one number.
+    pub ranges: Vec<SumRange>,
+    /// The place among all numbers: those of the declarations before it come first.
+    pub column: Affine,
+    /// Its value.
+    pub value: ExprId,
+}
+
+impl Observable {
+    /// The place of its first number.
+    pub fn first_column(&self) -> Option<Affine> {
+        let Some(sites) = self.ranges.first() else {
+            return Some(self.column.clone());
+        };
+        let site = Affine::symbol(IndexSymbol::Loop(sites.variable));
+        self.column
+            .plus_scaled(&site, -1)?
+            .plus_scaled(&sites.start, 1)
+    }
 }
 
 /// A parameter by which derivatives are wanted: a field, or one element of an array field.
@@ -229,8 +255,8 @@ pub struct Declared {
     pub forces: Vec<Force>,
     /// The constraints, in order.
     pub constraints: Vec<Constraint>,
-    /// The observables by name.
-    pub observables: Vec<(String, ExprId)>,
+    /// The observables, in order.
+    pub observables: Vec<Observable>,
     /// The parameters by which derivatives are wanted, in the order of `sensitivity(…)`.
     pub sensitivities: Vec<Parameter>,
     /// The specialised steppers asked for.

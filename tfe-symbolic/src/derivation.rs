@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use crate::constant::Constant;
 use crate::constraint;
 use crate::count::Counts;
-use crate::declared::{Constraint, Declared, Force, Form, Parameter};
+use crate::declared::{Constraint, Declared, Force, Form, Observable, Parameter};
 use crate::differentiate::{Forward, gradient};
 use crate::draft::Draft;
 use crate::entry::{Array, Entry, Place};
@@ -40,8 +40,8 @@ pub struct Model {
     pub forces: Vec<Force>,
     /// The constraints, free of sums over ranges; those by site of models of run-time length are holonomic.
     pub constraints: Vec<Constraint>,
-    /// The observables by name.
-    pub observables: Vec<(String, ExprId)>,
+    /// The observables.
+    pub observables: Vec<Observable>,
     /// The parameters by which derivatives are wanted.
     pub sensitivities: Vec<Parameter>,
 }
@@ -126,9 +126,7 @@ impl Derivation {
         for force in &forces {
             deriver.force(force.ranges.clone(), force.target.clone(), force.value);
         }
-        for (number, (_, value)) in observables.iter().enumerate() {
-            deriver.push(&[], Place::scalar(Array::Observable(number)), *value);
-        }
+        deriver.observables(&observables);
         let mut entries = deriver.entries;
         let constrain = match dof.is_of_run_time() {
             true => constraint::entries_by_site,
@@ -365,6 +363,17 @@ impl Deriver<'_> {
                 },
                 value,
             );
+        }
+    }
+
+    fn observables(&mut self, observables: &[Observable]) {
+        let by_site = observables.iter().any(|one| !one.ranges.is_empty());
+        for (number, one) in observables.iter().enumerate() {
+            let place = match by_site {
+                true => Place::vector(Array::SiteObservable, one.column.clone()),
+                false => Place::scalar(Array::Observable(number)),
+            };
+            self.push(&one.ranges, place, one.value);
         }
     }
 

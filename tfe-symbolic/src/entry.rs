@@ -29,6 +29,7 @@ pub(crate) enum Array {
     SitePhi,
     SiteRow,
     SiteDrift,
+    SiteObservable,
 }
 
 /// One entry of an array of results; vectors and numbers leave indices unused.
@@ -47,7 +48,7 @@ impl Array {
             Self::ByZ | Self::ByQ | Self::Force => request.first,
             Self::ZZ => request.mass || request.second,
             Self::ZQ | Self::QQ | Self::ForceZ | Self::ForceQ => request.second,
-            Self::Observable(_) => request.observables,
+            Self::Observable(_) | Self::SiteObservable => request.observables,
             Self::Phi(_) | Self::SitePhi => request.constraint_values,
             Self::Row(_) | Self::Drift(_) | Self::SiteRow | Self::SiteDrift => {
                 request.constraint_rows
@@ -99,6 +100,7 @@ impl Place {
             Array::SitePhi => Output::SitePhi(row),
             Array::SiteRow => Output::SiteRow(row, column),
             Array::SiteDrift => Output::SiteDrift(row),
+            Array::SiteObservable => Output::SiteObservable(row),
         }
     }
 

@@ -9,7 +9,7 @@ use std::fmt;
 use crate::ast::Comparison;
 use crate::constant::Constant;
 use crate::function::Function;
-use crate::input::{Affine, IndexSymbol, Input, LoopVariable};
+use crate::input::{Affine, Input, LoopVariable};
 
 /// An expression of a [`Graph`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -125,18 +125,10 @@ pub(crate) fn loop_bit(variable: LoopVariable) -> u64 {
     1 << variable.0.min(63)
 }
 
-fn loops_in(affine: &Affine) -> u64 {
-    let bit = |symbol: &IndexSymbol| {
-        if let IndexSymbol::Loop(variable) = symbol {
-            loop_bit(*variable)
-        } else {
-            0
-        }
-    };
-    affine
-        .terms
-        .iter()
-        .fold(0, |mask, (symbol, _)| mask | bit(symbol))
+/// The bits of all loop variables in an index.
+pub(crate) fn loops_in(affine: &Affine) -> u64 {
+    let variables = affine.variables().into_iter();
+    variables.fold(0, |mask, variable| mask | loop_bit(variable))
 }
 
 impl Graph {

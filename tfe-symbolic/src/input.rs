@@ -15,6 +15,8 @@ pub enum IndexSymbol {
     ConstParameter(String),
     /// A `usize` field of the struct.
     Field(String),
+    /// An entry of a `Vec<usize>` field of the struct, by its place in the list.
+    Entry(String, Affine),
 }
 
 /// `constant + Σ coefficient · symbol`, sorted by symbol, without zero coefficients.
@@ -92,7 +94,30 @@ impl Affine {
         self.terms.iter().any(field)
     }
 
-    /// What the loop variable is multiplied by.
+    /// The entries of lists in it: list and place.
+    pub fn entries(&self) -> impl Iterator<Item = (&str, &Self)> {
+        self.terms.iter().filter_map(|(symbol, _)| match symbol {
+            IndexSymbol::Entry(list, place) => Some((list.as_str(), place)),
+            _ => None,
+        })
+    }
+
+    /// Whether it holds an entry of a list: then nothing is known of how it goes from turn to turn.
+    pub fn holds_entry(&self) -> bool {
+        self.entries().next().is_some()
+    }
+
+    /// All loop variables in it, those in places of lists too.
+    pub(crate) fn variables(&self) -> Vec<LoopVariable> {
+        let own = |(symbol, _): &(IndexSymbol, i64)| match symbol {
+            IndexSymbol::Loop(variable) => vec![*variable],
+            IndexSymbol::Entry(_, place) => place.variables(),
+            IndexSymbol::ConstParameter(_) | IndexSymbol::Field(_) => Vec::new(),
+        };
+        self.terms.iter().flat_map(own).collect()
+    }
+
+    /// What the loop variable is multiplied by, where it stands outside of lists.
     pub(crate) fn factor_of(&self, variable: LoopVariable) -> i64 {
         let own = self
             .terms
@@ -103,9 +128,11 @@ impl Affine {
 
     /// Whether it depends on the loop variable.
     pub fn depends_on(&self, variable: LoopVariable) -> bool {
-        self.terms
-            .iter()
-            .any(|(symbol, _)| *symbol == IndexSymbol::Loop(variable))
+        self.terms.iter().any(|(symbol, _)| match symbol {
+            IndexSymbol::Loop(own) => *own == variable,
+            IndexSymbol::Entry(_, place) => place.depends_on(variable),
+            IndexSymbol::ConstParameter(_) | IndexSymbol::Field(_) => false,
+        })
     }
 }
 
@@ -127,6 +154,7 @@ impl fmt::Display for IndexSymbol {
         match self {
             Self::Loop(variable) => variable.fmt(f),
             Self::ConstParameter(name) | Self::Field(name) => f.write_str(name),
+            Self::Entry(list, place) => write!(f, "{list}[{place}]"),
         }
     }
 }

@@ -24,6 +24,8 @@ pub struct Environment {
     pub mu: Vec<f64>,
     /// Const parameters and lengths by name
     pub sizes: BTreeMap<String, i64>,
+    /// Lists of indices by name
+    pub lists: BTreeMap<String, Vec<usize>>,
 }
 
 /// What a kernel computes. Entries that a program does not write are zero. There are as many constraints as multipliers.
@@ -299,6 +301,7 @@ impl Machine<'_> {
                 IndexSymbol::Loop(variable) => {
                     *self.loops.get(variable).ok_or(InterpretError::Unassigned)?
                 }
+                IndexSymbol::Entry(name, place) => self.entry_of(name, place)?,
                 IndexSymbol::ConstParameter(name) | IndexSymbol::Field(name) => {
                     let size = self.environment.sizes.get(name);
                     *size.ok_or_else(|| InterpretError::Missing { name: name.clone() })?
@@ -308,6 +311,22 @@ impl Machine<'_> {
             total = total.checked_add(term).ok_or(InterpretError::Overflow)?;
         }
         Ok(total)
+    }
+
+    /// An entry of a list of indices.
+    fn entry_of(&self, name: &str, place: &Affine) -> Result<i64, InterpretError> {
+        let missing = || InterpretError::Missing {
+            name: name.to_owned(),
+        };
+        let list = self.environment.lists.get(name).ok_or_else(missing)?;
+        let index = self.index(place)?;
+        let found = usize::try_from(index).ok().and_then(|at| list.get(at));
+        let found = found.ok_or_else(|| InterpretError::OutOfRange {
+            array: name.to_owned(),
+            index,
+            length: list.len(),
+        })?;
+        number(*found)
     }
 
     fn temporary(&self, temporary: Temporary) -> Result<f64, InterpretError> {
@@ -349,6 +368,7 @@ impl Machine<'_> {
             Output::Phi(k) | Output::Drift(k) => number(*k)?,
             Output::Row(k, _) | Output::PsiQ(k, _) | Output::RowRate(k, _) => number(*k)?,
             Output::SitePhi(a) | Output::SiteRow(a, _) | Output::SiteDrift(a) => self.index(a)?,
+            Output::SiteObservable(a) => self.index(a)?,
         };
         let column = match output {
             Output::ZZ(_, b) | Output::ZQ(_, b) | Output::QQ(_, b) => self.index(b)?,
@@ -361,11 +381,10 @@ impl Machine<'_> {
         let results = &mut self.results;
         match output {
             Output::Value => Ok(&mut results.value),
-            Output::Observable(number) => {
-                if results.observables.len() <= *number {
-                    results.observables.resize(number + 1, 0.0);
-                }
-                Ok(&mut results.observables[*number])
+            Output::Observable(number) => Ok(element_of(&mut results.observables, *number)),
+            Output::SiteObservable(_) => {
+                let number = usize::try_from(row).map_err(|_| InterpretError::Overflow)?;
+                Ok(element_of(&mut results.observables, number))
             }
             Output::ByZ(_) => entry(&mut results.z, row),
             Output::ByQ(_) => entry(&mut results.q, row),
@@ -395,7 +414,7 @@ impl Machine<'_> {
         };
         match output {
             Output::Value => results.value = 0.0,
-            Output::Observable(_) => results.observables.fill(0.0),
+            Output::Observable(_) | Output::SiteObservable(_) => results.observables.fill(0.0),
             Output::ByZ(_) => results.z.fill(0.0),
             Output::ByQ(_) => results.q.fill(0.0),
             Output::Force(_) => results.force.fill(0.0),
@@ -415,6 +434,14 @@ impl Machine<'_> {
             Output::RateV(..) => results.rate_v.iter_mut().for_each(|row| row.fill(0.0)),
         }
     }
+}
+
+/// An element of a list that grows as far as it is written.
+fn element_of(list: &mut Vec<f64>, number: usize) -> &mut f64 {
+    if list.len() <= number {
+        list.resize(number + 1, 0.0);
+    }
+    &mut list[number]
 }
 
 fn number(number: usize) -> Result<i64, InterpretError> {

@@ -77,7 +77,7 @@ fn array(output: &Output) -> &'static str {
         Output::QQ(..) => "E_qq",
         Output::ForceZ(..) => "Q_z",
         Output::ForceQ(..) => "Q_q",
-        Output::Observable(_) => "output",
+        Output::Observable(_) | Output::SiteObservable(_) => "output",
         Output::Phi(_) | Output::SitePhi(_) => "phi",
         Output::Row(..) | Output::SiteRow(..) => "A",
         Output::Drift(_) | Output::SiteDrift(_) => "a",
@@ -98,7 +98,8 @@ impl fmt::Display for Output {
             | Self::ByQ(a)
             | Self::Force(a)
             | Self::SitePhi(a)
-            | Self::SiteDrift(a) => write!(f, "[{a}]"),
+            | Self::SiteDrift(a)
+            | Self::SiteObservable(a) => write!(f, "[{a}]"),
             Self::ZZ(a, b)
             | Self::ZQ(a, b)
             | Self::QQ(a, b)

@@ -61,12 +61,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     for (target, value) in &model.forces {
         forces.extend(lowerer.force(target, value));
     }
-    let mut observables = Vec::new();
-    for (name, value) in &model.outputs {
-        if let Some(value) = lowerer.scalar(value) {
-            observables.push((name.node.clone(), value));
-        }
-    }
+    let observables = lowerer.observables();
     let constraints = lowerer.constraints();
     lowerer.check_solvers(&constraints);
     let sensitivities = lowerer.sensitivities(&constraints);

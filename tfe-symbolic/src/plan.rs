@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use crate::ast::Comparison;
 use crate::constant::Constant;
 use crate::function::Function;
-use crate::graph::{ExprId, SumRange, loop_bit};
-use crate::input::{Affine, IndexSymbol, Input};
+use crate::graph::{ExprId, SumRange, loop_bit, loops_in};
+use crate::input::{Affine, Input};
 
 /// An operation of a [`Plan`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -164,13 +164,7 @@ impl Plan {
             .operands()
             .iter()
             .fold(0, |mask, operand| mask | self.loops_of(*operand));
-        let mut add = |index: &Affine| {
-            for (symbol, _) in &index.terms {
-                if let IndexSymbol::Loop(variable) = symbol {
-                    loops |= loop_bit(*variable);
-                }
-            }
-        };
+        let mut add = |index: &Affine| loops |= loops_in(index);
         match &op {
             Op::Input(input) => {
                 if let Some(index) = input.index() {

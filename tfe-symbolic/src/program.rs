@@ -102,6 +102,8 @@ pub enum Output {
     SiteRow(Affine, Affine),
     /// a of one constraint of a model of run-time length
     SiteDrift(Affine),
+    /// An observable of a model of run-time length that has some by site
+    SiteObservable(Affine),
 }
 
 impl Output {

@@ -224,16 +224,27 @@ fn opening_is_free(factor: Constant, constant: Constant, terms: &[(Constant, Exp
     after <= before && (constant.is_zero() || !costly(&factor) || after < before)
 }
 
-/// `affine` with `value` in place of the variable.
+/// `affine` with `value` in place of the variable, in the places of lists too.
 pub(crate) fn substitute(affine: &Affine, variable: LoopVariable, value: &Affine) -> Affine {
-    let symbol = IndexSymbol::Loop(variable);
-    let Some((_, factor)) = affine.terms.iter().find(|(s, _)| *s == symbol) else {
+    if !affine.depends_on(variable) {
         return affine.clone();
-    };
-    let mut rest = affine.clone();
-    rest.terms.retain(|(s, _)| *s != symbol);
-    rest.plus_scaled(value, *factor)
-        .unwrap_or_else(|| Affine::constant(i64::MAX))
+    }
+    let mut sum = Affine::constant(affine.constant);
+    for (symbol, factor) in &affine.terms {
+        let term = match symbol {
+            IndexSymbol::Loop(own) if *own == variable => value.clone(),
+            IndexSymbol::Entry(list, place) => {
+                let place = substitute(place, variable, value);
+                Affine::symbol(IndexSymbol::Entry(list.clone(), place))
+            }
+            symbol => Affine::symbol(symbol.clone()),
+        };
+        match sum.plus_scaled(&term, *factor) {
+            Some(next) => sum = next,
+            None => return Affine::constant(i64::MAX),
+        }
+    }
+    sum
 }
 
 #[cfg(test)]

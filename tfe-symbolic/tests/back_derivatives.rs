@@ -2,7 +2,7 @@
 
 use num_dual::{DualNum, HyperDual64};
 use proptest::prelude::*;
-use tfe_symbolic::declared::{Force, Form, Parameter};
+use tfe_symbolic::declared::{Force, Form, Observable, Parameter};
 use tfe_symbolic::derivation::{Derivation, Model};
 use tfe_symbolic::differentiate::derivative;
 use tfe_symbolic::function::Function;
@@ -206,7 +206,13 @@ const DIGITS: f64 = 1e-9;
 /// The values of some expressions.
 fn evaluate(mut graph: Graph, roots: &[ExprId], x: &[f64; 4]) -> Vec<f64> {
     let energy = graph.integer(0);
-    let observables = roots.iter().map(|root| (String::new(), *root)).collect();
+    let observable = |(number, root): (usize, &ExprId)| Observable {
+        name: String::new(),
+        ranges: Vec::new(),
+        column: Affine::constant(number as i64),
+        value: *root,
+    };
+    let observables = roots.iter().enumerate().map(observable).collect();
     let derivation = Derivation::of_model(Model {
         observables,
         ..model(graph, energy)

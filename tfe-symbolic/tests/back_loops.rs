@@ -314,7 +314,7 @@ fn results_of_output(text: &str, n: usize) -> Results {
     let declared =
         declare(text, &context(text)).unwrap_or_else(|problems| panic!("{text}\n{problems:?}"));
     let mut model = Model::from(&declared);
-    model.energy = model.observables.remove(0).1;
+    model.energy = model.observables.remove(0).value;
     let program = Derivation::of_model(model).program(ALL);
     interpret(&program, &environment(n)).unwrap_or_else(|error| panic!("{error}\n{program}"))
 }

@@ -39,7 +39,6 @@ fn derivation(text: &str) -> Derivation {
 fn environment(m: &[f64]) -> Environment {
     let n = m.len();
     Environment {
-        mu: Vec::new(),
         time: 0.4,
         q: (0..n).map(|i| (1.7 * i as f64 + 0.3).sin()).collect(),
         z: (0..n).map(|i| (0.9 * i as f64 - 0.2).cos()).collect(),
@@ -50,6 +49,7 @@ fn environment(m: &[f64]) -> Environment {
             .map(|(name, values)| (name.to_owned(), values))
             .into(),
         sizes: [("N".to_owned(), n as i64)].into(),
+        ..Environment::default()
     }
 }
 

@@ -187,3 +187,35 @@ fn requirements_name_the_constraint() {
         ]
     );
 }
+
+/// Outputs by site and single ones, in order of declaration; the sum is one number for each site.
+#[test]
+fn outputs_by_site_are_numbered() {
+    let text = "coordinates(x[n], y[n]), lagrangian = sum(i in 0..n, dot(x[i])^2/2 + dot(y[i])^2/2), \
+        output(strain[i in 0..n-1]) = (x[i+1] - x[i])/l[i] - 1, output(last) = y[n-1], \
+        output(pull[i in 1..n]) = sum(j in 0..i, k*(x[i] - x[j])*dot(y[j])), output(time) = t";
+    let derivation = Derivation::of(&declared(text));
+    let program = derivation.program(Request {
+        observables: true,
+        ..Request::default()
+    });
+    for n in [2, 3, 6] {
+        let mut environment = environment(n);
+        environment.z = environment.q.iter().map(|q| q * q - 0.3).collect();
+        let results =
+            interpret(&program, &environment).unwrap_or_else(|e| panic!("{e}\n{program}"));
+        let (x, y) = environment.q.split_at(n);
+        let y_dot = &environment.z[n..];
+        let strain = (0..n - 1).map(|i| (x[i + 1] - x[i]) / LENGTHS[i] - 1.0);
+        let pull = (1..n).map(|i| (0..i).map(|j| K * (x[i] - x[j]) * y_dot[j]).sum());
+        let expected: Vec<f64> = strain
+            .chain([y[n - 1]])
+            .chain(pull)
+            .chain([environment.time])
+            .collect();
+        assert_eq!(results.observables.len(), expected.len());
+        for (one, other) in results.observables.iter().zip(&expected) {
+            close(*one, *other);
+        }
+    }
+}

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! === name of the case
-//! struct: <N> m, k: [3], c: [N], w: Vec, n: usize, label: String
+//! struct: <N> m, k: [3], c: [N], w: Vec, n: usize, left: indices, label: String
 //! --- declaration
 //! coordinates(x), lagrangian = …
 //! --- result
@@ -69,7 +69,7 @@ fn cases(text: &str) -> Vec<Case> {
         .collect()
 }
 
-/// `<N> m, k: [3], c: [N], w: Vec, n: usize, label: String`
+/// `<N> m, k: [3], c: [N], w: Vec, n: usize, left: indices, label: String`
 fn context(text: &str) -> Context {
     let mut context = Context {
         struct_name: "Model".into(),
@@ -103,6 +103,7 @@ fn context(text: &str) -> Context {
                     }),
                     ("Vec", _) => FieldKind::Vector,
                     ("usize", _) => FieldKind::Length,
+                    ("indices", _) => FieldKind::Indices,
                     (other, _) => FieldKind::Other(other.to_owned()),
                 };
                 (name.trim(), kind)
@@ -148,8 +149,12 @@ fn shown(model: &Declared) -> String {
             constraint.name, constraint.kind
         );
     }
-    for (name, value) in &model.observables {
-        let _ = writeln!(out, "{name} = {}", graph.display(*value));
+    for one in &model.observables {
+        let _ = write!(out, "{} = {}", one.name, graph.display(one.value));
+        for range in &one.ranges {
+            let _ = write!(out, " for i in {}..{}", range.start, range.end);
+        }
+        out.push('\n');
     }
     if !model.sensitivities.is_empty() {
         let _ = writeln!(out, "{:?}", model.sensitivities);

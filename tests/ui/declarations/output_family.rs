@@ -1,4 +1,4 @@
-//! Families of outputs are not there yet.
+//! Outputs by site are for models of run-time length.
 
 use tfe::prelude::*;
 

@@ -2,6 +2,7 @@
 
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
+use std::collections::BTreeSet;
 use syn::DeriveInput;
 
 /// The implementations that uses of the type need to type-check.
@@ -10,11 +11,19 @@ pub(super) fn stubs(
     path: &TokenStream,
     form: &TokenStream,
     outputs: &[Ident],
+    by_site: &BTreeSet<String>,
 ) -> TokenStream {
     let (name, vis) = (&item.ident, &item.vis);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
     let names = outputs.iter().map(crate::input::plain);
     let private = quote!(#path::__private);
+    let results =
+        outputs.iter().map(
+            |output| match by_site.contains(&crate::input::plain(output)) {
+                true => quote!(#private::List),
+                false => quote!(f64),
+            },
+        );
     quote! {
         const _: () = {
             use #path::__private as __tfe;
@@ -107,8 +116,8 @@ pub(super) fn stubs(
                 _: f64,
                 _: &[f64],
                 _: &[f64],
-            ) -> ::core::result::Result<f64, #private::FamilyError> {
-                ::core::result::Result::Ok(0.0)
+            ) -> ::core::result::Result<#results, #private::FamilyError> {
+                ::core::result::Result::Ok(::core::default::Default::default())
             })*
         }
     }

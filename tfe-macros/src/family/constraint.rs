@@ -1,11 +1,11 @@
 //! The constraints of a model of run-time length: how many there are, their names, and their kernels.
 
-use crate::emit::{self, Emitter};
+use super::sites::{self, Sites};
+use crate::emit::Emitter;
 use proc_macro2::TokenStream;
 use quote::quote;
-use tfe_symbolic::declared::{Constraint, Declared};
+use tfe_symbolic::declared::Declared;
 use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::input::Affine;
 use tfe_symbolic::program::{Program, Request};
 
 /// What an implementation of `FamilyModel` holds of constraints: nothing where there are none.
@@ -18,61 +18,27 @@ pub(super) fn members(
     if constraints.is_empty() {
         return TokenStream::new();
     }
-    let rows = constraints
+    let sites: Vec<Sites> = constraints
         .iter()
-        .map(|constraint| match sites(constraint) {
-            None => quote!(1),
-            Some((_, count)) => count,
-        });
-    let names = constraints.iter().map(name);
+        .map(|constraint| (constraint.name.as_str(), constraint.ranges.as_slice()))
+        .collect();
+    let (count, name) = (sites::count(&sites), sites::name(&sites, &quote!(row)));
     let kernels = Kernels { derivation, dof };
     let (values, rows_and_drift, second) = (kernels.values(), kernels.rows(), kernels.second());
     quote! {
         const CONSTRAINED: bool = true;
 
         fn constraints(&self) -> usize {
-            0usize #(.saturating_add(#rows))*
+            #count
         }
 
         fn constraint_name(&self, row: usize) -> __tfe::CoordinateName {
-            #(#names)*
-            __tfe::CoordinateName::element("", row)
+            #name
         }
 
         #values
         #rows_and_drift
         #second
-    }
-}
-
-/// The first site and the number of sites of a constraint by site.
-fn sites(constraint: &Constraint) -> Option<(TokenStream, TokenStream)> {
-    let range = constraint.ranges.first()?;
-    let start = emit::index(&range.start);
-    let count = match range.end.plus_scaled(&range.start, -1) {
-        Some(count) => emit::index(&count),
-        None => emit::index(&Affine::default()),
-    };
-    Some((start, count))
-}
-
-/// Returns the name of one of its rows, or counts them off.
-fn name(constraint: &Constraint) -> TokenStream {
-    let name = &constraint.name;
-    match sites(constraint) {
-        None => quote! {
-            if row == 0 {
-                return __tfe::CoordinateName::single(#name);
-            }
-            let row = row - 1;
-        },
-        Some((start, count)) => quote! {
-            let count = #count;
-            if row < count {
-                return __tfe::CoordinateName::element(#name, #start + row);
-            }
-            let row = row - count;
-        },
     }
 }
 

@@ -12,9 +12,9 @@ pub enum FamilyError {
         /// The array as declared, `q[n]`.
         array: &'static str,
     },
-    /// A sum over nothing, or a constraint of no site.
+    /// A sum over nothing, or a constraint or an output of no site.
     EmptyRange {
-        /// The range of the sum, `i in 0..n-1`; of a constraint, the declaration, `constraint(rod[i in 0..n-1])`.
+        /// The range of the sum, `i in 0..n-1`; of a constraint or an output, the declaration, `constraint(rod[i in 0..n-1])`.
         ranges: &'static str,
         /// Its first value.
         start: i64,
@@ -27,10 +27,27 @@ pub enum FamilyError {
         array: &'static str,
         /// The index as declared, `i+1`.
         index: &'static str,
-        /// The ranges of the sums that it depends on, after the constraint that it stands in.
+        /// The ranges of the sums that it depends on, after the constraint or output that it stands in.
         ranges: &'static str,
         /// The first value that is outside.
         value: i64,
+        /// The length of the array.
+        length: usize,
+    },
+    /// An entry of a list of indices that makes an index lie outside of its array.
+    ListEntry {
+        /// The list.
+        list: &'static str,
+        /// The place in the list of the first such entry.
+        place: usize,
+        /// The entry.
+        entry: usize,
+        /// The array.
+        array: &'static str,
+        /// The index as declared, `left[k]`.
+        index: &'static str,
+        /// The ranges of the sums that it depends on, after the constraint or output that it stands in.
+        ranges: &'static str,
         /// The length of the array.
         length: usize,
     },
@@ -44,7 +61,7 @@ pub enum FamilyError {
         expected: i64,
         /// That index as declared.
         index: &'static str,
-        /// The ranges of the sums that it depends on, after the constraint that it stands in.
+        /// The ranges of the sums that it depends on, after the constraint or output that it stands in.
         ranges: &'static str,
     },
     /// A vector of a state that is not as long as the model.
@@ -118,6 +135,25 @@ impl fmt::Display for FamilyError {
                     write!(f, " in {sum}`{ranges}`")?;
                 }
                 write!(f, " becomes {value}, but `{array}` has {length} elements")
+            }
+            Self::ListEntry {
+                list,
+                place,
+                entry,
+                array,
+                index,
+                ranges,
+                length,
+            } => {
+                write!(
+                    f,
+                    "`{list}[{place}]` is {entry}, which takes the index of `{array}[{index}]`"
+                )?;
+                if !ranges.is_empty() {
+                    let sum = sum_over(ranges);
+                    write!(f, " in {sum}`{ranges}`")?;
+                }
+                write!(f, " outside of `{array}`, which has {length} elements")
             }
             Self::FieldLength {
                 field,

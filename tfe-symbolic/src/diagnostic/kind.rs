@@ -171,6 +171,11 @@ kinds! {
         /// The longest sum that is written out.
         limit: usize,
     },
+    /// `sum(j in 0..left[k], …)`
+    ListInRange {
+        /// The list.
+        list: String,
+    },
     /// `output(x[i in a..b])`
     OutputFamily,
     /// Neither a Lagrangian nor a Hamiltonian.

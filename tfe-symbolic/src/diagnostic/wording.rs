@@ -68,7 +68,10 @@ impl Kind {
             Self::SumInConstraint { name, .. } => {
                 format!("constraint `{name}` holds a sum that cannot be written out")
             }
-            Self::OutputFamily => "outputs over a range are not supported yet".into(),
+            Self::ListInRange { list } => {
+                format!("the bound of a range cannot be an entry of the list `{list}`")
+            }
+            Self::OutputFamily => "outputs over a range are for models of run-time length".into(),
             Self::NoEnergy => "the model has neither a Lagrangian nor a Hamiltonian".into(),
             Self::TwoEnergies => "the model has both a Lagrangian and a Hamiltonian".into(),
             Self::NoMomenta => "a Hamiltonian needs momenta".into(),
@@ -321,6 +324,9 @@ impl Kind {
                     .into()
             }
             Self::SolverOfConstraints { nodes, .. } => format!("use `Mixed::<{nodes}>`"),
+            Self::ListInRange { .. } => {
+                "bound the range by numbers and fields of type `usize`".into()
+            }
             Self::OutputFamily => "declare one `output` an element".into(),
             Self::NoEnergy => "add `lagrangian = …` or `hamiltonian = …`".into(),
             Self::TwoEnergies => "keep one of them".into(),

@@ -30,6 +30,16 @@ impl Lowerer<'_> {
                 digits.parse().ok().map(Affine::constant)
             }
             ExprKind::Name(name) => return self.index_symbol(name, expr),
+            ExprKind::Index { value, index } => {
+                if let ExprKind::Name(list) = &value.node
+                    && self.index(list).is_none()
+                    && self.is_list(list)
+                {
+                    return self.entry_of_list(list, index);
+                }
+                self.report(expr.span, not_integer());
+                return None;
+            }
             ExprKind::Negate(value) => Affine::default().plus_scaled(&self.affine(value)?, -1),
             ExprKind::Binary {
                 operator,
@@ -110,6 +120,30 @@ impl Lowerer<'_> {
         Some(Affine::symbol(symbol))
     }
 
+    /// Whether a name is that of a list of indices.
+    pub(super) fn is_list(&self, name: &str) -> bool {
+        let Some(Symbol::Field(at)) = self.symbol(name) else {
+            return false;
+        };
+        self.context.fields[*at].kind == FieldKind::Indices
+    }
+
+    /// `left[k]`; the list is as long as its largest index asks for.
+    pub(super) fn entry_of_list(&mut self, list: &str, index: &Expr) -> Option<Affine> {
+        self.use_symbol(&IndexSymbol::Field(list.to_owned()));
+        let place = self.affine(index)?;
+        if place.holds_entry() {
+            let text = index.to_string();
+            self.report(index.span, Kind::IndexNotAffine { index: text });
+            return None;
+        }
+        if !self.in_bounds(list, &place, None, index.span) {
+            return None;
+        }
+        self.require_length(list, &place);
+        Some(Affine::symbol(IndexSymbol::Entry(list.to_owned(), place)))
+    }
+
     /// The largest or smallest value over the ranges of all indices around, as far as ranges are
     /// independent of each other; `None` on overflow.
     pub(super) fn extreme(&self, affine: &Affine, largest: bool) -> Option<Affine> {
@@ -154,6 +188,15 @@ impl Lowerer<'_> {
         length: Option<&Affine>,
         span: Span,
     ) -> bool {
+        // What a list holds is known at run time.
+        if place.holds_entry() {
+            let length = match length {
+                Some(length) => Extent::Known(length.clone()),
+                None => Extent::OfField(array.to_owned()),
+            };
+            self.require_index(array, place, length);
+            return true;
+        }
         let extremes = (self.extreme(place, false), self.extreme(place, true));
         let (Some(low), Some(high)) = extremes else {
             self.report(
@@ -239,23 +282,28 @@ impl Lowerer<'_> {
 
     /// An affine expression with the user's names of indices.
     pub(super) fn in_words(&self, affine: &Affine) -> String {
+        self.with_names(affine).to_string()
+    }
+
+    fn with_names(&self, affine: &Affine) -> Affine {
         let named = |(symbol, coefficient): &(IndexSymbol, i64)| {
             let index = self
                 .indices
                 .iter()
                 .find(|x| *symbol == IndexSymbol::Loop(x.variable));
-            let symbol = match index {
-                Some(index) => IndexSymbol::Field(index.name.clone()),
-                None => symbol.clone(),
+            let symbol = match (index, symbol) {
+                (Some(index), _) => IndexSymbol::Field(index.name.clone()),
+                (None, IndexSymbol::Entry(list, place)) => {
+                    IndexSymbol::Entry(list.clone(), self.with_names(place))
+                }
+                (None, symbol) => symbol.clone(),
             };
             (symbol, *coefficient)
         };
-        let terms = affine.terms.iter().map(named).collect();
         Affine {
             constant: affine.constant,
-            terms,
+            terms: affine.terms.iter().map(named).collect(),
         }
-        .to_string()
     }
 
     /// On which side some trip of the loops around leaves the array, when generic lengths take some
@@ -329,6 +377,8 @@ impl Nest<'_> {
                     IndexSymbol::ConstParameter(name) | IndexSymbol::Field(name) => {
                         (self.size)(name)
                     }
+                    // Indices with entries of lists are left to the run time.
+                    IndexSymbol::Entry(..) => 0,
                 };
                 sum.saturating_add(coefficient.saturating_mul(value))
             })

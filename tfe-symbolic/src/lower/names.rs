@@ -173,7 +173,7 @@ impl Lowerer<'_> {
                 let elements = 0..*length as i64;
                 Value::Vector(elements.map(|at| self.graph.input(element(at))).collect())
             }
-            FieldKind::Array(_) | FieldKind::Vector => {
+            FieldKind::Array(_) | FieldKind::Vector | FieldKind::Indices => {
                 self.report(span, Kind::WholeArray { name });
                 Value::Error
             }
@@ -245,6 +245,16 @@ impl Lowerer<'_> {
     pub(super) fn element(&mut self, value: &Expr, index: &Expr, span: Span) -> Value {
         if let ExprKind::Name(name) = &value.node
             && self.index(name).is_none()
+            && self.is_list(name)
+        {
+            // As a number.
+            return match self.entry_of_list(name, index) {
+                Some(entry) => Value::Scalar(self.graph.input(Input::Integer(entry))),
+                None => Value::Error,
+            };
+        }
+        if let ExprKind::Name(name) = &value.node
+            && self.index(name).is_none()
             && let Some((array, first, length)) = self.array(name)
         {
             let Some(place) = self.affine(index) else {
@@ -255,6 +265,7 @@ impl Lowerer<'_> {
             }
             if let Array::Field(field) = &array
                 && length.is_none()
+                && !place.holds_entry()
             {
                 self.require_length(field, &place);
             }

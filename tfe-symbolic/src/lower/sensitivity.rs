@@ -46,7 +46,9 @@ impl Lowerer<'_> {
                     self.report(expr.span, Kind::ArrayOfParameters { name });
                     None
                 }
-                FieldKind::Length | FieldKind::Other(_) => self.not_a_parameter(expr),
+                FieldKind::Length | FieldKind::Indices | FieldKind::Other(_) => {
+                    self.not_a_parameter(expr)
+                }
             },
             ExprKind::Index { value, index } => match &value.node {
                 ExprKind::Name(name) => self.parameter_element(name, value.span, index, expr),
@@ -111,8 +113,12 @@ impl Lowerer<'_> {
             None if self.model.names_missing => return None,
             None => {
                 let fields = self.context.fields.iter();
-                let numbers = fields
-                    .filter(|field| !matches!(field.kind, FieldKind::Length | FieldKind::Other(_)));
+                let numbers = fields.filter(|field| {
+                    !matches!(
+                        field.kind,
+                        FieldKind::Length | FieldKind::Indices | FieldKind::Other(_)
+                    )
+                });
                 Kind::UnknownParameter {
                     name: name.to_owned(),
                     nearest: nearest(name, numbers.map(|field| &*field.name)),

@@ -4,7 +4,7 @@ use super::constraints::{Row, components};
 use super::{DeclaredPlace, Index, LONGEST_WRITTEN_OUT, Lowerer};
 use crate::ast::{Expr, Name, Range};
 use crate::constraint::{holds_state, holds_velocity, kind, normal};
-use crate::declared::Constraint;
+use crate::declared::{Constraint, Observable};
 use crate::diagnostic::Kind;
 use crate::graph::{ExprId, SumRange};
 use crate::input::{Affine, IndexSymbol};
@@ -50,6 +50,37 @@ impl Lowerer<'_> {
         known.constraints
     }
 
+    /// The observables, one number or one for each site.
+    pub(super) fn observables(&mut self) -> Vec<Observable> {
+        let model = self.model;
+        let mut found = Vec::new();
+        let mut columns = Affine::default();
+        for (name, range, value) in &model.outputs {
+            let lowered = match range {
+                None => Some((Vec::new(), self.scalar(value))),
+                // Reported.
+                Some(_) if !self.is_of_run_time_length() => None,
+                range => self.by_site("output", name, range.as_ref(), |x| x.scalar(value)),
+            };
+            let Some((ranges, Some(value_id))) = lowered else {
+                continue;
+            };
+            let Some((column, next)) = numbered(&columns, &ranges) else {
+                let number = columns.to_string();
+                self.report(value.span, Kind::NumberTooLarge { number });
+                continue;
+            };
+            columns = next;
+            found.push(Observable {
+                name: name.node.clone(),
+                ranges,
+                column,
+                value: value_id,
+            });
+        }
+        found
+    }
+
     /// Lowers the formula of a declaration with the index of its sites around it; nothing where the range is wrong.
     pub(super) fn by_site<T>(
         &mut self,
@@ -67,6 +98,7 @@ impl Lowerer<'_> {
         };
         let bounds = (self.affine(&range.start), self.affine(&range.end));
         self.index_name(&range.variable.node, range.variable.span);
+        let bounds = self.bounds_without_entries(bounds, (range.start.span, range.end.span));
         let (Some(start), Some(end)) = bounds else {
             return None;
         };
@@ -150,24 +182,8 @@ impl Lowerer<'_> {
             self.report(span, Kind::RepeatedConstraint { name, other });
             return false;
         }
-        let first = known.rows.clone();
-        let (number, next) = match ranges.first() {
-            None => (
-                Some(first.clone()),
-                first.plus_scaled(&Affine::constant(1), 1),
-            ),
-            Some(sites) => {
-                let before = first.plus_scaled(&sites.start, -1);
-                let site = Affine::symbol(IndexSymbol::Loop(sites.variable));
-                let number = before
-                    .as_ref()
-                    .and_then(|before| before.plus_scaled(&site, 1));
-                let next = before.and_then(|before| before.plus_scaled(&sites.end, 1));
-                (number, next)
-            }
-        };
-        let (Some(number), Some(next)) = (number, next) else {
-            let number = format!("{first}");
+        let Some((number, next)) = numbered(&known.rows, ranges) else {
+            let number = known.rows.to_string();
             self.report(span, Kind::NumberTooLarge { number });
             return false;
         };
@@ -181,5 +197,18 @@ impl Lowerer<'_> {
             value: row,
         });
         true
+    }
+}
+
+/// The number of what is declared after `first` others, by site that of the site at hand, and how many there are then.
+fn numbered(first: &Affine, ranges: &[SumRange]) -> Option<(Affine, Affine)> {
+    match ranges.first() {
+        None => Some((first.clone(), first.plus_scaled(&Affine::constant(1), 1)?)),
+        Some(sites) => {
+            let before = first.plus_scaled(&sites.start, -1)?;
+            let site = Affine::symbol(IndexSymbol::Loop(sites.variable));
+            let number = before.plus_scaled(&site, 1)?;
+            Some((number, before.plus_scaled(&sites.end, 1)?))
+        }
     }
 }

@@ -12,6 +12,7 @@ impl Lowerer<'_> {
         let bounds = (self.affine(&range.start), self.affine(&range.end));
         self.index_name(&range.variable.node, range.variable.span);
         let whole = range.start.span.join(range.end.span);
+        let bounds = self.bounds_without_entries(bounds, (range.start.span, range.end.span));
         let count = match &bounds {
             (Some(start), Some(end)) => {
                 let Some(length) = end.plus_scaled(start, -1) else {
@@ -77,6 +78,26 @@ impl Lowerer<'_> {
             }),
             Value::Error => Value::Error,
         }
+    }
+
+    /// The bounds of a range, of which neither may come from a list.
+    pub(super) fn bounds_without_entries(
+        &mut self,
+        (start, end): (Option<Affine>, Option<Affine>),
+        (start_span, end_span): (Span, Span),
+    ) -> (Option<Affine>, Option<Affine>) {
+        let mut plain = |bound: Option<Affine>, span| {
+            let bound = bound?;
+            let list = bound.entries().next().map(|(list, _)| list.to_owned());
+            match list {
+                None => Some(bound),
+                Some(list) => {
+                    self.report(span, Kind::ListInRange { list });
+                    None
+                }
+            }
+        };
+        (plain(start, start_span), plain(end, end_span))
     }
 
     fn sum_of(&mut self, range: SumRange, body: ExprId, terms: Option<u64>) -> ExprId {

@@ -20,8 +20,10 @@ pub(super) fn all_apart(all: &[Written]) -> bool {
 /// Whether the place is another one on every turn: each variable is read off an index in which it stands alone.
 fn new_on_every_turn((nest, place): &Written) -> bool {
     nest.iter().all(|range| {
+        // Two entries of a list may be equal.
         let shows = |index: &Affine| {
             index.depends_on(range.variable)
+                && !index.holds_entry()
                 && nest.iter().all(|other| {
                     other.variable == range.variable || !index.depends_on(other.variable)
                 })
@@ -56,6 +58,9 @@ fn beyond(nest: &[SumRange], index: &Affine, other_nest: &[SumRange], other: &Af
 /// The largest or the least value of an index, inner loops first, as their bounds may depend on outer ones.
 fn extreme(nest: &[SumRange], index: &Affine, largest: bool) -> Option<Affine> {
     let mut index = index.clone();
+    if index.holds_entry() {
+        return None;
+    }
     for range in nest.iter().rev() {
         let factor = index.factor_of(range.variable);
         let end = range.end.plus_scaled(&Affine::constant(1), -1)?;

@@ -1,0 +1,114 @@
+//! The observables of a model of run-time length: their kernel, their names, and one method for each.
+
+use super::sites::{self, Sites};
+use super::{Given, Kernels};
+use crate::emit;
+use proc_macro2::TokenStream;
+use quote::quote;
+use syn::Visibility;
+use tfe_symbolic::declared::Observable;
+use tfe_symbolic::program::Request;
+
+/// What an implementation of `FamilyModel` holds of observables: nothing where there are none.
+pub(super) fn members(kernels: &Kernels) -> TokenStream {
+    let observables = &kernels.declared.observables;
+    if observables.is_empty() {
+        return TokenStream::new();
+    }
+    let names = observables.iter().map(|one| &one.name);
+    let request = Request {
+        observables: true,
+        ..Request::default()
+    };
+    let program = kernels.program(request);
+    let body = kernels.body(&program, Given::Nothing).statements;
+    let by_site = observables.iter().any(|one| !one.ranges.is_empty());
+    let cut = by_site.then(|| {
+        quote! {
+            let values = &mut values[..__tfe::FamilyModel::columns(self)];
+        }
+    });
+    let columns = by_site.then(|| {
+        let sites: Vec<Sites> = observables
+            .iter()
+            .map(|one| (one.name.as_str(), one.ranges.as_slice()))
+            .collect();
+        let (count, name) = (sites::count(&sites), sites::name(&sites, &quote!(column)));
+        quote! {
+            fn columns(&self) -> usize {
+                #count
+            }
+
+            fn column_name(&self, column: usize) -> __tfe::CoordinateName {
+                #name
+            }
+        }
+    });
+    quote! {
+        const OBSERVABLES: &'static [&'static str] = &[#(#names),*];
+
+        #columns
+
+        fn observables<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R], values: &mut [R]) {
+            #cut
+            #body
+        }
+    }
+}
+
+/// The method that evaluates an observable; one by site gives a list.
+pub(super) fn method(
+    one: &Observable,
+    vis: &Visibility,
+    second: &TokenStream,
+    second_doc: &str,
+    path: &TokenStream,
+) -> TokenStream {
+    let name = &one.name;
+    let method = emit::identifier(name);
+    let private = quote!(#path::__private);
+    // What cannot be written as an index is no place of a result either.
+    let first = one.first_column().unwrap_or_default();
+    let column = emit::index(&first);
+    let sites = one.ranges.first();
+    let doc = match sites {
+        None => format!(
+            " The observable `{name}` at time `t`, coordinates `q` and {second_doc} `{second}`."
+        ),
+        Some(range) => format!(
+            " The observable `{name}` at time `t`, coordinates `q` and {second_doc} `{second}`: one number for each site in `{}..{}`.",
+            range.start, range.end,
+        ),
+    };
+    let result = match sites {
+        None => quote!(f64),
+        Some(_) => quote!(#private::List),
+    };
+    let value = match sites {
+        None if first.as_constant().is_some() => {
+            quote!(#private::family_observable(self, t, q, #second, #column))
+        }
+        None => quote! {
+            let values = #private::family_observables(self, t, q, #second, || (#column, 1))?;
+            ::core::result::Result::Ok(values.first().copied().unwrap_or(f64::NAN))
+        },
+        Some(range) => {
+            let length = sites::length(range);
+            quote!(#private::family_observables(self, t, q, #second, || (#column, #length)))
+        }
+    };
+    quote! {
+        #[doc = #doc]
+        ///
+        /// # Errors
+        /// Vectors of another length than the model's, and lengths of the model that do not fit together.
+        #vis fn #method(
+            &self,
+            t: f64,
+            q: &[f64],
+            #second: &[f64],
+        ) -> ::core::result::Result<#result, #private::FamilyError> {
+            #value
+        }
+    }
+}
