@@ -6,6 +6,7 @@
 //! elements and without the growth of round-off that stepping from one end to the other has.
 
 mod chain;
+mod convergence;
 mod mesh;
 mod newton;
 mod solution;
@@ -13,7 +14,11 @@ mod solution;
 pub use mesh::MeshError;
 pub use newton::AssemblyError;
 
+#[cfg(feature = "sparse")]
+pub(crate) use chain::Chain;
 pub(crate) use chain::{ClosureMut, DenseMut};
+#[cfg(feature = "sparse")]
+pub(crate) use convergence::{Convergence, size};
 pub(crate) use mesh::Mesh;
 pub(crate) use newton::{Assembly, Control, Iterate, Problem};
 pub(crate) use solution::Solution;

@@ -9,9 +9,13 @@
 //! a periodic Schur decomposition of the matrices of the elements ([`crate::periodic_schur`]), never from the product, so that a multiplier of
 //! 10⁻¹² keeps its digits beside one of 10¹².
 
+mod family;
 pub(crate) mod orbit;
 pub(crate) mod problem;
 
+pub use family::Orbits;
+#[cfg(feature = "sparse")]
+pub use family::{FamilyOrbit, FamilyPeriodicOrbit};
 pub use orbit::{Exponent, Orbit, Verdict};
 
 use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh, MeshError};
@@ -21,6 +25,7 @@ use crate::periodic_schur::PeriodicSchurError;
 use crate::simulation::Simulation;
 use problem::{Global, Periodic};
 use std::fmt;
+use tfe_runtime::length::Declared;
 use tfe_runtime::{Element, LegendreError, Mixed, Model, State, StepError, constrained, legendre};
 
 /// Which of the orbits of an autonomous model is meant: they differ in where the time begins.
@@ -52,6 +57,18 @@ enum Period {
     Missing,
     Known(f64),
     Guess(f64),
+}
+
+impl Period {
+    fn checked(self) -> Result<f64, OrbitError> {
+        match self {
+            Self::Missing => Err(OrbitError::NoPeriod),
+            Self::Known(period) | Self::Guess(period) if period.is_finite() && period > 0.0 => {
+                Ok(period)
+            }
+            Self::Known(period) | Self::Guess(period) => Err(OrbitError::Period { period }),
+        }
+    }
 }
 
 /// Where Newton's method starts.
@@ -106,9 +123,19 @@ pub struct PeriodicOrbit<'m, M, const N: usize> {
     control: Control,
 }
 
+impl<'m, M, const N: usize> PeriodicOrbit<'m, M, N> {
+    /// An orbit of `model`, with the defaults: this type for a model of fixed size, `FamilyPeriodicOrbit` (with the feature `sparse`) for one of
+    /// run-time length, which has methods of the same names.
+    pub fn of(model: &'m M) -> <M::Length as Orbits<M, N>>::Orbit<'m>
+    where
+        M: Declared<N, Length: Orbits<M, N>>,
+    {
+        M::Length::with_defaults(model)
+    }
+}
+
 impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
-    /// An orbit of `model`, with the defaults.
-    pub fn of(model: &'m M) -> Self {
+    fn with_defaults(model: &'m M) -> Self {
         Self {
             model,
             element: Mixed::<4>.into(),
@@ -229,7 +256,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
 
     /// The equations and their solution.
     pub(crate) fn solved(&self) -> Result<Solved<'m, M, N>, OrbitError> {
-        let period = self.checked_period()?;
+        let period = self.period.checked()?;
         let autonomous = !M::FACTS.time_dependent;
         let conservative = autonomous && !M::FACTS.forced;
         let mut problem = Periodic {
@@ -284,16 +311,6 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// The element, and how a solution is iterated.
     pub(crate) fn method(&self) -> (Element, Control) {
         (self.element, self.control)
-    }
-
-    fn checked_period(&self) -> Result<f64, OrbitError> {
-        match self.period {
-            Period::Missing => Err(OrbitError::NoPeriod),
-            Period::Known(period) | Period::Guess(period) if period.is_finite() && period > 0.0 => {
-                Ok(period)
-            }
-            Period::Known(period) | Period::Guess(period) => Err(OrbitError::Period { period }),
-        }
     }
 
     fn checked_phase(&self) -> Result<Phase, OrbitError> {
@@ -396,6 +413,9 @@ pub enum OrbitError {
     Constraints(StepError),
     /// The multipliers could not be computed.
     Multipliers(PeriodicSchurError),
+    /// A model of run-time length does not fit together, or its steps cannot be differentiated.
+    #[cfg(feature = "sparse")]
+    Family(tfe_runtime::family::FamilyTransitionError),
 }
 
 impl From<AssemblyError> for OrbitError {
@@ -439,6 +459,8 @@ impl fmt::Display for OrbitError {
             ),
             Self::Constraints(error) => write!(f, "the constraints: {error}"),
             Self::Multipliers(error) => write!(f, "the multipliers: {error}"),
+            #[cfg(feature = "sparse")]
+            Self::Family(error) => error.fmt(f),
         }
     }
 }
@@ -450,6 +472,8 @@ impl std::error::Error for OrbitError {
             Self::Guess(error) => Some(error),
             Self::Assembly(error) => error.source(),
             Self::Multipliers(error) => Some(error),
+            #[cfg(feature = "sparse")]
+            Self::Family(error) => error.source(),
             _ => None,
         }
     }

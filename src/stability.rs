@@ -1,23 +1,34 @@
 //! Linearised behaviour of steps: transition matrices, their spectra, and the steps at which a method fails.
 
+mod arnoldi;
 pub(crate) mod chebyshev;
 mod eigenvalues;
 pub(crate) mod frozen;
 mod intervals;
 mod map;
 mod modes;
+mod schur_order;
 mod sign_functions;
+mod step;
 
+pub use arnoldi::{Dominant, DominantError, Iteration, dominant_of};
 pub use eigenvalues::{EigenvalueError, eigenvalues};
 pub use intervals::{IntervalError, UnstableInterval, stability_changes_of, unstable_intervals_of};
 pub use map::{FloquetError, MapError, MapPlan, PointError, PointFailure, StabilityMap};
 pub use modes::{Mode, ModeError, ModeKind, modes};
+pub use step::Transitions;
+#[cfg(feature = "sparse")]
+pub use step::{dominant, transition};
+#[cfg(feature = "sparse")]
+pub use tfe_runtime::family::{FamilyTransition, FamilyTransitionError};
 pub use tfe_runtime::transition::TransitionError;
 
 use crate::constraints::tangent_basis;
 use nalgebra::{Complex, DMatrix};
 use std::ops::Range;
-use tfe_runtime::{Element, Model, State, transition};
+use tfe_runtime::length::Declared;
+use tfe_runtime::transition::of_step;
+use tfe_runtime::{Element, Model, State};
 
 /// The transition matrix of one element: the derivative of the step map (p, q) ↦ (p, q) at `state`.
 ///
@@ -25,10 +36,12 @@ use tfe_runtime::{Element, Model, State, transition};
 /// (δp₁, δq₁) = A (δp₀, δq₀)                                       (theory.md, transition matrices; the paper's (27))
 /// ```
 ///
+/// Of a model of run-time length too, with the feature `sparse`; for a long one take `transition`, which is no matrix but an operator.
+///
 /// # Shapes
 /// 2N × 2N, ordered (p, q).
 /// # Errors
-/// [`TransitionError`] where the element does not exist, cannot be solved, or has a singular tangent.
+/// [`TransitionError`] (or `FamilyTransitionError`) where the element does not exist, cannot be solved, or has a singular tangent.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -46,16 +59,17 @@ use tfe_runtime::{Element, Model, State, transition};
 /// # Ok(())
 /// # }
 /// ```
-pub fn transition_matrix<M: Model<N>, const N: usize>(
+pub fn transition_matrix<M, const N: usize>(
     model: &M,
     element: impl Into<Element>,
-    state: &State<N>,
+    state: &<M::Length as Transitions<M, N>>::State,
     t: f64,
     h: f64,
-) -> Result<DMatrix<f64>, TransitionError> {
-    let mut entries = vec![0.0; 4 * N * N];
-    transition::of_step(model, element.into(), state, t, h, &mut entries)?;
-    Ok(DMatrix::from_row_slice(2 * N, 2 * N, &entries))
+) -> Result<DMatrix<f64>, <M::Length as Transitions<M, N>>::Error>
+where
+    M: Declared<N, Length: Transitions<M, N>>,
+{
+    M::Length::matrix(model, element.into(), state, t, h)
 }
 
 /// The transition matrix of one element on the motions that the constraints of the model allow: in the orthonormal bases
@@ -96,7 +110,7 @@ pub fn on_constraints<M: Model<N>, const N: usize>(
     h: f64,
 ) -> Result<DMatrix<f64>, TransitionError> {
     let mut entries = vec![0.0; 4 * N * N];
-    let end = transition::of_step(model, element.into(), state, t, h, &mut entries)?;
+    let end = of_step(model, element.into(), state, t, h, &mut entries)?;
     let ambient = DMatrix::from_row_slice(2 * N, 2 * N, &entries);
     let (before, after) = (
         tangent_basis(model, t, state)?,

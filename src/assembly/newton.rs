@@ -10,6 +10,7 @@
 //! with Y_e the end of the element after its own Newton step; what closes the chain is the [`Problem`]'s.
 
 use super::chain::{Chain, ClosureMut, DenseMut};
+use super::convergence::{Convergence, size};
 use std::fmt;
 use tfe_runtime::condenser::{Condensed, Condenser, Direction, Placed};
 use tfe_runtime::{Element, ElementError, LegendreError, Model, State, Statistics, StepError};
@@ -79,34 +80,6 @@ impl<const N: usize> Iterate<N> {
             *value += factor * change;
         }
         sum
-    }
-}
-
-/// The largest of some values and of their corrections.
-#[derive(Clone, Copy, Default)]
-struct Largest {
-    value: f64,
-    correction: f64,
-    /// Zero, or not a number where a correction is none.
-    sum: f64,
-}
-
-impl Largest {
-    fn take(&mut self, values: &[f64], corrections: &[f64]) {
-        for (value, correction) in values.iter().zip(corrections) {
-            self.value = self.value.max(value.abs());
-            self.correction = self.correction.max(correction.abs());
-            self.sum += 0.0 * correction;
-        }
-    }
-
-    /// The correction beside the value or beside another scale, whichever is larger; one at most.
-    fn beside(&self, scale: f64) -> f64 {
-        if self.correction == 0.0 {
-            0.0
-        } else {
-            self.correction / self.value.max(scale).max(self.correction)
-        }
     }
 }
 
@@ -397,41 +370,19 @@ impl<const N: usize> Assembly<N> {
         })
     }
 
-    /// The correction beside the iterate: the largest of those of coordinates, momenta and globals.
-    ///
-    /// An orbit near an equilibrium may have no momenta to compare with. The matrices of the elements tell what its coordinates are
-    /// worth: momenta count as small beside max |∂p₁/∂q₀| max |q|, and coordinates the other way round.
+    /// The correction beside the iterate.
     pub(crate) fn size<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> f64 {
-        let [mut p, mut q] = [Largest::default(); 2];
-        for (e, node) in iterate.nodes.iter().enumerate() {
-            let (by_p, by_q) = self.chain.node(e).split_at(N);
-            p.take(&node.p, by_p);
-            q.take(&node.q, by_q);
+        let nodes = iterate.nodes.iter().enumerate();
+        let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], self.chain.node(e)));
+        let globals = self.chain.globals().iter().enumerate();
+        let globals = globals.map(|(k, correction)| correction / problem.scale(k));
+        let size = size(nodes, self.chain.matrices(), globals);
+        if P::Model::CONSTRAINTS.is_empty() || size.is_nan() {
+            return size;
         }
-        let (mut p_by_q, mut q_by_p) = (0.0_f64, 0.0_f64);
-        for (row, entries) in self.chain.matrices().chunks_exact(2 * N).enumerate() {
-            let (by_p, by_q) = entries.split_at(N);
-            let (entries, largest) = if row % (2 * N) < N {
-                (by_q, &mut p_by_q)
-            } else {
-                (by_p, &mut q_by_p)
-            };
-            *largest = entries
-                .iter()
-                .fold(*largest, |largest, entry| largest.max(entry.abs()));
-        }
-        let mut size = p.beside(p_by_q * q.value).max(q.beside(q_by_p * p.value));
-        let mut sum = p.sum + q.sum;
-        for (k, correction) in self.chain.globals().iter().enumerate() {
-            size = size.max((correction / problem.scale(k)).abs());
-            sum += 0.0 * correction;
-        }
-        if !P::Model::CONSTRAINTS.is_empty() {
-            // Nodes at rest do not feel the reactions, but the matrices do.
-            size = size.max(REACTIONS * self.interior_size(iterate));
-        }
-        // Maxima ignore what is not a number; the sum does not.
-        size + sum
+        // Nodes at rest do not feel the reactions, but the matrices do.
+        let reactions = REACTIONS * self.interior_size(iterate);
+        size.max(reactions)
     }
 
     /// The largest correction of interior unknowns beside the largest of them.
@@ -475,9 +426,6 @@ impl<const N: usize> Assembly<N> {
     }
 
     /// Iterates to a solution. Afterwards the linearisation is that of the solution, up to the tolerance.
-    ///
-    /// A step after which the next correction would be more than twice as large, or which leaves where the model is defined, is tried again
-    /// at half its length.
     pub(crate) fn solve<P: Problem<N>>(
         &mut self,
         problem: &mut P,
@@ -486,42 +434,25 @@ impl<const N: usize> Assembly<N> {
     ) -> Result<(), AssemblyError> {
         problem.set_globals(&iterate.globals);
         self.linearise(problem, iterate)?;
-        let (mut size, mut last) = (self.size(problem, iterate), f64::INFINITY);
-        let mut fraction = 1.0_f64;
-        let start = self.iterations;
+        let mut convergence = Convergence::new(control, self.size(problem, iterate));
         loop {
-            let stagnates = last < ROUND_OFF && size >= 0.25 * last;
-            if size <= control.tolerance || stagnates {
+            if convergence.is_done() {
                 self.correct(iterate, 1.0);
                 problem.set_globals(&iterate.globals);
                 return Ok(());
             }
-            let iterations = self.iterations - start;
-            if !(size.is_finite() && iterations < control.max_iterations) {
-                return Err(AssemblyError::Stalled {
-                    iterations,
-                    correction: size,
-                    tolerance: control.tolerance,
-                });
-            }
+            convergence.go_on()?;
             let before = iterate.clone();
-            self.correct(iterate, fraction);
+            self.correct(iterate, convergence.fraction());
             problem.set_globals(&iterate.globals);
             let tried = self.linearise(problem, iterate);
             let next = self.size(problem, iterate);
-            if tried.is_ok() && (next <= 2.0 * size || next < ROUND_OFF) {
-                (last, size) = (size, next);
-                fraction = (2.0 * fraction).min(1.0);
+            if convergence.accepts(tried.is_ok(), next) {
                 continue;
             }
-            fraction *= 0.5;
-            if fraction < SHORTEST {
+            if let Err(stalled) = convergence.halve() {
                 tried?;
-                return Err(AssemblyError::Stalled {
-                    iterations,
-                    correction: size,
-                    tolerance: control.tolerance,
-                });
+                return Err(stalled);
             }
             *iterate = before;
             problem.set_globals(&iterate.globals);
@@ -537,9 +468,3 @@ fn inner(a: &[f64], b: &[f64]) -> f64 {
 
 /// How much a relative correction of reactions counts beside one of the nodes: they carry the rounding of positions over h².
 const REACTIONS: f64 = 1e-3;
-
-/// Corrections below this one that no longer fall are round-off: a step from here would square them.
-const ROUND_OFF: f64 = 1e-9;
-
-/// The shortest part of a step that is tried.
-const SHORTEST: f64 = 1.0 / 256.0;

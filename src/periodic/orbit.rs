@@ -315,11 +315,16 @@ pub(crate) fn multipliers_of<M: Model<N>, const N: usize>(
         periodic_schur::multipliers_of(size, &reduced)
     };
     let mut floquet = floquet.map_err(OrbitError::Multipliers)?;
+    sort(&mut floquet);
+    Ok(floquet)
+}
+
+/// The largest modulus first.
+pub(crate) fn sort(floquet: &mut [Multiplier]) {
     floquet.sort_by(|a, b| {
         let by_modulus = b.log_modulus.total_cmp(&a.log_modulus);
         by_modulus.then(b.argument.total_cmp(&a.argument))
     });
-    Ok(floquet)
 }
 
 /// The places of the `count` multipliers nearest to one.

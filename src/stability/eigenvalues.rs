@@ -236,7 +236,7 @@ fn reflection(x: &[f64]) -> Option<([f64; 3], f64)> {
     Some((v, 2.0 / v.iter().map(|entry| entry * entry).sum::<f64>()))
 }
 
-fn eigenvalues_of_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
+pub(super) fn eigenvalues_of_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
     let (mean, half_difference) = (f64::midpoint(a, d), 0.5 * (a - d));
     let discriminant = half_difference * half_difference + b * c;
     if discriminant < 0.0 {

@@ -25,11 +25,17 @@ mod space;
 mod stepper;
 #[cfg(feature = "sparse")]
 mod tangent;
+#[cfg(feature = "sparse")]
+mod transition;
+#[cfg(feature = "sparse")]
+mod view;
 
 pub use dense::FamilyDense;
 pub use error::FamilyError;
 pub use pattern::{Pattern, Values};
 pub use stepper::FamilyStepper;
+#[cfg(feature = "sparse")]
+pub use transition::{FamilyTransition, FamilyTransitionError};
 
 use crate::model::{CoordinateName, Facts, Form};
 use crate::real::Real;

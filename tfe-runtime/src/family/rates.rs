@@ -434,6 +434,28 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
         Ok(())
     }
 
+    /// The rates of each coordinate, then the multipliers of each constraint, of the last step.
+    pub(super) fn unknowns(&self) -> &[f64] {
+        &self.unknowns
+    }
+
+    /// The matrix of Newton's method at the solution of the last step, from t to t + h, factored.
+    pub(super) fn linearised(&mut self, t: f64, h: f64) -> Result<Blocked, StepError> {
+        let scheme = self.table.view();
+        let element = super::tangent::Element {
+            scheme: &scheme,
+            t,
+            h,
+            points: &self.points,
+            start_rows: &self.start_rows,
+            end_rows: &self.rows.values,
+        };
+        self.parts.fill(self.model, &element, &mut self.matrix);
+        self.matrix.factor()?;
+        self.factored = h;
+        Ok(self.matrix.clone())
+    }
+
     /// The polynomial of the last step.
     pub(super) fn dense(&self, start: f64, end: f64) -> FamilyDense {
         let Some(h) = self.last else {

@@ -1,0 +1,284 @@
+//! Multiple shooting: the nodes of all elements as unknowns, each element solved by itself.
+
+use super::super::problem::Global;
+use super::super::{OrbitError, Phase};
+use crate::assembly::{AssemblyError, Chain, Control, Convergence, Mesh};
+use nalgebra::DMatrix;
+use tfe_runtime::family::{
+    self, FamilyModel, FamilyState, FamilyTransition, FamilyTransitionError, Gradient,
+};
+use tfe_runtime::{Element, Form, Statistics};
+
+/// The chain of elements over one period, closed by periodicity, and its iterate.
+#[derive(Clone, Debug)]
+pub(super) struct Shooting<'m, M> {
+    pub(super) model: &'m M,
+    pub(super) element: Element,
+    pub(super) mesh: Mesh,
+    pub(super) start: f64,
+    pub(super) period: f64,
+    pub(super) unfolding: f64,
+    pub(super) globals: Vec<Global>,
+    pub(super) phase: Option<Phase>,
+    pub(super) energy: Option<f64>,
+    pub(super) nodes: Vec<FamilyState>,
+    pub(super) transitions: Vec<DMatrix<f64>>,
+    pub(super) statistics: Statistics,
+}
+
+impl<'m, M: FamilyModel> Shooting<'m, M> {
+    /// A forced orbit through the nodes of a guess.
+    pub(super) fn new(
+        model: &'m M,
+        element: Element,
+        mesh: Mesh,
+        (start, period): (f64, f64),
+        nodes: Vec<FamilyState>,
+    ) -> Self {
+        Self {
+            model,
+            element,
+            mesh,
+            start,
+            period,
+            unfolding: 0.0,
+            globals: Vec::new(),
+            phase: None,
+            energy: None,
+            nodes,
+            transitions: Vec::new(),
+            statistics: Statistics::NONE,
+        }
+    }
+
+    /// Whether the guess does not move: an equilibrium, whose multipliers are asked for.
+    pub(super) fn is_at_rest(&self) -> bool {
+        let first = &self.nodes[0];
+        let velocity = family::velocity(self.model, self.start, first);
+        velocity.is_ok_and(|v| v.iter().all(|v| *v == 0.0))
+            && self.nodes.iter().all(|node| node == first)
+    }
+
+    /// The energy at the start; none where no velocity belongs to it.
+    pub(super) fn energy_of_start(&self) -> Option<f64> {
+        let (t, first) = (self.start, &self.nodes[0]);
+        let velocity = family::velocity(self.model, t, first).ok()?;
+        Some(family::energy(self.model, t, first, &velocity))
+    }
+
+    /// How many multipliers are one.
+    pub(super) fn trivial(&self) -> usize {
+        let unfolded = self.globals.contains(&Global::Unfolding);
+        usize::from(self.phase.is_some()) * (1 + usize::from(unfolded))
+    }
+
+    /// γ of the unfolding force, if there is one.
+    pub(super) fn unfolding(&self) -> Option<f64> {
+        let unfolded = self.globals.contains(&Global::Unfolding);
+        unfolded.then_some(self.unfolding)
+    }
+
+    /// Iterates to a solution, by steps that are halved where they lead away.
+    pub(super) fn solve(&mut self, control: Control) -> Result<(), OrbitError> {
+        let n = self.model.len();
+        let dense = usize::from(self.phase == Some(Phase::Orthogonal));
+        let mut chain = Chain::new(2 * n, self.globals.len(), self.mesh.elements(), dense);
+        self.linearise(&mut chain)?;
+        let mut convergence = Convergence::new(control, self.size(&chain));
+        loop {
+            if convergence.is_done() {
+                self.correct(&chain, 1.0);
+                return self.check();
+            }
+            convergence.go_on().map_err(OrbitError::Assembly)?;
+            let before = (self.nodes.clone(), self.period, self.unfolding);
+            self.correct(&chain, convergence.fraction());
+            let tried = self.linearise(&mut chain);
+            let next = self.size(&chain);
+            if convergence.accepts(tried.is_ok(), next) {
+                continue;
+            }
+            if let Err(stalled) = convergence.halve() {
+                tried?;
+                return Err(OrbitError::Assembly(stalled));
+            }
+            (self.nodes, self.period, self.unfolding) = before;
+            self.linearise(&mut chain)?;
+        }
+    }
+
+    /// Whether a solution is an orbit.
+    fn check(&self) -> Result<(), OrbitError> {
+        let (period, unfolding) = (self.period, self.unfolding);
+        if !(period > 0.0) {
+            return Err(OrbitError::Period { period });
+        }
+        // Damping that takes a percent of the motion over a period is no discretization error.
+        if !(unfolding.abs() * period < 1e-2) {
+            return Err(OrbitError::NoFamily { unfolding });
+        }
+        Ok(())
+    }
+
+    /// Steps all elements from their nodes and solves for the correction, which is then in the chain.
+    fn linearise(&mut self, chain: &mut Chain) -> Result<(), OrbitError> {
+        let n = self.model.len();
+        let mut transitions = Vec::with_capacity(self.mesh.elements());
+        let places: Vec<(f64, f64)> = (0..self.mesh.elements())
+            .map(|e| self.mesh.place(e, self.start, self.period))
+            .collect();
+        let steps = places.iter().zip(&self.nodes);
+        let steps = steps.map(|((t, h), node)| (*t, *h, node));
+        let each = |transition: FamilyTransition| {
+            let e = transitions.len();
+            let matrix = transition.matrix();
+            let link = chain.link_mut(e);
+            for (row, entries) in link.matrix.chunks_exact_mut(2 * n).enumerate() {
+                for (column, entry) in entries.iter_mut().enumerate() {
+                    *entry = matrix[(row, column)];
+                }
+            }
+            let (end, next) = (transition.end(), &self.nodes[e + 1]);
+            for row in 0..2 * n {
+                for (k, global) in self.globals.iter().enumerate() {
+                    link.global[row * self.globals.len() + k] = match global {
+                        Global::Period => self.mesh.share(e) * transition.by_length()[row],
+                        Global::Unfolding => transition.by_damping()[row],
+                    };
+                }
+                link.right[row] = component(end, row) - component(next, row);
+            }
+            transitions.push(matrix);
+        };
+        let stepped =
+            FamilyTransition::of_steps(self.model, self.element, self.unfolding, steps, each);
+        stepped.map_err(|(element, error)| match error {
+            FamilyTransitionError::Step(source) => AssemblyError::Linearise {
+                element,
+                time: places.get(element).map_or(f64::NAN, |(t, _)| *t),
+                source,
+            }
+            .into(),
+            other => OrbitError::Family(other),
+        })?;
+        self.transitions = transitions;
+        self.statistics.iterations += 1;
+        self.statistics.newton_iterations += 1;
+        self.statistics.steps += places.len() as u64;
+        self.statistics.factorizations += places.len() as u64;
+        self.close(chain)?;
+        let iterations = self.iterations();
+        chain
+            .solve()
+            .map_err(|_| AssemblyError::Singular { iterations }.into())
+    }
+
+    fn iterations(&self) -> u32 {
+        u32::try_from(self.statistics.newton_iterations).unwrap_or(u32::MAX)
+    }
+
+    /// Periodicity, phase and energy.
+    fn close(&self, chain: &mut Chain) -> Result<(), OrbitError> {
+        let n = self.model.len();
+        let size = 2 * n;
+        let (first, last) = (&self.nodes[0], &self.nodes[self.nodes.len() - 1]);
+        let mut closure = chain.closure_mut();
+        closure.clear();
+        for row in 0..size {
+            closure.first[row * size + row] = -1.0;
+            closure.last[row * size + row] = 1.0;
+            closure.right[row] = component(first, row) - component(last, row);
+        }
+        let mut row = size;
+        let fixed = match self.phase {
+            Some(Phase::Coordinate { index, value }) => Some((n + index, value)),
+            Some(Phase::Momentum { index, value }) => Some((index, value)),
+            Some(Phase::Orthogonal) | None => None,
+        };
+        if let Some((place, value)) = fixed {
+            closure.first[row * size + place] = 1.0;
+            closure.right[row] = value - component(first, place);
+            row += 1;
+        }
+        if let Some(energy) = self.energy {
+            let (slopes, present) = self.energy_slopes(first)?;
+            closure.first[row * size..(row + 1) * size].copy_from_slice(&slopes);
+            closure.right[row] = energy - present;
+        }
+        if self.phase == Some(Phase::Orthogonal) {
+            let dense = chain.dense_mut(0);
+            let last = self.nodes.len() - 1;
+            for e in 0..last {
+                // The flow is the difference of the neighbours; a condition of phase need not be exact.
+                let previous = &self.nodes[if e == 0 { last - 1 } else { e - 1 }];
+                for k in 0..size {
+                    let flow = component(&self.nodes[e + 1], k) - component(previous, k);
+                    dense.nodes[e * size + k] = flow;
+                }
+            }
+            dense.nodes[last * size..].fill(0.0);
+            dense.global.fill(0.0);
+            *dense.right = 0.0;
+        }
+        Ok(())
+    }
+
+    /// (H_p, H_q) and H.
+    fn energy_slopes(&self, state: &FamilyState) -> Result<(Vec<f64>, f64), OrbitError> {
+        let (n, t) = (self.model.len(), self.start);
+        let velocity = family::velocity(self.model, t, state)
+            .map_err(|error| OrbitError::Family(error.into()))?;
+        let energy = family::energy(self.model, t, state, &velocity);
+        let (z, sign) = match M::FORM {
+            Form::Lagrangian => (&velocity, -1.0),
+            Form::Hamiltonian => (&state.p, 1.0),
+        };
+        let [mut by_z, mut by_q, mut force] = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+        let first = Gradient {
+            z: &mut by_z,
+            q: &mut by_q,
+            force: &mut force,
+        };
+        self.model.first(t, &state.q, z, first);
+        let mut slopes = velocity;
+        slopes.extend(by_q.iter().map(|slope| sign * slope));
+        Ok((slopes, energy))
+    }
+
+    /// The correction beside the iterate, as for orbits of fixed size.
+    fn size(&self, chain: &Chain) -> f64 {
+        let nodes = self.nodes.iter().enumerate();
+        let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)));
+        let globals = self.globals.iter().zip(chain.globals());
+        let globals = globals.map(|(global, correction)| match global {
+            Global::Period => correction / self.period,
+            // A force that acts within a period.
+            Global::Unfolding => correction * self.period,
+        });
+        crate::assembly::size(nodes, chain.matrices(), globals)
+    }
+
+    /// Adds a fraction of the correction.
+    fn correct(&mut self, chain: &Chain, fraction: f64) {
+        let n = self.model.len();
+        for (e, node) in self.nodes.iter_mut().enumerate() {
+            let (by_p, by_q) = chain.node(e).split_at(n);
+            for a in 0..n {
+                node.p[a] += fraction * by_p[a];
+                node.q[a] += fraction * by_q[a];
+            }
+        }
+        for (global, correction) in self.globals.iter().zip(chain.globals()) {
+            match global {
+                Global::Period => self.period += fraction * correction,
+                Global::Unfolding => self.unfolding += fraction * correction,
+            }
+        }
+    }
+}
+
+/// A number of a state, in the order (p, q).
+fn component(state: &FamilyState, k: usize) -> f64 {
+    let n = state.p.len();
+    if k < n { state.p[k] } else { state.q[k - n] }
+}

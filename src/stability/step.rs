@@ -1,0 +1,174 @@
+//! Transition matrices of models of either kind of length, and operators for long ones.
+
+use nalgebra::DMatrix;
+use std::error::Error;
+use tfe_runtime::length::FixedLength;
+use tfe_runtime::transition::{self, TransitionError};
+use tfe_runtime::{Element, Model, State};
+
+#[cfg(feature = "sparse")]
+use super::{Dominant, DominantError, Iteration, dominant_of};
+#[cfg(feature = "sparse")]
+use tfe_runtime::family::{FamilyModel, FamilyState, FamilyTransition, FamilyTransitionError};
+#[cfg(feature = "sparse")]
+use tfe_runtime::length::RunTimeLength;
+
+/// How the transition matrix of models of one kind of length is found; what [`transition_matrix`](super::transition_matrix) asks for.
+#[cfg_attr(
+    not(feature = "sparse"),
+    diagnostic::on_unimplemented(
+        message = "transition matrices of models of run-time length need the feature `sparse`"
+    )
+)]
+pub trait Transitions<M, const N: usize> {
+    /// A point of phase space.
+    type State;
+    /// Why there is no matrix.
+    type Error: Error;
+
+    /// The matrix of one element.
+    ///
+    /// # Errors
+    /// As [`transition_matrix`](super::transition_matrix).
+    fn matrix(
+        model: &M,
+        element: Element,
+        state: &Self::State,
+        t: f64,
+        h: f64,
+    ) -> Result<DMatrix<f64>, Self::Error>;
+}
+
+impl<M: Model<N>, const N: usize> Transitions<M, N> for FixedLength {
+    type State = State<N>;
+    type Error = TransitionError;
+
+    fn matrix(
+        model: &M,
+        element: Element,
+        state: &State<N>,
+        t: f64,
+        h: f64,
+    ) -> Result<DMatrix<f64>, TransitionError> {
+        let mut entries = vec![0.0; 4 * N * N];
+        transition::of_step(model, element, state, t, h, &mut entries)?;
+        Ok(DMatrix::from_row_slice(2 * N, 2 * N, &entries))
+    }
+}
+
+#[cfg(feature = "sparse")]
+impl<M: FamilyModel> Transitions<M, 0> for RunTimeLength {
+    type State = FamilyState;
+    type Error = FamilyTransitionError;
+
+    fn matrix(
+        model: &M,
+        element: Element,
+        state: &FamilyState,
+        t: f64,
+        h: f64,
+    ) -> Result<DMatrix<f64>, FamilyTransitionError> {
+        Ok(FamilyTransition::of_step(model, element, state, t, h)?.matrix())
+    }
+}
+
+/// The transition matrix of one element of a model of run-time length as an operator, in memory and time linear in its length: the derivative of the
+/// step map (p, q) ↦ (p, q) at `state`.
+///
+/// ```text
+/// (δp₁, δq₁) = A (δp₀, δq₀)                                                                             (theory.md (T-30))
+/// ```
+///
+/// The kinetic energy may be any of a Lagrangian; that of a Hamiltonian has to be ½ Σ p²/m.
+///
+/// # Shapes
+/// 2n numbers, ordered (p, q).
+/// # Errors
+/// [`FamilyTransitionError`] where a step is impossible or fails, and for models with constraints.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2) - q[0]^2/2 - q[n-1]^2/2)]
+/// struct Chain { n: usize }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let chain = Chain { n: 300 };
+/// let rest = chain.state(vec![0.0; 300], vec![0.0; 300]);
+/// // Frequencies to 2: at h = 1.65 the fastest modes are between √10/h and √12/h, where this element is unstable.
+/// let step = stability::transition(&chain, Primal::<3>, &rest, 0.0, 1.65)?;
+/// let found = stability::dominant(&step, stability::Iteration::default())?;
+/// assert!(found.radius() > 1.01 && found.residual < 1e-10);
+/// # Ok(())
+/// # }
+/// ```
+#[cfg(feature = "sparse")]
+pub fn transition<M: FamilyModel>(
+    model: &M,
+    element: impl Into<Element>,
+    state: &FamilyState,
+    t: f64,
+    h: f64,
+) -> Result<FamilyTransition, FamilyTransitionError> {
+    FamilyTransition::of_step(model, element.into(), state, t, h)
+}
+
+/// The eigenvalue of largest modulus of a step, by [`dominant_of`]: its modulus is the spectral radius.
+///
+/// Momenta are first scaled by one number, which two products tell, to be as large as coordinates; the residual is that in the scaled numbers.
+///
+/// # Not guaranteed
+/// As for [`dominant_of`]. About a stable equilibrium a symplectic step has many eigenvalues of modulus one and no other: then this is an error that
+/// holds the best value, or one of those eigenvalues; how good it is says the residual.
+/// # Errors
+/// [`DominantError`]
+#[cfg(feature = "sparse")]
+pub fn dominant(
+    transition: &FamilyTransition,
+    control: Iteration,
+) -> Result<Dominant, DominantError> {
+    let (size, n) = (transition.size(), transition.size() / 2);
+    let mut input = vec![0.0; size];
+    let scale = momentum_scale(transition);
+    let apply = |x: &[f64], y: &mut [f64]| {
+        for a in 0..n {
+            (input[a], input[n + a]) = (scale * x[a], x[n + a]);
+        }
+        if transition.apply(&input, y).is_err() {
+            y.fill(f64::NAN);
+        }
+        for p in &mut y[..n] {
+            *p /= scale;
+        }
+    };
+    let mut found = dominant_of(size, apply, control);
+    if let Ok(best) | Err(DominantError::NotConverged { best, .. }) = &mut found {
+        best.products += 2;
+    }
+    found
+}
+
+/// A power of two by which momenta are larger than coordinates: √(|∂p/∂q| / |∂q/∂p|), on one vector each.
+#[cfg(feature = "sparse")]
+fn momentum_scale(transition: &FamilyTransition) -> f64 {
+    let (size, n) = (transition.size(), transition.size() / 2);
+    let mut end = vec![0.0; size];
+    let mut part = |from_p: bool| -> f64 {
+        // Neighbours in opposite directions, with irregular sizes: what is stiff shows.
+        let value = |a: usize| (1.7 * (a * a) as f64).sin();
+        let direction: Vec<f64> = (0..size)
+            .map(|k| if (k < n) == from_p { value(k % n) } else { 0.0 })
+            .collect();
+        if transition.apply(&direction, &mut end).is_err() {
+            return 0.0;
+        }
+        let other = if from_p { &end[n..] } else { &end[..n] };
+        other.iter().map(|x| x * x).sum::<f64>().sqrt()
+    };
+    let ratio = part(false) / part(true);
+    if ratio.is_finite() && ratio > 0.0 {
+        (0.5 * ratio.log2()).round().exp2()
+    } else {
+        1.0
+    }
+}

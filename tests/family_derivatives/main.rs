@@ -1,0 +1,5 @@
+//! Derivatives of steps of models of run-time length: transition operators, their spectra, periodic orbits.
+#![cfg(feature = "sparse")]
+
+mod orbits;
+mod transitions;

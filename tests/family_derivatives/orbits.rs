@@ -1,0 +1,366 @@
+//! Periodic orbits of families.
+
+use nalgebra::{Complex, DMatrix, DVector};
+use std::f64::consts::{PI, TAU};
+use tfe::family::FamilyState;
+use tfe::periodic::{OrbitError, Phase, Verdict};
+use tfe::prelude::*;
+
+/// A chain with fixed ends, cubic forces, damping, and a driven end.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + b/4*(q[i+1]-q[i])^4)
+        - q[0]^2/2 - b/4*q[0]^4 - q[n-1]^2/2 - b/4*q[n-1]^4,
+    dissipation = sum(i in 0..n, c/2*dot(q[i])^2),
+    force(q[n-1]) = f*cos(omega*t),
+)]
+#[derive(Debug)]
+struct Driven {
+    n: usize,
+    b: f64,
+    c: f64,
+    f: f64,
+    omega: f64,
+}
+
+#[dynamics(
+    coordinates(q[6]),
+    lagrangian = sum(i in 0..6, dot(q[i])^2/2) - sum(i in 0..5, (q[i+1]-q[i])^2/2 + b/4*(q[i+1]-q[i])^4)
+        - q[0]^2/2 - b/4*q[0]^4 - q[5]^2/2 - b/4*q[5]^4,
+    dissipation = sum(i in 0..6, c/2*dot(q[i])^2),
+    force(q[5]) = f*cos(omega*t),
+)]
+struct DrivenSix {
+    b: f64,
+    c: f64,
+    f: f64,
+    omega: f64,
+}
+
+/// The same without force: conservative.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + b/4*(q[i+1]-q[i])^4)
+        - q[0]^2/2 - b/4*q[0]^4 - q[n-1]^2/2 - b/4*q[n-1]^4,
+)]
+#[derive(Debug)]
+struct Chain {
+    n: usize,
+    b: f64,
+}
+
+#[dynamics(
+    coordinates(q[6]),
+    lagrangian = sum(i in 0..6, dot(q[i])^2/2) - sum(i in 0..5, (q[i+1]-q[i])^2/2 + b/4*(q[i+1]-q[i])^4)
+        - q[0]^2/2 - b/4*q[0]^4 - q[5]^2/2 - b/4*q[5]^4,
+)]
+struct Six {
+    b: f64,
+}
+
+/// How far each number is from the nearest of the others.
+fn apart(ones: &[Complex<f64>], others: &[Complex<f64>]) -> f64 {
+    let nearest = |one: &Complex<f64>| {
+        let distances = others.iter().map(|other| (one - other).norm());
+        distances.fold(f64::INFINITY, f64::min)
+    };
+    ones.iter().map(nearest).fold(0.0, f64::max)
+}
+
+#[test]
+fn driven_orbits_are_those_of_fixed_size() {
+    let (b, c, f, omega) = (0.8, 0.1, 0.4, 0.9);
+    let long = Driven {
+        n: 6,
+        b,
+        c,
+        f,
+        omega,
+    };
+    let six = DrivenSix { b, c, f, omega };
+    let one = PeriodicOrbit::of(&long).elements(24).period(TAU / omega);
+    let one = one.solve().expect("an orbit");
+    let other = PeriodicOrbit::of(&six).elements(24).period(TAU / omega);
+    let other = other.solve().expect("an orbit");
+    for a in 0..6 {
+        let (q, p) = (
+            one.start().q[a] - other.start().q[a],
+            one.start().p[a] - other.start().p[a],
+        );
+        assert!(q.abs() < 1e-12 && p.abs() < 1e-12, "{a}: {q:e} {p:e}");
+    }
+    let off = apart(one.multipliers(), other.multipliers());
+    assert!(off < 1e-10, "{off:e}");
+    assert!(one.is_stable() && one.trivial().is_empty() && one.unfolding().is_none());
+    let off = (one.monodromy() - other.monodromy()).amax();
+    assert!(off < 1e-11, "{off:e}");
+    let (motion, fixed) = (one.motion(), other.motion());
+    for time in [0.0, 1.234, 5.0, motion.last().t] {
+        let (one, other) = (
+            motion.at(time).expect("inside"),
+            fixed.at(time).expect("inside"),
+        );
+        for a in 0..6 {
+            assert!((one.q[a] - other.q[a]).abs() < 1e-11);
+            assert!((one.p[a] - other.p[a]).abs() < 1e-11);
+        }
+    }
+    assert_eq!(motion.states().len(), 25);
+    assert_eq!(one.nodes().len(), 25);
+}
+
+#[test]
+fn conservative_orbits_are_those_of_fixed_size() {
+    let (long, six) = (Chain { n: 6, b: 0.5 }, Six { b: 0.5 });
+    let q: [f64; 6] = std::array::from_fn(|i| 0.8 * (2.0 * PI * (i + 1) as f64 / 7.0).sin());
+    let (start, fixed) = (long.state(q, [0.0; 6]), six.state(q, [0.0; 6]));
+    for phase in [
+        Phase::Orthogonal,
+        Phase::Momentum {
+            index: 1,
+            value: 0.0,
+        },
+    ] {
+        let one = PeriodicOrbit::of(&long)
+            .unknown_period(6.8)
+            .guess_from(start.clone())
+            .energy(0.9)
+            .phase(phase)
+            .solve()
+            .expect("an orbit");
+        let other = PeriodicOrbit::of(&six)
+            .unknown_period(6.8)
+            .guess_from(fixed)
+            .energy(0.9)
+            .phase(phase)
+            .solve()
+            .expect("an orbit");
+        assert!((one.period() - other.period()).abs() < 1e-10);
+        if phase != Phase::Orthogonal {
+            // Else the phases may differ: corrections are not the same.
+            for a in 0..6 {
+                assert!((one.start().q[a] - other.start().q[a]).abs() < 1e-10);
+            }
+        }
+        assert_eq!(one.trivial().len(), 2);
+        let others = |multipliers: &[Complex<f64>], trivial: &[usize]| -> Vec<Complex<f64>> {
+            let all = multipliers.iter().enumerate();
+            let others = all.filter(|(place, _)| !trivial.contains(place));
+            others.map(|(_, multiplier)| *multiplier).collect()
+        };
+        let one_others = others(one.multipliers(), &one.trivial());
+        let off = apart(&one_others, &others(other.multipliers(), &other.trivial()));
+        assert!(off < 1e-10, "{off:e}");
+        let unfolding = one.unfolding().expect("unfolded");
+        assert!(unfolding.abs() < 1e-8, "{unfolding:e}");
+    }
+    // A given period instead of a given energy.
+    let one = PeriodicOrbit::of(&long)
+        .period(6.6)
+        .guess_from(start)
+        .solve();
+    let other = PeriodicOrbit::of(&six)
+        .period(6.6)
+        .guess_from(fixed)
+        .solve();
+    let (one, other) = (one.expect("an orbit"), other.expect("an orbit"));
+    let energy = |p: &[f64], q: &[f64]| -> f64 {
+        let stretch = |from: f64, to: f64| (to - from).powi(2) / 2.0 + 0.125 * (to - from).powi(4);
+        let kinetic: f64 = p.iter().map(|p| p * p / 2.0).sum();
+        let inside: f64 = q.windows(2).map(|pair| stretch(pair[0], pair[1])).sum();
+        kinetic + inside + stretch(0.0, q[0]) + stretch(0.0, q[5])
+    };
+    let (one, other) = (one.start().clone(), other.start());
+    let off = energy(&one.p, &one.q) - energy(&other.p, &other.q);
+    assert!(off.abs() < 1e-10, "{off:e}");
+}
+
+/// A linear chain: the steady state by a linear system, multipliers e^λT with λ² + cλ + ω_k² = 0.
+#[test]
+fn linear_chains_have_a_closed_form() {
+    let (n, c, f, omega) = (20, 0.1, 1.0, 0.7);
+    let (b, period) = (0.0, TAU / omega);
+    let chain = Driven { n, b, c, f, omega };
+    let orbit = PeriodicOrbit::of(&chain).element(Mixed::<6>).period(period);
+    let orbit = orbit.solve().expect("an orbit");
+    let stiffness = DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
+        0 => Complex::new(2.0 - omega * omega, c * omega),
+        1 => Complex::new(-1.0, 0.0),
+        _ => Complex::new(0.0, 0.0),
+    });
+    let mut force = DVector::from_element(n, Complex::new(0.0, 0.0));
+    force[n - 1] = Complex::new(f, 0.0);
+    let amplitude = stiffness.lu().solve(&force).expect("regular");
+    for a in 0..n {
+        let (q, p) = (amplitude[a].re, -omega * amplitude[a].im);
+        let off = (orbit.start().q[a] - q)
+            .abs()
+            .max((orbit.start().p[a] - p).abs());
+        // Order ten: (ω_max h)¹⁰ is 10⁻⁵, with a small factor, for the fastest modes, which move little.
+        assert!(off < 1e-10, "{a}: {off:e}");
+    }
+    let mut expected = Vec::new();
+    for k in 1..=n {
+        let frequency = 2.0 * (k as f64 * PI / (2.0 * (n + 1) as f64)).sin();
+        let imaginary = (frequency * frequency - c * c / 4.0).sqrt();
+        for sign in [1.0, -1.0] {
+            let exponent = Complex::new(-c / 2.0, sign * imaginary) * period;
+            expected.push(exponent.exp());
+        }
+    }
+    let off = apart(orbit.multipliers(), &expected);
+    assert!(off < 1e-8, "{off:e}");
+    assert!(matches!(orbit.verdict(), Verdict::Stable { .. }));
+    // Linear: one correction, and one that finds nothing to do.
+    assert!(orbit.statistics().newton_iterations <= 3);
+}
+
+/// Of 20 masses the seventh mode is exact: (a, a, 0, −a, −a, 0, …) moves as a Duffing oscillator, a'' = −a − b a³.
+#[test]
+fn a_mode_of_twenty_masses_has_a_closed_form() {
+    let (b, a) = (1.0, 0.6);
+    let chain = Chain { n: 20, b };
+    let pattern = [1.0, 1.0, 0.0, -1.0, -1.0, 0.0];
+    let q: Vec<f64> = (0..20).map(|i| a * pattern[i % 6]).collect();
+    let start = chain.state(q, vec![0.0; 20]);
+    let orbit = PeriodicOrbit::of(&chain)
+        .element(Mixed::<6>)
+        .unknown_period(5.5)
+        .guess_from(start.clone())
+        .phase(Phase::Momentum {
+            index: 0,
+            value: 0.0,
+        })
+        .solve()
+        .expect("an orbit");
+    // T = 2π / agm(√(1 + b a²), √(1 + b a²/2)).
+    let (mut mean, mut geometric) = ((1.0 + b * a * a).sqrt(), (1.0 + b * a * a / 2.0).sqrt());
+    for _ in 0..6 {
+        (mean, geometric) = (f64::midpoint(mean, geometric), (mean * geometric).sqrt());
+    }
+    let off = orbit.period() - TAU / mean;
+    assert!(off.abs() < 1e-10, "{off:e}");
+    for (found, given) in orbit.start().q.iter().zip(&start.q) {
+        assert!((found - given).abs() < 1e-8, "{found} {given}");
+    }
+    // Symplectic: multipliers in pairs μ, 1/μ.
+    let logs: f64 = orbit.floquet().iter().map(|one| one.log_modulus).sum();
+    assert!(logs.abs() < 1e-9, "{logs:e}");
+    let inverses: Vec<Complex<f64>> = orbit.multipliers().iter().map(Complex::inv).collect();
+    let off = apart(orbit.multipliers(), &inverses);
+    assert!(off < 1e-6, "{off:e}");
+    // A bush of modes that others leave.
+    assert!(matches!(orbit.verdict(), Verdict::Unstable { .. }));
+    assert_eq!(orbit.multipliers().len(), 40);
+}
+
+/// A chain of van der Pol oscillators: an isolated orbit of unknown period.
+#[dynamics(
+    coordinates(x[n]), momenta(p[n]),
+    hamiltonian = sum(i in 0..n, p[i]^2/2 + x[i]^2/2) + sum(i in 0..n-1, k/2*(x[i+1]-x[i])^2),
+    force(x[i]) = mu*(1 - x[i]^2)*p[i],
+)]
+struct VanDerPol {
+    n: usize,
+    k: f64,
+    mu: f64,
+}
+
+#[dynamics(
+    coordinates(x[4]), momenta(p[4]),
+    hamiltonian = sum(i in 0..4, p[i]^2/2 + x[i]^2/2) + sum(i in 0..3, k/2*(x[i+1]-x[i])^2),
+    force(x[i]) = mu*(1 - x[i]^2)*p[i],
+)]
+struct FourVanDerPol {
+    k: f64,
+    mu: f64,
+}
+
+#[test]
+fn isolated_orbits_of_unknown_period() {
+    let model = VanDerPol {
+        n: 4,
+        k: 0.3,
+        mu: 1.0,
+    };
+    let guess = model.state(vec![2.0; 4], vec![0.0; 4]);
+    let orbit = PeriodicOrbit::of(&model)
+        .element(Mixed::<6>)
+        .elements(40)
+        .unknown_period(6.66)
+        .guess_from(guess)
+        .solve()
+        .expect("an orbit");
+    // All move together, with the period of a single one, by any table.
+    assert!(
+        (orbit.period() - 6.663_286_859_323_13).abs() < 1e-9,
+        "{}",
+        orbit.period()
+    );
+    assert_eq!(orbit.trivial().len(), 1);
+    let trivial = orbit.multipliers()[orbit.trivial()[0]];
+    assert!((trivial - 1.0).norm() < 1e-9, "{trivial}");
+    let four = FourVanDerPol { k: 0.3, mu: 1.0 };
+    let fixed = PeriodicOrbit::of(&four)
+        .element(Mixed::<6>)
+        .elements(40)
+        .unknown_period(6.66)
+        .guess_from(four.state([2.0; 4], [0.0; 4]))
+        .solve()
+        .expect("an orbit");
+    assert!((orbit.period() - fixed.period()).abs() < 1e-11);
+    let off = apart(orbit.multipliers(), fixed.multipliers());
+    assert!(off < 1e-10, "{off:e}");
+}
+
+#[test]
+fn what_makes_no_sense_is_told() {
+    let (n, b, c, f, omega) = (3, 0.1, 0.1, 0.3, 1.0);
+    let driven = Driven { n, b, c, f, omega };
+    let no_period = PeriodicOrbit::of(&driven).solve().expect_err("none given");
+    assert_eq!(no_period, OrbitError::NoPeriod);
+    let forced = PeriodicOrbit::of(&driven).unknown_period(6.0).solve();
+    assert_eq!(forced.expect_err("forced"), OrbitError::ForcedPeriod);
+    let negative = PeriodicOrbit::of(&driven)
+        .period(-1.0)
+        .solve()
+        .expect_err("negative");
+    assert_eq!(negative, OrbitError::Period { period: -1.0 });
+    let short = PeriodicOrbit::of(&driven)
+        .period(1.0)
+        .guess(|_| (vec![0.0; 2], vec![0.0; 3]));
+    let short = short.solve().expect_err("two of three");
+    assert!(matches!(short, OrbitError::Family(_)), "{short}");
+    let short = FamilyState {
+        q: vec![0.0; 3],
+        p: Vec::new(),
+    };
+    let short = PeriodicOrbit::of(&driven)
+        .period(1.0)
+        .guess_from(short)
+        .solve();
+    assert!(matches!(short, Err(OrbitError::Guess(_))));
+    let none = PeriodicOrbit::of(&driven).period(1.0).elements(0).solve();
+    assert!(matches!(none, Err(OrbitError::Mesh(_))));
+    let chain = Chain { n: 3, b: 0.1 };
+    let phase = Phase::Coordinate {
+        index: 3,
+        value: 0.0,
+    };
+    let guess = chain.state([0.1, 0.2, 0.1], [0.0; 3]);
+    let orbit = PeriodicOrbit::of(&chain)
+        .unknown_period(8.0)
+        .guess_from(guess);
+    let error = orbit.phase(phase).solve().expect_err("three coordinates");
+    assert_eq!(error, OrbitError::Phase { index: 3 });
+    let empty = Chain { n: 0, b: 0.1 };
+    let error = PeriodicOrbit::of(&empty)
+        .period(1.0)
+        .solve()
+        .expect_err("no sites");
+    assert!(matches!(error, OrbitError::Family(_)), "{error}");
+    // Rest is an orbit of any period: its multipliers are those of the linear modes.
+    let rest = PeriodicOrbit::of(&chain).period(1.0).solve().expect("rest");
+    assert!(rest.unfolding().is_none() && rest.trivial().is_empty());
+    assert!(matches!(rest.verdict(), Verdict::Neutral { .. }));
+}

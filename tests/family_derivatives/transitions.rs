@@ -1,0 +1,374 @@
+//! The derivative of a step of a family.
+
+use tfe::family::{Block, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, Gradient};
+use tfe::prelude::*;
+use tfe::runtime::step::Control;
+use tfe::runtime::{CoordinateName, Facts, Form, Real};
+use tfe::stability::{
+    DominantError, FamilyTransitionError, Iteration, dominant, spectral_radius,
+    symplecticity_defect, transition, transition_matrix,
+};
+
+/// Springs with a cubic part, velocities in forces, a potential that mixes velocities and coordinates, masses of their own.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2 + g*q[i]^2*dot(q[i])^2) + sum(i in 0..n-1, b*dot(q[i])*dot(q[i+1]) + b*dot(q[i])*q[i+1])
+        - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + a/3*(q[i+1]-q[i])^3),
+    force(q[i]) = -c*dot(q[i]) + c*q[i]*sin(t),
+    force(q[0]) = -c*dot(q[0])*q[1]^2,
+)]
+struct Web {
+    n: usize,
+    m: Vec<f64>,
+    a: f64,
+    b: f64,
+    c: f64,
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(q[5]),
+    lagrangian = sum(i in 0..5, m[i]/2*dot(q[i])^2 + g*q[i]^2*dot(q[i])^2) + sum(i in 0..4, b*dot(q[i])*dot(q[i+1]) + b*dot(q[i])*q[i+1])
+        - sum(i in 0..4, (q[i+1]-q[i])^2/2 + a/3*(q[i+1]-q[i])^3),
+    force(q[i]) = -c*dot(q[i]) + c*q[i]*sin(t),
+    force(q[0]) = -c*dot(q[0])*q[1]^2,
+)]
+struct WebOfFive {
+    m: [f64; 5],
+    a: f64,
+    b: f64,
+    c: f64,
+    g: f64,
+}
+
+/// Masses on springs by momenta, damped.
+#[dynamics(
+    coordinates(q[n]), momenta(p[n]),
+    hamiltonian = sum(i in 0..n, p[i]^2/2/m[i] + q[i]^4/4) + sum(i in 0..n-1, (q[i+1]-q[i])^2/2),
+    force(q[i]) = -c*p[i]*q[i]^2,
+)]
+struct ByMomenta {
+    n: usize,
+    m: Vec<f64>,
+    c: f64,
+}
+
+#[dynamics(
+    coordinates(q[5]), momenta(p[5]),
+    hamiltonian = sum(i in 0..5, p[i]^2/2/m[i] + q[i]^4/4) + sum(i in 0..4, (q[i+1]-q[i])^2/2),
+    force(q[i]) = -c*p[i]*q[i]^2,
+)]
+struct FiveByMomenta {
+    m: [f64; 5],
+    c: f64,
+}
+
+const MASSES: [f64; 5] = [1.0, 0.5, 2.0, 1.5, 0.7];
+const Q: [f64; 5] = [0.3, -0.2, 0.4, 0.1, -0.5];
+const V: [f64; 5] = [0.1, 0.5, -0.3, 0.2, 0.4];
+
+fn webs() -> (Web, WebOfFive) {
+    let (a, b, c, g) = (0.3, 0.2, 0.15, 0.1);
+    let m = MASSES.to_vec();
+    let long = Web {
+        n: 5,
+        m,
+        a,
+        b,
+        c,
+        g,
+    };
+    let m = MASSES;
+    (long, WebOfFive { m, a, b, c, g })
+}
+
+#[test]
+fn matrices_are_those_of_fixed_size() {
+    let (web, five) = webs();
+    let (start, fixed) = (web.state(Q, V), five.state(Q, V));
+    for element in [
+        Element::mixed(3),
+        Element::mixed(6),
+        Element::primal(4),
+        Element::primal(3).reduced(),
+        Element::mixed(3).quadrature(4),
+        Element::radau(3),
+        Element::energy_conserving(3),
+    ] {
+        let one = transition_matrix(&web, element, &start, 0.7, 0.2).expect("from the family");
+        let other = transition_matrix(&five, element, &fixed, 0.7, 0.2).expect("of fixed size");
+        let off = (&one - &other).amax();
+        // Entries of size one to three, some hundred operations.
+        assert!(off < 1e-12, "{element}: {off:e}");
+        let operator = transition(&web, element, &start, 0.7, 0.2).expect("an operator");
+        let (x, mut y): (Vec<f64>, _) = ((0..10).map(|k| f64::from(k).cos()).collect(), [0.0; 10]);
+        operator.apply(&x, &mut y).expect("ten numbers");
+        for (row, y) in y.iter().enumerate() {
+            let product: f64 = (0..10).map(|k| one[(row, k)] * x[k]).sum();
+            assert!((product - y).abs() < 1e-13);
+        }
+    }
+    let (m, c) = (MASSES.to_vec(), 0.3);
+    let (chain, five) = (ByMomenta { n: 5, m, c }, FiveByMomenta { m: MASSES, c });
+    let (start, fixed) = (chain.state(Q, V), five.state(Q, V));
+    for element in [Element::mixed(3), Element::mixed(5), Element::radau(3)] {
+        let one = transition_matrix(&chain, element, &start, 0.0, 0.2).expect("from the family");
+        let other = transition_matrix(&five, element, &fixed, 0.0, 0.2).expect("of fixed size");
+        let off = (&one - &other).amax();
+        assert!(off < 1e-12, "{element}: {off:e}");
+    }
+}
+
+/// The end of one step from a state shifted by `shift` times the direction `k`.
+fn end<M: FamilyModel>(
+    model: &M,
+    element: Element,
+    state: &FamilyState,
+    (t, h): (f64, f64),
+    (k, shift): (usize, f64),
+) -> Vec<f64> {
+    let n = state.q.len();
+    let mut state = state.clone();
+    match k {
+        _ if k < n => state.p[k] += shift,
+        _ if k < 2 * n => state.q[k - n] += shift,
+        _ => {}
+    }
+    let h = if k < 2 * n { h } else { h + shift };
+    let mut stepper = FamilyStepper::new(model, element, Control::default()).expect("a stepper");
+    stepper.advance(t, h, &mut state).expect("a step");
+    [state.p, state.q].concat()
+}
+
+/// Of fourth order: errors of 1e-12 from truncation, 1e-13 / 1e-3 from rounding.
+fn difference(end: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
+    let d = 1e-3;
+    let ends = [end(d), end(-d), end(2.0 * d), end(-2.0 * d)];
+    (0..ends[0].len())
+        .map(|a| (8.0 * (ends[0][a] - ends[1][a]) - (ends[2][a] - ends[3][a])) / (12.0 * d))
+        .collect()
+}
+
+#[test]
+fn operators_are_derivatives_of_the_step() {
+    let (web, _) = webs();
+    let chain = ByMomenta {
+        n: 5,
+        m: MASSES.to_vec(),
+        c: 0.3,
+    };
+    check_derivatives(&web, &web.state(Q, V), Element::primal(4));
+    check_derivatives(&web, &web.state(Q, V), Element::mixed(4));
+    check_derivatives(&chain, &chain.state(Q, V), Element::mixed(4));
+}
+
+#[track_caller]
+fn check_derivatives<M: FamilyModel>(model: &M, start: &FamilyState, element: Element) {
+    let leg = (0.4, 0.2);
+    let operator = transition(model, element, start, leg.0, leg.1).expect("an operator");
+    let matrix = operator.matrix();
+    for k in 0..10 {
+        let by_steps = difference(|d| end(model, element, start, leg, (k, d)));
+        for (row, by_steps) in by_steps.iter().enumerate() {
+            let off = (matrix[(row, k)] - by_steps).abs();
+            assert!(off < 1e-9, "{element} ({row}, {k}): {off:e}");
+        }
+    }
+    if !M::FACTS.time_dependent {
+        let by_steps = difference(|d| end(model, element, start, leg, (10, d)));
+        for (by_length, by_steps) in operator.by_length().iter().zip(&by_steps) {
+            assert!((by_length - by_steps).abs() < 1e-9);
+        }
+    }
+    let ends = end(model, element, start, leg, (10, 0.0));
+    for (one, other) in [&operator.end().p[..], &operator.end().q]
+        .concat()
+        .iter()
+        .zip(&ends)
+    {
+        // Two iterations, one solution.
+        assert!((one - other).abs() < 1e-13);
+    }
+}
+
+/// Masses on springs, fixed at both ends: ω_k = 2 √(k/m) sin(kπ/(2(n + 1))).
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2) - k/2*q[0]^2 - k/2*q[n-1]^2,
+    dissipation = sum(i in 0..n, c/2*dot(q[i])^2),
+)]
+struct Harmonic {
+    n: usize,
+    m: f64,
+    k: f64,
+    c: f64,
+}
+
+#[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2, dissipation = c/2*dot(x)^2)]
+struct Oscillator {
+    m: f64,
+    k: f64,
+    c: f64,
+}
+
+/// The largest radius among the modes.
+fn largest_of_modes(chain: &Harmonic, element: Element, h: f64) -> f64 {
+    let radius = |mode: usize| {
+        let angle = mode as f64 * std::f64::consts::PI / (2.0 * (chain.n + 1) as f64);
+        let omega = 2.0 * (chain.k / chain.m).sqrt() * angle.sin();
+        let one = Oscillator {
+            m: chain.m,
+            k: chain.m * omega * omega,
+            c: chain.c,
+        };
+        let matrix = transition_matrix(&one, element, &one.state([0.0], [0.0]), 0.0, h);
+        spectral_radius(&matrix.expect("a matrix"))
+    };
+    (1..=chain.n).map(radius).fold(0.0, f64::max)
+}
+
+/// Where modes of a thousand sites are unstable the radius is that of the worst of them.
+#[test]
+fn radii_of_a_thousand_sites() {
+    let mut chain = Harmonic {
+        n: 1000,
+        m: 2.0,
+        k: 8.0,
+        c: 0.0,
+    };
+    let rest = chain.state(vec![0.0; 1000], vec![0.0; 1000]);
+    // ω h up to 3.4: unstable from √10 to √12. In the second case some eighty modes around 3.3 of frequencies up to 4 h = 4.8.
+    for (c, element, h) in [
+        (0.0, Element::primal(3), 0.85),
+        (0.0, Element::primal(3), 1.2),
+        (0.3, Element::mixed(4), 0.3),
+        (0.3, Element::mixed(4), 2.0),
+    ] {
+        chain.c = c;
+        let expected = largest_of_modes(&chain, element, h);
+        let step = transition(&chain, element, &rest, 0.0, h).expect("an operator");
+        let found = dominant(&step, Iteration::default())
+            .unwrap_or_else(|error| panic!("{element} {h}: {error}, expected {expected}"));
+        let off = found.radius() - expected;
+        assert!(off.abs() < 1e-9, "{element} {h}: {off:e}, {found:?}");
+        assert!((expected > 1.0) == (c == 0.0));
+    }
+}
+
+/// All eigenvalues of a stable symplectic step lie on the circle: what is found lies there to its residual, or it is said that nothing was found.
+#[test]
+fn stable_symplectic_steps_have_no_largest_eigenvalue() {
+    let chain = Harmonic {
+        n: 400,
+        m: 1.0,
+        k: 1.0,
+        c: 0.0,
+    };
+    let rest = chain.state(vec![0.0; 400], vec![0.0; 400]);
+    let step = transition(&chain, Mixed::<4>, &rest, 0.0, 0.5).expect("an operator");
+    let control = Iteration {
+        products: 2000,
+        ..Iteration::default()
+    };
+    let (best, converged) = match dominant(&step, control) {
+        Ok(found) => (found, true),
+        Err(DominantError::NotConverged { best, .. }) => (best, false),
+        Err(other) => panic!("{other}"),
+    };
+    if converged {
+        assert!((best.radius() - 1.0).abs() < 1e-9);
+    } else {
+        assert!(best.residual > 1e-11);
+    }
+    let short = Harmonic { n: 20, ..chain };
+    let rest = short.state(vec![0.0; 20], vec![0.0; 20]);
+    let matrix = transition_matrix(&short, Mixed::<4>, &rest, 0.0, 0.5).expect("a matrix");
+    assert!(symplecticity_defect(&matrix) < 1e-14);
+    // A short one is exhausted.
+    let step = transition(&short, Mixed::<4>, &rest, 0.0, 0.5).expect("an operator");
+    let found = dominant(&step, Iteration::default()).expect("forty eigenvalues");
+    assert!((found.radius() - 1.0).abs() < 1e-12, "{found:?}");
+}
+
+/// A particle that says it is constrained.
+struct Bound;
+
+impl FamilyModel for Bound {
+    const FORM: Form = Form::Lagrangian;
+    const FACTS: Facts = Facts::UNKNOWN;
+    const MOMENTA_MOVE: bool = false;
+    const CONSTRAINED: bool = true;
+
+    fn len(&self) -> usize {
+        1
+    }
+
+    fn check(&self) -> Result<(), FamilyError> {
+        Ok(())
+    }
+
+    fn energy_function<R: Real>(&self, _: R, _: &[R], z: &[R]) -> R {
+        z[0] * z[0] * R::from_f64(0.5)
+    }
+
+    fn first<R: Real>(&self, _: R, _: &[R], z: &[R], first: Gradient<'_, R>) {
+        (first.z[0], first.q[0]) = (z[0], R::from_f64(0.0));
+    }
+
+    fn forces_inline<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>) {
+        self.first(t, q, z, first);
+    }
+
+    fn mass<R: Real, E: Entries<R>>(&self, _: R, _: &[R], _: &[R], entries: &mut E) {
+        entries.add(Block::ZZ, 0, 0, R::from_f64(1.0));
+    }
+
+    fn second<R: Real, E: Entries<R>>(
+        &self,
+        t: R,
+        q: &[R],
+        z: &[R],
+        first: Gradient<'_, R>,
+        entries: &mut E,
+    ) {
+        self.first(t, q, z, first);
+        self.mass(t, q, z, entries);
+    }
+
+    fn coordinate_name(&self, index: usize) -> CoordinateName {
+        CoordinateName::element("x", index)
+    }
+}
+
+#[test]
+fn what_is_impossible_is_told() {
+    let (web, _) = webs();
+    let start = web.state(Q, V);
+    let short = FamilyState {
+        q: vec![0.0; 3],
+        p: vec![0.0; 5],
+    };
+    let error = transition(&web, Mixed::<4>, &short, 0.0, 0.1).expect_err("three of five");
+    assert!(matches!(error, FamilyTransitionError::Family(_)), "{error}");
+    for h in [0.0, f64::NAN] {
+        let error = transition(&web, Mixed::<4>, &start, 0.0, h).expect_err("no step");
+        assert!(matches!(error, FamilyTransitionError::Step(_)), "{error}");
+    }
+    let operator = transition(&web, Mixed::<4>, &start, 0.0, 0.1).expect("an operator");
+    let error = operator.apply(&[0.0; 9], &mut [0.0; 10]).expect_err("nine");
+    let (needed, given) = (10, 9);
+    assert_eq!(error, FamilyTransitionError::Shape { needed, given });
+    let chain = ByMomenta {
+        n: 5,
+        m: MASSES.to_vec(),
+        c: 0.0,
+    };
+    let error = transition(&chain, Primal::<3>, &chain.state(Q, V), 0.0, 0.1).expect_err("phase");
+    assert!(matches!(error, FamilyTransitionError::Family(_)), "{error}");
+    let state = FamilyState {
+        q: vec![0.0],
+        p: vec![1.0],
+    };
+    let error = transition(&Bound, Mixed::<4>, &state, 0.0, 0.1).expect_err("constraints");
+    assert_eq!(error, FamilyTransitionError::Constrained);
+}

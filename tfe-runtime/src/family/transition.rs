@@ -1,0 +1,402 @@
+//! The derivative of one step of a family by its start, as an operator: implicit differentiation (T-30).
+
+use super::blocked::Blocked;
+use super::rates::Rates;
+use super::view::View;
+use super::{Block, FamilyDense, FamilyError, FamilyModel, FamilyState, Gradient, Pattern};
+use crate::element::Element;
+use crate::error::StepError;
+use crate::model::Form;
+use crate::newton::Control;
+use crate::points::tables::MAX_GROUPS;
+use crate::scheme::{SchemeTable, Tables as _};
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+use nalgebra::DMatrix;
+
+/// Why there is no derivative of a step of a family.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum FamilyTransitionError {
+    /// The model does not fit together, or families cannot do what was asked for.
+    Family(FamilyError),
+    /// The step itself failed, or its tangent is singular.
+    Step(StepError),
+    /// The model has constraints: not supported yet.
+    Constrained,
+    /// A vector is not as long as the phase space.
+    Shape {
+        /// Numbers that are needed.
+        needed: usize,
+        /// Numbers that were given.
+        given: usize,
+    },
+}
+
+impl From<FamilyError> for FamilyTransitionError {
+    fn from(error: FamilyError) -> Self {
+        Self::Family(error)
+    }
+}
+
+impl From<StepError> for FamilyTransitionError {
+    fn from(error: StepError) -> Self {
+        Self::Step(error)
+    }
+}
+
+impl fmt::Display for FamilyTransitionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Family(error) => error.fmt(f),
+            Self::Step(error) => error.fmt(f),
+            Self::Constrained => f.write_str(
+                "transition matrices of models of run-time length with constraints are not supported",
+            ),
+            Self::Shape { needed, given } => {
+                write!(f, "the vector needs {needed} numbers, not {given}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for FamilyTransitionError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Family(error) => error.source(),
+            Self::Step(error) => error.source(),
+            _ => None,
+        }
+    }
+}
+
+/// The derivative of one step of a family, (δp₀, δq₀) ↦ (δp₁, δq₁): an operator on 2n numbers, ordered (p, q).
+///
+/// At the solution ν of the step, with J the matrix of Newton's method,
+///
+/// ```text
+/// (J δν)_i = δp₀ − Σ_l P_il L_vq,l δq₀ + h Σ_l G_il F_q,l δq₀ ,     F = L_q + Q ,
+/// δv_l = Σ_j E_lj δν_j ,     δq_l = δq₀ + h Σ_j C_lj δν_j ,
+/// δp₁ = δp₀ + h Σ_l b_l (F_v δv_l + F_q δq_l) ,     δq₁ = δq₀ + h Σ_j β_j δν_j .
+/// ```
+///
+/// It is the derivative of the numbers that the step computes, whichever iteration computes them. It holds the sparse factors of J and the second
+/// derivatives at the points: memory, and the time of [`apply`](Self::apply), are linear in their entries.
+///
+/// # Example
+/// The example is at [`stability::transition`](https://docs.rs/tfe), which makes it.
+#[derive(Clone, Debug)]
+pub struct FamilyTransition {
+    h: f64,
+    table: SchemeTable,
+    matrix: Blocked,
+    pattern: Arc<Pattern>,
+    /// Second derivatives, point by point.
+    values: Vec<f64>,
+    end: FamilyState,
+    dense: FamilyDense,
+    by_length: Vec<f64>,
+    by_damping: Vec<f64>,
+}
+
+/// What changes in an element, by point and coordinate: q_l and F_l before rates answer; by coordinate: p₀, and q₁ − h Σ β ν.
+struct Change<S, F, P, A> {
+    shift: S,
+    push: F,
+    impulse: P,
+    advance: A,
+}
+
+impl FamilyTransition {
+    /// That of the step from `state` at time t to t + h.
+    ///
+    /// # Errors
+    /// [`FamilyTransitionError`] where a step of this model is impossible or fails, for a state of another length, and for constraints.
+    pub fn of_step<M: FamilyModel>(
+        model: &M,
+        element: Element,
+        state: &FamilyState,
+        t: f64,
+        h: f64,
+    ) -> Result<Self, FamilyTransitionError> {
+        let mut only = None;
+        Self::of_steps(model, element, 0.0, [(t, h, state)], |transition| {
+            only = Some(transition);
+        })
+        .map_err(|(_, error)| error)?;
+        only.ok_or(FamilyTransitionError::Step(StepError::NonFinite))
+    }
+
+    /// Those of several steps (t, h, state), with an additional force γ v, γ = `damping`, handed over one by one.
+    ///
+    /// # Errors
+    /// As [`of_step`](Self::of_step), with the number of the step.
+    pub fn of_steps<'s, M: FamilyModel>(
+        model: &M,
+        element: Element,
+        damping: f64,
+        steps: impl IntoIterator<Item = (f64, f64, &'s FamilyState)>,
+        mut each: impl FnMut(Self),
+    ) -> Result<(), (usize, FamilyTransitionError)> {
+        let refused = |error: FamilyTransitionError| (0, error);
+        let table = Self::admitted::<M>(model, element).map_err(refused)?;
+        let view = View::new(model, damping).map_err(|error| refused(error.into()))?;
+        let rates = Rates::new(&view, table.clone(), Control::default());
+        let mut rates = rates.map_err(|error| refused(error.into()))?;
+        let pattern = Arc::new(Pattern::of(&view));
+        for (number, (t, h, state)) in steps.into_iter().enumerate() {
+            let transition = Self::next(&view, &mut rates, (&table, &pattern), state, (t, h));
+            each(transition.map_err(|error| (number, error))?);
+        }
+        Ok(())
+    }
+
+    /// The tables of an element that this model can step with.
+    fn admitted<M: FamilyModel>(
+        model: &M,
+        element: Element,
+    ) -> Result<SchemeTable, FamilyTransitionError> {
+        model.check()?;
+        if M::CONSTRAINED {
+            return Err(FamilyTransitionError::Constrained);
+        }
+        let table = SchemeTable::new(element).map_err(FamilyError::Element)?;
+        let stepped = element.has_phase_form() && table.view().points() <= 4 * MAX_GROUPS;
+        if M::FORM == Form::Hamiltonian && !stepped {
+            return Err(FamilyError::ElementNotSupported { element }.into());
+        }
+        Ok(table)
+    }
+
+    fn next<V: FamilyModel>(
+        view: &V,
+        rates: &mut Rates<'_, V>,
+        (table, pattern): (&SchemeTable, &Arc<Pattern>),
+        state: &FamilyState,
+        (t, h): (f64, f64),
+    ) -> Result<Self, FamilyTransitionError> {
+        let n = view.len();
+        for (vector, values) in [("q", &state.q), ("p", &state.p)] {
+            if values.len() != n {
+                return Err(FamilyError::StateLength {
+                    vector,
+                    length: values.len(),
+                    expected: n,
+                }
+                .into());
+            }
+            if !values.iter().all(|value| value.is_finite()) {
+                return Err(StepError::NonFinite.into());
+            }
+        }
+        if !(h.is_finite() && h != 0.0) {
+            return Err(StepError::InvalidStep { step: h }.into());
+        }
+        let mut end = state.clone();
+        rates.advance(t, h, &mut end)?;
+        let matrix = rates.linearised(t, h)?;
+        let scheme = table.view();
+        let count = pattern.places().len();
+        let mut values = vec![0.0; count * scheme.points()];
+        let mut unused = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+        for (l, point) in rates.points.iter().enumerate() {
+            let [z, q, force] = &mut unused;
+            let mut entries = pattern.scatter(&mut values[l * count..(l + 1) * count]);
+            let first = Gradient { z, q, force };
+            let time = t + h * scheme.nodes[l];
+            view.second(time, &point.q, &point.v, first, &mut entries);
+        }
+        let mut transition = Self {
+            h,
+            table: table.clone(),
+            matrix,
+            pattern: Arc::clone(pattern),
+            values,
+            end,
+            dense: rates.dense(t, t + h),
+            by_length: Vec::new(),
+            by_damping: Vec::new(),
+        };
+        transition.differentiate(rates);
+        Ok(transition)
+    }
+
+    /// The derivatives by what is no state.
+    fn differentiate<V: FamilyModel>(&mut self, rates: &Rates<'_, V>) {
+        let scheme = self.table.view();
+        let count = scheme.unknowns();
+        let sum = |weights: &[f64], a: usize| -> f64 {
+            let rates = &rates.unknowns()[a * count..(a + 1) * count];
+            weights.iter().zip(rates).map(|(w, rate)| w * rate).sum()
+        };
+        let h = self.h;
+        let by_length = self.respond(&Change {
+            shift: |l: usize, a: usize| sum(&scheme.position[l * count..(l + 1) * count], a),
+            push: |l: usize, a: usize| rates.points[l].force[a] / h,
+            impulse: |_| 0.0,
+            advance: |a| sum(scheme.advance, a),
+        });
+        let by_damping = self.respond(&Change {
+            shift: |_, _| 0.0,
+            push: |l: usize, a: usize| rates.points[l].v[a],
+            impulse: |_| 0.0,
+            advance: |_| 0.0,
+        });
+        (self.by_length, self.by_damping) = (by_length, by_damping);
+    }
+
+    /// The numbers of the phase space, 2n.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        2 * self.end.q.len()
+    }
+
+    /// The state at the end of the step.
+    #[must_use]
+    pub fn end(&self) -> &FamilyState {
+        &self.end
+    }
+
+    /// The polynomial of the step, and nothing of its derivative.
+    #[must_use]
+    pub fn into_dense(self) -> FamilyDense {
+        self.dense
+    }
+
+    /// ∂(p₁, q₁)/∂h, of a model in which the time does not appear.
+    #[must_use]
+    pub fn by_length(&self) -> &[f64] {
+        &self.by_length
+    }
+
+    /// ∂(p₁, q₁)/∂γ of an additional force γ v.
+    #[must_use]
+    pub fn by_damping(&self) -> &[f64] {
+        &self.by_damping
+    }
+
+    /// Writes (δp₁, δq₁) for (δp₀, δq₀) = `input`.
+    ///
+    /// # Errors
+    /// [`FamilyTransitionError::Shape`] unless both have 2n numbers.
+    pub fn apply(&self, input: &[f64], output: &mut [f64]) -> Result<(), FamilyTransitionError> {
+        let needed = self.size();
+        for given in [input.len(), output.len()] {
+            if given != needed {
+                return Err(FamilyTransitionError::Shape { needed, given });
+            }
+        }
+        let (p, q) = input.split_at(needed / 2);
+        let end = self.respond(&Change {
+            shift: |_, a: usize| q[a],
+            push: |_, _| 0.0,
+            impulse: |a: usize| p[a],
+            advance: |a: usize| q[a],
+        });
+        output.copy_from_slice(&end);
+        Ok(())
+    }
+
+    /// All of it: 2n × 2n, ordered (p, q); 2n applications and 4n² numbers.
+    #[must_use]
+    pub fn matrix(&self) -> DMatrix<f64> {
+        let size = self.size();
+        let mut matrix = DMatrix::zeros(size, size);
+        for (column, mut target) in matrix.column_iter_mut().enumerate() {
+            let (from_p, a) = (column < size / 2, column % (size / 2).max(1));
+            let end = self.respond(&Change {
+                shift: |_, b: usize| unit(!from_p && a == b),
+                push: |_, _| 0.0,
+                impulse: |b: usize| unit(from_p && a == b),
+                advance: |b: usize| unit(!from_p && a == b),
+            });
+            target.copy_from_slice(&end);
+        }
+        matrix
+    }
+
+    /// The end of the step after a change.
+    fn respond<S, F, P, A>(&self, change: &Change<S, F, P, A>) -> Vec<f64>
+    where
+        S: Fn(usize, usize) -> f64,
+        F: Fn(usize, usize) -> f64,
+        P: Fn(usize) -> f64,
+        A: Fn(usize) -> f64,
+    {
+        let scheme = self.table.view();
+        let (n, h) = (self.end.q.len(), self.h);
+        let (count, points) = (scheme.unknowns(), scheme.points());
+        let Change {
+            shift,
+            push,
+            impulse,
+            advance,
+        } = change;
+        let mut rates = vec![0.0; n * count];
+        let [mut q, mut v, mut momentum, mut force] =
+            [vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+        for l in 0..points {
+            for a in 0..n {
+                (q[a], momentum[a], force[a]) = (shift(l, a), 0.0, push(l, a));
+            }
+            self.bend(l, &q, &v, &mut momentum, &mut force);
+            for (a, sides) in rates.chunks_exact_mut(count).enumerate() {
+                for (i, side) in sides.iter_mut().enumerate() {
+                    let at = i * points + l;
+                    *side += h * scheme.force[at] * force[a] - scheme.momentum[at] * momentum[a];
+                }
+            }
+        }
+        for (a, sides) in rates.chunks_exact_mut(count).enumerate() {
+            let impulse = impulse(a);
+            sides.iter_mut().for_each(|side| *side += impulse);
+        }
+        self.matrix.solve(&mut rates);
+        let mut end: Vec<f64> = (0..n).map(impulse).chain((0..n).map(advance)).collect();
+        let (end_p, end_q) = end.split_at_mut(n);
+        let product = |weights: &[f64], a: usize| -> f64 {
+            let rates = &rates[a * count..(a + 1) * count];
+            weights.iter().zip(rates).map(|(w, rate)| w * rate).sum()
+        };
+        for l in 0..points {
+            let row = l * count..(l + 1) * count;
+            for a in 0..n {
+                q[a] = shift(l, a) + h * product(&scheme.position[row.clone()], a);
+                v[a] = product(&scheme.velocity[row.clone()], a);
+                force[a] = push(l, a);
+            }
+            self.bend(l, &q, &v, &mut momentum, &mut force);
+            for (p, force) in end_p.iter_mut().zip(&force) {
+                *p += h * scheme.weights[l] * force;
+            }
+        }
+        for (a, end) in end_q.iter_mut().enumerate() {
+            *end += h * product(scheme.advance, a);
+        }
+        end
+    }
+
+    /// Adds L_vq δq to `momentum`, F_v δv + F_q δq to `force`, at one point.
+    fn bend(&self, l: usize, q: &[f64], v: &[f64], momentum: &mut [f64], force: &mut [f64]) {
+        let places = self.pattern.places();
+        let values = &self.values[l * places.len()..(l + 1) * places.len()];
+        for ((block, row, column), value) in places.iter().zip(values) {
+            match block {
+                Block::ZZ => {}
+                Block::ZQ => {
+                    momentum[*row] += value * q[*column];
+                    force[*column] += value * v[*row];
+                }
+                Block::ForceZ => force[*row] += value * v[*column],
+                // Of L_q and of forces by coordinates.
+                _ => force[*row] += value * q[*column],
+            }
+        }
+    }
+}
+
+fn unit(here: bool) -> f64 {
+    if here { 1.0 } else { 0.0 }
+}

@@ -1,0 +1,175 @@
+//! A family as its Lagrangian: what is solved for rates, however it was declared.
+
+use super::inertia::Inertia;
+use super::{Block, Entries, FamilyError, FamilyModel, Gradient};
+use crate::model::{CoordinateName, Facts, Form};
+use crate::real::Real;
+use alloc::vec::Vec;
+
+/// A model by its Lagrangian, with an additional force γ v.
+///
+/// A Hamiltonian with a constant diagonal mass matrix has the Lagrangian
+///
+/// ```text
+/// L(q, v) = v·Mv − H(q, Mv) ,     L_v = M v ,     L_q = −H_q(q, Mv) ,     ∂Q/∂v = Q_p M .
+/// ```
+#[derive(Clone, Debug)]
+pub(super) struct View<'m, M> {
+    model: &'m M,
+    /// The masses of a Hamiltonian.
+    mass: Vec<f64>,
+    damping: f64,
+}
+
+impl<'m, M: FamilyModel> View<'m, M> {
+    /// The view of a model that has been checked.
+    ///
+    /// # Errors
+    /// [`FamilyError`] for a Hamiltonian of another kind.
+    pub(super) fn new(model: &'m M, damping: f64) -> Result<Self, FamilyError> {
+        let mass = match M::FORM {
+            Form::Lagrangian => Vec::new(),
+            Form::Hamiltonian => Inertia::of(model)?.mass,
+        };
+        Ok(Self {
+            model,
+            mass,
+            damping,
+        })
+    }
+
+    fn is_hamiltonian(&self) -> bool {
+        M::FORM == Form::Hamiltonian
+    }
+
+    /// What the kernels take beside coordinates, if it is not the velocities.
+    fn momenta<R: Real>(&self, v: &[R]) -> Vec<R> {
+        let masses = self.mass.iter().zip(v);
+        masses.map(|(mass, v)| *v * v.like(*mass)).collect()
+    }
+
+    /// From derivatives of H to those of L, and the additional force.
+    fn turn<R: Real>(&self, v: &[R], momenta: Vec<R>, first: Gradient<'_, R>) {
+        if self.is_hamiltonian() {
+            first.z.copy_from_slice(&momenta);
+            for slope in first.q.iter_mut() {
+                *slope = -*slope;
+            }
+        }
+        for (force, v) in first.force.iter_mut().zip(v) {
+            let push = *v * v.like(self.damping);
+            *force = if M::FACTS.forced { *force + push } else { push };
+        }
+    }
+}
+
+/// The parts of a gradient, for a while.
+fn lend<'a, R>(first: &'a mut Gradient<'_, R>) -> Gradient<'a, R> {
+    Gradient {
+        z: &mut *first.z,
+        q: &mut *first.q,
+        force: &mut *first.force,
+    }
+}
+
+/// Turns second derivatives of H into those of L.
+struct Turned<'a, E> {
+    mass: &'a [f64],
+    entries: &'a mut E,
+}
+
+impl<R: Real, E: Entries<R>> Entries<R> for Turned<'_, E> {
+    fn add(&mut self, block: Block, row: usize, column: usize, value: R) {
+        match block {
+            // M is constant and told by the view; there is nothing mixed.
+            Block::ZZ | Block::ZQ => {}
+            Block::QQ => self.entries.add(block, row, column, -value),
+            Block::ForceZ => {
+                let mass = value.like(self.mass[column]);
+                self.entries.add(block, row, column, value * mass);
+            }
+            // Of forces by coordinates.
+            _ => self.entries.add(block, row, column, value),
+        }
+    }
+}
+
+impl<M: FamilyModel> FamilyModel for View<'_, M> {
+    const FORM: Form = Form::Lagrangian;
+    const FACTS: Facts = Facts {
+        forced: true,
+        ..M::FACTS
+    };
+    const MOMENTA_MOVE: bool = M::MOMENTA_MOVE;
+    const CONSTRAINED: bool = M::CONSTRAINED;
+
+    fn len(&self) -> usize {
+        self.model.len()
+    }
+
+    fn check(&self) -> Result<(), FamilyError> {
+        self.model.check()
+    }
+
+    fn energy_function<R: Real>(&self, t: R, q: &[R], z: &[R]) -> R {
+        if !self.is_hamiltonian() {
+            return self.model.energy_function(t, q, z);
+        }
+        let momenta = self.momenta(z);
+        let negative = -self.model.energy_function(t, q, &momenta);
+        let parts = momenta.iter().zip(z);
+        parts.fold(negative, |sum, (p, v)| sum + *p * *v)
+    }
+
+    fn first<R: Real>(&self, t: R, q: &[R], z: &[R], mut first: Gradient<'_, R>) {
+        let momenta = self.momenta(z);
+        let taken = if self.is_hamiltonian() { &momenta } else { z };
+        self.model.first(t, q, taken, lend(&mut first));
+        self.turn(z, momenta, first);
+    }
+
+    fn forces_inline<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>) {
+        self.first(t, q, z, first);
+    }
+
+    fn mass<R: Real, E: Entries<R>>(&self, t: R, q: &[R], z: &[R], entries: &mut E) {
+        if !self.is_hamiltonian() {
+            return self.model.mass(t, q, z, entries);
+        }
+        for (a, mass) in self.mass.iter().enumerate() {
+            entries.add(Block::ZZ, a, a, t.like(*mass));
+        }
+    }
+
+    fn second<R: Real, E: Entries<R>>(
+        &self,
+        t: R,
+        q: &[R],
+        z: &[R],
+        mut first: Gradient<'_, R>,
+        entries: &mut E,
+    ) {
+        if self.damping != 0.0 {
+            for a in 0..self.len() {
+                entries.add(Block::ForceZ, a, a, t.like(self.damping));
+            }
+        }
+        if !self.is_hamiltonian() {
+            self.model.second(t, q, z, lend(&mut first), entries);
+            return self.turn(z, Vec::new(), first);
+        }
+        let momenta = self.momenta(z);
+        self.mass(t, q, z, entries);
+        let mut turned = Turned {
+            mass: &self.mass,
+            entries,
+        };
+        self.model
+            .second(t, q, &momenta, lend(&mut first), &mut turned);
+        self.turn(z, momenta, first);
+    }
+
+    fn coordinate_name(&self, index: usize) -> CoordinateName {
+        self.model.coordinate_name(index)
+    }
+}
