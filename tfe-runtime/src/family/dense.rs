@@ -1,7 +1,7 @@
 //! The solution of a family between the nodes: integrated rates (T-69).
 
 use super::FamilyState;
-use crate::basis::{MAX_NODES, legendre, legendre_integrals};
+use crate::basis::{MAX_NODES, legendre_integrals};
 use crate::scheme::SchemeRef;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -25,6 +25,7 @@ enum Momenta {
     /// Of h dp/dt.
     Rates(Vec<f64>),
     /// Of p itself.
+    #[cfg(feature = "sparse")]
     Values(Vec<f64>),
 }
 
@@ -117,9 +118,10 @@ impl FamilyDense {
         add(&self.rates, &integrals, &mut state.q);
         match &self.momenta {
             Momenta::Rates(rates) => add(rates, &integrals, &mut state.p),
+            #[cfg(feature = "sparse")]
             Momenta::Values(values) => {
                 let mut polynomials = [0.0; MAX_NODES];
-                legendre(tau, &mut polynomials);
+                crate::basis::legendre(tau, &mut polynomials);
                 state.p.fill(0.0);
                 add(values, &polynomials, &mut state.p);
             }
