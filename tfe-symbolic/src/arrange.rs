@@ -6,13 +6,14 @@
 mod demand;
 mod fractions;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::constant::{Constant, is_decimal};
 use crate::function::Function;
 use crate::graph::{ExprId, Graph, Node};
 use crate::pairs::{self, Item, Kind, Operands, Pair};
 use crate::plan::{Op, Plan, Value};
+use crate::table::{Map, Set};
 use demand::{Multiple, ONE, PositiveConstant, Terms, demanded, gather, multiple};
 pub(crate) use demand::{Opened, scaled_sums};
 use fractions::{Factors, Fractions};
@@ -28,6 +29,8 @@ pub(crate) enum Grouping {
     ByLoops,
     /// The parameters too: they are one coefficient wherever they stand together.
     ParametersApart,
+    /// All but velocities and momenta: the entries of the mass matrix and their derivatives, which are wanted by themselves.
+    VelocitiesLast,
 }
 
 /// Arranges what the roots need.
@@ -43,13 +46,14 @@ pub(crate) fn arrange_with(
     grouping: Grouping,
 ) -> Plan {
     let moving = match grouping {
-        Grouping::ByLoops => HashSet::new(),
+        Grouping::ByLoops => Set::default(),
         Grouping::ParametersApart => graph.moving(roots),
+        Grouping::VelocitiesLast => graph.containing_z(roots),
     };
     Arranger::new(graph, opened, moving).run(roots)
 }
 
-/// The mark of a factor that is more than parameters, among the bits of loops: none nest so deep.
+/// The mark of a factor that is kept apart, among the bits of loops: none nest so deep.
 const MOVES: u64 = 1 << 62;
 
 /// What an operand stands for.
@@ -72,10 +76,10 @@ enum Meaning {
 struct Family {
     kind: Kind,
     meanings: Vec<Meaning>,
-    items: HashMap<Meaning, Item>,
+    items: Map<Meaning, Item>,
     loops: Vec<u64>,
     sets: Vec<Operands>,
-    known: HashMap<Vec<(Item, i32)>, usize>,
+    known: Map<Vec<(Item, i32)>, usize>,
     pairs: Vec<Pair>,
     /// Of pairs and of sets, once they are built.
     built_pairs: Vec<Option<Value>>,
@@ -87,10 +91,10 @@ impl Family {
         Self {
             kind,
             meanings: Vec::new(),
-            items: HashMap::new(),
+            items: Map::default(),
             loops: Vec::new(),
             sets: Vec::new(),
-            known: HashMap::new(),
+            known: Map::default(),
             pairs: Vec::new(),
             built_pairs: Vec::new(),
             built_sets: Vec::new(),
@@ -181,16 +185,16 @@ struct Quotient {
 struct Arranger<'a> {
     graph: &'a Graph,
     opened: &'a Opened,
-    /// What is to be kept apart from parameters.
-    moving: HashSet<ExprId>,
+    /// What is to be kept apart from other factors.
+    moving: Set<ExprId>,
     plan: Plan,
     sums: Family,
     products: Family,
-    sum_sets: HashMap<Multiple, usize>,
-    quotients: HashMap<Multiple, Quotient>,
+    sum_sets: Map<Multiple, usize>,
+    quotients: Map<Multiple, Quotient>,
     fractions: Fractions,
     fraction_sets: Vec<Quotient>,
-    built: HashMap<Multiple, Value>,
+    built: Map<Multiple, Value>,
 }
 
 /// The products in which a divisor stands, with its exponents.
@@ -200,7 +204,7 @@ type Places = Vec<(Multiple, i32)>;
 type SharedDivisors = BTreeMap<ExprId, Vec<ExprId>>;
 
 impl<'a> Arranger<'a> {
-    fn new(graph: &'a Graph, opened: &'a Opened, moving: HashSet<ExprId>) -> Self {
+    fn new(graph: &'a Graph, opened: &'a Opened, moving: Set<ExprId>) -> Self {
         Self {
             graph,
             opened,
@@ -208,11 +212,11 @@ impl<'a> Arranger<'a> {
             plan: Plan::default(),
             sums: Family::new(Kind::Sum),
             products: Family::new(Kind::Product),
-            sum_sets: HashMap::new(),
-            quotients: HashMap::new(),
+            sum_sets: Map::default(),
+            quotients: Map::default(),
             fractions: Fractions::default(),
             fraction_sets: Vec::new(),
-            built: HashMap::new(),
+            built: Map::default(),
         }
     }
 

@@ -9,6 +9,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::angles::expand_angles;
 use crate::constant::Constant;
 use crate::constraint;
 use crate::count::Counts;
@@ -21,7 +22,11 @@ use crate::input::{Affine, IndexSymbol, Input, LoopVariable};
 use crate::program::{By, Program, Request};
 use crate::quadratic::{self, Writing};
 use crate::sensitivity::{Leaf, entries_by};
+use crate::squares::by_squares;
 use crate::structure::Structure;
+
+/// Larger energies, in expressions, are not written by squares.
+const SQUARED: usize = 300;
 
 /// What is differentiated.
 #[derive(Clone, Debug)]
@@ -88,8 +93,8 @@ impl From<&Declared> for Model {
 pub struct Derivation {
     graph: Graph,
     entries: Vec<Entry>,
-    /// The same by the matrix of an energy that is quadratic in z, in several ways.
-    by_matrix: Vec<Vec<Entry>>,
+    /// The same in other ways: by the matrix of an energy that is quadratic in z, by squares.
+    written: Vec<Vec<Entry>>,
     structure: Structure,
     sensitivities: Vec<Parameter>,
 }
@@ -136,12 +141,13 @@ impl Derivation {
         let structure = Structure::of(&graph, form, &dof, &entries);
         let by_matrix = [Writing::AsDerived, Writing::Expanded]
             .into_iter()
-            .filter_map(|writing| quadratic::entries(&mut graph, energy, &entries, writing))
-            .collect();
+            .filter_map(|writing| quadratic::entries(&mut graph, energy, &entries, writing));
+        let mut written: Vec<Vec<Entry>> = by_matrix.collect();
+        written.extend(entries_by_squares(&mut graph, form, energy, &entries));
         Self {
             graph,
             entries,
-            by_matrix,
+            written,
             structure,
             sensitivities,
         }
@@ -163,7 +169,7 @@ impl Derivation {
             Draft::of(self.graph.clone(), wanted.cloned().collect())
         };
         let plain = std::iter::once(&self.entries);
-        Draft::best(plain.chain(&self.by_matrix).map(draft).collect())
+        Draft::best(plain.chain(&self.written).map(draft).collect())
     }
 
     /// The program of the first derivatives and forces differentiated once more, partially at fixed (q, z):
@@ -226,6 +232,49 @@ impl Derivation {
     pub fn counts(&self, request: Request) -> Counts {
         Counts::of(&self.program(request))
     }
+}
+
+/// The entries with the derivatives of the energy by squares; nothing where there are none, or other derivatives.
+fn entries_by_squares(
+    graph: &mut Graph,
+    form: Form,
+    energy: ExprId,
+    entries: &[Entry],
+) -> Option<Vec<Entry>> {
+    let small = graph.reachable(&[energy]).len() <= SQUARED;
+    if !small || entries.iter().any(|entry| !entry.nest.is_empty()) {
+        return None;
+    }
+    // With all sines and cosines that the derivatives need.
+    let values = entries.iter().map(|entry| entry.value);
+    let roots = std::iter::once(energy).chain(values).collect();
+    let energy = *expand_angles(graph, roots).first()?;
+    let energy = by_squares(graph, energy)?;
+    let mut deriver = Deriver {
+        form,
+        graph,
+        entries: Vec::new(),
+    };
+    deriver.energy(energy);
+    let mut values: BTreeMap<Place, ExprId> = BTreeMap::new();
+    for Entry { place, value, .. } in deriver.entries {
+        if quadratic::is_derivative(&place) && values.insert(place, value).is_some() {
+            return None;
+        }
+    }
+    let own = entries.iter().map(|entry| {
+        let value = match values.remove(&entry.place) {
+            Some(value) => value,
+            None if quadratic::is_derivative(&entry.place) => return None,
+            None => entry.value,
+        };
+        Some(Entry {
+            value,
+            ..entry.clone()
+        })
+    });
+    let own: Option<Vec<Entry>> = own.collect();
+    own.filter(|_| values.is_empty())
 }
 
 /// Collects the entries.

@@ -2,12 +2,11 @@
 //!
 //! Both walk with an explicit stack or a forward loop and remember what they have met, so a shared node is differentiated once.
 
-use std::collections::{HashMap, HashSet};
-
 use crate::constant::Constant;
 use crate::function::Function;
 use crate::graph::{ExprId, Graph, Node};
 use crate::input::Input;
+use crate::table::{Map, Set};
 
 /// Derivative of `of` by one leaf; other leaves, and the same array with another index, are held fixed.
 pub fn derivative(graph: &mut Graph, of: ExprId, by: &Input) -> ExprId {
@@ -30,7 +29,7 @@ pub fn directional(
 
 /// Forward derivatives of several expressions along one direction, each shared node once.
 #[derive(Default)]
-pub(crate) struct Forward(HashMap<ExprId, Option<ExprId>>);
+pub(crate) struct Forward(Map<ExprId, Option<ExprId>>);
 
 impl Forward {
     /// The derivative of `of`; `seed` must be the same in every call.
@@ -133,9 +132,9 @@ impl Forward {
 /// Derivatives of an expression by some of its nodes, in one backward sweep. Sums over ranges are not entered: they count as leaves.
 pub(crate) fn gradient(graph: &mut Graph, of: ExprId, by: &[ExprId]) -> Vec<ExprId> {
     let order = graph.reachable_outside_sums(&[of]);
-    let mut results: HashMap<ExprId, ExprId> = HashMap::new();
+    let mut results: Map<ExprId, ExprId> = Map::default();
     // What depends on no wanted node needs no adjoint.
-    let mut active: HashSet<ExprId> = by.iter().copied().collect();
+    let mut active: Set<ExprId> = by.iter().copied().collect();
     for id in &order {
         if outside_sums(graph.node(*id))
             .iter()
@@ -144,7 +143,7 @@ pub(crate) fn gradient(graph: &mut Graph, of: ExprId, by: &[ExprId]) -> Vec<Expr
             active.insert(*id);
         }
     }
-    let mut contributions: HashMap<ExprId, Vec<(Constant, ExprId)>> = HashMap::new();
+    let mut contributions: Map<ExprId, Vec<(Constant, ExprId)>> = Map::default();
     let one = graph.constant(Constant::ONE);
     contributions.insert(of, vec![(Constant::ONE, one)]);
     for id in order.into_iter().rev().filter(|id| active.contains(id)) {

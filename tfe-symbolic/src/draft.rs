@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::angles::expand_angles;
+use crate::arms::Arms;
 use crate::arrange::{Grouping, arrange};
 use crate::balance::{Balance, balances};
 use crate::blocks::Block;
@@ -18,15 +19,19 @@ use crate::schedule::schedule;
 use crate::signs::with_fewer_negations;
 use crate::writes::settle;
 
-/// Of the drafts, those that cost no more than so many halves of the cheapest are followed: identities may change their order.
-const WITHIN: usize = 3;
+/// Of the drafts, those that cost no more than so many fifths of the cheapest are followed: identities may change their order.
+const WITHIN: usize = 6;
 
 /// Drafts up to this cost are also multiplied out before common factors are sought.
 const MULTIPLIED: usize = 110;
 
-/// In so many plans, the cheapest ones, identities are sought, where they cost no more than so many quarters of the cheapest.
+/// Drafts up to this cost are also written by arms.
+const ARMED: usize = 600;
+
+/// Identities are sought in the cheapest plans, where they cost no more than so many quarters of the cheapest, up to so many operations
+/// altogether.
 const CLOSE: usize = 6;
-const FOLLOWED: usize = 2;
+const FOLLOWED: usize = 240;
 
 /// Entries in their loops, before common factors are sought.
 pub(crate) struct Draft {
@@ -77,7 +82,7 @@ impl Draft {
     pub(crate) fn best(mut drafts: Vec<Self>) -> Program {
         drafts.sort_by_key(|draft| draft.cost);
         let least = drafts.first().map_or(0, |draft| draft.cost);
-        drafts.retain(|draft| 2 * draft.cost <= WITHIN * least);
+        drafts.retain(|draft| 5 * draft.cost <= WITHIN * least);
         drafts.dedup_by_key(|draft| draft.cost);
         let share = BUDGET / (4 * drafts.len().max(1));
         let mut arranged: Vec<Arranged> = drafts
@@ -87,8 +92,16 @@ impl Draft {
         arranged.sort_by_key(|arranged| arranged.plan.cost());
         let least = arranged.first().map_or(0, |arranged| arranged.plan.cost());
         arranged.retain(|arranged| 4 * arranged.plan.cost() <= CLOSE * least);
-        arranged.dedup_by_key(|arranged| (arranged.plan.cost(), arranged.plan.len()));
-        arranged.truncate(FOLLOWED);
+        let key = |arranged: &Arranged| (arranged.plan.cost(), arranged.plan.len());
+        arranged.dedup_by_key(|arranged| (arranged.draft.cost, key(arranged)));
+        let mut left = FOLLOWED;
+        let within = arranged.iter().take_while(|arranged| {
+            let enough = arranged.plan.len() <= left;
+            left = left.saturating_sub(arranged.plan.len());
+            enough
+        });
+        let followed = within.count();
+        arranged.truncate(followed.max(1));
         for Arranged { plan, .. } in &mut arranged {
             *plan = by_identities(std::mem::take(plan));
         }
@@ -103,8 +116,9 @@ impl Draft {
         let graph = &mut self.graph;
         let factored = take_out_factors(graph, self.values.clone(), budget);
         let mut ways = vec![
-            (factored, Grouping::ByLoops),
+            (factored.clone(), Grouping::ByLoops),
             (self.values.clone(), Grouping::ParametersApart),
+            (factored, Grouping::VelocitiesLast),
         ];
         if self.cost <= MULTIPLIED && self.block.inner.is_empty() {
             let values: Option<Vec<ExprId>> =
@@ -113,13 +127,32 @@ impl Draft {
                 ways.push((take_out_factors(graph, values, budget), Grouping::ByLoops));
             }
         }
+        let by_arms = self.by_arms(budget);
         let draft: &Self = self;
         let plans = ways.into_iter().map(|(values, grouping)| Arranged {
             draft,
             plan: distribute(&draft.graph, &values, grouping),
             values,
         });
-        plans.collect()
+        let by_arms = by_arms.map(|(arms, values)| {
+            let roots: Vec<ExprId> = values.iter().copied().chain(arms.parts()).collect();
+            let plan = distribute(&draft.graph, &roots, Grouping::VelocitiesLast);
+            Arranged {
+                draft,
+                plan: arms.written_out(plan, &values),
+                values,
+            }
+        });
+        plans.chain(by_arms).collect()
+    }
+
+    /// The values by arms, with common factors taken out.
+    fn by_arms(&mut self, budget: usize) -> Option<(Arms, Vec<ExprId>)> {
+        if self.cost > ARMED || !self.block.inner.is_empty() {
+            return None;
+        }
+        let (arms, values) = Arms::of(&mut self.graph, &self.values)?;
+        Some((arms, take_out_factors(&mut self.graph, values, budget)))
     }
 }
 

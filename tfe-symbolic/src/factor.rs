@@ -3,7 +3,7 @@
 //! Taking a factor out saves a product, but may cost one elsewhere that shared `a b`. So each change is kept only if the arranged whole
 //! costs less; how many changes are tried depends on the size, to keep compile times linear.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::arrange::{Grouping, arrange};
 use crate::constant::Constant;
@@ -14,7 +14,7 @@ use crate::rewrite::{Mapping, Uses};
 pub(crate) const BUDGET: usize = 50_000;
 
 /// A sum and a factor of several of its terms.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Candidate {
     sum: ExprId,
     factor: ExprId,
@@ -43,9 +43,11 @@ pub(crate) fn take_out_factors(
         }
         best = trial;
     }
-    // One by one, the most promising first.
+    // One by one, the most promising first. What does not help is not tried again: it hardly would where the sum is the same.
+    let mut tried = BTreeSet::new();
     'again: loop {
         let mut all = candidates(graph, &best.roots);
+        all.retain(|candidate| !tried.contains(candidate));
         all.sort_by_key(|candidate| std::cmp::Reverse(candidate.terms));
         for candidate in all {
             match budget.checked_sub(best.size) {
@@ -53,6 +55,7 @@ pub(crate) fn take_out_factors(
                 None => return best.roots,
             }
             let trial = apply(graph, &best.roots, &[candidate]);
+            tried.insert(candidate);
             if trial.cost < best.cost {
                 best = trial;
                 continue 'again;

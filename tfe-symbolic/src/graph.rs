@@ -3,13 +3,13 @@
 //! Nodes are made only by the constructors of [`Graph`], which simplify locally; the rewrites are listed in `simplify.rs`. Every walk is a
 //! forward loop or an explicit stack, so a sum of a million terms cannot overflow the call stack.
 
-use std::collections::{HashMap, HashSet};
 use std::fmt;
 
 use crate::ast::Comparison;
 use crate::constant::Constant;
 use crate::function::Function;
 use crate::input::{Affine, Input, LoopVariable};
+use crate::table::{Map, Set};
 
 /// An expression of a [`Graph`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -72,7 +72,7 @@ struct Facts {
 
 /// Hash table without iteration, so that no order can come from it.
 #[derive(Clone, Debug, Default)]
-struct Interner(HashMap<Node, ExprId>);
+struct Interner(Map<Node, ExprId>);
 
 /// The arena.
 #[derive(Clone, Debug, Default)]
@@ -254,19 +254,31 @@ impl Graph {
     }
 
     /// The nodes of the roots that are made of more than parameters and numbers.
-    pub(crate) fn moving(&self, roots: &[ExprId]) -> HashSet<ExprId> {
-        let mut moving = HashSet::new();
+    pub(crate) fn moving(&self, roots: &[ExprId]) -> Set<ExprId> {
+        let is_parameter =
+            |input: &Input| matches!(input, Input::Parameter(_) | Input::ParameterElement(..));
+        self.containing(roots, |input| !is_parameter(input))
+    }
+
+    /// The nodes of the roots in which velocities or momenta stand.
+    pub(crate) fn containing_z(&self, roots: &[ExprId]) -> Set<ExprId> {
+        self.containing(roots, |input| {
+            matches!(input, Input::Velocity(_) | Input::Momentum(_))
+        })
+    }
+
+    fn containing(&self, roots: &[ExprId], wanted: impl Fn(&Input) -> bool) -> Set<ExprId> {
+        let mut found = Set::default();
         for id in self.reachable(roots) {
-            let moves = match self.node(id) {
-                Node::Input(Input::Parameter(_) | Input::ParameterElement(..)) => false,
-                Node::Input(_) => true,
-                node => node.children().iter().any(|child| moving.contains(child)),
+            let contains = match self.node(id) {
+                Node::Input(input) => wanted(input),
+                node => node.children().iter().any(|child| found.contains(child)),
             };
-            if moves {
-                moving.insert(id);
+            if contains {
+                found.insert(id);
             }
         }
-        moving
+        found
     }
 
     /// The distinct leaves of an expression, in order of first making; inside sums their indices mention the loop variable.

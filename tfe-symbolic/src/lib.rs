@@ -8,6 +8,7 @@
 //! neither Rust tokens nor floating-point linear algebra.
 
 mod angles;
+mod arms;
 mod arrange;
 pub mod ast;
 mod balance;
@@ -48,5 +49,7 @@ mod schedule;
 mod sensitivity;
 mod signs;
 mod simplify;
+mod squares;
 pub mod structure;
+mod table;
 mod writes;

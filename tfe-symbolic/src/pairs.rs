@@ -3,7 +3,8 @@
 //! Sums and products of many operands leave open what is added or multiplied first. The pair that saves most operations over all of them
 //! becomes an operand of its own, again and again, as long as one saves anything.
 
-use std::collections::{BTreeMap, BinaryHeap, HashMap};
+use crate::table::Map;
+use std::collections::{BTreeMap, BinaryHeap};
 
 /// An operand: an index chosen by the caller, or of a pair made here.
 pub(crate) type Item = u32;
@@ -36,7 +37,7 @@ pub(crate) fn extract(kind: Kind, sets: &mut [Operands], first_pair: Item) -> Ve
     let mut search = Search {
         kind,
         sets,
-        places: HashMap::new(),
+        places: Map::default(),
         queue: BinaryHeap::new(),
         made: Vec::new(),
         first_pair,
@@ -52,7 +53,7 @@ struct Search<'a> {
     kind: Kind,
     sets: &'a mut [Operands],
     /// Where a pair may occur: complete, but not always up to date.
-    places: HashMap<Pair, Vec<usize>>,
+    places: Map<Pair, Vec<usize>>,
     queue: BinaryHeap<Candidate>,
     made: Vec<Pair>,
     first_pair: Item,

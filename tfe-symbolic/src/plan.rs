@@ -1,12 +1,11 @@
 //! Operations of two operands, hash-consed: what is left to do is to put them in order.
 
-use std::collections::HashMap;
-
 use crate::ast::Comparison;
 use crate::constant::Constant;
 use crate::function::Function;
 use crate::graph::{ExprId, SumRange, loop_bit, loops_in};
 use crate::input::{Affine, Input};
+use crate::table::Map;
 
 /// An operation of a [`Plan`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -58,8 +57,8 @@ pub(crate) struct Plan {
     loops: Vec<u64>,
     /// Whether there is a sum over a range in it.
     reduces: Vec<bool>,
-    known: HashMap<Op, OpId>,
-    values: HashMap<ExprId, Value>,
+    known: Map<Op, OpId>,
+    values: Map<ExprId, Value>,
 }
 
 impl Plan {
@@ -148,6 +147,11 @@ impl Plan {
     /// Notes what a root has become.
     pub(crate) fn set_value(&mut self, root: ExprId, value: Value) {
         self.values.insert(root, value);
+    }
+
+    /// Forgets other roots.
+    pub(crate) fn retain_values(&mut self, wanted: impl Fn(ExprId) -> bool) {
+        self.values.retain(|root, _| wanted(*root));
     }
 
     /// All roots and what they have become, in no order.

@@ -8,7 +8,7 @@
 //! with the second ones: that E_z is E_zz z cannot be seen from the products. Written by M, b and U, all derivatives are made of the same few
 //! expressions. Which form costs less is decided where programs are made.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::constant::Constant;
 use crate::differentiate::gradient;
@@ -16,6 +16,7 @@ use crate::entry::{Array, Entry, Place};
 use crate::graph::{ExprId, Graph, Node};
 use crate::input::{Affine, Input};
 use crate::rewrite::Mapping;
+use crate::table::Map;
 
 /// M, b, U and the variables.
 struct Parts {
@@ -64,7 +65,7 @@ pub(crate) fn entries(
 struct Slopes {
     indices: Vec<Affine>,
     leaves: Vec<ExprId>,
-    known: HashMap<ExprId, Vec<ExprId>>,
+    known: Map<ExprId, Vec<ExprId>>,
 }
 
 impl Slopes {
@@ -74,7 +75,7 @@ impl Slopes {
         Self {
             leaves: indices.iter().map(leaf).collect(),
             indices,
-            known: HashMap::new(),
+            known: Map::default(),
         }
     }
 
@@ -137,7 +138,8 @@ fn is_z(graph: &Graph, id: ExprId) -> bool {
     )
 }
 
-fn is_derivative(place: &Place) -> bool {
+/// Whether it is a derivative of the energy.
+pub(crate) fn is_derivative(place: &Place) -> bool {
     use Array::{ByQ, ByZ, QQ, ZQ, ZZ};
     matches!(place.array, ByZ | ByQ | ZZ | ZQ | QQ)
 }

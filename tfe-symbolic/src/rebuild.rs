@@ -1,9 +1,10 @@
 //! Plans written anew: from the operations that their roots need, with some replaced and some differences turned round.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 
 use crate::constant::Constant;
 use crate::plan::{Op, OpId, Plan, Value};
+use crate::table::Map;
 
 /// An expression in place of an operation, of operations of the same plan.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,18 +43,18 @@ impl Formula {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Changes {
     /// What is computed instead of these operations. No formula may need what it replaces.
-    pub(crate) formulas: HashMap<OpId, Formula>,
+    pub(crate) formulas: Map<OpId, Formula>,
     /// Differences a − b that are computed as −(b − a).
     pub(crate) turned: BTreeSet<OpId>,
 }
 
 /// A plan with the changes made, of what its roots need and nothing else; and what each operation has become.
-pub(crate) fn rebuild(old: &Plan, changes: &Changes) -> (Plan, HashMap<OpId, Value>) {
+pub(crate) fn rebuild(old: &Plan, changes: &Changes) -> (Plan, Map<OpId, Value>) {
     let mut rebuilder = Rebuilder {
         old,
         changes,
         new: Plan::default(),
-        built: HashMap::new(),
+        built: Map::default(),
     };
     let mut roots: Vec<_> = old.values().collect();
     // In the order in which they were made: the same plan on every run.
@@ -69,7 +70,7 @@ struct Rebuilder<'a> {
     old: &'a Plan,
     changes: &'a Changes,
     new: Plan,
-    built: HashMap<OpId, Value>,
+    built: Map<OpId, Value>,
 }
 
 impl Rebuilder<'_> {

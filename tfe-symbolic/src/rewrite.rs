@@ -1,17 +1,16 @@
 //! Whole-expression rewrites: substitution of loop variables, writing sums out, opening sums that are used once.
 
-use std::collections::HashMap;
-
 use crate::constant::Constant;
 use crate::graph::{ExprId, Graph, Node, SumRange, TooLong};
 use crate::input::{Affine, IndexSymbol, LoopVariable};
+use crate::table::Map;
 
 /// The most terms that [`Graph::unroll`] writes out, over all sums of an expression.
 const UNROLL_LIMIT: u64 = 4096;
 
 /// Old expressions and what became of them; lookups only.
 #[derive(Default)]
-pub(crate) struct Mapping(HashMap<ExprId, ExprId>);
+pub(crate) struct Mapping(Map<ExprId, ExprId>);
 
 impl Mapping {
     /// What `old` became; itself if it was not touched.

@@ -1,6 +1,6 @@
 //! From arranged operations to a program: temporaries in the order of their use, each as far outside of the loops as it can be.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 
 use crate::balance::Balance;
 use crate::blocks::{Block, Local, Sink, Target};
@@ -10,6 +10,7 @@ use crate::graph::{SumRange, loop_bit};
 use crate::input::LoopVariable;
 use crate::plan::{Op, OpId, Plan, Value};
 use crate::program::{Operand, Operation, Program, Statement, Temporary};
+use crate::table::Map;
 
 /// Schedules a plan that holds the values of all results; these arrays are cleared first.
 pub(crate) fn schedule(
@@ -26,7 +27,7 @@ pub(crate) fn schedule(
         plan,
         scopes: vec![Scope::default()],
         temporaries: 0,
-        locals: HashMap::new(),
+        locals: Map::default(),
     };
     for array in cleared {
         scheduler.append(Statement::Clear {
@@ -54,7 +55,7 @@ struct Scope {
     /// The bit of its variable; none for the program itself.
     bit: u64,
     statements: Vec<Statement>,
-    values: HashMap<OpId, Operand>,
+    values: Map<OpId, Operand>,
 }
 
 struct Scheduler {
@@ -64,7 +65,7 @@ struct Scheduler {
     scopes: Vec<Scope>,
     temporaries: u32,
     /// The variables that loops change.
-    locals: HashMap<usize, Temporary>,
+    locals: Map<usize, Temporary>,
 }
 
 impl Scheduler {

@@ -120,11 +120,11 @@ fn declared_by_positions() {
 #[test]
 fn heavy_top() {
     // 14/33/2, 12/31/2, 12/28/2
-    check(HEAVY_TOP, 11, 18, 2);
+    check(HEAVY_TOP, 10, 17, 2);
 }
 
 #[test]
 fn free_body() {
     // 54/122/4 and a division, 39/88/4, 28/76/4
-    check(BODY, 23, 46, 4);
+    check(BODY, 23, 44, 4);
 }

@@ -42,18 +42,33 @@ impl Found<'_> {
         if !operands.iter().all(|id| self.usable[id.index()]) {
             return;
         }
-        let kept = operands.iter().filter_map(|id| self.alone.get(id));
-        let spent = operations * self.unit + kept.sum::<usize>();
-        let Some(saving) = self.total.checked_sub(spent).filter(|saving| *saving > 0) else {
+        let Some(most) = self.total.checked_sub(operations * self.unit) else {
             return;
         };
-        if self.search.check(&formula) == self.search.checks[self.target.index()] {
+        let saving = most.saturating_sub(self.kept(operands));
+        if saving > 0 && self.search.check(&formula) == self.search.checks[self.target.index()] {
             self.candidates.push(Candidate {
                 saving,
                 target: self.target,
                 formula,
             });
         }
+    }
+
+    /// What stays of the operations that only the target needs.
+    fn kept(&self, mut stack: Vec<OpId>) -> usize {
+        let mut seen = Vec::new();
+        let mut kept = 0;
+        while let Some(id) = stack.pop() {
+            if let Some(cost) = self.alone.get(&id)
+                && !seen.contains(&id)
+            {
+                kept += cost;
+                seen.push(id);
+                stack.extend(self.search.plan.op(id).operands());
+            }
+        }
+        kept
     }
 
     /// x
@@ -156,48 +171,63 @@ impl Found<'_> {
     /// x y ± z w, x (y ± z w), x ± y (z ± w)
     pub(super) fn four(&mut self) {
         let search = self.search;
-        let operands = self.operands();
-        for (at, x) in operands.iter().enumerate() {
-            for y in &operands[..=at] {
-                let product = self.value(*x).times(self.value(*y));
-                for negative in [false, true] {
-                    let signed = if negative {
-                        product.opposite()
-                    } else {
-                        product
-                    };
-                    let rest = self.goal().minus(signed);
-                    for (_, z, w) in search.products.find(rest) {
-                        let first = Formula::product(is(*x, negative), is(*y, false));
-                        let second = self.product_of(*z, *w, rest);
-                        self.note(Formula::sum(first, second), 3);
-                    }
-                }
+        let goal = self.goal();
+        for (size, x, y) in &search.products.entries {
+            if self.usable[x.index()] && self.usable[y.index()] {
+                self.two_products((*x, *y), *size, goal.minus(*size));
+                self.two_products((*x, *y), size.opposite(), goal.plus(*size));
             }
         }
-        for x in &operands {
-            let quotient = self.quotient(*x);
-            for y in &operands {
-                for negative in [false, true] {
-                    let y_signed = if negative {
-                        self.value(*y).opposite()
-                    } else {
-                        self.value(*y)
-                    };
-                    let rest = quotient.minus(y_signed);
-                    for (_, z, w) in search.products.find(rest) {
-                        let inner = Formula::sum(is(*y, negative), self.product_of(*z, *w, rest));
-                        self.note(Formula::product(is(*x, false), inner), 3);
-                    }
-                    let rest = self.rest(*y, negative);
-                    let inner = rest.times(search.reciprocals[x.index()]);
-                    for (_, z, w) in search.sums.find(inner) {
-                        if let Some(sum) = self.sum_of(*z, *w, inner) {
-                            let product = Formula::product(is(*x, false), sum);
-                            self.note(Formula::sum(is(*y, negative), product), 3);
-                        }
-                    }
-                }
+        let operands: Vec<(OpId, Residue)> = self
+            .operands()
+            .into_iter()
+            .map(|id| (id, self.value(id)))
+            .collect();
+        for (x, _) in &operands {
+            let reciprocal = search.reciprocals[x.index()];
+            let quotient = goal.times(reciprocal);
+            for (y, value) in &operands {
+                self.times_sum(*x, (*y, false), quotient.minus(*value));
+                self.times_sum(*x, (*y, true), quotient.plus(*value));
+                let (rest, other) = (goal.minus(*value), goal.plus(*value));
+                self.plus_product((*y, false), *x, rest.times(reciprocal));
+                self.plus_product((*y, true), *x, other.times(reciprocal));
+            }
+        }
+    }
+
+    /// x y, which is `product` up to its sign, ± z w = rest
+    fn two_products(&mut self, (x, y): (OpId, OpId), product: Residue, rest: Residue) {
+        if !self.search.products.may_hold(rest) {
+            return;
+        }
+        for (_, z, w) in self.search.products.find(rest) {
+            let first = self.product_of(x, y, product);
+            let second = self.product_of(*z, *w, rest);
+            self.note(Formula::sum(first, second), 3);
+        }
+    }
+
+    /// x (y ± z w), the product being `rest`
+    fn times_sum(&mut self, x: OpId, (y, negative): (OpId, bool), rest: Residue) {
+        if !self.search.products.may_hold(rest) {
+            return;
+        }
+        for (_, z, w) in self.search.products.find(rest) {
+            let inner = Formula::sum(is(y, negative), self.product_of(*z, *w, rest));
+            self.note(Formula::product(is(x, false), inner), 3);
+        }
+    }
+
+    /// y ± x (z ± w), the sum being `inner`
+    fn plus_product(&mut self, (y, negative): (OpId, bool), x: OpId, inner: Residue) {
+        if !self.search.sums.may_hold(inner) {
+            return;
+        }
+        for (_, z, w) in self.search.sums.find(inner) {
+            if let Some(sum) = self.sum_of(*z, *w, inner) {
+                let product = Formula::product(is(x, false), sum);
+                self.note(Formula::sum(is(y, negative), product), 3);
             }
         }
     }

@@ -59,7 +59,11 @@ impl Residue {
 
     /// x or −x, the same for both.
     pub(super) fn size(self) -> Self {
-        self.min(self.opposite())
+        if self.0 > PRIME / 2 {
+            Self(PRIME - self.0)
+        } else {
+            self
+        }
     }
 
     /// Some bits of it.

@@ -1,12 +1,13 @@
 //! Tables of values, and for each operation what it could be replaced by.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use super::formulas::Found;
 use super::residue::{Residue, residues};
 use super::weight;
 use crate::plan::{Op, OpId, Plan};
 use crate::rebuild::Formula;
+use crate::table::Map;
 
 /// Sums and products of two are tabulated up to so many operations.
 const TABLED: usize = 160;
@@ -24,37 +25,80 @@ pub(super) struct Candidate {
     pub(super) formula: Formula,
 }
 
-/// Sums or products of two operations by their values; whether there is one of a value is seen fast.
+/// Sums or products of two operations by their values, up to the sign.
 pub(super) struct Table {
-    entries: Vec<(Residue, OpId, OpId)>,
+    pub(super) entries: Vec<(Residue, OpId, OpId)>,
+    /// One bit for each value that there is, and for some others: small enough to stay in the cache.
     filter: Vec<u64>,
+    /// By some bits of the value, the first entry.
+    heads: Vec<u32>,
+    /// For each entry the next one with these bits.
+    next: Vec<u32>,
 }
 
-/// Bits of the filter, a power of two.
-const FILTER: u64 = 1 << 17;
+/// The number of heads and the bits of the filter, powers of two.
+const HEADS: u64 = 1 << 15;
+const FILTER: u64 = 1 << 18;
+
+/// No entry.
+const NONE: u32 = u32::MAX;
+
+/// The entries of a value, in their order.
+pub(super) struct Matches<'a> {
+    table: &'a Table,
+    size: Residue,
+    at: u32,
+}
 
 impl Table {
-    fn of(mut entries: Vec<(Residue, OpId, OpId)>) -> Self {
-        entries.sort_unstable();
+    fn of(entries: Vec<(Residue, OpId, OpId)>) -> Self {
+        let mut heads = vec![NONE; HEADS as usize];
         let mut filter = vec![0; (FILTER / 64) as usize];
-        for (value, ..) in &entries {
+        let mut next = vec![NONE; entries.len()];
+        for (at, (value, ..)) in entries.iter().enumerate().rev() {
+            let head = &mut heads[value.bits(HEADS - 1) as usize];
+            next[at] = std::mem::replace(head, at as u32);
             let bit = value.bits(FILTER - 1);
             filter[(bit / 64) as usize] |= 1 << (bit % 64);
         }
-        Self { entries, filter }
+        Self {
+            entries,
+            filter,
+            heads,
+            next,
+        }
+    }
+
+    /// Whether there may be one of this value.
+    pub(super) fn may_hold(&self, value: Residue) -> bool {
+        let bit = value.size().bits(FILTER - 1);
+        self.filter[(bit / 64) as usize] & (1 << (bit % 64)) != 0
     }
 
     /// All entries of a value, up to its sign.
-    pub(super) fn find(&self, value: Residue) -> &[(Residue, OpId, OpId)] {
+    pub(super) fn find(&self, value: Residue) -> Matches<'_> {
         let size = value.size();
-        let bit = size.bits(FILTER - 1);
-        if self.filter[(bit / 64) as usize] & (1 << (bit % 64)) == 0 {
-            return &[];
+        Matches {
+            table: self,
+            size,
+            at: self.heads[size.bits(HEADS - 1) as usize],
         }
-        let start = self.entries.partition_point(|(own, ..)| *own < size);
-        let rest = &self.entries[start..];
-        let length = rest.iter().take_while(|(own, ..)| *own == size).count();
-        &rest[..length]
+    }
+}
+
+impl<'a> Iterator for Matches<'a> {
+    type Item = &'a (Residue, OpId, OpId);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while self.at != NONE {
+            let at = self.at as usize;
+            let entry = &self.table.entries[at];
+            self.at = self.table.next[at];
+            if entry.0 == self.size {
+                return Some(entry);
+            }
+        }
+        None
     }
 }
 
@@ -66,7 +110,7 @@ pub(super) struct Search<'a> {
     pub(super) reciprocals: Vec<Residue>,
     /// One bit for each operation that is not defined everywhere.
     partial: Vec<u64>,
-    pub(super) singles: HashMap<Residue, Vec<OpId>>,
+    pub(super) singles: Map<Residue, Vec<OpId>>,
     pub(super) products: Table,
     /// x + y and x − y
     pub(super) sums: Table,
@@ -75,7 +119,7 @@ pub(super) struct Search<'a> {
 impl<'a> Search<'a> {
     pub(super) fn of(plan: &'a Plan) -> Self {
         let values = residues(plan, 1);
-        let mut singles: HashMap<Residue, Vec<OpId>> = HashMap::new();
+        let mut singles: Map<Residue, Vec<OpId>> = Map::default();
         for id in plan.ids() {
             let size = values[id.index()].size();
             singles.entry(size).or_default().push(id);
