@@ -15,8 +15,9 @@ use nalgebra::DMatrix;
 use std::error::Error;
 use std::time::Instant;
 use tfe::charts::{Axis, Chart, Scale, Style};
-use tfe::family::{self, FamilyModel, FamilySimulation, FamilyState};
+use tfe::family::{self, FamilyModel, FamilySimulation, FamilyState, FamilyStepper};
 use tfe::prelude::*;
+use tfe::runtime::step::Control;
 
 #[dynamics(
     coordinates(q[n]),
@@ -43,6 +44,8 @@ const STEPS: u32 = 50;
 struct Row {
     n: usize,
     microseconds: f64,
+    /// The most that is held at once while a stepper works, in bytes for each body.
+    bytes: f64,
     iterations: f64,
     energy_error: f64,
 }
@@ -58,14 +61,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         .y(Axis::new("time per step (µs)").scale(Scale::Logarithmic));
     for (name, rows) in &curves {
         println!(
-            "{name:<6} {:>8} {:>13} {:>11} {:>10} {:>13}",
-            "n", "µs a step", "ns a body", "it./step", "energy error"
+            "{name:<6} {:>8} {:>13} {:>11} {:>13} {:>10} {:>13}",
+            "n", "µs a step", "ns a body", "bytes a body", "it./step", "energy error"
         );
         for row in rows {
             let by_body = 1e3 * row.microseconds / row.n as f64;
             println!(
-                "{:<6} {:>8} {:>13.2} {by_body:>11.1} {:>10.1} {:>13.1e}",
-                "", row.n, row.microseconds, row.iterations, row.energy_error
+                "{:<6} {:>8} {:>13.2} {by_body:>11.1} {:>13.0} {:>10.1} {:>13.1e}",
+                "", row.n, row.microseconds, row.bytes, row.iterations, row.energy_error
             );
         }
         let exponent = exponent(&rows[2..]);
@@ -96,6 +99,7 @@ fn sweep<M: FamilyModel>(model: impl Fn(usize) -> M) -> Result<Vec<Row>, Box<dyn
         let mut row = Row {
             n,
             microseconds: f64::INFINITY,
+            bytes: bytes(&model, &start)? / n as f64,
             iterations: 0.0,
             energy_error: 0.0,
         };
@@ -115,6 +119,24 @@ fn sweep<M: FamilyModel>(model: impl Fn(usize) -> M) -> Result<Vec<Row>, Box<dyn
         rows.push(row);
     }
     Ok(rows)
+}
+
+/// What a stepper holds at most while it is made and does a few steps.
+fn bytes<M: FamilyModel>(model: &M, start: &FamilyState) -> Result<f64, Box<dyn Error>> {
+    let mut outcome = Ok(());
+    let used = allocation_counter::measure(|| {
+        outcome = FamilyStepper::new(model, Mixed::<4>.into(), Control::default())
+            .map_err(Box::<dyn Error>::from)
+            .and_then(|mut stepper| {
+                let mut state = start.clone();
+                for step in 0..3 {
+                    stepper.advance(f64::from(step) * STEP, STEP, &mut state)?;
+                }
+                Ok(())
+            });
+    });
+    outcome?;
+    Ok(used.bytes_max as f64)
 }
 
 /// The slope of log(time) over log(n), by least squares.

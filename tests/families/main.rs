@@ -1,5 +1,8 @@
 //! Models of run-time length.
 
+#[path = "../common/mod.rs"]
+mod common;
+
 #[cfg(feature = "sparse")]
 mod constrained;
 mod constraints;
