@@ -6,7 +6,7 @@ use crate::error::AtError;
 use std::fmt;
 use std::io;
 use std::path::Path;
-use tfe_runtime::family::{self, FamilyDense, FamilyModel, FamilyState};
+use tfe_runtime::family::{self, FamilyDense, FamilyError, FamilyModel, FamilyState};
 use tfe_runtime::{CoordinateName, Form, Statistics};
 
 /// A state of a family with its time.
@@ -91,13 +91,18 @@ pub struct FamilyMotion {
 
 impl FamilyMotion {
     /// The motion that has only its start, which is as long as the model.
-    pub(crate) fn from_start<M: FamilyModel>(model: &M, t: f64, start: &FamilyState) -> Self {
+    pub(crate) fn from_start<M: FamilyModel>(
+        model: &M,
+        t: f64,
+        start: &FamilyState,
+        velocity: Result<Vec<f64>, FamilyError>,
+    ) -> Self {
         let mut motion = Self::empty(model, t, start);
         motion.nodes.clear();
         motion.names = (0..model.len()).map(|a| model.coordinate_name(a)).collect();
         let columns = 0..model.columns();
         motion.outputs.names = columns.map(|at| model.column_name(at)).collect();
-        motion.record(model, t, start);
+        motion.record(model, t, start, velocity);
         motion
     }
 
@@ -115,9 +120,14 @@ impl FamilyMotion {
         }
     }
 
-    /// Appends a node, with its velocity, energy and observables; NaN where no velocity belongs to the momentum.
-    pub(crate) fn record<M: FamilyModel>(&mut self, model: &M, t: f64, state: &FamilyState) {
-        let velocity = family::velocity(model, t, state);
+    /// Appends a node, with its energy and observables; NaN where no velocity belongs to the momentum.
+    pub(crate) fn record<M: FamilyModel>(
+        &mut self,
+        model: &M,
+        t: f64,
+        state: &FamilyState,
+        velocity: Result<Vec<f64>, FamilyError>,
+    ) {
         let velocity = velocity.unwrap_or_else(|_| vec![f64::NAN; state.q.len()]);
         self.energies
             .push(family::energy(model, t, state, &velocity));

@@ -7,7 +7,7 @@ use crate::motion::family::{FamilyMotion, FamilyNode};
 use std::error::Error;
 use std::fmt;
 use std::ops::Range;
-use tfe_runtime::family::{self, FamilyError, FamilyModel, FamilyState, FamilyStepper};
+use tfe_runtime::family::{FamilyError, FamilyModel, FamilyState, FamilyStepper};
 use tfe_runtime::length::{FixedLength, RunTimeLength};
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Model, Solve};
@@ -184,16 +184,16 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             FamilyRunError::new(kind, partial)
         };
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
-        let mut stepper = self.stepper(span.start, &start).map_err(refused)?;
+        let (mut stepper, v) = self.stepper(span.start, &start).map_err(refused)?;
         let mesh = Mesh::<0>::new(&span, step, &self.breaks, &[]).map_err(refused)?;
-        let mut motion = FamilyMotion::from_start(self.model, span.start, &start);
+        let mut motion = FamilyMotion::from_start(self.model, span.start, &start, Ok(v));
         let mut bar = progress::Bar::new(self.progress, mesh.steps());
         let mut failure = None;
         let mut state = start;
         for (element, (t, next, h)) in mesh.elements().enumerate() {
             if let Err(source) = stepper.advance(t, h, &mut state) {
                 if motion.last().t != t {
-                    motion.record(self.model, t, &state);
+                    motion.record(self.model, t, &state, stepper.velocity(t, &state));
                 }
                 failure = Some(RunErrorKind::Solve {
                     element,
@@ -208,7 +208,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             }
             let last = element + 1 == mesh.steps();
             if last || (element + 1) % self.record_every == 0 {
-                motion.record(self.model, next, &state);
+                motion.record(self.model, next, &state, stepper.velocity(next, &state));
             }
             bar.advance();
         }
@@ -222,7 +222,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     /// The states that follow `start`, one a step, without end and in constant memory. After an error the iterator is finished.
     pub fn steps(&self, start: FamilyState, t0: f64) -> FamilySteps<'m, M> {
         let step = self.step.unwrap_or(f64::NAN);
-        let stepper = self.stepper(t0, &start).and_then(|stepper| {
+        let stepper = self.stepper(t0, &start).and_then(|(stepper, _)| {
             if !(step.is_finite() && step != 0.0) {
                 return Err(RunErrorKind::Step { step });
             }
@@ -246,8 +246,12 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         }
     }
 
-    /// A stepper, if model, element and start are good.
-    fn stepper(&self, t: f64, start: &FamilyState) -> Result<FamilyStepper<'m, M>, RunErrorKind> {
+    /// A stepper and the velocity at the start, if model, element and start are good.
+    fn stepper(
+        &self,
+        t: f64,
+        start: &FamilyState,
+    ) -> Result<(FamilyStepper<'m, M>, Vec<f64>), RunErrorKind> {
         self.model.check().map_err(RunErrorKind::Family)?;
         // Before memory is asked for: a wrong length may be any number.
         let expected = self.model.len();
@@ -267,10 +271,10 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             }
         }
         let stepper = FamilyStepper::new(self.model, self.element, self.control);
-        let stepper = stepper.map_err(RunErrorKind::Family)?;
+        let mut stepper = stepper.map_err(RunErrorKind::Family)?;
         // A run records velocities: what has none is refused before it begins.
-        family::velocity(self.model, t, start).map_err(RunErrorKind::Family)?;
-        Ok(stepper)
+        let velocity = stepper.velocity(t, start).map_err(RunErrorKind::Family)?;
+        Ok((stepper, velocity))
     }
 }
 

@@ -41,6 +41,7 @@ use crate::model::{CoordinateName, Facts, Form};
 use crate::real::Real;
 use alloc::vec;
 use alloc::vec::Vec;
+use inertia::Legendre;
 
 /// A point of phase space of a family: coordinates and their momenta p = ∂L/∂v, on the heap.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -233,7 +234,7 @@ pub fn momenta<M: FamilyModel>(
     }
     match M::FORM {
         Form::Lagrangian => Ok(slope(model, t, q, v)),
-        Form::Hamiltonian => inertia::other(model, t, q, v),
+        Form::Hamiltonian => Legendre::default().other(model, t, q, v),
     }
 }
 
@@ -246,10 +247,7 @@ pub fn velocity<M: FamilyModel>(
     t: f64,
     state: &FamilyState,
 ) -> Result<Vec<f64>, FamilyError> {
-    match M::FORM {
-        Form::Lagrangian => inertia::other(model, t, &state.q, &state.p),
-        Form::Hamiltonian => Ok(slope(model, t, &state.q, &state.p)),
-    }
+    Legendre::default().velocity(model, t, state)
 }
 
 /// The energy H = p·v − L, or H itself, at a state with its velocities.

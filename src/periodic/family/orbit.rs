@@ -7,7 +7,7 @@ use crate::motion::family::{FamilyMotion, FamilyNode};
 use crate::periodic_schur::{self, Multiplier};
 use nalgebra::{Complex, DMatrix};
 use tfe_runtime::Statistics;
-use tfe_runtime::family::{FamilyModel, FamilyState, FamilyTransition};
+use tfe_runtime::family::{self, FamilyModel, FamilyState, FamilyTransition};
 
 /// A periodic orbit of a model of run-time length with its Floquet multipliers: what [`Orbit`](crate::Orbit) is for models of fixed size, by the
 /// same names.
@@ -121,8 +121,10 @@ impl<'m, M: FamilyModel> FamilyOrbit<'m, M> {
     /// The motion over one period, with dense output: the polynomials of the elements.
     pub fn motion(&self) -> FamilyMotion {
         let shooting = &self.shooting;
+        let velocity = |t, state| family::velocity(shooting.model, t, state);
+        let (start, first) = (shooting.start, &shooting.nodes[0]);
         let mut motion =
-            FamilyMotion::from_start(shooting.model, shooting.start, &shooting.nodes[0]);
+            FamilyMotion::from_start(shooting.model, start, first, velocity(start, first));
         motion.set_statistics(shooting.statistics);
         // Each element begins where the one before ends, to the last bit.
         let mut places = Vec::with_capacity(shooting.mesh.elements());
@@ -138,7 +140,8 @@ impl<'m, M: FamilyModel> FamilyOrbit<'m, M> {
         let each = |transition: FamilyTransition| {
             let dense = transition.into_dense();
             e += 1;
-            motion.record(shooting.model, dense.end(), &shooting.nodes[e]);
+            let (end, node) = (dense.end(), &shooting.nodes[e]);
+            motion.record(shooting.model, end, node, velocity(end, node));
             motion.keep_element(dense);
         };
         // These steps have been done before: they cannot fail now, and a motion that ends early would show it.

@@ -40,12 +40,9 @@ impl fmt::Debug for Blocked {
 
 impl Blocked {
     /// `count` rows of blocks of size `block`, at the given (row, column); nothing where memory does not suffice for an ordering.
-    pub(super) fn new(
-        count: usize,
-        block: usize,
-        places: impl Iterator<Item = (usize, usize)>,
-    ) -> Option<Self> {
-        let mut pairs: Vec<(usize, usize)> = places.map(|(row, column)| (column, row)).collect();
+    pub(super) fn new(count: usize, block: usize, places: &[(usize, usize)]) -> Option<Self> {
+        let mut pairs: Vec<(usize, usize)> =
+            places.iter().map(|(row, column)| (*column, *row)).collect();
         pairs.sort_unstable();
         pairs.dedup();
         let starts: Vec<usize> = (0..=count)

@@ -47,8 +47,8 @@ impl FamilyDense {
         times: (f64, f64),
         h: f64,
         (start, end): (FamilyState, FamilyState),
-        rate: impl Fn(usize, usize) -> f64,
-        force: impl Fn(usize, usize) -> f64,
+        rate: &dyn Fn(usize, usize) -> f64,
+        force: &dyn Fn(usize, usize) -> f64,
     ) -> Self {
         let n = start.q.len();
         let force_rates = coefficients(scheme.force_rate, scheme.points(), (h, n), force);
@@ -68,8 +68,8 @@ impl FamilyDense {
         times: (f64, f64),
         h: f64,
         (start, end): (FamilyState, FamilyState),
-        rate: impl Fn(usize, usize) -> f64,
-        momentum: impl Fn(usize, usize) -> f64,
+        rate: &dyn Fn(usize, usize) -> f64,
+        momentum: &dyn Fn(usize, usize) -> f64,
     ) -> Self {
         let (n, s) = (start.q.len(), scheme.rates());
         let mut values = coefficients(scheme.rate, scheme.unknowns(), (1.0, n), momentum);
@@ -135,7 +135,7 @@ fn coefficients(
     matrix: &[f64],
     columns: usize,
     (factor, n): (f64, usize),
-    value: impl Fn(usize, usize) -> f64,
+    value: &dyn Fn(usize, usize) -> f64,
 ) -> Vec<f64> {
     let mut rows = vec![0.0; matrix.len() / columns * n];
     for (row, weights) in rows.chunks_exact_mut(n).zip(matrix.chunks_exact(columns)) {

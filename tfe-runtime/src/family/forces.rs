@@ -282,7 +282,7 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
             self.problem.velocity[a] + h * self.problem.inertia.inverse[a] * integral
         };
         let ends = (self.start.clone(), self.end.clone());
-        FamilyDense::of(&scheme, (start, end), h, ends, rate, force)
+        FamilyDense::of(&scheme, (start, end), h, ends, &rate, &force)
     }
 }
 

@@ -1,6 +1,8 @@
 //! Mass matrices of families.
 
-use super::{Block, Entries, FamilyError, FamilyModel, slope};
+use super::{Block, Entries, FamilyError, FamilyModel, FamilyState, slope};
+#[cfg(feature = "sparse")]
+use super::{node::Node, rows::Rows};
 use crate::double_double::DoubleDouble;
 use crate::model::Form;
 use alloc::vec;
@@ -48,53 +50,87 @@ impl Inertia {
     }
 }
 
-/// The momentum that belongs to a velocity of a Hamiltonian, or the velocity that belongs to a momentum of a Lagrangian: one step of Newton's
-/// method, from zero, where the energy is quadratic with a diagonal mass matrix; else (with the feature `sparse`) as many as it takes.
-pub(super) fn other<M: FamilyModel>(
-    model: &M,
-    t: f64,
-    q: &[f64],
-    wanted: &[f64],
-) -> Result<Vec<f64>, FamilyError> {
-    let zero = vec![0.0; model.len()];
-    let second = match M::FACTS.quadratic_in_z {
-        true => diagonal(model, t, q, &zero),
-        false => Err(FamilyError::NotSecondOrder),
-    };
-    let second = match second {
-        Err(FamilyError::NotSecondOrder | FamilyError::MassNotDiagonal { .. })
-            if cfg!(feature = "sparse") =>
-        {
-            return by_newton(model, t, q, wanted);
+/// What takes velocities to momenta of a Hamiltonian, and momenta to velocities of a Lagrangian.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Legendre {
+    /// Made when it is needed: for mass matrices that are not diagonal.
+    #[cfg(feature = "sparse")]
+    node: Option<Node>,
+}
+
+impl Legendre {
+    /// The velocity at a state.
+    pub(super) fn velocity<M: FamilyModel>(
+        &mut self,
+        model: &M,
+        t: f64,
+        state: &FamilyState,
+    ) -> Result<Vec<f64>, FamilyError> {
+        match M::FORM {
+            Form::Lagrangian => self.other(model, t, &state.q, &state.p),
+            Form::Hamiltonian => Ok(slope(model, t, &state.q, &state.p)),
         }
-        second => second?,
-    };
-    let offset = slope(model, t, q, &zero);
-    let all = wanted.iter().zip(&offset).zip(&second);
-    Ok(all
-        .map(|((wanted, offset), second)| (wanted - offset) / second)
-        .collect())
-}
+    }
 
-#[cfg(feature = "sparse")]
-fn by_newton<M: FamilyModel>(
-    model: &M,
-    t: f64,
-    q: &[f64],
-    wanted: &[f64],
-) -> Result<Vec<f64>, FamilyError> {
-    use super::{node::Node, rows::Rows};
-    let free = Rows::none();
-    let mut node = Node::new(model, &free).ok_or(FamilyError::TooLarge)?;
-    let mut z = vec![0.0; model.len()];
-    node.solve(model, (t, q), wanted, &free, &mut z)
-        .map_err(|_| FamilyError::NoVelocity)?;
-    Ok(z)
-}
+    /// The momentum that belongs to a velocity of a Hamiltonian, or the velocity that belongs to a momentum of a Lagrangian: one step of
+    /// Newton's method, from zero, where the energy is quadratic with a diagonal mass matrix; else (with the feature `sparse`) as many as
+    /// it takes.
+    pub(super) fn other<M: FamilyModel>(
+        &mut self,
+        model: &M,
+        t: f64,
+        q: &[f64],
+        wanted: &[f64],
+    ) -> Result<Vec<f64>, FamilyError> {
+        let zero = vec![0.0; model.len()];
+        let second = match M::FACTS.quadratic_in_z {
+            true => diagonal(model, t, q, &zero),
+            false => Err(FamilyError::NotSecondOrder),
+        };
+        let second = match second {
+            Err(FamilyError::NotSecondOrder | FamilyError::MassNotDiagonal { .. })
+                if cfg!(feature = "sparse") =>
+            {
+                return self.by_newton(model, t, q, wanted);
+            }
+            second => second?,
+        };
+        let offset = slope(model, t, q, &zero);
+        let all = wanted.iter().zip(&offset).zip(&second);
+        Ok(all
+            .map(|((wanted, offset), second)| (wanted - offset) / second)
+            .collect())
+    }
 
-#[cfg(not(feature = "sparse"))]
-fn by_newton<M: FamilyModel>(_: &M, _: f64, _: &[f64], _: &[f64]) -> Result<Vec<f64>, FamilyError> {
-    Err(FamilyError::NotSecondOrder)
+    #[cfg(feature = "sparse")]
+    fn by_newton<M: FamilyModel>(
+        &mut self,
+        model: &M,
+        t: f64,
+        q: &[f64],
+        wanted: &[f64],
+    ) -> Result<Vec<f64>, FamilyError> {
+        let free = Rows::none();
+        let node = match &mut self.node {
+            Some(node) => node,
+            empty => empty.insert(Node::new(model, &free).ok_or(FamilyError::TooLarge)?),
+        };
+        let mut z = vec![0.0; model.len()];
+        node.solve(model, (t, q), wanted, &free, &mut z)
+            .map_err(|_| FamilyError::NoVelocity)?;
+        Ok(z)
+    }
+
+    #[cfg(not(feature = "sparse"))]
+    fn by_newton<M: FamilyModel>(
+        &mut self,
+        _: &M,
+        _: f64,
+        _: &[f64],
+        _: &[f64],
+    ) -> Result<Vec<f64>, FamilyError> {
+        Err(FamilyError::NotSecondOrder)
+    }
 }
 
 /// The diagonal of ∂²/∂z∂z, of which nothing may be zero, and which may be all there is.

@@ -50,13 +50,16 @@ pub(super) struct Tangent {
 impl Tangent {
     /// Finds the places and orders them; nothing where memory does not suffice.
     pub(super) fn new<M: FamilyModel>(model: &M, points: usize) -> Option<Self> {
-        let n = model.len();
-        let pattern = Pattern::of(model);
+        Self::of(Pattern::of(model), M::FORM, model.len(), points)
+    }
+
+    fn of(pattern: Pattern, form: Form, n: usize, points: usize) -> Option<Self> {
         let enters = |block: &Block| matches!(block, Block::QQ | Block::ForceQ | Block::ForceZ);
         let entering = pattern.places().iter().filter(|(block, ..)| enters(block));
         let blocks = entering.map(|(_, row, column)| (*row, *column));
-        let matrix = Blocked::new(n, points, blocks.chain((0..n).map(|a| (a, a))))?;
-        let sign = |block: &Block| match (M::FORM, block) {
+        let places: Vec<(usize, usize)> = blocks.chain((0..n).map(|a| (a, a))).collect();
+        let matrix = Blocked::new(n, points, &places)?;
+        let sign = |block: &Block| match (form, block) {
             (Form::Hamiltonian, Block::QQ) => -1.0,
             _ => 1.0,
         };

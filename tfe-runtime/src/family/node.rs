@@ -36,11 +36,15 @@ pub(super) struct Node {
 impl Node {
     /// Finds the places and orders them; nothing where memory does not suffice.
     pub(super) fn new<M: FamilyModel>(model: &M, rows: &Rows) -> Option<Self> {
-        let (n, m) = (model.len(), rows.phi.len());
-        let pattern = Pattern::of_mass(model);
+        Self::of(Pattern::of_mass(model), model.len(), rows)
+    }
+
+    fn of(pattern: Pattern, n: usize, rows: &Rows) -> Option<Self> {
+        let m = rows.phi.len();
         let masses = || pattern.places().iter().map(|(_, a, b)| (*a, *b));
         let borders = rows.places().flat_map(|(c, a)| [(n + c, a), (a, n + c)]);
-        let matrix = Blocked::new(n + m, 1, masses().chain(borders))?;
+        let places: Vec<(usize, usize)> = masses().chain(borders).collect();
+        let matrix = Blocked::new(n + m, 1, &places)?;
         Some(Self {
             masses: masses().map(|(a, b)| matrix.place(a, b)).collect(),
             rows: rows

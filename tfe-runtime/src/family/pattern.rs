@@ -86,9 +86,12 @@ impl Pattern {
     fn recorded(run: impl FnOnce(&mut Recorder)) -> Self {
         let mut recorder = Recorder(Vec::new());
         run(&mut recorder);
-        let Recorder(recorded) = recorder;
+        Self::sorted(&recorder.0)
+    }
+
+    fn sorted(recorded: &[(Block, usize, usize)]) -> Self {
         let by_column = |(block, row, column): &(Block, usize, usize)| (*block, *column, *row);
-        let mut places = recorded.clone();
+        let mut places = recorded.to_vec();
         places.sort_unstable_by_key(by_column);
         places.dedup();
         let place = |one| places.binary_search_by_key(&by_column(one), by_column);

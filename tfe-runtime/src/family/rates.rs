@@ -19,7 +19,7 @@ use crate::double_double::DoubleDouble;
 use crate::equations::{Increment, relative};
 use crate::error::{ConstraintError, StepError};
 use crate::newton::{Control, Monitor, SERVES, Solve, Verdict};
-use crate::scheme::{SchemeTable, Tables as _};
+use crate::scheme::{MAX_RATES, SchemeTable, Tables as _};
 use crate::statistics::Statistics;
 use crate::step::set_extrapolation;
 use alloc::vec;
@@ -73,10 +73,12 @@ pub(super) struct Point {
     phi: Vec<f64>,
     /// μ̇
     pub(super) mu_rate: Vec<f64>,
+    /// P_j′ there, which takes multipliers to μ̇.
+    pub(super) slopes: [f64; MAX_RATES],
 }
 
 impl Point {
-    fn new(n: usize, rows: usize, constraints: usize) -> Self {
+    fn new(n: usize, rows: usize, constraints: usize, slopes: [f64; MAX_RATES]) -> Self {
         Self {
             q: vec![0.0; n],
             v: vec![0.0; n],
@@ -85,6 +87,7 @@ impl Point {
             rows: vec![0.0; rows],
             phi: vec![0.0; constraints],
             mu_rate: vec![0.0; constraints],
+            slopes,
         }
     }
 }
@@ -103,8 +106,11 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
             return Err(FamilyError::NeedsNewton);
         }
         let (n, m) = (model.len(), model.constraints());
-        let (unknowns, points) = (table.view().unknowns(), table.view().points());
         let rows = Rows::new(model);
+        let scheme = table.view();
+        let unknowns = scheme.unknowns();
+        let point = |node: &f64| Point::new(n, rows.values.len(), m, slopes(*node, unknowns));
+        let points = scheme.nodes.iter().map(point).collect();
         let (parts, matrix) = Parts::new(model, &rows, unknowns).ok_or(FamilyError::TooLarge)?;
         let node = Node::new(model, &rows).ok_or(FamilyError::TooLarge)?;
         let zero = || FamilyState {
@@ -123,7 +129,7 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
             unknowns: vec![0.0; size],
             step: vec![0.0; size],
             factored: f64::NAN,
-            points: vec![Point::new(n, rows.values.len(), m); points],
+            points,
             start_rows: vec![0.0; rows.values.len()],
             rows,
             q_end: vec![0.0; n],
@@ -337,13 +343,12 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
                 }
             }
             if m > 0 {
-                let slopes = slopes(scheme.nodes[l], count);
                 for (rate, m) in point
                     .mu_rate
                     .iter_mut()
                     .zip(multipliers.chunks_exact(count))
                 {
-                    *rate = product(&slopes[1..count], &m[1..]);
+                    *rate = product(&point.slopes[1..count], &m[1..]);
                 }
                 self.rows.evaluate(self.model, time, &point.q);
                 self.rows
@@ -382,8 +387,7 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
         for (c, rest) in constraints.chunks_exact_mut(count).enumerate() {
             rest.fill(0.0);
             for (l, point) in self.points.iter().enumerate() {
-                let slopes = slopes(scheme.nodes[l], count);
-                for (rest, slope) in rest.iter_mut().zip(slopes).skip(1) {
+                for (rest, slope) in rest.iter_mut().zip(point.slopes).skip(1) {
                     *rest += scheme.weights[l] * slope * point.phi[c] / h;
                 }
             }
@@ -467,10 +471,10 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
         let rate = |unknown: usize, a: usize| self.unknowns[a * count + unknown];
         if self.constraints > 0 {
             let momentum = |point: usize, a: usize| self.points[point].momentum[a];
-            return FamilyDense::with_jumps(&scheme, (start, end), h, ends, rate, momentum);
+            return FamilyDense::with_jumps(&scheme, (start, end), h, ends, &rate, &momentum);
         }
         let force = |point: usize, a: usize| self.points[point].force[a];
-        FamilyDense::of(&scheme, (start, end), h, ends, rate, force)
+        FamilyDense::of(&scheme, (start, end), h, ends, &rate, &force)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Steps of families: which unknowns a model gets.
 
 use super::forces::Forces;
+use super::inertia::Legendre;
 use super::lanes::largest;
 #[cfg(feature = "sparse")]
 use super::rates::Rates;
@@ -24,8 +25,10 @@ use alloc::boxed::Box;
 /// The example is at [`Simulation::new`](https://docs.rs/tfe), with which families are run.
 #[derive(Clone, Debug)]
 pub struct FamilyStepper<'m, M> {
+    model: &'m M,
     length: usize,
     way: Way<'m, M>,
+    legendre: Legendre,
 }
 
 /// What is solved for.
@@ -46,7 +49,12 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
         let table = SchemeTable::new(element).map_err(FamilyError::Element)?;
         let way = Self::way(model, element, table, control)?;
         let length = model.len();
-        Ok(Self { length, way })
+        Ok(Self {
+            model,
+            length,
+            way,
+            legendre: Legendre::default(),
+        })
     }
 
     fn way(
@@ -110,6 +118,14 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
             #[cfg(feature = "sparse")]
             Way::Rates(rates) => rates.dense(start, end),
         }
+    }
+
+    /// What [`velocity`](super::velocity) says, to the last bit, with the memory and the ordering of equations kept from one call to the next.
+    ///
+    /// # Errors
+    /// As [`velocity`](super::velocity).
+    pub fn velocity(&mut self, t: f64, state: &FamilyState) -> Result<Vec<f64>, FamilyError> {
+        self.legendre.velocity(self.model, t, state)
     }
 
     /// What the steps so far have cost.

@@ -9,7 +9,6 @@ use super::blocked::{Blocked, Place};
 use super::rates::Point;
 use super::rows::Rows;
 use super::{Block, FamilyModel, Gradient, Pattern};
-use crate::constrained::element::slopes;
 use crate::scheme::SchemeRef;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -59,9 +58,21 @@ impl Parts {
         rows: &Rows,
         block: usize,
     ) -> Option<(Self, Blocked)> {
-        let (n, m) = (model.len(), rows.phi.len());
-        let second = Pattern::of(model);
-        let bends = Pattern::of_bends(model);
+        Self::of(
+            Pattern::of(model),
+            Pattern::of_bends(model),
+            rows,
+            (model.len(), block),
+        )
+    }
+
+    fn of(
+        second: Pattern,
+        bends: Pattern,
+        rows: &Rows,
+        (n, block): (usize, usize),
+    ) -> Option<(Self, Blocked)> {
+        let m = rows.phi.len();
         let entries: Vec<(usize, Role, usize, usize)> = second
             .places()
             .iter()
@@ -87,7 +98,8 @@ impl Parts {
         };
         let borders = rows.places().flat_map(|(c, a)| [(n + c, a), (a, n + c)]);
         let places = entries.iter().map(|(_, _, row, column)| (*row, *column));
-        let matrix = Blocked::new(n + m, block, places.chain(bent()).chain(borders))?;
+        let places: Vec<(usize, usize)> = places.chain(bent()).chain(borders).collect();
+        let matrix = Blocked::new(n + m, block, &places)?;
         let parts = entries
             .iter()
             .map(|(number, role, row, column)| (*number, *role, matrix.place(*row, *column)))
@@ -175,13 +187,14 @@ impl Parts {
     fn add_rows(&self, element: &Element<'_>, l: usize, values: &mut [f64]) {
         let Element { scheme, h, .. } = *element;
         let (points, block) = (scheme.points(), scheme.unknowns());
-        let slopes = slopes(scheme.nodes[l], block);
-        for ((row, transposed), value) in self.row_places.iter().zip(&element.points[l].rows) {
+        let point = &element.points[l];
+        for ((row, transposed), value) in self.row_places.iter().zip(&point.rows) {
             for k in 1..block {
                 for i in 0..block {
-                    let force = h * scheme.force[i * points + l] * slopes[k];
+                    let force = h * scheme.force[i * points + l] * point.slopes[k];
                     values[transposed.first + k * transposed.stride + i] += force * value;
-                    let position = scheme.weights[l] * slopes[k] * scheme.position[l * block + i];
+                    let position =
+                        scheme.weights[l] * point.slopes[k] * scheme.position[l * block + i];
                     values[row.first + i * row.stride + k] += position * value;
                 }
             }
