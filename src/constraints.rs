@@ -285,7 +285,7 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
     t: f64,
     state: &State<N>,
 ) -> Result<DMatrix<f64>, StepError> {
-    if M::CONSTRAINTS.is_empty() {
+    if const { M::CONSTRAINTS.is_empty() } {
         return Ok(DMatrix::identity(2 * N, 2 * N));
     }
     let v = constrained::velocity(model, t, &state.q, &state.p, &[0.0; N])?;

@@ -125,7 +125,7 @@ impl<const N: usize> Motion<N> {
             q: state.q,
             p: state.p,
         });
-        if !M::CONSTRAINTS.is_empty() {
+        if const { !M::CONSTRAINTS.is_empty() } {
             self.record_constraints(model, t, state, &velocity);
         }
         self.velocities.push(velocity);

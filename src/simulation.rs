@@ -206,7 +206,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let motion = self.drive(start, &span, false, |stepper, t, before| {
             stepper.transition(&mut entries)?;
             transitions.push(DMatrix::from_row_slice(2 * N, 2 * N, &entries));
-            if !M::CONSTRAINTS.is_empty() {
+            if const { !M::CONSTRAINTS.is_empty() } {
                 starts.push((t, *before));
             }
             Ok(())
@@ -369,7 +369,7 @@ pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
     h: f64,
     start: &State<N>,
 ) -> Result<(), RunErrorKind> {
-    if M::CONSTRAINTS.is_empty() {
+    if const { M::CONSTRAINTS.is_empty() } {
         return Ok(());
     }
     let v = constrained::velocity_of(model, time, &start.q, &start.p, &[0.0; N]);

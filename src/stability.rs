@@ -173,7 +173,7 @@ pub fn unstable_intervals<M: Model<N>, const N: usize>(
 ) -> Result<Vec<UnstableInterval>, IntervalError<TransitionError>> {
     let element = element.into();
     let matrix = |h| {
-        if M::CONSTRAINTS.is_empty() {
+        if const { M::CONSTRAINTS.is_empty() } {
             transition_matrix(model, element, equilibrium, 0.0, h)
         } else {
             // The zeros of directions that are no motions are no modes either.

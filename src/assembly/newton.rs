@@ -377,7 +377,7 @@ impl<const N: usize> Assembly<N> {
         let globals = self.chain.globals().iter().enumerate();
         let globals = globals.map(|(k, correction)| correction / problem.scale(k));
         let size = size(nodes, self.chain.matrices(), globals);
-        if P::Model::CONSTRAINTS.is_empty() || size.is_nan() {
+        if const { P::Model::CONSTRAINTS.is_empty() } || size.is_nan() {
             return size;
         }
         // Nodes at rest do not feel the reactions, but the matrices do.

@@ -286,13 +286,18 @@ fn number(value: f64, step: f64, largest: f64) -> String {
     };
     let digit = step.log10().floor() as i32;
     if (1e-4..1e6).contains(&largest) {
-        return minus(&format!("{value:.*}", usize::try_from(-digit).unwrap_or(0)));
+        return minus(&format!(
+            "{value:.*}",
+            usize::try_from(digit.saturating_neg()).unwrap_or(0)
+        ));
     }
     if value == 0.0 {
         return "0".to_owned();
     }
     let exponent = value.abs().log10().floor() as i32;
-    let digits = usize::try_from(exponent - digit).unwrap_or(0).min(16);
+    let digits = usize::try_from(exponent.saturating_sub(digit))
+        .unwrap_or(0)
+        .min(16);
     let text = format!("{value:.digits$e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
     format!("{}·10{}", minus(mantissa), superscript(exponent))

@@ -305,7 +305,7 @@ pub(crate) fn multipliers_of<M: Model<N>, const N: usize>(
     nodes: &[State<N>],
     transitions: &[f64],
 ) -> Result<Vec<Multiplier>, OrbitError> {
-    let floquet = if M::CONSTRAINTS.is_empty() {
+    let floquet = if const { M::CONSTRAINTS.is_empty() } {
         periodic_schur::multipliers_of(2 * N, transitions)
     } else {
         let times = problem.mesh.times(problem.start, problem.period);

@@ -48,7 +48,7 @@ pub(crate) struct Frozen<const N: usize> {
 impl<const N: usize> Frozen<N> {
     /// The model as it is at `state`; none where it has no velocity there, or an entry is not finite.
     pub(crate) fn at<M: Model<N>>(model: &M, t: f64, state: &State<N>) -> Option<Self> {
-        if !M::CONSTRAINTS.is_empty() {
+        if const { !M::CONSTRAINTS.is_empty() } {
             // Frozen second derivatives say nothing about motions that constraints hold.
             return None;
         }

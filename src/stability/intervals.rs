@@ -16,7 +16,7 @@ mod tests;
 mod worst;
 
 use nalgebra::DMatrix;
-use search::Search;
+use search::{Failure, Search, Withheld};
 use std::error::Error;
 use std::fmt;
 use std::ops::Range;
@@ -159,17 +159,19 @@ pub fn unstable_intervals_of<E>(
     matrix: impl FnMut(f64) -> Result<DMatrix<f64>, E>,
     range: Range<f64>,
 ) -> Result<Vec<UnstableInterval>, IntervalError<E>> {
-    let mut search = Search::over(matrix, &range)?;
-    let verdict = search.verdict(&range)?;
-    let mut intervals = Vec::new();
-    let mut unstable_since = verdict.unstable_at_start.then_some(range.start);
-    for change in verdict.changes.into_iter().chain([range.end]) {
-        match unstable_since.take() {
-            Some(start) => intervals.push(search.worst_in(start, change, &range)?),
-            None => unstable_since = Some(change),
+    named(matrix, |matrix| {
+        let mut search = Search::over(matrix, &range)?;
+        let verdict = search.verdict(&range)?;
+        let mut intervals = Vec::new();
+        let mut unstable_since = verdict.unstable_at_start.then_some(range.start);
+        for change in verdict.changes.into_iter().chain([range.end]) {
+            match unstable_since.take() {
+                Some(start) => intervals.push(search.worst_in(start, change, &range)?),
+                None => unstable_since = Some(change),
+            }
         }
-    }
-    Ok(intervals)
+        Ok(intervals)
+    })
 }
 
 /// Every parameter in `range` at which the spectral radius of `matrix` rises above one or returns to it, ascending.
@@ -195,5 +197,39 @@ pub fn stability_changes_of<E>(
     matrix: impl FnMut(f64) -> Result<DMatrix<f64>, E>,
     range: Range<f64>,
 ) -> Result<Vec<f64>, IntervalError<E>> {
-    Ok(Search::over(matrix, &range)?.verdict(&range)?.changes)
+    named(matrix, |matrix| {
+        Ok(Search::over(matrix, &range)?.verdict(&range)?.changes)
+    })
+}
+
+/// Runs a search that knows nothing of the errors of its matrix, and names the one that ended it.
+fn named<T, E>(
+    mut matrix: impl FnMut(f64) -> Result<DMatrix<f64>, E>,
+    search: impl FnOnce(&mut dyn FnMut(f64) -> Result<DMatrix<f64>, Withheld>) -> Result<T, Failure>,
+) -> Result<T, IntervalError<E>> {
+    let mut held = None;
+    let mut withholding = |at: f64| {
+        matrix(at).map_err(|source| {
+            held = Some(source);
+            Withheld
+        })
+    };
+    let found = search(&mut withholding);
+    found.map_err(|failure| match (failure, held) {
+        (IntervalError::Matrix { at, .. }, Some(source)) => IntervalError::Matrix { at, source },
+        // Without an error there is none to name: it is unresolved there.
+        (IntervalError::Matrix { at, .. }, None) => IntervalError::Unresolved {
+            near: at,
+            evaluations: 0,
+        },
+        (IntervalError::Range { start, end }, _) => IntervalError::Range { start, end },
+        (IntervalError::Shape { at, rows, columns }, _) => {
+            IntervalError::Shape { at, rows, columns }
+        }
+        (IntervalError::NotFinite { at }, _) => IntervalError::NotFinite { at },
+        (IntervalError::Eigenvalues { at }, _) => IntervalError::Eigenvalues { at },
+        (IntervalError::Unresolved { near, evaluations }, _) => {
+            IntervalError::Unresolved { near, evaluations }
+        }
+    })
 }

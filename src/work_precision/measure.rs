@@ -185,7 +185,7 @@ impl<'a, M: Model<N>, const N: usize> Observer<'a, M, N> {
     }
 
     fn look_at_constraints(&mut self, time: f64, state: &State<N>) {
-        if M::CONSTRAINTS.is_empty() {
+        if const { M::CONSTRAINTS.is_empty() } {
             return;
         }
         for one in constrained::residuals(self.model, time, &state.q, &self.velocity, 1.0) {

@@ -26,7 +26,7 @@ use crate::model::{First, Model, State};
 use crate::phase_form::PhaseForm;
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
-use crate::step::{Interval, Last, Memory, end_of, is_phase};
+use crate::step::{Interval, Last, Memory, end_of, may_be_phase};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Workspace, interior_len, numbers_len, pivots_len};
 
@@ -161,7 +161,7 @@ impl<const N: usize> Condenser<N> {
         interior: &mut [f64],
     ) -> Result<(), LegendreError> {
         let scheme = self.table.view();
-        let interior = if M::CONSTRAINTS.is_empty() {
+        let interior = if const { M::CONSTRAINTS.is_empty() } {
             interior
         } else {
             let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
@@ -176,7 +176,7 @@ impl<const N: usize> Condenser<N> {
             &mut interior[..layout.rates()]
         };
         let rates = interior.as_chunks_mut::<N>().0;
-        if is_phase::<M, N>(&scheme) {
+        if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
             let (forces, velocities) = rates.split_at_mut(scheme.points());
             for (k, node) in scheme.nodes.iter().enumerate() {
                 let t = time + node * length;
@@ -257,7 +257,7 @@ impl<const N: usize> Condenser<N> {
             sides: condensed.response,
         };
         let ends = condensed.ends;
-        let end = if !M::CONSTRAINTS.is_empty() {
+        let end = if const { !M::CONSTRAINTS.is_empty() } {
             let element = scheme.element;
             if let Some(constraint) = refused::<M, N>(&element) {
                 return Err(ConstraintError::Element {
@@ -288,7 +288,7 @@ impl<const N: usize> Condenser<N> {
             };
             linearise(&mut form, interior, directions, true, system, ends)?;
             form.end_state(interior)?.0
-        } else if is_phase::<M, N>(&scheme) {
+        } else if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
             let mut equations = PhaseForm {
                 model,
                 scheme,
@@ -355,7 +355,7 @@ impl<const N: usize> Condenser<N> {
     ) -> DenseElement<N> {
         let scheme = self.table.view();
         let m = self.interior;
-        if !M::CONSTRAINTS.is_empty() {
+        if const { !M::CONSTRAINTS.is_empty() } {
             let points = scheme.points() * N;
             // The workspace begins with the unknowns, their start, the increments and the forces.
             let momenta = &self.numbers[3 * m + points..3 * m + 2 * points];
@@ -372,7 +372,8 @@ impl<const N: usize> Condenser<N> {
             );
         }
         let rates = placed.interior.as_chunks().0;
-        let (rates, forces) = if is_phase::<M, N>(&scheme) {
+        let (rates, forces) = if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form()
+        {
             let (forces, velocities) = rates.split_at(scheme.points());
             (velocities, forces)
         } else {

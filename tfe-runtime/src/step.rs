@@ -163,7 +163,7 @@ where
         if !(h.is_finite() && h != 0.0) {
             return Err(StepError::InvalidStep { step: h });
         }
-        if !M::CONSTRAINTS.is_empty() {
+        if const { !M::CONSTRAINTS.is_empty() } {
             return crate::constrained::advance(self, memory, workspace, interval, state);
         }
         let scheme = self.tables.view();
@@ -199,7 +199,8 @@ where
             pivots: parts.tangent_pivots,
         };
         memory.factored = None;
-        let (end, end_low) = if is_phase::<M, N>(&scheme) {
+        let (end, end_low) = if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form()
+        {
             let mut equations = PhaseForm {
                 model: self.model,
                 scheme,
@@ -286,7 +287,7 @@ where
             memory.ratio = Some(fraction);
         }
         let unknowns = scheme.unknowns();
-        let halves = if M::CONSTRAINTS.is_empty() {
+        let halves = if const { M::CONSTRAINTS.is_empty() } {
             parts.unknowns.len() / (unknowns * N)
         } else {
             1
@@ -313,14 +314,12 @@ where
     }
 }
 
-/// Whether the equations are those of phase space.
-pub(crate) fn is_phase<M, const N: usize>(scheme: &SchemeRef<'_>) -> bool
+/// Whether the equations are those of phase space, given an element that has them.
+pub(crate) const fn may_be_phase<M, const N: usize>() -> bool
 where
     M: Model<N>,
 {
-    matches!(M::FORM, Form::Hamiltonian)
-        && scheme.element.has_phase_form()
-        && M::CONSTRAINTS.is_empty()
+    matches!(M::FORM, Form::Hamiltonian) && M::CONSTRAINTS.is_empty()
 }
 
 /// ω_i(τ*) J for every row.

@@ -12,7 +12,7 @@ use crate::points::{Leg, Points};
 use crate::propagator::Propagator;
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::{Contraction, Statistics};
-use crate::step::{Impulse, Interval, Last, Memory, Method, is_phase};
+use crate::step::{Impulse, Interval, Last, Memory, Method, may_be_phase};
 use crate::transition::TransitionError;
 use crate::workspace::{Workspace, interior_len, numbers_len, pivots_len, transition_len, width};
 
@@ -107,6 +107,10 @@ where
     /// A constant, so that nothing is compiled for models that never step like this.
     const MAY_HAVE_POINTS: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
 
+    /// Likewise a constant: whether all steps of one length have the same matrix.
+    const MAY_BE_PROPAGATED: bool =
+        M::FACTS.linear && !M::FACTS.time_dependent && M::CONSTRAINTS.is_empty();
+
     /// A stepper at rest.
     ///
     /// # Errors
@@ -162,7 +166,11 @@ where
     ) -> Result<(), StepError> {
         self.impulses.clear();
         self.impulses.extend_from_slice(impulses);
-        if self.is_propagated() && impulses.is_empty() && self.propagate(t, h, state) {
+        if Self::MAY_BE_PROPAGATED
+            && self.is_propagated()
+            && impulses.is_empty()
+            && self.propagate(t, h, state)
+        {
             return Ok(());
         }
         if Self::MAY_HAVE_POINTS && impulses.is_empty() && h.is_finite() && h != 0.0 {
@@ -190,13 +198,9 @@ where
         method.advance(&mut self.memory, workspace, interval, state)
     }
 
-    /// Whether all steps of one length have the same matrix.
+    /// Whether a matrix is asked for.
     fn is_propagated(&self) -> bool {
-        self.ends_only
-            && M::FACTS.linear
-            && !M::FACTS.time_dependent
-            && M::CONSTRAINTS.is_empty()
-            && !matches!(self.control.solve, Solve::FixedPoint)
+        self.ends_only && !matches!(self.control.solve, Solve::FixedPoint)
     }
 
     /// Moves `state` by the matrix of a linear model; false where an ordinary step is to be done.
@@ -323,7 +327,7 @@ where
         let length = scheme.points() * N;
         let unknowns = scheme.unknowns() * width(&scheme.element, M::FORM, N);
         let (first, rest) = self.numbers.split_at_mut(length);
-        if is_phase::<M, N>(&scheme) {
+        if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
             points.unknowns::<M>(h, &mut rest[..length], first);
         } else {
             let start = 3 * unknowns - length;
@@ -386,7 +390,7 @@ where
         };
         let retraced = self.retrace();
         let numbers = retraced.as_ref().unwrap_or(&self.numbers);
-        if !M::CONSTRAINTS.is_empty() {
+        if const { !M::CONSTRAINTS.is_empty() } {
             let m = interior_len(&scheme.element, M::FORM, N, M::CONSTRAINTS.len());
             let points = scheme.points() * N;
             let momenta = &numbers[3 * m + points..3 * m + 2 * points];
@@ -398,7 +402,8 @@ where
         // The workspace begins with the unknowns, their start and the increments.
         let m = scheme.unknowns() * width(&scheme.element, M::FORM, N);
         let unknowns = numbers[..m].as_chunks().0;
-        let (rates, forces) = if is_phase::<M, N>(&scheme) {
+        let (rates, forces) = if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form()
+        {
             let (pi, kappa) = unknowns.split_at(scheme.points());
             (kappa, pi)
         } else {

@@ -18,7 +18,7 @@ use crate::model::Model;
 use crate::model::State;
 use crate::phase_form::PhaseForm;
 use crate::scheme::Tables;
-use crate::step::{Impulse, Interval, Memory, Method, is_phase, set_kicks, total};
+use crate::step::{Impulse, Interval, Memory, Method, may_be_phase, set_kicks, total};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Workspace, transition_len};
 
@@ -170,7 +170,7 @@ where
             residual: parts.step,
             sides,
         };
-        if !M::CONSTRAINTS.is_empty() {
+        if const { !M::CONSTRAINTS.is_empty() } {
             let mut form = ConstrainedForm {
                 inner: VelocityForm {
                     model: self.model,
@@ -197,7 +197,7 @@ where
                 &mut matrix[..4 * N * N],
             )?);
         }
-        if is_phase::<M, N>(&scheme) {
+        if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
             let mut equations = PhaseForm {
                 model: self.model,
                 scheme,

@@ -1,9 +1,8 @@
 //! Where stability changes: roots of the functions, and the verdict between them.
 
 use super::IntervalError;
-use super::search::{SHORTEST, SPLIT, Sample, Search};
+use super::search::{Failure, SHORTEST, SPLIT, Sample, Search};
 use crate::stability::chebyshev::bracketed_root;
-use nalgebra::DMatrix;
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -30,18 +29,15 @@ pub(super) struct Verdict {
 }
 
 /// Why the polishing of a root stopped.
-enum Stop<E> {
+enum Stop {
     /// The function grows between the ends of the bracket: it changes its sign through infinity.
     Pole,
-    Failed(IntervalError<E>),
+    Failed(Failure),
 }
 
-impl<F, E> Search<F>
-where
-    F: FnMut(f64) -> Result<DMatrix<f64>, E>,
-{
+impl Search<'_> {
     /// Classifies the pieces between all candidates, and tells where the class changes.
-    pub(super) fn verdict(&mut self, range: &Range<f64>) -> Result<Verdict, IntervalError<E>> {
+    pub(super) fn verdict(&mut self, range: &Range<f64>) -> Result<Verdict, Failure> {
         /// Interior points of a piece whose majority decides: one may hit a tangency.
         const INTERIOR: [f64; 3] = [0.3, 0.5, 0.75];
         /// Samples closer than this to a candidate, relative to the piece, say nothing.
@@ -134,7 +130,7 @@ where
         left: &Sample,
         right: &Sample,
         left_unstable: bool,
-    ) -> Result<f64, IntervalError<E>> {
+    ) -> Result<f64, Failure> {
         let (mut low, mut high) = (left.at, right.at);
         loop {
             let middle = f64::midpoint(low, high);
@@ -151,7 +147,7 @@ where
     }
 
     /// All roots and touching points, ascending, no two at one place.
-    fn candidates(&mut self) -> Result<Vec<Candidate>, IntervalError<E>> {
+    fn candidates(&mut self) -> Result<Vec<Candidate>, Failure> {
         let count = self
             .samples
             .first()
@@ -210,8 +206,8 @@ where
         function: usize,
         start: (f64, f64),
         end: (f64, f64),
-    ) -> Result<Candidate, IntervalError<E>> {
-        let value_at = |search: &mut Self, at: f64| -> Result<f64, IntervalError<E>> {
+    ) -> Result<Candidate, Failure> {
+        let value_at = |search: &mut Self, at: f64| -> Result<f64, Failure> {
             let matrix = search.matrix_at(at)?;
             let (functions, _) = search
                 .measure

@@ -1,10 +1,9 @@
 //! Pieces of the range, small enough for polynomials, and what the polynomials show.
 
 use super::IntervalError;
-use super::search::{SHORTEST, SPLIT, Sample, Search};
+use super::search::{Failure, SHORTEST, SPLIT, Sample, Search};
 use crate::stability::chebyshev::{DEGREE, Series, points};
 use crate::stability::sign_functions::scale_of;
-use nalgebra::DMatrix;
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -86,17 +85,14 @@ struct Interpolant {
     is_resolved: bool,
 }
 
-impl<F, E> Search<F>
-where
-    F: FnMut(f64) -> Result<DMatrix<f64>, E>,
-{
+impl Search<'_> {
     /// Interpolates all functions on a piece; adds samples at the points and at the critical points that matter, or smaller pieces.
     pub(super) fn resolve(
         &mut self,
         piece: Piece,
         range: &Range<f64>,
         waiting: &mut Vec<Piece>,
-    ) -> Result<(), IntervalError<E>> {
+    ) -> Result<(), Failure> {
         /// Where the interpolant is compared with the function itself.
         const CHECKS: [f64; 2] = [0.1371, 0.8193];
         let Piece {

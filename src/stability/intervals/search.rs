@@ -27,9 +27,19 @@ pub(super) struct Sample {
     pub(super) radius: f64,
 }
 
+/// The matrix could not be computed: the error stays with who computes it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Withheld;
+
+/// Why a search ends early.
+pub(super) type Failure = IntervalError<Withheld>;
+
+/// The matrix at a value of the parameter: a pointer to a function, so that the search is compiled once and not for every model.
+type Matrix<'m> = &'m mut dyn FnMut(f64) -> Result<DMatrix<f64>, Withheld>;
+
 /// The search through one range.
-pub(super) struct Search<F> {
-    pub(super) matrix: F,
+pub(super) struct Search<'m> {
+    matrix: Matrix<'m>,
     pub(super) measure: Measure,
     pub(super) size: usize,
     evaluations: usize,
@@ -39,12 +49,9 @@ pub(super) struct Search<F> {
     pub(super) touches: Vec<f64>,
 }
 
-impl<F, E> Search<F>
-where
-    F: FnMut(f64) -> Result<DMatrix<f64>, E>,
-{
+impl<'m> Search<'m> {
     /// Samples the range until every function is resolved.
-    pub(super) fn over(matrix: F, range: &Range<f64>) -> Result<Self, IntervalError<E>> {
+    pub(super) fn over(matrix: Matrix<'m>, range: &Range<f64>) -> Result<Self, Failure> {
         let Range { start, end } = *range;
         if !(start.is_finite() && end.is_finite() && (end - start).is_finite() && start < end) {
             return Err(IntervalError::Range { start, end });
@@ -73,7 +80,7 @@ where
         Ok(search)
     }
 
-    pub(super) fn matrix_at(&mut self, at: f64) -> Result<DMatrix<f64>, IntervalError<E>> {
+    pub(super) fn matrix_at(&mut self, at: f64) -> Result<DMatrix<f64>, Failure> {
         if self.evaluations >= MOST_EVALUATIONS {
             return Err(IntervalError::Unresolved {
                 near: at,
@@ -93,11 +100,7 @@ where
         Ok(matrix)
     }
 
-    pub(super) fn sample(
-        &mut self,
-        at: f64,
-        scale: &Rc<DMatrix<f64>>,
-    ) -> Result<Sample, IntervalError<E>> {
+    pub(super) fn sample(&mut self, at: f64, scale: &Rc<DMatrix<f64>>) -> Result<Sample, Failure> {
         let matrix = self.matrix_at(at)?;
         let (functions, radius) = self
             .measure

@@ -1,24 +1,20 @@
 //! The largest spectral radius of an unstable interval.
 
-use super::search::Search;
+use super::search::{Failure, Search};
 use super::{IntervalError, UnstableInterval};
-use nalgebra::DMatrix;
 use std::ops::Range;
 
 /// A spectral radius this large is called infinite: a pole, approached as far as the maximum of a smooth function would be.
 const POLE: f64 = 1e8;
 
-impl<F, E> Search<F>
-where
-    F: FnMut(f64) -> Result<DMatrix<f64>, E>,
-{
+impl Search<'_> {
     /// The largest spectral radius of an unstable interval: around the best samples by golden section.
     pub(super) fn worst_in(
         &mut self,
         start: f64,
         end: f64,
         range: &Range<f64>,
-    ) -> Result<UnstableInterval, IntervalError<E>> {
+    ) -> Result<UnstableInterval, Failure> {
         /// Local maxima among the samples that are refined.
         const STARTS: usize = 3;
         let inside = self
@@ -57,11 +53,7 @@ where
     }
 
     /// A local maximum (h, ρ) by golden section, to the square root of round-off in h.
-    fn highest_between(
-        &mut self,
-        mut low: f64,
-        mut high: f64,
-    ) -> Result<(f64, f64), IntervalError<E>> {
+    fn highest_between(&mut self, mut low: f64, mut high: f64) -> Result<(f64, f64), Failure> {
         const GOLDEN: f64 = 0.381_966_011_250_105_1;
         let tolerance = f64::EPSILON.sqrt() * (high - low);
         let radius_at = |search: &mut Self, at: f64| match search.matrix_at(at) {

@@ -230,7 +230,7 @@ mod heap {
     where
         M: Model<N>,
     {
-        if M::CONSTRAINTS.is_empty() {
+        if const { M::CONSTRAINTS.is_empty() } {
             return Ok(crate::legendre::velocity(model, t, q, p, guess)?);
         }
         let count = M::CONSTRAINTS.len();
@@ -264,7 +264,7 @@ mod heap {
         M: Model<N>,
     {
         let v = velocity(model, t, q, p, guess)?;
-        Ok(if M::CONSTRAINTS.is_empty() {
+        Ok(if const { M::CONSTRAINTS.is_empty() } {
             v
         } else {
             super::own_velocity(model, t, q, p, &v)
