@@ -2,6 +2,7 @@
 
 mod error;
 mod fit;
+mod given;
 mod grid;
 mod measure;
 mod measurements;
@@ -10,6 +11,7 @@ mod peer;
 mod point;
 mod reference;
 mod rounds;
+mod subject;
 
 use grid::Grid;
 use measure::{Measure, Way};
@@ -22,9 +24,7 @@ use std::io::Write;
 use std::ops::Range;
 use std::time::Duration;
 use tfe_runtime::step::Control;
-use tfe_runtime::{Element, Model, Solve, State};
-
-use crate::simulation::Simulation;
+use tfe_runtime::{Element, Solve};
 
 pub use error::{SaveError, WorkPrecisionError};
 pub use fit::Slope;
@@ -32,6 +32,7 @@ pub use measurements::{Curve, Measurements};
 pub use peer::{Peer, PeerMeasured, PeerPoint, PeerRun};
 pub use point::{Cost, Measured, Point};
 pub use reference::Reference;
+pub use subject::{PhasePoint, Subject};
 
 /// Runs one model with several elements and steps, and measures what each run costs and how far off it ends.
 ///
@@ -72,10 +73,39 @@ pub use reference::Reference;
 /// ```
 ///
 /// Times are those of the steps alone, on one processor, the best of several repetitions where a run is short. What they are compared
-/// with is [`reference`](Self::reference), or else a run with `Mixed::<8>` whose step is halved until it no longer changes.
-pub struct WorkPrecision<'m, M, const N: usize> {
+/// with is a `reference` of one's own, or else a run with `Mixed::<8>` whose step is halved until it no longer changes.
+///
+/// Models of run-time length are measured by the same calls: `S` is the type of the states, [`State`](crate::State) or
+/// [`FamilyState`](crate::family::FamilyState).
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(
+///     coordinates(q[n]),
+///     lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + b/4*(q[i+1]-q[i])^4),
+/// )]
+/// struct Chain { n: usize, b: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let chain = Chain { n: 16, b: 0.3 };
+/// let q: Vec<f64> = (0..chain.n).map(|i| (0.2 * i as f64).cos()).collect();
+/// let start = chain.state(q, vec![0.0; chain.n]);
+/// let measured = WorkPrecision::new(&chain, start, 0.0..5.0)
+///     .element(Mixed::<4>)
+///     .steps([0.4, 0.2, 0.1])
+///     .run()?;
+/// let slope = measured.curves()[0].slope().ok_or("no slope")?;
+/// assert!((slope.exponent - 6.0).abs() < 0.2);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// What a family cannot run (an element or a solver, see [`FamilySimulation`](crate::family::FamilySimulation)) is a failed point that says
+/// why; the other curves are measured all the same.
+pub struct WorkPrecision<'m, M, S> {
     model: &'m M,
-    start: State<N>,
+    start: S,
     span: Range<f64>,
     title: String,
     elements: Vec<Element>,
@@ -83,17 +113,17 @@ pub struct WorkPrecision<'m, M, const N: usize> {
     steps: Vec<f64>,
     control: Control,
     tolerances: Vec<f64>,
-    rivals: Vec<Rival<'m, N>>,
-    source: Source<'m, N>,
+    rivals: Vec<Rival<'m, S>>,
+    source: Source<'m, S>,
     uncertainty: Option<f64>,
     repeat_for: Duration,
     cost: Cost,
     progress: bool,
 }
 
-impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
+impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
     /// Runs of `model` from `start` over the span, backwards where it ends before it starts; no element and no step so far.
-    pub fn new(model: &'m M, start: State<N>, span: Range<f64>) -> Self {
+    pub fn new(model: &'m M, start: S, span: Range<f64>) -> Self {
         Self {
             model,
             start,
@@ -141,7 +171,8 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
         self
     }
 
-    /// When the iteration inside an element is done, as in [`Simulation::tolerance`]. It limits the accuracy as well as the cost.
+    /// When the iteration inside an element is done, as in [`Simulation::tolerance`](crate::Simulation::tolerance). It limits the
+    /// accuracy as well as the cost.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;
@@ -195,7 +226,7 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
         run: F,
     ) -> Self
     where
-        F: Fn(f64) -> Result<PeerRun<N>, Box<dyn Error>> + 'm,
+        F: Fn(f64) -> Result<PeerRun<S>, Box<dyn Error>> + 'm,
     {
         self.rivals.push(Rival {
             name: name.into(),
@@ -209,21 +240,6 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
     #[must_use]
     pub fn max_iterations(mut self, iterations: u32) -> Self {
         self.control.max_iterations = iterations;
-        self
-    }
-
-    /// What runs are compared with: the exact (q, p) at any time of the span. Its uncertainty counts as one rounding, unless
-    /// [`reference_uncertainty`](Self::reference_uncertainty) says more.
-    #[must_use]
-    pub fn reference(mut self, exact: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
-        self.source = Source::Function(Box::new(exact));
-        self
-    }
-
-    /// What runs are compared with: the exact state at the end of the span, and nothing between.
-    #[must_use]
-    pub fn reference_end(mut self, q: [f64; N], p: [f64; N]) -> Self {
-        self.source = Source::End(State { q, p });
         self
     }
 
@@ -274,14 +290,14 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
         self.report(format_args!("reference …"));
         let reference = self.source.find(
             self.model,
-            (self.span.start, self.start),
+            (self.span.start, &self.start),
             &grids,
             self.uncertainty,
         )?;
         self.report(format_args!("reference: {}", reference.summary()));
         let measure = Measure {
             model: self.model,
-            start: self.start,
+            start: &self.start,
             reference: &reference,
         };
         let solvers = match self.solvers.as_slice() {
@@ -330,7 +346,7 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
         }
         Ok(Measurements {
             title: self.title.clone(),
-            constrained: !M::CONSTRAINTS.is_empty(),
+            constrained: M::CONSTRAINED,
             curves,
             peers,
             reference: reference.into_summary(),
@@ -357,24 +373,13 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
 
     /// Refuses a start from which no simulation begins.
     fn check_start(&self, grids: &[Grid]) -> Result<(), WorkPrecisionError> {
-        use crate::error::RunErrorKind;
         let Some(grid) = grids.last() else {
             return Err(WorkPrecisionError::NoSteps);
         };
-        // One step, of which only the checks before it count.
         let (_, next, h) = grid.element(0);
-        let simulation = Simulation::new(self.model).step(h);
-        match simulation.run(self.start, self.span.start..next) {
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    RunErrorKind::Start { .. } | RunErrorKind::Inconsistent { .. }
-                ) =>
-            {
-                Err(WorkPrecisionError::Start(error.kind().clone()))
-            }
-            _ => Ok(()),
-        }
+        let step = self.span.start..next;
+        let checked = self.model.check_start(&self.start, step, h);
+        checked.map_err(WorkPrecisionError::Start)
     }
 
     fn report(&self, line: fmt::Arguments<'_>) {
@@ -385,7 +390,7 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, N> {
     }
 }
 
-impl<M, const N: usize> fmt::Debug for WorkPrecision<'_, M, N> {
+impl<M, S> fmt::Debug for WorkPrecision<'_, M, S> {
     /// What is to be run; models and functions may have nothing to show.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("WorkPrecision")

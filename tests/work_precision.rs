@@ -44,7 +44,7 @@ fn end_of_table() -> State<1> {
     }
 }
 
-fn pendulum(model: &Pendulum) -> WorkPrecision<'_, Pendulum, 1> {
+fn pendulum(model: &Pendulum) -> WorkPrecision<'_, Pendulum, State<1>> {
     // Counts and errors are tested, not times.
     WorkPrecision::new(model, START, 0.0..10.0).repeat_for(Duration::ZERO)
 }
@@ -430,7 +430,7 @@ fn backwards_and_with_a_shorter_last_step() {
 }
 
 /// Leapfrog for the table's pendulum, with a clock that always says the same.
-fn leapfrog(step: f64) -> PeerRun<1> {
+fn leapfrog(step: f64) -> PeerRun<State<1>> {
     let (mut end, steps) = (START, (10.0 / step).round() as u64);
     for _ in 0..steps {
         end.p[0] -= step / 2.0 * end.q[0].sin();

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 use tfe::charts::Section;
 use tfe::prelude::*;
-use tfe::work_precision::{Curve, Measurements, WorkPrecisionError};
+use tfe::work_precision::{Curve, Measurements, PhasePoint, Subject, WorkPrecisionError};
 
 /// The errors to be reached.
 pub const TARGETS: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
@@ -19,9 +19,9 @@ pub struct Scene {
 
 impl Scene {
     /// Runs the scene with all elements.
-    pub fn measure<M: Model<N>, const N: usize>(
+    pub fn measure<M: Subject<S>, S: PhasePoint>(
         title: &'static str,
-        problem: WorkPrecision<'_, M, N>,
+        problem: WorkPrecision<'_, M, S>,
     ) -> Result<Self, WorkPrecisionError> {
         let measured = problem
             .elements(elements())

@@ -28,12 +28,12 @@ pub enum Field {
 
 /// Adds the peers to a problem. `momenta` gives the state of coordinates and velocities.
 pub fn contest<'m, M, S, const N: usize, const D: usize>(
-    ours: WorkPrecision<'m, M, N>,
+    ours: WorkPrecision<'m, M, State<N>>,
     system: &'m S,
     start: &Start<N>,
     field: Field,
     state: fn([f64; N], [f64; N]) -> State<N>,
-) -> WorkPrecision<'m, M, N>
+) -> WorkPrecision<'m, M, State<N>>
 where
     M: tfe::Model<N>,
     S: System<N>,
@@ -63,7 +63,7 @@ where
         ("Yoshida 6 (utsuroi)", fixed::yoshida6, 14.0),
         ("Yoshida 8 (utsuroi)", fixed::yoshida8, 30.0),
     ];
-    let with = |ours: WorkPrecision<'m, M, N>,
+    let with = |ours: WorkPrecision<'m, M, State<N>>,
                 name: &str,
                 settings: Vec<f64>,
                 method: Method<'m, S, N, D>| {

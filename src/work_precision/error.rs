@@ -47,6 +47,17 @@ pub enum WorkPrecisionError {
         /// At which time.
         time: f64,
     },
+    /// A vector of the reference that was given is not as long as the model.
+    ReferenceLength {
+        /// `q` or `p`.
+        vector: &'static str,
+        /// At which time.
+        time: f64,
+        /// Its length.
+        length: usize,
+        /// The number of coordinates.
+        expected: usize,
+    },
 }
 
 impl fmt::Display for WorkPrecisionError {
@@ -77,6 +88,15 @@ impl fmt::Display for WorkPrecisionError {
             Self::ReferenceValue { time } => {
                 write!(f, "the reference at t = {time} is not finite")
             }
+            Self::ReferenceLength {
+                vector,
+                time,
+                length,
+                expected,
+            } => write!(
+                f,
+                "the vector {vector} of the reference at t = {time} has {length} elements, but the model has {expected} coordinates"
+            ),
         }
     }
 }

@@ -3,22 +3,22 @@
 use super::grid::Grid;
 use super::point::Measured;
 use super::reference::Known;
+use super::subject::{PhasePoint, Subject};
 use crate::error::RunErrorKind;
 use std::hint::black_box;
 use std::ops::Range;
 use std::time::{Duration, Instant};
-use tfe_runtime::constrained;
-use tfe_runtime::step::{Control, Stepper};
-use tfe_runtime::{Element, Model, State, legendre};
+use tfe_runtime::Element;
+use tfe_runtime::step::Control;
 
 /// The most repetitions of a run: the best of a hundred is not much above the best of a thousand.
 pub(super) const MOST_REPETITIONS: u32 = 100;
 
 /// What all runs have in common.
-pub(super) struct Measure<'a, M, const N: usize> {
+pub(super) struct Measure<'a, M, S> {
     pub(super) model: &'a M,
-    pub(super) start: State<N>,
-    pub(super) reference: &'a Known<N>,
+    pub(super) start: &'a S,
+    pub(super) reference: &'a Known<S>,
 }
 
 /// One way to cross the span.
@@ -29,33 +29,33 @@ pub(super) struct Way<'g> {
     pub(super) grid: &'g Grid,
 }
 
-impl<M: Model<N>, const N: usize> Measure<'_, M, N> {
-    fn stepper(&self, way: Way<'_>) -> Result<Stepper<'_, M, N>, RunErrorKind> {
-        Stepper::new(self.model, way.element, way.control).map_err(RunErrorKind::Element)
+impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
+    fn stepper(&self, way: Way<'_>) -> Result<M::Stepper<'_>, RunErrorKind> {
+        self.model.stepper(way.element, way.control)
     }
 
     /// Makes the run, with the clock stopped while it is looked at.
     pub(super) fn look(&self, way: Way<'_>) -> Result<Measured, RunErrorKind> {
         let (grid, mut stepper) = (way.grid, self.stepper(way)?);
-        let mut observer = Observer::new(self, grid.node(0));
-        let (mut state, mut from, mut time) = (self.start, 0, Duration::ZERO);
+        let mut observer = Observer::new(self, &mut stepper, grid.node(0));
+        let (mut state, mut from, mut time) = (self.start.clone(), 0, Duration::ZERO);
         for look in grid.looks() {
-            time += advance(&mut stepper, grid, from..look.node, &mut state)?;
+            time += advance::<M, S>(&mut stepper, grid, from..look.node, &mut state)?;
             from = look.node;
-            observer.look(grid.node(look.node), &state, look.compare);
+            observer.look(&mut stepper, grid.node(look.node), &state, look.compare);
         }
         let mut measured = observer.measured;
         measured.seconds = time.as_secs_f64();
         measured.repetitions = 1;
-        measured.statistics = *stepper.statistics();
+        measured.statistics = M::statistics(&stepper);
         measured.at_reference_floor = measured.error() <= self.reference.uncertainty();
         Ok(measured)
     }
 
     /// Makes the run without looking.
     pub(super) fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind> {
-        let (grid, mut state) = (way.grid, self.start);
-        advance(&mut self.stepper(way)?, grid, 0..grid.steps(), &mut state)
+        let (grid, mut state) = (way.grid, self.start.clone());
+        advance::<M, S>(&mut self.stepper(way)?, grid, 0..grid.steps(), &mut state)
     }
 
     /// Makes the run with each tolerance, the tightest first, and keeps the loosest that does not show in the error.
@@ -94,44 +94,42 @@ impl<M: Model<N>, const N: usize> Measure<'_, M, N> {
 const SHOWS: f64 = 1.25;
 
 /// Moves `state` over some elements of the grid, and says how long that took.
-pub(super) fn advance<M: Model<N>, const N: usize>(
-    stepper: &mut Stepper<'_, M, N>,
+pub(super) fn advance<M: Subject<S>, S: PhasePoint>(
+    stepper: &mut M::Stepper<'_>,
     grid: &Grid,
     elements: Range<usize>,
-    state: &mut State<N>,
+    state: &mut S,
 ) -> Result<Duration, RunErrorKind> {
     let clock = Instant::now();
     for k in elements {
         let (t, _, h) = grid.element(k);
-        stepper
-            .advance(t, h, state, &[])
-            .map_err(|source| RunErrorKind::Solve {
-                element: k,
-                time: t,
-                step: h,
-                source,
-            })?;
+        M::advance(stepper, t, h, state).map_err(|source| RunErrorKind::Solve {
+            element: k,
+            time: t,
+            step: h,
+            source,
+        })?;
     }
     black_box(&state);
     Ok(clock.elapsed())
 }
 
 /// What is seen of a run at its nodes.
-struct Observer<'a, M, const N: usize> {
+struct Observer<'a, M: Subject<S>, S: PhasePoint> {
     model: &'a M,
-    reference: &'a Known<N>,
+    reference: &'a Known<S>,
     start_energy: f64,
-    velocity: [f64; N],
+    velocity: M::Velocity,
     measured: Measured,
 }
 
-impl<'a, M: Model<N>, const N: usize> Observer<'a, M, N> {
-    fn new(measure: &Measure<'a, M, N>, time: f64) -> Self {
+impl<'a, M: Subject<S>, S: PhasePoint> Observer<'a, M, S> {
+    fn new(measure: &Measure<'a, M, S>, stepper: &mut M::Stepper<'_>, time: f64) -> Self {
         let mut observer = Self {
             model: measure.model,
             reference: measure.reference,
             start_energy: 0.0,
-            velocity: [0.0; N],
+            velocity: measure.model.rest(),
             measured: Measured {
                 error_q: 0.0,
                 error_p: 0.0,
@@ -146,13 +144,13 @@ impl<'a, M: Model<N>, const N: usize> Observer<'a, M, N> {
                 at_reference_floor: false,
             },
         };
-        observer.start_energy = observer.energy(time, &measure.start);
-        observer.look_at_constraints(time, &measure.start);
+        observer.start_energy = observer.energy(stepper, time, measure.start);
+        observer.look_at_constraints(time, measure.start);
         observer
     }
 
-    fn look(&mut self, time: f64, state: &State<N>, compare: bool) {
-        let energy = self.energy(time, state);
+    fn look(&mut self, stepper: &mut M::Stepper<'_>, time: f64, state: &S, compare: bool) {
+        let energy = self.energy(stepper, time, state);
         let scale = if self.start_energy == 0.0 {
             1.0
         } else {
@@ -168,35 +166,22 @@ impl<'a, M: Model<N>, const N: usize> Observer<'a, M, N> {
         }
     }
 
-    /// The energy; NaN where the momentum belongs to no velocity. Keeps the velocity.
-    fn energy(&mut self, time: f64, state: &State<N>) -> f64 {
-        let velocity =
-            constrained::velocity_of(self.model, time, &state.q, &state.p, &self.velocity);
-        match velocity {
-            Ok(velocity) => {
-                self.velocity = velocity;
-                legendre::energy_at(self.model, time, &state.q, &state.p, &velocity)
-            }
-            Err(_) => {
-                self.velocity = [0.0; N];
-                f64::NAN
-            }
-        }
+    fn energy(&mut self, stepper: &mut M::Stepper<'_>, time: f64, state: &S) -> f64 {
+        self.model.energy(stepper, time, state, &mut self.velocity)
     }
 
-    fn look_at_constraints(&mut self, time: f64, state: &State<N>) {
-        if const { M::CONSTRAINTS.is_empty() } {
+    fn look_at_constraints(&mut self, time: f64, state: &S) {
+        if const { !M::CONSTRAINED } {
             return;
         }
-        for one in constrained::residuals(self.model, time, &state.q, &self.velocity, 1.0) {
-            largest(&mut self.measured.constraint_position, one.position.abs());
-            largest(&mut self.measured.constraint_velocity, one.velocity.abs());
-        }
+        let (position, velocity) = self.model.residuals(time, state, &self.velocity);
+        largest(&mut self.measured.constraint_position, position);
+        largest(&mut self.measured.constraint_velocity, velocity);
     }
 }
 
 /// Keeps the larger one; `f64::max` would drop a NaN.
-fn largest(so_far: &mut f64, value: f64) {
+pub(super) fn largest(so_far: &mut f64, value: f64) {
     if !(value <= *so_far) {
         *so_far = value;
     }

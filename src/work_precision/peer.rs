@@ -3,15 +3,15 @@
 use super::measure::MOST_REPETITIONS;
 use super::point::Cost;
 use super::reference::Known;
+use super::subject::PhasePoint;
 use std::error::Error;
 use std::time::Duration;
-use tfe_runtime::State;
 
-/// What another integrator says of one run, see [`WorkPrecision::peer`](super::WorkPrecision::peer).
+/// What another integrator says of one run, see [`WorkPrecision::peer`](super::WorkPrecision::peer); `S` is the type of the model's states.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PeerRun<const N: usize> {
+pub struct PeerRun<S> {
     /// Where it ended.
-    pub end: State<N>,
+    pub end: S,
     /// How long the run took, without what comes before its first step.
     pub time: Duration,
     /// How often it evaluated the equations; zero where nothing counts them.
@@ -98,18 +98,18 @@ impl PeerMeasured {
 }
 
 /// A run of another integrator with one setting.
-type Run<'m, const N: usize> = dyn Fn(f64) -> Result<PeerRun<N>, Box<dyn Error>> + 'm;
+type Run<'m, S> = dyn Fn(f64) -> Result<PeerRun<S>, Box<dyn Error>> + 'm;
 
 /// Another integrator, not run yet.
-pub(super) struct Rival<'m, const N: usize> {
+pub(super) struct Rival<'m, S> {
     pub(super) name: String,
     pub(super) settings: Vec<f64>,
-    pub(super) run: Box<Run<'m, N>>,
+    pub(super) run: Box<Run<'m, S>>,
 }
 
-impl<const N: usize> Rival<'_, N> {
+impl<S: PhasePoint> Rival<'_, S> {
     /// The first run with each setting.
-    pub(super) fn look(&self, reference: &Known<N>, end: f64) -> Peer {
+    pub(super) fn look(&self, reference: &Known<S>, end: f64) -> Peer {
         let point = |setting: &f64| PeerPoint {
             setting: *setting,
             outcome: self.look_at(*setting, reference, end),
@@ -123,11 +123,20 @@ impl<const N: usize> Rival<'_, N> {
     fn look_at(
         &self,
         setting: f64,
-        reference: &Known<N>,
+        reference: &Known<S>,
         end: f64,
     ) -> Result<PeerMeasured, String> {
         let run = (self.run)(setting).map_err(|error| error.to_string())?;
-        let finite = run.end.q.iter().chain(&run.end.p).all(|x| x.is_finite());
+        let (q, p) = (run.end.q(), run.end.p());
+        for (vector, length) in [("q", q.len()), ("p", p.len())] {
+            let expected = reference.length();
+            if length != expected {
+                return Err(format!(
+                    "the vector {vector} of the end has {length} elements, but the model has {expected} coordinates"
+                ));
+            }
+        }
+        let finite = q.iter().chain(p).all(|x| x.is_finite());
         let errors = reference.errors(end, &run.end).filter(|_| finite);
         let (error_q, error_p) = errors.ok_or("the end is not finite")?;
         let mut measured = PeerMeasured {

@@ -2,10 +2,11 @@
 
 use super::WorkPrecisionError;
 use super::grid::Grid;
+use super::subject::{PhasePoint, Subject};
 use crate::error::RunErrorKind;
 use std::fmt;
-use tfe_runtime::step::{Control, Stepper};
-use tfe_runtime::{Element, Mixed, Model, State};
+use tfe_runtime::step::Control;
+use tfe_runtime::{Element, Mixed};
 
 /// How the reference was found, and how well it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,20 +56,20 @@ impl fmt::Display for Reference {
     }
 }
 
-/// Exact (q, p) at a time.
-type Function<'m, const N: usize> = dyn Fn(f64) -> ([f64; N], [f64; N]) + 'm;
+/// The exact state at a time.
+type Function<'m, S> = dyn Fn(f64) -> S + 'm;
 
 /// Where the reference comes from.
-pub(super) enum Source<'m, const N: usize> {
+pub(super) enum Source<'m, S> {
     Computed,
-    End(State<N>),
-    Function(Box<Function<'m, N>>),
+    End(S),
+    Function(Box<Function<'m, S>>),
 }
 
 /// The reference at all times at which runs are compared with it.
-pub(super) struct Known<const N: usize> {
+pub(super) struct Known<S> {
     /// In the order of time.
-    states: Vec<(f64, State<N>)>,
+    states: Vec<(f64, S)>,
     scale: Scale,
     summary: Reference,
 }
@@ -81,11 +82,11 @@ struct Scale {
 }
 
 impl Scale {
-    fn of<'s, const N: usize>(states: impl Iterator<Item = &'s State<N>>) -> Self {
+    fn of<'s, S: PhasePoint + 's>(states: impl Iterator<Item = &'s S>) -> Self {
         let mut scale = Self { q: 0.0, p: 0.0 };
         for state in states {
-            scale.q = scale.q.max(norm(&state.q));
-            scale.p = scale.p.max(norm(&state.p));
+            scale.q = scale.q.max(norm(state.q()));
+            scale.p = scale.p.max(norm(state.p()));
         }
         let or_one = |value: f64| if value > 0.0 { value } else { 1.0 };
         Self {
@@ -95,17 +96,14 @@ impl Scale {
     }
 
     /// The relative distances of coordinates and of momenta.
-    fn distances<const N: usize>(self, a: &State<N>, b: &State<N>) -> (f64, f64) {
-        let difference = |a: &[f64; N], b: &[f64; N]| {
-            let mut difference = *a;
-            for (difference, b) in difference.iter_mut().zip(b) {
-                *difference -= b;
-            }
-            norm(&difference)
+    fn distances<S: PhasePoint>(self, a: &S, b: &S) -> (f64, f64) {
+        let difference = |a: &[f64], b: &[f64]| {
+            let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+            norm(&differences)
         };
         (
-            difference(&a.q, &b.q) / self.q,
-            difference(&a.p, &b.p) / self.p,
+            difference(a.q(), b.q()) / self.q,
+            difference(a.p(), b.p()) / self.p,
         )
     }
 }
@@ -129,10 +127,15 @@ fn norm(values: &[f64]) -> f64 {
 /// Times closer than this, relative to their size, are one: a step between them would be rounding.
 const SAME: f64 = 8.0 * f64::EPSILON;
 
-impl<const N: usize> Known<N> {
+impl<S: PhasePoint> Known<S> {
     /// The relative error at the end that even the exact motion would seem to have.
     pub(super) fn uncertainty(&self) -> f64 {
         self.summary.uncertainty()
+    }
+
+    /// The number of coordinates.
+    pub(super) fn length(&self) -> usize {
+        self.states.first().map_or(0, |(_, state)| state.q().len())
     }
 
     pub(super) fn summary(&self) -> &Reference {
@@ -144,7 +147,7 @@ impl<const N: usize> Known<N> {
     }
 
     /// The relative errors of q and p, if there is a reference at this time.
-    pub(super) fn errors(&self, time: f64, state: &State<N>) -> Option<(f64, f64)> {
+    pub(super) fn errors(&self, time: f64, state: &S) -> Option<(f64, f64)> {
         let distance = |known: &f64| (known - time).abs();
         let nearest = self
             .states
@@ -156,49 +159,58 @@ impl<const N: usize> Known<N> {
     }
 }
 
-impl<const N: usize> Source<'_, N> {
+impl<S: PhasePoint> Source<'_, S> {
     /// The reference at all times at which the grids are looked at.
-    pub(super) fn find<M: Model<N>>(
+    pub(super) fn find<M: Subject<S>>(
         &self,
         model: &M,
-        start: (f64, State<N>),
+        start: (f64, &S),
         grids: &[Grid],
         uncertainty: Option<f64>,
-    ) -> Result<Known<N>, WorkPrecisionError> {
+    ) -> Result<Known<S>, WorkPrecisionError> {
         let believed = uncertainty.unwrap_or(0.0).abs().max(f64::EPSILON);
         let times = times(grids);
         let states = match self {
             Self::Computed => return computed(model, start, grids, &times, believed),
             Self::End(state) => {
                 let end = times.last().copied();
-                end.map(|time| (time, *state)).into_iter().collect()
+                end.map(|time| (time, state.clone())).into_iter().collect()
             }
             Self::Function(exact) => {
-                let state = |time: f64| {
-                    let (q, p) = exact(time);
-                    (time, State { q, p })
-                };
+                let state = |time: f64| (time, exact(time));
                 times.into_iter().map(state).collect::<Vec<_>>()
             }
         };
         for (time, state) in &states {
-            if !state
-                .q
-                .iter()
-                .chain(&state.p)
-                .all(|value| value.is_finite())
-            {
-                return Err(WorkPrecisionError::ReferenceValue { time: *time });
-            }
+            check(*time, state, start.1.q().len())?;
         }
         Ok(Known {
-            scale: Scale::of(states.iter().map(|(_, state)| state).chain([&start.1])),
+            scale: Scale::of(states.iter().map(|(_, state)| state).chain([start.1])),
             states,
             summary: Reference::Given {
                 uncertainty: believed,
             },
         })
     }
+}
+
+/// Refuses a state of a reference that cannot be compared with those of the model.
+fn check<S: PhasePoint>(time: f64, state: &S, expected: usize) -> Result<(), WorkPrecisionError> {
+    for (vector, values) in [("q", state.q()), ("p", state.p())] {
+        let length = values.len();
+        if length != expected {
+            return Err(WorkPrecisionError::ReferenceLength {
+                vector,
+                time,
+                length,
+                expected,
+            });
+        }
+        if !values.iter().all(|value| value.is_finite()) {
+            return Err(WorkPrecisionError::ReferenceValue { time });
+        }
+    }
+    Ok(())
 }
 
 /// The times at which any of the grids is compared, in the order in which a run meets them.
@@ -220,13 +232,13 @@ fn times(grids: &[Grid]) -> Vec<f64> {
 }
 
 /// A run with half the step, and half of that, until it no longer changes.
-fn computed<M: Model<N>, const N: usize>(
+fn computed<M: Subject<S>, S: PhasePoint>(
     model: &M,
-    start: (f64, State<N>),
+    start: (f64, &S),
     grids: &[Grid],
     times: &[f64],
     believed: f64,
-) -> Result<Known<N>, WorkPrecisionError> {
+) -> Result<Known<S>, WorkPrecisionError> {
     /// Below it, a difference that no longer falls is one of roundings; above it, the motion is not resolved yet.
     const RESOLVED: f64 = 1e-6;
     /// Of steps so different that this is not enough, the longest are not worth a comparison.
@@ -237,7 +249,7 @@ fn computed<M: Model<N>, const N: usize>(
     let shortest = steps().fold(f64::INFINITY, f64::min);
     let least = (shortest / 4.0).min(longest / 64.0);
     let (mut last, mut failure) = (None, None);
-    let mut best: Option<Known<N>> = None;
+    let mut best: Option<Known<S>> = None;
     for halvings in 0..MOST_HALVINGS {
         let step = longest * 0.5_f64.powi(halvings as i32);
         if step < least {
@@ -246,7 +258,7 @@ fn computed<M: Model<N>, const N: usize>(
         match run(model, element, start, times, (longest, halvings)) {
             Err(kind) => failure = Some(kind),
             Ok(states) => {
-                let scale = Scale::of(states.iter().chain([&start.1]));
+                let scale = Scale::of(states.iter().chain([start.1]));
                 if let Some(coarse) = last.replace(states.clone()) {
                     let uncertainty = difference(scale, &coarse, &states);
                     let before = best.as_ref().map(Known::uncertainty);
@@ -279,7 +291,7 @@ fn computed<M: Model<N>, const N: usize>(
 }
 
 /// The larger relative difference of two runs at the end.
-fn difference<const N: usize>(scale: Scale, a: &[State<N>], b: &[State<N>]) -> f64 {
+fn difference<S: PhasePoint>(scale: Scale, a: &[S], b: &[S]) -> f64 {
     match (a.last(), b.last()) {
         (Some(a), Some(b)) => {
             let (q, p) = scale.distances(a, b);
@@ -291,15 +303,15 @@ fn difference<const N: usize>(scale: Scale, a: &[State<N>], b: &[State<N>]) -> f
 
 /// The states at all times, with steps of this size at most, cut in half so many times. Every step is: where the times leave only short
 /// steps, a run with a shorter limit would be the same run, and prove nothing.
-fn run<M: Model<N>, const N: usize>(
+fn run<M: Subject<S>, S: PhasePoint>(
     model: &M,
     element: Element,
-    (mut t, mut state): (f64, State<N>),
+    (mut t, start): (f64, &S),
     times: &[f64],
     (step, halvings): (f64, u32),
-) -> Result<Vec<State<N>>, RunErrorKind> {
-    let stepper = Stepper::new(model, element, Control::default());
-    let mut stepper = stepper.map_err(RunErrorKind::Element)?;
+) -> Result<Vec<S>, RunErrorKind> {
+    let mut stepper = model.stepper(element, Control::default())?;
+    let mut state = start.clone();
     let mut states = Vec::with_capacity(times.len());
     let mut done = 0;
     for &time in times {
@@ -308,7 +320,7 @@ fn run<M: Model<N>, const N: usize>(
         let h = (time - t) / count as f64;
         for k in 0..count {
             let time = t + k as f64 * h;
-            let advanced = stepper.advance(time, h, &mut state, &[]);
+            let advanced = M::advance(&mut stepper, time, h, &mut state);
             advanced.map_err(|source| RunErrorKind::Solve {
                 element: done,
                 time,
@@ -318,7 +330,7 @@ fn run<M: Model<N>, const N: usize>(
             done += 1;
         }
         t = time;
-        states.push(state);
+        states.push(state.clone());
     }
     Ok(states)
 }

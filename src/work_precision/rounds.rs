@@ -6,8 +6,8 @@ use super::measure::{MOST_REPETITIONS, Measure, Way};
 use super::peer::{Peer, Rival};
 use super::point::Point;
 use super::reference::Known;
+use super::subject::{PhasePoint, Subject};
 use std::time::Duration;
-use tfe_runtime::Model;
 use tfe_runtime::step::Control;
 
 /// How often all runs have their turn after the first.
@@ -22,8 +22,8 @@ pub(super) struct Timed<'g> {
 
 impl<'g> Timed<'g> {
     /// The first run.
-    pub(super) fn look<M: Model<N>, const N: usize>(
-        measure: &Measure<'_, M, N>,
+    pub(super) fn look<M: Subject<S>, S: PhasePoint>(
+        measure: &Measure<'_, M, S>,
         way: Way<'g>,
         tolerances: &[f64],
     ) -> Self {
@@ -55,9 +55,9 @@ impl<'g> Timed<'g> {
     }
 
     /// Repeats the run until it has taken `until` in all.
-    fn repeat<M: Model<N>, const N: usize>(
+    fn repeat<M: Subject<S>, S: PhasePoint>(
         &mut self,
-        measure: &Measure<'_, M, N>,
+        measure: &Measure<'_, M, S>,
         until: Duration,
     ) {
         let Ok(measured) = &mut self.point.outcome else {
@@ -76,10 +76,10 @@ impl<'g> Timed<'g> {
 }
 
 /// Repeats all runs in turn, each for `repeat_for` in all.
-pub(super) fn repeat<M: Model<N>, const N: usize>(
-    measure: &Measure<'_, M, N>,
+pub(super) fn repeat<M: Subject<S>, S: PhasePoint>(
+    measure: &Measure<'_, M, S>,
     curves: &mut [Vec<Timed<'_>>],
-    (rivals, peers): (&[Rival<'_, N>], &mut [Peer]),
+    (rivals, peers): (&[Rival<'_, S>], &mut [Peer]),
     repeat_for: Duration,
 ) {
     let first = |peer: &Peer| {
@@ -102,9 +102,9 @@ pub(super) fn repeat<M: Model<N>, const N: usize>(
 }
 
 /// All rivals, each run once.
-pub(super) fn look_at_peers<const N: usize>(
-    rivals: &[Rival<'_, N>],
-    reference: &Known<N>,
+pub(super) fn look_at_peers<S: PhasePoint>(
+    rivals: &[Rival<'_, S>],
+    reference: &Known<S>,
     end: f64,
 ) -> Vec<Peer> {
     let looks = rivals.iter().map(|rival| rival.look(reference, end));

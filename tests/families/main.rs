@@ -15,3 +15,4 @@ mod outputs;
 mod rates;
 #[cfg(feature = "sparse")]
 mod stiff;
+mod work_precision;

@@ -29,7 +29,7 @@ pub fn lattice_start() -> Start<32> {
     }
 }
 
-pub fn lattice() -> WorkPrecision<'static, Lattice, 32> {
+pub fn lattice() -> WorkPrecision<'static, Lattice, State<32>> {
     let Start { q, v, end } = lattice_start();
     WorkPrecision::new(&LATTICE, LATTICE.state(q, v), 0.0..end).steps(steps(end, 10, 400))
 }

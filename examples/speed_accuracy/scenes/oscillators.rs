@@ -16,7 +16,7 @@ pub const PENDULUM_START: Start<1> = Start {
 };
 
 /// From rest at two radians; the end by 32 digits of arithmetic.
-pub fn pendulum() -> WorkPrecision<'static, Pendulum, 1> {
+pub fn pendulum() -> WorkPrecision<'static, Pendulum, State<1>> {
     let Start { q, v, end } = PENDULUM_START;
     WorkPrecision::new(&PENDULUM, PENDULUM.state(q, v), 0.0..end)
         .steps(steps(end, 2, 200))
@@ -34,7 +34,7 @@ pub const HENON_HEILES_START: Start<2> = Start {
 };
 
 /// A chaotic one. The end by 20 digits of arithmetic.
-pub fn henon_heiles() -> WorkPrecision<'static, HenonHeiles, 2> {
+pub fn henon_heiles() -> WorkPrecision<'static, HenonHeiles, State<2>> {
     let Start { q, v, end } = HENON_HEILES_START;
     WorkPrecision::new(&HenonHeiles {}, State { q, p: v }, 0.0..end)
         .steps(steps(end, 30, 2000))
@@ -61,7 +61,7 @@ pub const DOUBLE_PENDULUM_START: Start<2> = Start {
 };
 
 /// Two equal point masses on rods of one metre, in regular motion. Its end is known to 13 digits.
-pub fn double_pendulum() -> WorkPrecision<'static, DoublePendulum, 2> {
+pub fn double_pendulum() -> WorkPrecision<'static, DoublePendulum, State<2>> {
     let Start { q, v, end } = DOUBLE_PENDULUM_START;
     let last = DOUBLE_PENDULUM.state(
         [-0.107_542_332_622_4, 0.387_937_148_385_3],
@@ -87,7 +87,7 @@ pub const VAN_DER_POL_START: Start<1> = Start {
 };
 
 /// Onto its limit cycle and three times around; energy is no invariant.
-pub fn van_der_pol() -> WorkPrecision<'static, VanDerPol, 1> {
+pub fn van_der_pol() -> WorkPrecision<'static, VanDerPol, State<1>> {
     let Start { q, v, end } = VAN_DER_POL_START;
     WorkPrecision::new(&VAN_DER_POL, VAN_DER_POL.state(q, v), 0.0..end).steps(steps(end, 20, 800))
 }

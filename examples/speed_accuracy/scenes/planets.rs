@@ -13,7 +13,7 @@ pub const KEPLER_START: Start<2> = Start {
 };
 
 /// Eccentricity 0.6, from the pericentre, three times around. The end by 32 digits of arithmetic.
-pub fn kepler() -> WorkPrecision<'static, Kepler, 2> {
+pub fn kepler() -> WorkPrecision<'static, Kepler, State<2>> {
     let Start { q, v, end } = KEPLER_START;
     WorkPrecision::new(&Kepler {}, State { q, p: v }, 0.0..end)
         .steps(steps(end, 30, 800))
@@ -92,7 +92,7 @@ pub fn solar_system_start() -> Start<18> {
     }
 }
 
-pub fn solar_system() -> WorkPrecision<'static, Bodies, 18> {
+pub fn solar_system() -> WorkPrecision<'static, Bodies, State<18>> {
     let Start { q, v, end } = solar_system_start();
     WorkPrecision::new(&SOLAR_SYSTEM, SOLAR_SYSTEM.state(q, v), 0.0..end).steps(steps(end, 5, 200))
 }

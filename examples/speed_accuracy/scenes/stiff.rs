@@ -22,7 +22,7 @@ pub const ELASTIC_START: Start<2> = Start {
 
 /// The spring swings 160 times a second, the pendulum once in two. The momentum of the spring is the small part of the state, and its
 /// phase is what the errors of long steps are of.
-pub fn elastic_pendulum() -> WorkPrecision<'static, ElasticPendulum, 2> {
+pub fn elastic_pendulum() -> WorkPrecision<'static, ElasticPendulum, State<2>> {
     let Start { q, v, end } = ELASTIC_START;
     WorkPrecision::new(&ELASTIC, ELASTIC.state(q, v), 0.0..end).steps(steps(end, 10, 1000))
 }

@@ -1,0 +1,75 @@
+//! References of one's own, with the vectors of the model's kind.
+
+use super::WorkPrecision;
+use super::reference::Source;
+use tfe_runtime::family::{FamilyModel, FamilyState};
+use tfe_runtime::{Model, State};
+
+impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, State<N>> {
+    /// What runs are compared with: the exact (q, p) at any time of the span. Its uncertainty counts as one rounding, unless
+    /// [`reference_uncertainty`](Self::reference_uncertainty) says more.
+    #[must_use]
+    pub fn reference(mut self, exact: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
+        self.source = Source::Function(Box::new(move |time| {
+            let (q, p) = exact(time);
+            State { q, p }
+        }));
+        self
+    }
+
+    /// What runs are compared with: the exact state at the end of the span, and nothing between.
+    #[must_use]
+    pub fn reference_end(mut self, q: [f64; N], p: [f64; N]) -> Self {
+        self.source = Source::End(State { q, p });
+        self
+    }
+}
+
+impl<'m, M: FamilyModel> WorkPrecision<'m, M, FamilyState> {
+    /// What runs are compared with: the exact (q, p) at any time of the span, vectors as long as the model. Its uncertainty counts as one
+    /// rounding, unless [`reference_uncertainty`](Self::reference_uncertainty) says more.
+    ///
+    /// Vectors of another length are [`WorkPrecisionError::ReferenceLength`](super::WorkPrecisionError::ReferenceLength) when it is run.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2 - w[i]^2/2*q[i]^2))]
+    /// struct Oscillators { n: usize, w: Vec<f64> }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let model = Oscillators { n: 3, w: vec![1.0, 1.5, 2.0] };
+    /// let exact = |t: f64| {
+    ///     let q = model.w.iter().map(|w| (w * t).cos()).collect();
+    ///     let p = model.w.iter().map(|w| -w * (w * t).sin()).collect();
+    ///     (q, p)
+    /// };
+    /// let measured = WorkPrecision::new(&model, model.state([1.0; 3], [0.0; 3]), 0.0..5.0)
+    ///     .element(Mixed::<4>)
+    ///     .steps([0.2, 0.1, 0.05])
+    ///     .reference(exact)
+    ///     .run()?;
+    /// let slope = measured.curves()[0].slope().ok_or("no slope")?;
+    /// assert!((slope.exponent - 6.0).abs() < 0.1);
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn reference(mut self, exact: impl Fn(f64) -> (Vec<f64>, Vec<f64>) + 'm) -> Self {
+        self.source = Source::Function(Box::new(move |time| {
+            let (q, p) = exact(time);
+            FamilyState { q, p }
+        }));
+        self
+    }
+
+    /// What runs are compared with: the exact state at the end of the span, vectors as long as the model, and nothing between.
+    ///
+    /// Vectors of another length are [`WorkPrecisionError::ReferenceLength`](super::WorkPrecisionError::ReferenceLength) when it is run.
+    #[must_use]
+    pub fn reference_end(mut self, q: impl Into<Vec<f64>>, p: impl Into<Vec<f64>>) -> Self {
+        let (q, p) = (q.into(), p.into());
+        self.source = Source::End(FamilyState { q, p });
+        self
+    }
+}

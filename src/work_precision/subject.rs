@@ -1,0 +1,291 @@
+//! What is measured: models of fixed size and of run-time length, behind one interface.
+//!
+//! Everything is resolved at compile time: the steps that are timed are those that a simulation of the same model makes.
+
+use super::measure::largest;
+use crate::error::{RunError, RunErrorKind};
+use crate::simulation::Simulation;
+use crate::simulation::family::FamilySimulation;
+use std::ops::Range;
+use tfe_runtime::ConstraintError;
+use tfe_runtime::constrained;
+use tfe_runtime::family::{self, FamilyModel, FamilyState, FamilyStepper};
+use tfe_runtime::legendre;
+use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::{Element, Model, State, Statistics, StepError};
+
+/// A state as numbers: [`State`] of models of fixed size, [`FamilyState`] of those of run-time length.
+pub trait PhasePoint: Clone {
+    /// The coordinates.
+    fn q(&self) -> &[f64];
+    /// The momenta, as many.
+    fn p(&self) -> &[f64];
+}
+
+impl<const N: usize> PhasePoint for State<N> {
+    fn q(&self) -> &[f64] {
+        &self.q
+    }
+
+    fn p(&self) -> &[f64] {
+        &self.p
+    }
+}
+
+impl PhasePoint for FamilyState {
+    fn q(&self) -> &[f64] {
+        &self.q
+    }
+
+    fn p(&self) -> &[f64] {
+        &self.p
+    }
+}
+
+/// A model with states of type `S` that [`WorkPrecision`](super::WorkPrecision) can measure: every [`Model`] with [`State`], every
+/// [`FamilyModel`] with [`FamilyState`], and nothing else.
+///
+/// For functions that take either:
+///
+/// ```
+/// use tfe::prelude::*;
+/// use tfe::work_precision::{PhasePoint, Subject, WorkPrecisionError};
+///
+/// fn order<M: Subject<S>, S: PhasePoint>(problem: WorkPrecision<'_, M, S>) -> Result<f64, WorkPrecisionError> {
+///     let measured = problem.element(Mixed::<3>).steps([0.2, 0.1, 0.05]).run()?;
+///     Ok(measured.curves()[0].slope().map_or(f64::NAN, |slope| slope.exponent))
+/// }
+///
+/// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^4/4)]
+/// struct Single;
+///
+/// #[dynamics(coordinates(x[n]), lagrangian = sum(i in 0..n, dot(x[i])^2/2 - x[i]^4/4))]
+/// struct Many { n: usize }
+///
+/// # fn main() -> Result<(), WorkPrecisionError> {
+/// let many = Many { n: 3 };
+/// let one = order(WorkPrecision::new(&Single, Single.state([1.0], [0.0]), 0.0..4.0))?;
+/// let three = order(WorkPrecision::new(&many, many.state([1.0; 3], [0.0; 3]), 0.0..4.0))?;
+/// assert!((one - 4.0).abs() < 0.2 && (one - three).abs() < 1e-3);
+/// # Ok(())
+/// # }
+/// ```
+pub trait Subject<S: PhasePoint>: Steppable<S> {}
+
+impl<M: Steppable<S>, S: PhasePoint> Subject<S> for M {}
+
+/// How a model is stepped and looked at. Not to be named outside.
+pub trait Steppable<S> {
+    /// What makes the steps.
+    type Stepper<'m>
+    where
+        Self: 'm;
+
+    /// The velocities of the last look.
+    type Velocity;
+
+    /// Whether there are constraints.
+    const CONSTRAINED: bool;
+
+    /// A stepper at rest.
+    fn stepper(
+        &self,
+        element: Element,
+        control: Control,
+    ) -> Result<Self::Stepper<'_>, RunErrorKind>;
+
+    /// Moves the state from t to t + h.
+    fn advance(
+        stepper: &mut Self::Stepper<'_>,
+        t: f64,
+        h: f64,
+        state: &mut S,
+    ) -> Result<(), StepError>;
+
+    /// What the steps so far have cost.
+    fn statistics(stepper: &Self::Stepper<'_>) -> Statistics;
+
+    /// Velocities of zero.
+    fn rest(&self) -> Self::Velocity;
+
+    /// The energy; NaN where the momentum belongs to no velocity. Keeps the velocity, zeros where there is none.
+    fn energy(
+        &self,
+        stepper: &mut Self::Stepper<'_>,
+        t: f64,
+        state: &S,
+        velocity: &mut Self::Velocity,
+    ) -> f64;
+
+    /// The largest |φ| and |A v + a|.
+    fn residuals(&self, t: f64, state: &S, velocity: &Self::Velocity) -> (f64, f64);
+
+    /// Refuses a start from which no simulation makes the step `over`.
+    fn check_start(&self, start: &S, over: Range<f64>, h: f64) -> Result<(), RunErrorKind>;
+}
+
+impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
+    type Stepper<'m>
+        = Stepper<'m, M, N>
+    where
+        M: 'm;
+
+    type Velocity = [f64; N];
+
+    const CONSTRAINED: bool = !M::CONSTRAINTS.is_empty();
+
+    fn stepper(
+        &self,
+        element: Element,
+        control: Control,
+    ) -> Result<Stepper<'_, M, N>, RunErrorKind> {
+        Stepper::new(self, element, control).map_err(RunErrorKind::Element)
+    }
+
+    #[inline]
+    fn advance(
+        stepper: &mut Stepper<'_, M, N>,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+    ) -> Result<(), StepError> {
+        stepper.advance(t, h, state, &[])
+    }
+
+    fn statistics(stepper: &Stepper<'_, M, N>) -> Statistics {
+        *stepper.statistics()
+    }
+
+    fn rest(&self) -> [f64; N] {
+        [0.0; N]
+    }
+
+    fn energy(
+        &self,
+        _: &mut Stepper<'_, M, N>,
+        t: f64,
+        state: &State<N>,
+        velocity: &mut [f64; N],
+    ) -> f64 {
+        match constrained::velocity_of(self, t, &state.q, &state.p, velocity) {
+            Ok(found) => {
+                *velocity = found;
+                legendre::energy_at(self, t, &state.q, &state.p, velocity)
+            }
+            Err(_) => {
+                *velocity = [0.0; N];
+                f64::NAN
+            }
+        }
+    }
+
+    fn residuals(&self, t: f64, state: &State<N>, velocity: &[f64; N]) -> (f64, f64) {
+        let (mut position, mut rate) = (0.0, 0.0);
+        for one in constrained::residuals(self, t, &state.q, velocity, 1.0) {
+            largest(&mut position, one.position.abs());
+            largest(&mut rate, one.velocity.abs());
+        }
+        (position, rate)
+    }
+
+    fn check_start(&self, start: &State<N>, over: Range<f64>, h: f64) -> Result<(), RunErrorKind> {
+        let run = Simulation::new(self).step(h).run(*start, over);
+        match run.as_ref().map_err(RunError::kind) {
+            Err(kind @ (RunErrorKind::Start { .. } | RunErrorKind::Inconsistent { .. })) => {
+                Err(kind.clone())
+            }
+            // Only the checks before the step count.
+            _ => Ok(()),
+        }
+    }
+}
+
+impl<M: FamilyModel> Steppable<FamilyState> for M {
+    type Stepper<'m>
+        = FamilyStepper<'m, M>
+    where
+        M: 'm;
+
+    type Velocity = Vec<f64>;
+
+    const CONSTRAINED: bool = <M as FamilyModel>::CONSTRAINED;
+
+    fn stepper(
+        &self,
+        element: Element,
+        control: Control,
+    ) -> Result<FamilyStepper<'_, M>, RunErrorKind> {
+        FamilyStepper::new(self, element, control).map_err(RunErrorKind::Family)
+    }
+
+    #[inline]
+    fn advance(
+        stepper: &mut FamilyStepper<'_, M>,
+        t: f64,
+        h: f64,
+        state: &mut FamilyState,
+    ) -> Result<(), StepError> {
+        stepper.advance(t, h, state)
+    }
+
+    fn statistics(stepper: &FamilyStepper<'_, M>) -> Statistics {
+        *stepper.statistics()
+    }
+
+    fn rest(&self) -> Vec<f64> {
+        vec![0.0; self.len()]
+    }
+
+    fn energy(
+        &self,
+        stepper: &mut FamilyStepper<'_, M>,
+        t: f64,
+        state: &FamilyState,
+        velocity: &mut Vec<f64>,
+    ) -> f64 {
+        // The stepper keeps the ordering of the mass matrix from one look to the next.
+        match stepper.velocity(t, state) {
+            Ok(found) => {
+                *velocity = found;
+                family::energy(self, t, state, velocity)
+            }
+            Err(_) => {
+                velocity.fill(0.0);
+                f64::NAN
+            }
+        }
+    }
+
+    fn residuals(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>) -> (f64, f64) {
+        family::constraint_residual(self, t, &state.q, velocity)
+    }
+
+    fn check_start(
+        &self,
+        start: &FamilyState,
+        over: Range<f64>,
+        h: f64,
+    ) -> Result<(), RunErrorKind> {
+        let run = FamilySimulation::new(self).step(h).run(start.clone(), over);
+        match run {
+            Err(error) if refuses(error.kind()) => Err(error.kind().clone()),
+            // As above.
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether a run of a family failed because of model or start.
+fn refuses(kind: &RunErrorKind) -> bool {
+    matches!(
+        kind,
+        RunErrorKind::Start { .. }
+            | RunErrorKind::Family(_)
+            | RunErrorKind::Solve {
+                // Found by the first step: fixed-size models say `Inconsistent` before it.
+                source: StepError::Constraint(ConstraintError::Start { .. }),
+                element: 0,
+                ..
+            }
+    )
+}
