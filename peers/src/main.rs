@@ -9,6 +9,7 @@
 mod contest;
 mod ensembles;
 mod equations;
+mod long;
 #[path = "../../examples/speed_accuracy/overview.rs"]
 mod overview;
 mod run;
@@ -139,6 +140,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let stiff = Section::new("Stiff scenes")
         .paragraph(stiff::EXPLANATION)
         .table(table::HEADER, stiff);
+    println!("\n{}", long::line(&long::HEADER));
+    let lattices = long::table()?;
+    for row in &lattices {
+        println!("{}", long::line(row));
+    }
+    fs::write(folder.join("long.csv"), table::csv(long::HEADER, &lattices))?;
+    let lattices = Section::new("A long lattice")
+        .paragraph(long::EXPLANATION)
+        .table(long::HEADER, lattices);
     println!("\n{}", ensembles::line(&ensembles::HEADER));
     let crowds = ensembles::table()?;
     for row in &crowds {
@@ -161,6 +171,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let page = Page::new("Speed and accuracy of finite elements in time")
         .section(summary)
         .section(stiff)
+        .section(lattices)
         .section(ensembles);
     let path = folder.join("speed_accuracy.html");
     sections.into_iter().fold(page, Page::section).save(&path)?;

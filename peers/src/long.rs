@@ -1,0 +1,267 @@
+//! A lattice of 1024 sites: a model of run-time length beside the peers.
+
+use crate::run::{Problem, Run, de, fixed, ode_solvers};
+use crate::scenes::Start;
+use crate::system::System;
+use crate::table::{milliseconds, verdict};
+use std::error::Error;
+use std::time::Instant;
+use tfe::family::{FamilyNode, FamilyState};
+use tfe::prelude::*;
+
+const SITES: usize = 1024;
+const COMPONENTS: usize = 2 * SITES;
+const END: f64 = 100.0;
+const TARGETS: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
+/// The ratio of times, ours to theirs, that is aimed at.
+const AIM: f64 = 0.5;
+const REPETITIONS: usize = 7;
+
+/// What the page says above the table.
+pub const EXPLANATION: &str = "The lattice of Fermi, Pasta, Ulam and Tsingou with 1024 free sites, to t = 100: ours is a declaration of run-time length, whose steps keep nothing on \
+     the way; errors at the end are relative to the largest state. The fastest run of each side that reaches the error; the aim is half of the time of the peer.";
+
+/// Unit masses with free ends, springs of force δ + a δ².
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + a/3*(q[i+1]-q[i])^3),
+)]
+struct Fput {
+    n: usize,
+    a: f64,
+}
+
+const A: f64 = 0.25;
+
+/// The same by hand.
+struct ByHand;
+
+impl System<SITES> for ByHand {
+    const SEPARABLE: bool = true;
+
+    #[inline]
+    fn acceleration(&self, q: &[f64; SITES], _: &[f64; SITES]) -> [f64; SITES] {
+        let mut a = [0.0; SITES];
+        let mut before = 0.0;
+        for i in 0..SITES - 1 {
+            let stretch = q[i + 1] - q[i];
+            let after = stretch * (1.0 + A * stretch);
+            a[i] = after - before;
+            before = after;
+        }
+        a[SITES - 1] = -before;
+        a
+    }
+
+    // Only implicit methods ask; none takes part.
+    fn variation(
+        &self,
+        q: &[f64; SITES],
+        _: &[f64; SITES],
+        dq: &[f64; SITES],
+        _: &[f64; SITES],
+    ) -> [f64; SITES] {
+        let mut a = [0.0; SITES];
+        let mut before = 0.0;
+        for i in 0..SITES - 1 {
+            let after = (1.0 + 2.0 * A * (q[i + 1] - q[i])) * (dq[i + 1] - dq[i]);
+            a[i] = after - before;
+            before = after;
+        }
+        a[SITES - 1] = -before;
+        a
+    }
+}
+
+fn start() -> Start<SITES> {
+    let mut q = [0.0; SITES];
+    for (i, q) in (1..).zip(&mut q) {
+        *q = 0.5 * (1.7 * f64::from(i)).sin();
+    }
+    Start {
+        q,
+        v: [0.0; SITES],
+        end: END,
+    }
+}
+
+/// A way to run: what it is called, and its seconds and error.
+struct Way<'w> {
+    name: String,
+    run: Box<dyn Fn() -> Option<(f64, f64)> + 'w>,
+}
+
+/// The largest difference, relative to the largest coordinate or velocity.
+fn error(q: &[f64], v: &[f64], known: &FamilyNode) -> f64 {
+    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let apart = |one: &[f64], other: &[f64]| -> f64 {
+        let differences = one
+            .iter()
+            .zip(other)
+            .map(|(one, other)| (one - other).abs());
+        // A NaN is the largest of all.
+        differences.fold(0.0, |most, x| if x <= most { most } else { x })
+    };
+    let (q, v) = (
+        apart(q, &known.q) / largest(&known.q),
+        apart(v, &known.p) / largest(&known.p),
+    );
+    if q >= v { q } else { v }
+}
+
+fn ours<'w>(fput: &'w Fput, begin: &'w FamilyState, known: &'w FamilyNode) -> Vec<Way<'w>> {
+    let mut ways = Vec::new();
+    for nodes in [4, 5, 6, 7, 8, 9, 12] {
+        let element = Element::mixed(nodes);
+        for step in [2.0, 1.6, 1.25, 1.0, 0.8, 0.625, 0.5, 0.4, 0.25] {
+            for tolerance in [1e-5, 1e-7, 1e-9, 1e-11, 0.05 * f64::EPSILON] {
+                let simulation = Simulation::new(fput).element(element).step(step);
+                let simulation = simulation.tolerance(tolerance).record_every(usize::MAX);
+                let run = move || {
+                    let clock = Instant::now();
+                    let motion = simulation.run(begin.clone(), 0.0..END).ok()?;
+                    let seconds = clock.elapsed().as_secs_f64();
+                    let last = motion.last();
+                    Some((seconds, error(&last.q, &last.p, known)))
+                };
+                ways.push(Way {
+                    name: format!("{element}, {step}, {tolerance:.0e}"),
+                    run: Box::new(run),
+                });
+            }
+        }
+    }
+    ways
+}
+
+type Problem1024<'s> = Problem<'s, ByHand, SITES, COMPONENTS>;
+type Method = fn(&Problem1024<'_>, f64) -> Result<Run<COMPONENTS>, Box<dyn Error>>;
+
+fn peers<'w>(problem: &'w Problem1024<'w>, known: &'w FamilyNode) -> Vec<Way<'w>> {
+    let adaptive: [(&str, Method); 5] = [
+        ("DOPRI5 (ode_solvers)", ode_solvers::dopri5),
+        ("DOP853 (ode_solvers)", ode_solvers::dop853),
+        ("DOP853 (differential-equations)", de::dop853),
+        ("Verner 8(7) (differential-equations)", de::verner87),
+        ("Verner 9(8) (differential-equations)", de::verner98),
+    ];
+    let tolerances: Vec<f64> = (6..=26)
+        .map(|k| 10.0_f64.powf(-0.5 * f64::from(k)))
+        .collect();
+    let symplectic: [(&str, Method); 3] = [
+        ("Yoshida 4 (utsuroi)", fixed::yoshida4),
+        ("Yoshida 6 (utsuroi)", fixed::yoshida6),
+        ("Yoshida 8 (utsuroi)", fixed::yoshida8),
+    ];
+    let counts: Vec<f64> = (12..=24)
+        .map(|k| 2.0_f64.powf(0.5 * f64::from(k)).round())
+        .collect();
+    let adaptive = adaptive.map(|(name, method)| (name, method, &tolerances));
+    let symplectic = symplectic.map(|(name, method)| (name, method, &counts));
+    let mut ways = Vec::new();
+    for (name, method, settings) in adaptive.into_iter().chain(symplectic) {
+        for &setting in settings {
+            let run = move || {
+                let run = method(problem, setting).ok()?;
+                let (q, v) = run.y.split_at(SITES);
+                Some((run.time.as_secs_f64(), error(q, v, known)))
+            };
+            ways.push(Way {
+                name: if setting < 1.0 {
+                    format!("{name}, {setting:.1e}")
+                } else {
+                    format!("{name}, {setting} steps")
+                },
+                run: Box::new(run),
+            });
+        }
+    }
+    ways
+}
+
+/// The fastest way to an error: its place and seconds, the least of some runs.
+fn fastest(ways: &[Way<'_>], looks: &[Option<(f64, f64)>], target: f64) -> Option<(usize, f64)> {
+    let places = looks.iter().enumerate();
+    let mut found: Vec<(f64, usize)> = places
+        .filter_map(|(k, look)| {
+            look.filter(|(_, error)| *error <= target)
+                .map(|look| (look.0, k))
+        })
+        .collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let least = |k: usize| {
+        let runs = (0..REPETITIONS).filter_map(|_| (ways[k].run)());
+        runs.map(|run| run.0).fold(f64::INFINITY, f64::min)
+    };
+    let tried = found.iter().take(4).map(|(_, k)| (*k, least(*k)));
+    tried.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// The columns.
+pub const HEADER: [&str; 7] = [
+    "scene",
+    "error",
+    "our element, step, tolerance",
+    "time",
+    "best peer, setting",
+    "its time",
+    "ratio",
+];
+
+/// A row for every target.
+pub fn table() -> Result<Vec<[String; 7]>, Box<dyn Error>> {
+    let fput = Fput { n: SITES, a: A };
+    let start = start();
+    let begin = fput.state(start.q.to_vec(), start.v.to_vec());
+    let end = |step: f64| -> Result<FamilyNode, Box<dyn Error>> {
+        let simulation = Simulation::new(&fput).element(Mixed::<9>).step(step);
+        let motion = simulation
+            .record_every(usize::MAX)
+            .run(begin.clone(), 0.0..END)?;
+        Ok(motion.last().clone())
+    };
+    let (known, finer) = (end(0.2)?, end(0.1)?);
+    let uncertainty = error(&known.q, &known.p, &finer);
+    println!("  lattice of 1024: reference known to {uncertainty:.1e}");
+    let problem = Problem::new(&ByHand, &start);
+    let (ours, peers) = (ours(&fput, &begin, &finer), peers(&problem, &finer));
+    // Twice, so that neither side pays for the first look.
+    let look = |ways: &[Way<'_>]| -> Vec<Option<(f64, f64)>> {
+        ways.iter()
+            .map(|way| {
+                let (one, other) = ((way.run)()?, (way.run)()?);
+                Some((one.0.min(other.0), other.1))
+            })
+            .collect()
+    };
+    let (of_ours, of_peers) = (look(&ours), look(&peers));
+    let row = |target: f64| {
+        let dash = || "—".to_owned();
+        let one = fastest(&ours, &of_ours, target);
+        let other = fastest(&peers, &of_peers, target);
+        let name = |ways: &[Way<'_>], found: Option<(usize, f64)>| {
+            found.map_or_else(dash, |(k, _)| ways[k].name.clone())
+        };
+        let time = |found: Option<(usize, f64)>| found.map_or_else(dash, |(_, s)| milliseconds(s));
+        let ratio = match (one, other) {
+            (Some((_, ours)), Some((_, theirs))) => verdict(ours / theirs, AIM),
+            _ => dash(),
+        };
+        [
+            "FPUT lattice, n = 1024".to_owned(),
+            format!("{target:.0e}"),
+            name(&ours, one),
+            time(one),
+            name(&peers, other),
+            time(other),
+            ratio,
+        ]
+    };
+    Ok(TARGETS.map(row).into())
+}
+
+/// A printed line.
+pub fn line(row: &[impl AsRef<str>; 7]) -> String {
+    let [a, b, c, d, e, f, g] = row.each_ref().map(AsRef::as_ref);
+    format!("{a:<24} {b:>5}  {c:<40} {d:>12}  {e:<48} {f:>12}  {g}")
+}
