@@ -286,10 +286,10 @@ fn number(value: f64, step: f64, largest: f64) -> String {
     };
     let digit = step.log10().floor() as i32;
     if (1e-4..1e6).contains(&largest) {
-        return minus(&format!(
-            "{value:.*}",
-            usize::try_from(digit.saturating_neg()).unwrap_or(0)
-        ));
+        // No step, no digits: as many as there are integers would be too many to write.
+        let decimals = digit.checked_neg().map(usize::try_from);
+        let decimals = decimals.and_then(Result::ok).unwrap_or(0);
+        return minus(&format!("{value:.decimals$}"));
     }
     if value == 0.0 {
         return "0".to_owned();
