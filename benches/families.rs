@@ -69,6 +69,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut expected = vec![0.0; chain.n];
     by_hand(&chain, &q, &mut expected);
     let generated = nanoseconds(|| {
+        force.fill(0.0);
         let first = Gradient {
             z: &mut [],
             q: &mut force,

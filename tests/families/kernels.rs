@@ -82,7 +82,7 @@ fn kernels_are_those_of_the_fixed_size() {
     let (mut expected, mut second) = (First::ZERO, Second::ZERO);
     Model::second(&five, T, &Q, &V, &mut expected, &mut second);
     let [z, by_q, force] = first(&long, &Q, &V);
-    let [mut forces_q, mut forces] = [[f64::NAN; 5]; 2];
+    let [mut forces_q, mut forces] = [[0.0; 5]; 2];
     let gradient = Gradient {
         z: &mut [],
         q: &mut forces_q,

@@ -164,7 +164,6 @@ const _: () = {
             };
             let a = t.like(self.a);
             let k = t.like(self.k);
-            first.q.fill(t.like(0.0));
             let t0 = q[0] - q[1];
             let t1 = k * t0;
             let mut t2 = t1;

@@ -17,6 +17,8 @@ pub(crate) struct Emitter<'a> {
     second: TokenStream,
     /// Second derivatives are told entry by entry, as those of models of run-time length are.
     by_entries: bool,
+    /// The places of results hold zeros already.
+    onto_zeros: bool,
     /// What velocities and momenta are called.
     z: Ident,
     /// How often each temporary is read.
@@ -45,6 +47,7 @@ impl<'a> Emitter<'a> {
             coordinates,
             second,
             by_entries: false,
+            onto_zeros: false,
             z: format_ident!("z"),
             reads: BTreeMap::new(),
             indices: BTreeSet::new(),
@@ -65,6 +68,12 @@ impl<'a> Emitter<'a> {
     /// The same with second derivatives given to `entries`.
     pub(crate) fn by_entries(mut self) -> Self {
         self.by_entries = true;
+        self
+    }
+
+    /// The same, for places that hold zeros when the kernel begins.
+    pub(crate) fn onto_zeros(mut self, onto_zeros: bool) -> Self {
+        self.onto_zeros = onto_zeros;
         self
     }
 
@@ -246,6 +255,7 @@ impl<'a> Emitter<'a> {
         let vector = |array: TokenStream| quote!(#array.fill(t.like(0.0)););
         let matrix = |array: TokenStream| quote!(for row in &mut #array { row.fill(t.like(0.0)); });
         match output {
+            _ if self.onto_zeros => TokenStream::new(),
             // They are sums of what is added from the start.
             _ if self.by_entries && block(output).is_some() => TokenStream::new(),
             Output::ByZ(_) => vector(quote!(first.z)),

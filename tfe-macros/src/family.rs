@@ -70,6 +70,7 @@ impl Kernels<'_> {
         };
         let body = Emitter::new(&[], TokenStream::new())
             .by_entries()
+            .onto_zeros(given == Given::Forces)
             .body(program);
         let statements = body.statements;
         Body {

@@ -11,6 +11,7 @@ mod dense;
 mod error;
 mod forces;
 mod inertia;
+mod kernel;
 mod lanes;
 #[cfg(feature = "sparse")]
 mod newton;
@@ -19,6 +20,7 @@ mod node;
 mod pattern;
 #[cfg(feature = "sparse")]
 mod rates;
+mod registers;
 #[cfg(feature = "sparse")]
 mod rows;
 mod space;
@@ -120,7 +122,8 @@ pub trait FamilyModel {
     /// Its first derivatives, and the generalized force.
     fn first<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>);
 
-    /// L_q (or H_q) and Q alone, written into the place of the call, so that it is compiled for the instruction set of that place.
+    /// L_q (or H_q) and Q alone, into slices that hold zeros: whoever reads them last sets them to zero while they are at hand. Written into
+    /// the place of the call, so that it is compiled for the instruction set of that place.
     fn forces_inline<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>);
 
     /// The contributions to ∂²/∂z∂z.

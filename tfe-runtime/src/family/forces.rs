@@ -5,15 +5,14 @@ use super::inertia::Inertia;
 use super::lanes::Scale;
 #[cfg(feature = "sparse")]
 use super::newton::Tangent;
-use super::space::{Leg, Outcome, Problem, Space};
+use super::registers::{Outcome, Registers};
+use super::space::{Kind, Leg, Problem};
 use super::{FamilyDense, FamilyError, FamilyModel, FamilyState};
 use crate::error::StepError;
 use crate::newton::{Control, Preference, Solve};
 #[cfg(feature = "sparse")]
 use crate::newton::{Monitor, SERVES, Verdict};
-use crate::points::four::Four;
 use crate::points::tables::Tables;
-use crate::real::Lanes;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::{Contraction, Statistics};
 use alloc::vec;
@@ -36,14 +35,6 @@ pub(super) struct Forces<'m, M> {
     end: FamilyState,
     low: FamilyState,
     next_low: FamilyState,
-}
-
-/// The unknowns in the widest registers of the processor.
-#[derive(Clone, Debug)]
-enum Registers {
-    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-    Quads(Space<crate::quad::Quad>, pulp::x86::V3),
-    Lanes(Space<Lanes<4>>),
 }
 
 impl<'m, M: FamilyModel> Forces<'m, M> {
@@ -72,7 +63,7 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
         };
         Ok(Self {
             model,
-            registers: Registers::new::<M>(n, problem.tables.groups),
+            registers: Registers::new(Kind::of::<M>(), n, problem.tables.groups),
             table,
             control,
             problem,
@@ -88,23 +79,33 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
         })
     }
 
-    /// As [`FamilyStepper::advance`](super::FamilyStepper::advance), for a state that is finite and as long as the model.
+    /// Whether the last step ended there.
+    pub(super) fn ends_in(&self, state: &FamilyState) -> bool {
+        self.last.is_some() && self.end == *state
+    }
+
+    /// As [`FamilyStepper::advance`](super::FamilyStepper::advance), for a state that is finite and as long as the model; `continues` where the last
+    /// step ended there.
     pub(super) fn advance(
         &mut self,
         t: f64,
         h: f64,
         state: &mut FamilyState,
+        continues: bool,
     ) -> Result<(), StepError> {
-        let last = self.last.take().filter(|_| self.end == *state);
+        let last = self.last.take().filter(|_| continues);
         match last {
-            Some((_, length)) => self.problem.tables.set_ratio(&self.table, h / length),
+            Some((_, length)) => {
+                self.problem.tables.set_ratio(&self.table, h / length);
+                core::mem::swap(&mut self.start, &mut self.end);
+            }
             None => {
                 self.low.q.fill(0.0);
                 self.low.p.fill(0.0);
+                self.start.q.copy_from_slice(&state.q);
+                self.start.p.copy_from_slice(&state.p);
             }
         }
-        self.start.q.copy_from_slice(&state.q);
-        self.start.p.copy_from_slice(&state.p);
         self.solve(t, h, last.is_some())?;
         self.statistics.steps += 1;
         self.last = Some((t, h));
@@ -118,15 +119,23 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
     fn solve(&mut self, t: f64, h: f64, is_warm: bool) -> Result<(), StepError> {
         let solve = self.control.solve;
         let yielding = cfg!(feature = "sparse") && solve == Solve::Auto;
-        self.dispatch(t, h, Task::Prepare { is_warm });
+        self.prepare(t, h, is_warm);
         if solve != Solve::Newton && (!yielding || self.preference.is_fixed_point()) {
-            let outcome = self.dispatch(t, h, Task::Iterate { yielding });
+            let leg = Leg {
+                t,
+                h,
+                start: &self.start,
+                low: &self.low,
+            };
+            let outcome =
+                self.registers
+                    .iterate(self.model, &self.problem, &self.control, leg, yielding);
             let iterations = u64::from(outcome.iterations);
             self.statistics.iterations += iterations;
             self.statistics.fixed_point_iterations += iterations;
             self.statistics.contraction = Contraction::of(outcome.contraction);
             self.count_evaluations(iterations);
-            if outcome.converged && self.dispatch(t, h, Task::End).converged {
+            if outcome.converged && self.end(t, h) {
                 self.preference.confirm_fixed_point();
                 return Ok(());
             }
@@ -135,11 +144,22 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
             }
             self.preference.leave_fixed_point();
             self.statistics.fallbacks += 1;
-            self.dispatch(t, h, Task::Prepare { is_warm: false });
+            self.prepare(t, h, false);
         } else {
             self.preference.count_newton();
         }
         self.newton(t, h)
+    }
+
+    fn prepare(&mut self, t: f64, h: f64, is_warm: bool) {
+        let leg = Leg {
+            t,
+            h,
+            start: &self.start,
+            low: &self.low,
+        };
+        self.registers
+            .prepare(self.model, &mut self.problem, leg, is_warm);
     }
 
     #[cfg(not(feature = "sparse"))]
@@ -159,7 +179,7 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
         let outcome = self.newton_with(&mut tangent, t, h);
         self.tangent = Some(tangent);
         let outcome = outcome?;
-        if outcome.converged && self.dispatch(t, h, Task::End).converged {
+        if outcome.converged && self.end(t, h) {
             return Ok(());
         }
         Err(self.stalled(&outcome, true))
@@ -170,33 +190,35 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
         let mut monitor = Monitor::new(self.control.tolerance);
         let known = tangent.serves(h);
         let mut fresh = !known;
+        let scheme = self.table.view();
+        let points = scheme.points();
         let mut outcome = Outcome {
             converged: false,
             iterations: 0,
             residual: f64::INFINITY,
             contraction: 1.0,
         };
+        let leg = Leg {
+            t,
+            h,
+            start: &self.start,
+            low: &self.low,
+        };
+        let scale = Scale::of(&self.problem, leg);
         while outcome.iterations < self.control.max_iterations {
             if fresh {
                 let (q, z) = (&mut tangent.q[..], &mut tangent.z[..]);
-                self.dispatch(t, h, Task::Positions { q, z });
-                let scheme = self.table.view();
-                self.statistics.tangent_evaluations += scheme.points() as u64;
+                self.registers.positions(&self.problem, leg, q, z);
+                self.statistics.tangent_evaluations += points as u64;
                 tangent.factor(self.model, &scheme, &self.problem, t, h)?;
                 self.statistics.factorizations += 1;
             }
-            let rest = &mut tangent.rest[..];
-            self.dispatch(t, h, Task::Rest { rest });
-            self.count_evaluations(1);
+            self.registers
+                .rest(self.model, &self.problem, leg, &mut tangent.rest);
+            self.statistics.residual_evaluations += points as u64;
             tangent.solve();
-            let leg = Leg {
-                t,
-                h,
-                start: &self.start,
-                low: &self.low,
-            };
-            let (changed, size) = self.registers.correct(&self.problem, &tangent.rest);
-            let increment = Scale::of(&self.problem, &leg).increment(changed, size);
+            let sizes = self.registers.correct(&self.problem, &tangent.rest);
+            let increment = scale.increment(sizes);
             outcome.iterations += 1;
             self.statistics.iterations += 1;
             self.statistics.newton_iterations += 1;
@@ -245,26 +267,15 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
         }
     }
 
-    fn dispatch(&mut self, t: f64, h: f64, task: Task<'_>) -> Outcome {
+    fn end(&mut self, t: f64, h: f64) -> bool {
         let leg = Leg {
             t,
             h,
             start: &self.start,
             low: &self.low,
         };
-        let job = Job {
-            model: self.model,
-            problem: &mut self.problem,
-            control: &self.control,
-            leg,
-            end: (&mut self.end, &mut self.next_low),
-            task,
-        };
-        match &mut self.registers {
-            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            Registers::Quads(space, isa) => isa.vectorize(InRegisters { space, job }),
-            Registers::Lanes(space) => job.run(space),
-        }
+        self.registers
+            .end(&self.problem, leg, &mut self.end, &mut self.next_low)
     }
 
     /// The polynomial of the last step.
@@ -283,106 +294,5 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
         };
         let ends = (self.start.clone(), self.end.clone());
         FamilyDense::of(&scheme, (start, end), h, ends, &rate, &force)
-    }
-}
-
-impl Registers {
-    fn new<M: FamilyModel>(n: usize, groups: usize) -> Self {
-        #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-        if let Some(isa) = pulp::x86::V3::try_new() {
-            let like = crate::quad::Quad::of(isa, [0.0; 4]);
-            return Self::Quads(Space::new::<M>(like, n, groups), isa);
-        }
-        Self::Lanes(Space::new::<M>(Lanes([0.0; 4]), n, groups))
-    }
-
-    #[cfg(feature = "sparse")]
-    fn correct(&mut self, problem: &Problem, steps: &[f64]) -> (f64, f64) {
-        match self {
-            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            Self::Quads(space, _) => space.correct(problem, steps),
-            Self::Lanes(space) => space.correct(problem, steps),
-        }
-    }
-
-    fn force_at(&self, point: usize, a: usize) -> f64 {
-        match self {
-            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            Self::Quads(space, _) => space.force_at(point, a),
-            Self::Lanes(space) => space.force_at(point, a),
-        }
-    }
-}
-
-/// A part of a step.
-#[cfg_attr(
-    not(feature = "sparse"),
-    expect(dead_code, reason = "Newton's method alone asks for some")
-)]
-enum Task<'a> {
-    /// Forces to begin with.
-    Prepare { is_warm: bool },
-    /// The fixed-point iteration.
-    Iterate { yielding: bool },
-    /// What is left of the equations.
-    Rest { rest: &'a mut [f64] },
-    /// Where the points are.
-    Positions { q: &'a mut [f64], z: &'a mut [f64] },
-    /// The end of the element.
-    End,
-}
-
-/// A part of a step, with what it needs.
-struct Job<'a, M> {
-    model: &'a M,
-    problem: &'a mut Problem,
-    control: &'a Control,
-    leg: Leg<'a>,
-    end: (&'a mut FamilyState, &'a mut FamilyState),
-    task: Task<'a>,
-}
-
-impl<M: FamilyModel> Job<'_, M> {
-    #[inline(always)]
-    fn run<V: Four>(self, space: &mut Space<V>) -> Outcome {
-        let Self {
-            model,
-            problem,
-            control,
-            leg,
-            ..
-        } = self;
-        let mut outcome = Outcome {
-            converged: true,
-            iterations: 0,
-            residual: 0.0,
-            contraction: 0.0,
-        };
-        match self.task {
-            Task::Prepare { is_warm } => space.prepare(model, problem, leg, is_warm),
-            Task::Iterate { yielding } => {
-                outcome = space.iterate(model, problem, control, leg, yielding);
-            }
-            Task::Rest { rest } => space.rest(model, problem, leg, rest),
-            Task::Positions { q, z } => space.positions::<M>(problem, leg, q, z),
-            Task::End => outcome.converged = space.end(problem, leg, self.end.0, self.end.1),
-        }
-        outcome
-    }
-}
-
-/// The same in code for one instruction set.
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-struct InRegisters<'a, M> {
-    space: &'a mut Space<crate::quad::Quad>,
-    job: Job<'a, M>,
-}
-
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl<M: FamilyModel> pulp::NullaryFnOnce for InRegisters<'_, M> {
-    type Output = Outcome;
-    #[inline(always)]
-    fn call(self) -> Outcome {
-        self.job.run(self.space)
     }
 }

@@ -1,30 +1,10 @@
 //! Arithmetic of the iteration of families, and the sizes that it is judged by.
 
-use super::FamilyModel;
-use super::space::{Leg, Problem};
+use super::space::{Leg, Problem, Sizes};
 use crate::equations::Increment;
-use crate::model::Form;
 use crate::points::four::Four;
 use crate::points::sweep::relative;
 use crate::points::tables::Matrix;
-
-/// L_q + Q, or Q − H_q.
-#[inline(always)]
-pub(super) fn total<V: Four, M: FamilyModel>(by_q: V, force: V) -> V {
-    match M::FORM {
-        Form::Lagrangian => by_q + force,
-        Form::Hamiltonian => force - by_q,
-    }
-}
-
-/// The same where there is no Q.
-#[inline(always)]
-pub(super) fn alone<V: Four, M: FamilyModel>(by_q: V) -> V {
-    match M::FORM {
-        Form::Lagrangian => by_q,
-        Form::Hamiltonian => -by_q,
-    }
-}
 
 /// The forces at one coordinate at all points, times a number.
 #[inline(always)]
@@ -88,7 +68,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    pub(super) fn of(problem: &Problem, leg: &Leg<'_>) -> Self {
+    pub(super) fn of(problem: &Problem, leg: Leg<'_>) -> Self {
         Self {
             h: leg.h,
             q: largest(&leg.start.q),
@@ -96,8 +76,7 @@ impl Scale {
         }
     }
 
-    /// Of the largest change of an acceleration and the largest one.
-    pub(super) fn increment(&self, changed: f64, size: f64) -> Increment {
+    pub(super) fn increment(&self, Sizes { changed, size }: Sizes) -> Increment {
         let h = self.h;
         let velocity = relative(h, self.velocity, size, changed);
         let moved = self.velocity + h.abs() * size;

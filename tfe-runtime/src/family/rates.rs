@@ -144,14 +144,20 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
         })
     }
 
+    /// Whether the last step ended there.
+    pub(super) fn ends_in(&self, state: &FamilyState) -> bool {
+        self.last.is_some() && self.end == *state
+    }
+
     /// As [`FamilyStepper::advance`](super::FamilyStepper::advance), for a state that is finite and as long as the model.
     pub(super) fn advance(
         &mut self,
         t: f64,
         h: f64,
         state: &mut FamilyState,
+        continues: bool,
     ) -> Result<(), StepError> {
-        let last = self.last.take().filter(|_| self.end == *state);
+        let last = self.last.take().filter(|_| continues);
         self.start.clone_from(state);
         self.rows.evaluate(self.model, t, &self.start.q);
         self.start_rows.copy_from_slice(&self.rows.values);

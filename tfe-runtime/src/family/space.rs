@@ -1,18 +1,19 @@
-//! M q̈ = f(q, q̇) for all points of an element, four to a register: the iteration for as many coordinates as there are.
+//! M q̈ = f(q, q̇, t) for all points of an element, four to a register: the passes of the iteration over as many coordinates as there are.
 //!
 //! ```text
 //! q_l = q₀ + h Σ A_lj v₀ + h² Σ (A²)_lj M⁻¹ f_j ,     unknown f
 //! ```
 //!
-//! The same equations as those of fixed-size models, with another order in memory: for each group of four points all coordinates, so that the
-//! loops of a kernel run through memory once.
+//! The same equations as those of fixed-size models, with another order in memory: for each group of four points all coordinates, so that
+//! loops run through memory once. Long chains do not fit into a cache: a pass that compares forces with those before places the next
+//! group of points too, while they are at hand.
 
 use super::inertia::Inertia;
-use super::lanes::{Scale, add_exactly, alone, at_points, product, rows, total};
-use super::{FamilyModel, FamilyState, Gradient};
+use super::kernel::Here;
+use super::lanes::{add_exactly, at_points, product, rows};
+use super::{FamilyModel, FamilyState};
 use crate::double_double::DoubleDouble;
 use crate::model::Form;
-use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 use crate::points::end::moved;
 use crate::points::four::{Four, block, put};
 use crate::points::sweep::Largest;
@@ -29,15 +30,33 @@ pub(super) struct Problem {
     pub(super) velocity_low: Vec<f64>,
 }
 
+/// What the passes have to know about a model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kind {
+    form: Form,
+    /// Whether there are forces Q, which may depend on velocities (momenta).
+    forced: bool,
+}
+
+impl Kind {
+    pub(super) fn of<M: FamilyModel>() -> Self {
+        Self {
+            form: M::FORM,
+            forced: M::FACTS.forced,
+        }
+    }
+}
+
 /// The unknowns at all points: for each group of four all coordinates.
 #[derive(Clone, Debug)]
 pub(super) struct Space<V> {
     like: V,
+    kind: Kind,
     n: usize,
     /// L_q + Q
     forces: Vec<V>,
-    /// What low words of state and tables add at the points.
-    low_position: Vec<V>,
+    /// How far the points are from the start without forces: h c_l v₀, and what low words of state and tables add.
+    drift: Vec<V>,
     /// Coordinates, velocities (momenta) and derivatives of one group.
     q: Vec<V>,
     z: Vec<V>,
@@ -54,149 +73,170 @@ pub(super) struct Leg<'a> {
     pub(super) low: &'a FamilyState,
 }
 
-/// What has come of the iteration of a step.
-pub(super) struct Outcome {
-    pub(super) converged: bool,
-    pub(super) iterations: u32,
-    /// The last increment, relative, and its ratio to that before.
-    pub(super) residual: f64,
-    pub(super) contraction: f64,
+/// One run through all coordinates.
+pub(super) enum Pass<'a> {
+    /// Places all points at the start.
+    Stand,
+    /// Takes the derivatives at hand for the forces at all points.
+    Spread,
+    /// Forces to begin with, those at hand or where the last element's polynomial goes on; what low words add; places the first group.
+    Begin { is_warm: bool },
+    /// Places the points of a group.
+    #[cfg(feature = "sparse")]
+    Place { group: usize },
+    /// Takes the derivatives at hand for the forces of a group, and places the next one.
+    Settle { group: usize },
+    /// What the derivatives at hand are beyond the forces of a group, the points of one coordinate next to each other.
+    #[cfg(feature = "sparse")]
+    Rest { group: usize, rest: &'a mut [f64] },
+    /// The end of the element.
+    End {
+        end: &'a mut FamilyState,
+        low: &'a mut FamilyState,
+    },
+}
+
+/// The largest change of an acceleration and the largest one; NaN where something is not finite.
+#[derive(Clone, Copy)]
+pub(super) struct Sizes {
+    pub(super) changed: f64,
+    pub(super) size: f64,
+}
+
+impl Sizes {
+    pub(super) const NONE: Self = Self {
+        changed: 0.0,
+        size: 0.0,
+    };
+
+    /// Of both.
+    pub(super) fn and(self, other: Self) -> Self {
+        let larger = |a: f64, b: f64| a.max(b) + 0.0 * (a + b);
+        Self {
+            changed: larger(self.changed, other.changed),
+            size: larger(self.size, other.size),
+        }
+    }
+}
+
+impl Pass<'_> {
+    /// Runs, with the number of groups known to the compiler; only [`Pass::Settle`] and [`Pass::End`] have something to say.
+    #[inline(always)]
+    pub(super) fn run<V: Four>(
+        self,
+        space: &mut Space<V>,
+        problem: &Problem,
+        leg: Leg<'_>,
+    ) -> Sizes {
+        match problem.tables.groups {
+            1 => self.run_for::<V, 1>(space, problem, leg),
+            2 => self.run_for::<V, 2>(space, problem, leg),
+            3 => self.run_for::<V, 3>(space, problem, leg),
+            _ => self.run_for::<V, MAX_GROUPS>(space, problem, leg),
+        }
+    }
+
+    #[inline(always)]
+    fn run_for<V: Four, const G: usize>(
+        self,
+        space: &mut Space<V>,
+        problem: &Problem,
+        leg: Leg<'_>,
+    ) -> Sizes {
+        match self {
+            Pass::Stand => space.stand(problem, leg),
+            Pass::Spread => space.spread(),
+            Pass::Begin { is_warm } => space.begin::<G>(problem, leg, is_warm),
+            #[cfg(feature = "sparse")]
+            Pass::Place { group } => space.place::<G>(problem, leg, group),
+            Pass::Settle { group } if space.kind.forced => {
+                return space.settle::<G, true>(problem, leg, group);
+            }
+            Pass::Settle { group } => return space.settle::<G, false>(problem, leg, group),
+            #[cfg(feature = "sparse")]
+            Pass::Rest { group, rest } => space.rest(&problem.tables, group, rest),
+            Pass::End { end, low } => return space.end(problem, leg, end, low),
+        }
+        Sizes::NONE
+    }
+}
+
+/// How the points of one group follow from forces at all of them.
+#[derive(Clone, Copy)]
+struct Placement<V, const G: usize> {
+    h: V,
+    /// A
+    once: [[V; 4]; G],
+    /// A²
+    twice: [[V; 4]; G],
+}
+
+impl<V: Four, const G: usize> Placement<V, G> {
+    #[inline(always)]
+    fn of(like: V, tables: &Tables, h: f64, group: usize) -> Self {
+        Self {
+            h: like.like(h),
+            once: rows::<V, G>(like, &tables.once)[group],
+            twice: rows::<V, G>(like, &tables.twice)[group],
+        }
+    }
+
+    #[inline(always)]
+    fn position(&self, start: f64, drift: V, accelerations: &[[f64; 4]; G]) -> V {
+        let h = self.h;
+        h.like(start) + (drift + h * h * product(h, &self.twice, accelerations))
+    }
+
+    /// Velocity, or momentum.
+    #[inline(always)]
+    fn rate(&self, start: f64, rates: &[[f64; 4]; G]) -> V {
+        self.h.like(start) + self.h * product(self.h, &self.once, rates)
+    }
 }
 
 impl<V: Four> Space<V> {
-    pub(super) fn new<M: FamilyModel>(like: V, n: usize, groups: usize) -> Self {
+    pub(super) fn new(like: V, kind: Kind, n: usize, groups: usize) -> Self {
         let zeros = |count: usize| vec![like.like(0.0); count];
-        let forced = if M::FACTS.forced { n } else { 0 };
         Self {
             like,
+            kind,
             n,
             forces: zeros(n * groups),
-            low_position: zeros(n * groups),
+            drift: zeros(n * groups),
             q: zeros(n),
             // Without forces no kernel reads it.
             z: zeros(n),
             by_q: zeros(n),
-            force: zeros(forced),
+            force: zeros(if kind.forced { n } else { 0 }),
         }
     }
 
-    /// Forces to begin with, and what low words add at the points.
-    #[inline(always)]
-    pub(super) fn prepare<M: FamilyModel>(
-        &mut self,
-        model: &M,
-        problem: &mut Problem,
-        leg: Leg<'_>,
-        is_warm: bool,
-    ) {
-        let groups = problem.tables.groups;
-        problem.begin(&leg);
-        if is_warm {
-            match groups {
-                1 => self.apply_continued::<1>(problem),
-                2 => self.apply_continued::<2>(problem),
-                3 => self.apply_continued::<3>(problem),
-                _ => self.apply_continued::<MAX_GROUPS>(problem),
-            }
-        } else {
-            self.start_cold(model, problem, &leg);
-        }
-        match groups {
-            1 => self.begin::<1>(problem, &leg),
-            2 => self.begin::<2>(problem, &leg),
-            3 => self.begin::<3>(problem, &leg),
-            _ => self.begin::<MAX_GROUPS>(problem, &leg),
+    /// What a kernel is given.
+    pub(super) fn here(&mut self, t: V) -> Here<'_, V> {
+        Here {
+            t,
+            q: &self.q,
+            z: &self.z,
+            by_q: &mut self.by_q,
+            force: &mut self.force,
         }
     }
 
-    /// The fixed-point iteration; with `yielding` it gives up as soon as Newton's method is the better way.
-    #[inline(always)]
-    pub(super) fn iterate<M: FamilyModel>(
-        &mut self,
-        model: &M,
-        problem: &Problem,
-        control: &Control,
-        leg: Leg<'_>,
-        yielding: bool,
-    ) -> Outcome {
-        let mut monitor = Monitor::new(control.tolerance);
-        let (mut iterations, mut converged) = (0, false);
-        let most = if yielding {
-            control.max_iterations.min(PATIENCE)
-        } else {
-            control.max_iterations
-        };
-        let scale = Scale::of(problem, &leg);
-        while iterations < most {
-            let (changed, size) = self.sweep(model, problem, &leg);
-            iterations += 1;
-            match monitor.judge(scale.increment(changed, size)) {
-                Ok(Verdict::Converged) => {
-                    converged = true;
-                    break;
-                }
-                Ok(Verdict::GoOn) => {}
-                Err(_) => break,
-            }
-            if yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1) {
-                break;
-            }
-        }
-        Outcome {
-            converged,
-            iterations,
-            residual: monitor.last(),
-            contraction: monitor.rate(),
-        }
-    }
-
-    /// f(q, z) − f at the points, the points of one coordinate next to each other.
-    #[inline(always)]
-    pub(super) fn rest<M: FamilyModel>(
-        &mut self,
-        model: &M,
-        problem: &Problem,
-        leg: Leg<'_>,
-        rest: &mut [f64],
-    ) {
-        let (like, points) = (self.like, problem.tables.points);
-        for group in 0..problem.tables.groups {
-            self.set_group::<M>(problem, &leg, group);
-            let t = like.like(leg.t) + like.like(leg.h) * like.with(problem.tables.nodes[group]);
-            self.evaluate(model, t);
-            let here = 4.min(points - 4 * group);
-            for a in 0..self.n {
-                let rest_here = self.new_force::<M>(a) - self.forces[group * self.n + a];
-                let from = a * points + 4 * group;
-                rest[from..from + here].copy_from_slice(&rest_here.lanes()[..here]);
-            }
-        }
-    }
-
-    /// Coordinates and velocities (momenta) at all points, a row of n for each.
-    pub(super) fn positions<M: FamilyModel>(
-        &mut self,
-        problem: &Problem,
-        leg: Leg<'_>,
-        q: &mut [f64],
-        z: &mut [f64],
-    ) {
-        let (n, points) = (self.n, problem.tables.points);
-        for group in 0..problem.tables.groups {
-            self.set_group::<M>(problem, &leg, group);
-            for lane in 0..4.min(points - 4 * group) {
-                let from = (4 * group + lane) * n;
-                for a in 0..n {
-                    q[from + a] = self.q[a].lanes()[lane];
-                    z[from + a] = self.z[a].lanes()[lane];
-                }
-            }
-        }
-    }
-
-    /// Adds to the forces; the largest change of an acceleration and the largest one.
+    /// Coordinates and velocities (momenta) of the group at hand, a row of n for each point.
     #[cfg(feature = "sparse")]
-    pub(super) fn correct(&mut self, problem: &Problem, steps: &[f64]) -> (f64, f64) {
+    pub(super) fn positions(&self, tables: &Tables, group: usize, q: &mut [f64], z: &mut [f64]) {
+        for lane in 0..4.min(tables.points - 4 * group) {
+            let from = (4 * group + lane) * self.n;
+            for a in 0..self.n {
+                q[from + a] = self.q[a].lanes()[lane];
+                z[from + a] = self.z[a].lanes()[lane];
+            }
+        }
+    }
+
+    /// Adds to the forces.
+    #[cfg(feature = "sparse")]
+    pub(super) fn correct(&mut self, problem: &Problem, steps: &[f64]) -> Sizes {
         let points = problem.tables.points;
         let (mut changed, mut size, mut zero) = (0.0_f64, 0.0_f64, 0.0);
         for group in 0..problem.tables.groups {
@@ -215,183 +255,205 @@ impl<V: Four> Space<V> {
                 *force = force.with(lanes);
             }
         }
-        (changed + zero, size + zero)
+        Sizes {
+            changed: changed + zero,
+            size: size + zero,
+        }
     }
 
-    /// The forces at the start, at all points.
     #[inline(always)]
-    fn start_cold<M: FamilyModel>(&mut self, model: &M, problem: &Problem, leg: &Leg<'_>) {
+    fn stand(&mut self, problem: &Problem, leg: Leg<'_>) {
         let like = self.like;
+        let z = match self.kind.form {
+            Form::Lagrangian => &problem.velocity,
+            Form::Hamiltonian => &leg.start.p,
+        };
         for a in 0..self.n {
             self.q[a] = like.like(leg.start.q[a]);
-            self.z[a] = like.like(match M::FORM {
-                Form::Lagrangian => problem.velocity[a],
-                Form::Hamiltonian => leg.start.p[a],
-            });
-        }
-        self.evaluate(model, like.like(leg.t));
-        for group in 0..problem.tables.groups {
-            for a in 0..self.n {
-                self.forces[group * self.n + a] = self.new_force::<M>(a);
-            }
+            self.z[a] = like.like(z[a]);
         }
     }
 
-    /// L_q and Q at the coordinates and velocities of one group.
     #[inline(always)]
-    fn evaluate<M: FamilyModel>(&mut self, model: &M, t: V) {
-        // Not read where there are no forces: the kernel wants slices of full length all the same.
-        let first = Gradient {
-            z: &mut [],
-            q: &mut self.by_q,
-            force: &mut self.force,
-        };
-        model.forces_inline(t, &self.q, &self.z, first);
-    }
-
-    #[inline(always)]
-    fn new_force<M: FamilyModel>(&self, a: usize) -> V {
-        if M::FACTS.forced {
-            total::<V, M>(self.by_q[a], self.force[a])
-        } else {
-            alone::<V, M>(self.by_q[a])
-        }
-    }
-
-    /// Forces where the last element's polynomial goes on.
-    #[inline(always)]
-    fn apply_continued<const G: usize>(&mut self, problem: &Problem) {
-        let rows = rows::<V, G>(self.like, &problem.tables.continued);
-        let forces = &mut self.forces[..G * self.n];
+    fn spread(&mut self) {
         for a in 0..self.n {
-            let old = at_points::<V, G>(forces, self.n, a, self.like.like(1.0));
-            for (group, row) in rows.iter().enumerate() {
-                forces[group * self.n + a] = product(self.like, row, &old);
+            let force = self.take(a);
+            for forces in self.forces.chunks_exact_mut(self.n) {
+                forces[a] = force;
             }
         }
     }
 
-    /// What low words of the start and of the tables add at the points.
+    /// L_q + Q of the evaluation at hand; leaves zeros for the next one.
     #[inline(always)]
-    fn begin<const G: usize>(&mut self, problem: &Problem, leg: &Leg<'_>) {
+    fn take(&mut self, a: usize) -> V {
+        let zero = self.like.like(0.0);
+        let mut force = self.kind.signed(self.by_q[a]);
+        self.by_q[a] = zero;
+        if self.kind.forced {
+            force += self.force[a];
+            self.force[a] = zero;
+        }
+        force
+    }
+
+    #[cfg(feature = "sparse")]
+    #[inline(always)]
+    fn rest(&mut self, tables: &Tables, group: usize, rest: &mut [f64]) {
+        let here = 4.min(tables.points - 4 * group);
+        for a in 0..self.n {
+            let rest_here = self.take(a) - self.forces[group * self.n + a];
+            let from = a * tables.points + 4 * group;
+            rest[from..from + here].copy_from_slice(&rest_here.lanes()[..here]);
+        }
+    }
+
+    #[inline(always)]
+    fn begin<const G: usize>(&mut self, problem: &Problem, leg: Leg<'_>, is_warm: bool) {
         let (like, n) = (self.like, self.n);
         let h = like.like(leg.h);
+        let continued = rows::<V, G>(like, &problem.tables.continued);
         let low_rows = rows::<V, G>(like, &problem.tables.twice_low);
         let rows = rows::<V, G>(like, &problem.tables.twice);
-        let (forces, low_position) = (&self.forces[..G * n], &mut self.low_position[..G * n]);
+        let first = Placement::<V, G>::of(like, &problem.tables, leg.h, 0);
+        let forces = &mut self.forces[..G * n];
+        let drift = &mut self.drift[..G * n];
         let (inverse, inverse_low) = (
             &problem.inertia.inverse[..n],
             &problem.inertia.inverse_low[..n],
         );
         let (velocity, velocity_low) = (&problem.velocity[..n], &problem.velocity_low[..n]);
-        let low_q = &leg.low.q[..n];
+        let (start, low_q) = (&leg.start.q[..n], &leg.low.q[..n]);
+        let q = &mut self.q[..n];
         for a in 0..n {
+            if is_warm {
+                let old = at_points::<V, G>(forces, n, a, like.like(1.0));
+                for (group, row) in continued.iter().enumerate() {
+                    forces[group * n + a] = product(like, row, &old);
+                }
+            }
             let accelerations = at_points::<V, G>(forces, n, a, like.like(inverse[a]));
             // What the one rounding of 1/m takes from all accelerations.
             let missing = at_points::<V, G>(forces, n, a, like.like(inverse_low[a]));
             let (low_q, low_v) = (like.like(low_q[a]), like.like(velocity_low[a]));
-            let velocity = like.like(velocity[a]);
+            let v = like.like(velocity[a]);
             for group in 0..G {
                 let by_tables = product(like, &low_rows[group], &accelerations);
                 let by_masses = product(like, &rows[group], &missing);
                 let reach = like.with(problem.tables.reach[group]);
                 let reach_low = like.with(problem.tables.reach_low[group]);
-                let drift = reach * low_v + reach_low * velocity;
-                let moved = h * (drift + h * (by_tables + by_masses));
-                low_position[group * n + a] = low_q + moved;
+                let by_velocity = reach * low_v + reach_low * v;
+                let low = low_q + h * (by_velocity + h * (by_tables + by_masses));
+                drift[group * n + a] = h * reach * v + low;
             }
+            q[a] = first.position(start[a], drift[a], &accelerations);
+        }
+        if self.kind.forced {
+            self.place_rates(problem, leg, &first);
         }
     }
 
-    /// One iteration; the largest change of an acceleration and the largest one.
     #[inline(always)]
-    fn sweep<M: FamilyModel>(&mut self, model: &M, problem: &Problem, leg: &Leg<'_>) -> (f64, f64) {
-        let like = self.like;
-        let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
-        // Of several groups, later ones see forces of this iteration at the points of earlier ones: the fixed point is the same.
-        for group in 0..problem.tables.groups {
-            self.set_group::<M>(problem, leg, group);
-            let t = like.like(leg.t) + like.like(leg.h) * like.with(problem.tables.nodes[group]);
-            self.evaluate(model, t);
-            let n = self.n;
-            let inverse = &problem.inertia.inverse[..n];
-            let by_q = &self.by_q[..n];
-            let forced = &self.force[..if M::FACTS.forced { n } else { 0 }];
-            let forces = &mut self.forces[group * n..][..n];
-            for a in 0..n {
-                let force = if M::FACTS.forced {
-                    total::<V, M>(by_q[a], forced[a])
-                } else {
-                    alone::<V, M>(by_q[a])
-                };
-                // As accelerations: momenta of light and heavy bodies say nothing beside each other.
-                let inverse = like.like(inverse[a]);
-                changed.raise(inverse * (force - forces[a]));
-                size.raise(inverse * force);
-                forces[a] = force;
-            }
-        }
-        (changed.get(), size.get())
-    }
-
-    #[inline(always)]
-    fn set_group<M: FamilyModel>(&mut self, problem: &Problem, leg: &Leg<'_>, group: usize) {
-        match problem.tables.groups {
-            1 => self.set_points::<M, 1>(problem, leg, group),
-            2 => self.set_points::<M, 2>(problem, leg, group),
-            3 => self.set_points::<M, 3>(problem, leg, group),
-            _ => self.set_points::<M, MAX_GROUPS>(problem, leg, group),
-        }
-    }
-
-    /// Coordinates (and velocities or momenta, where forces depend on them) at the points of one group.
-    #[inline(always)]
-    fn set_points<M: FamilyModel, const G: usize>(
+    fn settle<const G: usize, const FORCED: bool>(
         &mut self,
         problem: &Problem,
-        leg: &Leg<'_>,
+        leg: Leg<'_>,
         group: usize,
-    ) {
-        let (like, n) = (self.like, self.n);
-        let h = like.like(leg.h);
-        let reach = like.with(problem.tables.reach[group]);
-        let row = rows::<V, G>(like, &problem.tables.twice)[group];
-        let (start, velocity) = (&leg.start.q[..n], &problem.velocity[..n]);
+    ) -> Sizes {
+        let (like, n, kind) = (self.like, self.n, self.kind);
+        let zero = like.like(0.0);
+        let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
+        // Of several groups, later ones see forces of this iteration at the points of earlier ones: the fixed point is the same.
+        let next = (group + 1) % G;
+        let placement = Placement::<V, G>::of(like, &problem.tables, leg.h, next);
+        let start = &leg.start.q[..n];
         let inverse = &problem.inertia.inverse[..n];
-        let forces = &self.forces[..G * n];
-        let low = &self.low_position[group * n..][..n];
+        let by_q = &mut self.by_q[..n];
+        let forced = &mut self.force[..if FORCED { n } else { 0 }];
+        let drift = &self.drift[next * n..][..n];
+        let forces = &mut self.forces[..G * n];
         let q = &mut self.q[..n];
         for a in 0..n {
-            let accelerations = at_points::<V, G>(forces, n, a, like.like(inverse[a]));
-            let by_forces = product(like, &row, &accelerations);
-            let moved = h * (reach * like.like(velocity[a]) + h * by_forces);
-            q[a] = like.like(start[a]) + (moved + low[a]);
+            let mut force = kind.signed(by_q[a]);
+            by_q[a] = zero;
+            if FORCED {
+                force += forced[a];
+                forced[a] = zero;
+            }
+            // As accelerations: momenta of light and heavy bodies say nothing beside each other.
+            let factor = like.like(inverse[a]);
+            changed.raise(factor * (force - forces[group * n + a]));
+            size.raise(factor * force);
+            forces[group * n + a] = force;
+            let accelerations = at_points::<V, G>(forces, n, a, factor);
+            q[a] = placement.position(start[a], drift[a], &accelerations);
         }
-        if !M::FACTS.forced {
-            return;
+        if FORCED {
+            self.place_rates(problem, leg, &placement);
         }
-        let row = rows::<V, G>(like, &problem.tables.once)[group];
-        let (momentum, z) = (&leg.start.p[..n], &mut self.z[..n]);
-        for a in 0..n {
-            let (start, factor) = match M::FORM {
-                Form::Lagrangian => (velocity[a], inverse[a]),
-                Form::Hamiltonian => (momentum[a], 1.0),
-            };
-            let rates = at_points::<V, G>(forces, n, a, like.like(factor));
-            z[a] = like.like(start) + h * product(like, &row, &rates);
+        Sizes {
+            changed: changed.get(),
+            size: size.get(),
         }
     }
 
-    /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f), to more than the working precision, four coordinates at once; false where that is
-    /// not finite.
+    #[cfg(feature = "sparse")]
     #[inline(always)]
-    pub(super) fn end(
+    fn place<const G: usize>(&mut self, problem: &Problem, leg: Leg<'_>, group: usize) {
+        let (like, n) = (self.like, self.n);
+        let placement = Placement::<V, G>::of(like, &problem.tables, leg.h, group);
+        let start = &leg.start.q[..n];
+        let inverse = &problem.inertia.inverse[..n];
+        let drift = &self.drift[group * n..][..n];
+        let forces = &self.forces[..G * n];
+        for a in 0..n {
+            let accelerations = at_points::<V, G>(forces, n, a, like.like(inverse[a]));
+            self.q[a] = placement.position(start[a], drift[a], &accelerations);
+        }
+        if self.kind.forced {
+            self.place_rates(problem, leg, &placement);
+        }
+    }
+
+    /// Velocities or momenta at the points of a group.
+    #[inline(always)]
+    fn place_rates<const G: usize>(
+        &mut self,
+        problem: &Problem,
+        leg: Leg<'_>,
+        placement: &Placement<V, G>,
+    ) {
+        let (like, n) = (self.like, self.n);
+        let forces = &self.forces[..G * n];
+        let z = &mut self.z[..n];
+        match self.kind.form {
+            Form::Lagrangian => {
+                let (start, inverse) = (&problem.velocity[..n], &problem.inertia.inverse[..n]);
+                for a in 0..n {
+                    let rates = at_points::<V, G>(forces, n, a, like.like(inverse[a]));
+                    z[a] = placement.rate(start[a], &rates);
+                }
+            }
+            Form::Hamiltonian => {
+                let start = &leg.start.p[..n];
+                for a in 0..n {
+                    let rates = at_points::<V, G>(forces, n, a, like.like(1.0));
+                    z[a] = placement.rate(start[a], &rates);
+                }
+            }
+        }
+    }
+
+    /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f), to more than the working precision, four coordinates at once; sizes are NaN
+    /// where that is not finite.
+    #[inline(always)]
+    fn end(
         &self,
         problem: &Problem,
         leg: Leg<'_>,
         end: &mut FamilyState,
         low: &mut FamilyState,
-    ) -> bool {
+    ) -> Sizes {
         let (like, n) = (self.like, self.n);
         let h = like.like(leg.h);
         let inertia = &problem.inertia;
@@ -420,7 +482,11 @@ impl<V: Four> Space<V> {
             put(p_low, &mut low.p, at);
         }
         let [a, b, c, d] = zero.lanes();
-        (a + b) + (c + d) == 0.0
+        let zero = (a + b) + (c + d);
+        Sizes {
+            changed: zero,
+            size: zero,
+        }
     }
 
     /// Σ b f and Σ (bᵀA) f at four coordinates, each a number and what rounding took from it: weights and step are the same numbers in every
@@ -455,9 +521,20 @@ impl<V: Four> Space<V> {
     }
 }
 
+impl Kind {
+    /// L_q, or −H_q.
+    #[inline(always)]
+    fn signed<V: Four>(self, by_q: V) -> V {
+        match self.form {
+            Form::Lagrangian => by_q,
+            Form::Hamiltonian => -by_q,
+        }
+    }
+}
+
 impl Problem {
     /// Velocity at the start, and what low words add.
-    fn begin(&mut self, leg: &Leg<'_>) {
+    pub(super) fn begin(&mut self, leg: Leg<'_>) {
         for (a, mass) in self.inertia.mass.iter().enumerate() {
             let p = leg.start.p[a];
             // The momentum belongs to no rounded velocity; the rest counts as low word.

@@ -100,13 +100,21 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
             return Err(StepError::InvalidStep { step: h });
         }
         let is_right = state.q.len() == self.length && state.p.len() == self.length;
-        if !(is_right && largest(&state.q).is_finite() && largest(&state.p).is_finite()) {
+        let continues = is_right
+            && match &self.way {
+                Way::Forces(forces) => forces.ends_in(state),
+                #[cfg(feature = "sparse")]
+                Way::Rates(rates) => rates.ends_in(state),
+            };
+        // Where a step has ended is finite.
+        let is_finite = |values: &[f64]| largest(values).is_finite();
+        if !(continues || is_right && is_finite(&state.q) && is_finite(&state.p)) {
             return Err(StepError::NonFinite);
         }
         match &mut self.way {
-            Way::Forces(forces) => forces.advance(t, h, state),
+            Way::Forces(forces) => forces.advance(t, h, state, continues),
             #[cfg(feature = "sparse")]
-            Way::Rates(rates) => rates.advance(t, h, state),
+            Way::Rates(rates) => rates.advance(t, h, state, continues),
         }
     }
 

@@ -195,7 +195,7 @@ impl FamilyTransition {
             return Err(StepError::InvalidStep { step: h }.into());
         }
         let mut end = state.clone();
-        rates.advance(t, h, &mut end)?;
+        rates.advance(t, h, &mut end, false)?;
         let matrix = rates.linearised(t, h)?;
         let scheme = table.view();
         let count = pattern.places().len();

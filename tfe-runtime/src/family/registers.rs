@@ -1,0 +1,212 @@
+//! The unknowns in the widest registers of the processor, and the fixed-point iteration.
+
+use super::FamilyState;
+use super::kernel::Kernel;
+use super::lanes::Scale;
+use super::space::{Kind, Leg, Pass, Problem, Sizes, Space};
+use crate::newton::{Control, Monitor, PATIENCE, Verdict};
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+use crate::quad::Quad;
+use crate::real::Lanes;
+
+/// The unknowns of a step.
+#[derive(Clone, Debug)]
+pub(super) enum Registers {
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    Quads(Space<Quad>, pulp::x86::V3),
+    Lanes(Space<Lanes<4>>),
+}
+
+/// What has come of the iteration of a step.
+pub(super) struct Outcome {
+    pub(super) converged: bool,
+    pub(super) iterations: u32,
+    /// The last increment, relative, and its ratio to that before.
+    pub(super) residual: f64,
+    pub(super) contraction: f64,
+}
+
+impl Registers {
+    pub(super) fn new(kind: Kind, n: usize, groups: usize) -> Self {
+        #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+        if let Some(isa) = pulp::x86::V3::try_new() {
+            return Self::Quads(Space::new(Quad::of(isa, [0.0; 4]), kind, n, groups), isa);
+        }
+        Self::Lanes(Space::new(Lanes([0.0; 4]), kind, n, groups))
+    }
+
+    /// Forces to begin with, what low words add, and the place of the first group of points.
+    pub(super) fn prepare(
+        &mut self,
+        kernel: &dyn Kernel,
+        problem: &mut Problem,
+        leg: Leg<'_>,
+        is_warm: bool,
+    ) {
+        problem.begin(leg);
+        if !is_warm {
+            self.run(Pass::Stand, problem, leg);
+            // The forces at the start, at all points.
+            let standing = Leg { h: 0.0, ..leg };
+            self.evaluate(kernel, problem, standing, 0);
+            self.run(Pass::Spread, problem, leg);
+        }
+        self.run(Pass::Begin { is_warm }, problem, leg);
+    }
+
+    /// The fixed-point iteration; with `yielding` it gives up as soon as Newton's method is the better way.
+    pub(super) fn iterate(
+        &mut self,
+        kernel: &dyn Kernel,
+        problem: &Problem,
+        control: &Control,
+        leg: Leg<'_>,
+        yielding: bool,
+    ) -> Outcome {
+        let mut monitor = Monitor::new(control.tolerance);
+        let (mut iterations, mut converged) = (0, false);
+        let most = if yielding {
+            control.max_iterations.min(PATIENCE)
+        } else {
+            control.max_iterations
+        };
+        let scale = Scale::of(problem, leg);
+        while iterations < most {
+            let mut sizes = Sizes::NONE;
+            for group in 0..problem.tables.groups {
+                self.evaluate(kernel, problem, leg, group);
+                sizes = sizes.and(self.run(Pass::Settle { group }, problem, leg));
+            }
+            iterations += 1;
+            match monitor.judge(scale.increment(sizes)) {
+                Ok(Verdict::Converged) => {
+                    converged = true;
+                    break;
+                }
+                Ok(Verdict::GoOn) => {}
+                Err(_) => break,
+            }
+            if yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1) {
+                break;
+            }
+        }
+        Outcome {
+            converged,
+            iterations,
+            residual: monitor.last(),
+            contraction: monitor.rate(),
+        }
+    }
+
+    /// f(q, z) − f at the points, the points of one coordinate next to each other.
+    #[cfg(feature = "sparse")]
+    pub(super) fn rest(
+        &mut self,
+        kernel: &dyn Kernel,
+        problem: &Problem,
+        leg: Leg<'_>,
+        rest: &mut [f64],
+    ) {
+        for group in 0..problem.tables.groups {
+            self.run(Pass::Place { group }, problem, leg);
+            self.evaluate(kernel, problem, leg, group);
+            self.run(Pass::Rest { group, rest }, problem, leg);
+        }
+    }
+
+    /// Coordinates and velocities (momenta) at all points, a row of n for each.
+    #[cfg(feature = "sparse")]
+    pub(super) fn positions(
+        &mut self,
+        problem: &Problem,
+        leg: Leg<'_>,
+        q: &mut [f64],
+        z: &mut [f64],
+    ) {
+        for group in 0..problem.tables.groups {
+            self.run(Pass::Place { group }, problem, leg);
+            match self {
+                #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+                Self::Quads(space, _) => space.positions(&problem.tables, group, q, z),
+                Self::Lanes(space) => space.positions(&problem.tables, group, q, z),
+            }
+        }
+    }
+
+    /// Adds to the forces.
+    #[cfg(feature = "sparse")]
+    pub(super) fn correct(&mut self, problem: &Problem, steps: &[f64]) -> Sizes {
+        match self {
+            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+            Self::Quads(space, _) => space.correct(problem, steps),
+            Self::Lanes(space) => space.correct(problem, steps),
+        }
+    }
+
+    /// The end of the element; false where that is not finite.
+    pub(super) fn end(
+        &mut self,
+        problem: &Problem,
+        leg: Leg<'_>,
+        end: &mut FamilyState,
+        low: &mut FamilyState,
+    ) -> bool {
+        self.run(Pass::End { end, low }, problem, leg).size == 0.0
+    }
+
+    /// L_q + Q at one point of the last step.
+    pub(super) fn force_at(&self, point: usize, a: usize) -> f64 {
+        match self {
+            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+            Self::Quads(space, _) => space.force_at(point, a),
+            Self::Lanes(space) => space.force_at(point, a),
+        }
+    }
+
+    /// L_q and Q where the points of the group are placed.
+    fn evaluate(&mut self, kernel: &dyn Kernel, problem: &Problem, leg: Leg<'_>, group: usize) {
+        let times = problem.tables.nodes[group].map(|node| leg.t + leg.h * node);
+        match self {
+            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+            Self::Quads(space, isa) => {
+                let t = Quad::of(*isa, times);
+                kernel.in_quads(*isa, space.here(t));
+            }
+            Self::Lanes(space) => {
+                kernel.in_lanes(space.here(Lanes(times)));
+            }
+        }
+    }
+
+    fn run(&mut self, pass: Pass<'_>, problem: &Problem, leg: Leg<'_>) -> Sizes {
+        match self {
+            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+            Self::Quads(space, isa) => isa.vectorize(InRegisters {
+                space,
+                problem,
+                leg,
+                pass,
+            }),
+            Self::Lanes(space) => pass.run(space, problem, leg),
+        }
+    }
+}
+
+/// A pass in code for one instruction set.
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+struct InRegisters<'a> {
+    space: &'a mut Space<Quad>,
+    problem: &'a Problem,
+    leg: Leg<'a>,
+    pass: Pass<'a>,
+}
+
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl pulp::NullaryFnOnce for InRegisters<'_> {
+    type Output = Sizes;
+
+    #[inline(always)]
+    fn call(self) -> Sizes {
+        self.pass.run(self.space, self.problem, self.leg)
+    }
+}
