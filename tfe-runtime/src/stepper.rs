@@ -122,22 +122,43 @@ where
         } else {
             None
         };
-        let numbers = numbers_len(element, M::FORM, N, M::CONSTRAINTS.len());
-        let pivots = pivots_len(element, M::FORM, N, M::CONSTRAINTS.len());
-        Ok(Self {
+        let mut stepper = Self {
             model,
             table,
             control,
             memory: Memory::new(),
-            numbers: vec![0.0; numbers],
-            pivots: vec![0; pivots],
+            numbers: Vec::new(),
+            pivots: Vec::new(),
             impulses: Vec::new(),
             ends_only: false,
             propagator: None,
             points,
             alike: (0.0, 0),
             skipped: false,
-        })
+        };
+        if stepper.points.is_none() {
+            stepper.make_room();
+        }
+        Ok(stepper)
+    }
+
+    /// Memory for the tangent of an element, if there is none yet: megabytes for thirty coordinates, and no use while a fixed point contracts.
+    fn make_room(&mut self) {
+        if self.numbers.is_empty() {
+            (self.numbers, self.pivots) = self.room();
+        }
+    }
+
+    fn room(&self) -> (Vec<f64>, Vec<usize>) {
+        let element = self.table.view().element;
+        let numbers = numbers_len(element, M::FORM, N, M::CONSTRAINTS.len());
+        let pivots = pivots_len(element, M::FORM, N, M::CONSTRAINTS.len());
+        (vec![0.0; numbers], vec![0; pivots])
+    }
+
+    /// Changes what iterations may leave from the next step on: [`Control::tolerance`].
+    pub fn set_tolerance(&mut self, tolerance: f64) {
+        self.control.tolerance = tolerance;
     }
 
     /// Says that [`dense`](Self::dense) and [`transition`](Self::transition) will be asked for now and then only.
@@ -181,6 +202,7 @@ where
             }
         }
         self.skipped = false;
+        self.make_room();
         let interval = Interval {
             start: t,
             length: h,
@@ -320,6 +342,7 @@ where
 
     /// Rates and forces of the last step to where an ordinary step has them.
     fn write_back(&mut self, h: f64) {
+        self.make_room();
         let Some(points) = &mut self.points else {
             return;
         };
@@ -371,7 +394,7 @@ where
     /// The workspace of the last step, where it was gone past.
     fn retrace(&self) -> Option<Vec<f64>> {
         let last = self.memory.last.filter(|_| self.skipped)?;
-        let (mut numbers, mut pivots) = (self.numbers.clone(), self.pivots.clone());
+        let (mut numbers, mut pivots) = self.room();
         let mut state = last.start;
         let (mut memory, place) = (Memory::new(), (last.t, last.h));
         self.ordinary(&mut memory, (&mut numbers, &mut pivots), place, &mut state)
@@ -429,6 +452,7 @@ where
         let element = self.table.view().element;
         let length = transition_len(element, M::FORM, N, M::CONSTRAINTS.len());
         let mut extra = vec![0.0; length];
+        self.make_room();
         if let Some(numbers) = self.retrace() {
             self.numbers = numbers;
             self.skipped = false;
