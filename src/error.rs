@@ -22,6 +22,20 @@ pub enum RunErrorKind {
         /// The step asked for.
         step: f64,
     },
+    /// The accuracy asked for is no number between 0 and 1.
+    Accuracy {
+        /// What was asked for.
+        asked: f64,
+    },
+    /// No step was found with which the estimated error is as small as it was asked to be. The motion is the best one that was found.
+    AccuracyMissed {
+        /// What was asked for.
+        asked: f64,
+        /// The estimated error of the motion, as [`Estimated::error_estimate`](crate::accuracy::Estimated::error_estimate) measures it.
+        estimate: f64,
+        /// The last time up to which it is as small as asked; `None` where it is larger from the first comparison on.
+        until: Option<f64>,
+    },
     /// The ends of the span are not finite.
     Span {
         /// The start asked for.
@@ -119,6 +133,26 @@ impl fmt::Display for RunErrorKind {
             Self::Family(error) => error.fmt(f),
             Self::Step { step } => {
                 write!(f, "the step is {step}, but it must be finite and not zero")
+            }
+            Self::Accuracy { asked } => {
+                write!(
+                    f,
+                    "the accuracy is {asked}, but it must lie between 0 and 1"
+                )
+            }
+            Self::AccuracyMissed {
+                asked,
+                estimate,
+                until,
+            } => {
+                write!(
+                    f,
+                    "the error is estimated at {estimate:.1e}, above the {asked:.1e} asked for"
+                )?;
+                match until {
+                    Some(time) => write!(f, "; it is met up to t = {time}"),
+                    None => Ok(()),
+                }
             }
             Self::Span { start, end } => {
                 write!(f, "the span {start}..{end} has an end that is not finite")

@@ -2,6 +2,7 @@
 
 extern crate self as tfe;
 
+pub mod accuracy;
 mod assembly;
 pub mod boundary;
 #[cfg(feature = "charts")]

@@ -1,5 +1,6 @@
 //! Runs: a model, an element, a step, a span.
 
+mod accurate;
 pub(crate) mod family;
 pub(crate) mod mesh;
 mod watch;
@@ -18,6 +19,7 @@ use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 use watch::Watch;
 
+pub use accurate::Accurate;
 pub use watch::Warning;
 
 /// A run to be: which model, with which element and step.
@@ -43,7 +45,8 @@ pub use watch::Warning;
 #[derive(Debug)]
 pub struct Simulation<'m, M, const N: usize> {
     model: &'m M,
-    element: Element,
+    /// The default where it is not chosen.
+    element: Option<Element>,
     step: Option<f64>,
     control: Control,
     record_every: usize,
@@ -81,7 +84,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     fn with_defaults(model: &'m M) -> Self {
         Self {
             model,
-            element: Element::from(Mixed::<4>),
+            element: None,
             step: None,
             control: Control::default(),
             record_every: 1,
@@ -94,7 +97,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// The element: `Mixed::<4>`, `Primal::<3>.reduced()`, `Element::mixed(n)`, …
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
-        self.element = element.into();
+        self.element = Some(element.into());
         self
     }
 
@@ -184,7 +187,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # }
     /// ```
     pub fn run(&self, start: State<N>, span: Range<f64>) -> Result<Motion<N>, RunError<N>> {
-        self.drive(start, &span, self.record_every != 1, |_, _, _| Ok(()))
+        self.drive(start, &span, self.record_every != 1, |_, _| Ok(()))
     }
 
     /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion.
@@ -203,11 +206,11 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let mut transitions = Vec::new();
         let mut entries = vec![0.0; 4 * N * N];
         let mut starts = Vec::new();
-        let motion = self.drive(start, &span, false, |stepper, t, before| {
+        let motion = self.drive(start, &span, false, |stepper, passed| {
             stepper.transition(&mut entries)?;
             transitions.push(DMatrix::from_row_slice(2 * N, 2 * N, &entries));
             if const { !M::CONSTRAINTS.is_empty() } {
-                starts.push((t, *before));
+                starts.push((passed.start, *passed.before));
             }
             Ok(())
         })?;
@@ -220,17 +223,32 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         start: State<N>,
         span: &Range<f64>,
         ends_only: bool,
-        mut finished: impl FnMut(&mut Stepper<'m, M, N>, f64, &State<N>) -> Result<(), TransitionError>,
+        finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
     ) -> Result<Motion<N>, RunError<N>> {
-        let mut motion = Motion::from_start(self.model, span.start, &start);
         let (mesh, mut stepper) = match self.prepare(&start, span) {
             Ok(prepared) => prepared,
-            Err(kind) => return Err(RunError::new(kind, motion)),
+            Err(kind) => {
+                let motion = Motion::from_start(self.model, span.start, &start);
+                return Err(RunError::new(kind, motion));
+            }
         };
         if ends_only {
             stepper = stepper.ends_only();
         }
-        let mut watch = Watch::new(self.element);
+        self.drive_over(start, span.start, &mesh, &mut stepper, finished)
+    }
+
+    /// Runs over a mesh with a stepper at rest.
+    fn drive_over(
+        &self,
+        start: State<N>,
+        t0: f64,
+        mesh: &Mesh<N>,
+        stepper: &mut Stepper<'m, M, N>,
+        mut finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
+    ) -> Result<Motion<N>, RunError<N>> {
+        let mut motion = Motion::from_start(self.model, t0, &start);
+        let mut watch = Watch::new(self.chosen_element());
         let mut state = start;
         let mut bar = progress::Bar::new(self.progress, mesh.steps());
         let mut failure = None;
@@ -247,8 +265,14 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             });
             // Before the matrix, which needs the same memory.
             let dense = (self.record_every == 1 && step.is_ok()).then(|| stepper.dense(t, next));
+            let passed = Passed {
+                start: t,
+                before: &before,
+                end: next,
+                after: &state,
+            };
             let step = step.and_then(|()| {
-                finished(&mut stepper, t, &before).map_err(|source| RunErrorKind::Transition {
+                finished(stepper, passed).map_err(|source| RunErrorKind::Transition {
                     element,
                     time: t,
                     step: h,
@@ -290,7 +314,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         if let Some((_, _, h)) = mesh.elements().next() {
             check_constraints(self.model, span.start, h, start)?;
         }
-        let stepper = Stepper::new(self.model, self.element, self.control);
+        let stepper = Stepper::new(self.model, self.chosen_element(), self.control);
         Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
     }
 
@@ -327,7 +351,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                     end: f64::INFINITY,
                 });
             }
-            Stepper::new(self.model, self.element, self.control)
+            Stepper::new(self.model, self.chosen_element(), self.control)
                 .map(Stepper::ends_only)
                 .map_err(RunErrorKind::Element)
         });
@@ -346,10 +370,22 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
     }
 
+    fn chosen_element(&self) -> Element {
+        self.element.unwrap_or_else(|| Element::from(Mixed::<4>))
+    }
+
     fn mesh(&self, span: &Range<f64>) -> Result<Mesh<N>, RunErrorKind> {
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
         Mesh::new(span, step, &self.breaks, &self.impulses)
     }
+}
+
+/// An element that a run has passed.
+struct Passed<'a, const N: usize> {
+    start: f64,
+    before: &'a State<N>,
+    end: f64,
+    after: &'a State<N>,
 }
 
 /// Refuses start values that are not finite.

@@ -76,6 +76,31 @@ impl<const N: usize> Mesh<N> {
         })
     }
 
+    /// The parts between `cuts`, in the order of the run, each in equal steps of at most `step`; of impulses those that act there.
+    pub(crate) fn even(
+        cuts: &[f64],
+        step: f64,
+        impulses: &[Impulse<N>],
+    ) -> Result<Self, RunErrorKind> {
+        let (start, end) = match cuts {
+            [start, .., end] => (*start, *end),
+            _ => (0.0, 0.0),
+        };
+        let inside = |impulse: &&Impulse<N>| {
+            start.min(end) <= impulse.time && impulse.time <= start.max(end)
+        };
+        let impulses: Vec<_> = impulses.iter().filter(inside).copied().collect();
+        let mut mesh = Self::new(&(start..end), end - start, &[], &impulses)?;
+        let parts = cuts.windows(2);
+        mesh.segments = parts
+            .map(|pair| {
+                let steps = ((pair[1] - pair[0]).abs() / step).ceil().max(1.0);
+                Segment::new(pair[0], pair[1], (pair[1] - pair[0]) / steps)
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(mesh)
+    }
+
     /// How many elements there are.
     pub(crate) fn steps(&self) -> usize {
         self.segments.iter().map(|segment| segment.steps).sum()

@@ -1,0 +1,107 @@
+//! What two runs are compared by: states and outputs at times that both pass.
+
+use std::ops::Range;
+
+/// Rows of numbers, one a time: coordinates, momenta, outputs.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Trace {
+    /// Numbers of one kind lie together: all coordinates, all momenta, one output.
+    kinds: Vec<Range<usize>>,
+    rows: Vec<f64>,
+    /// The largest number of each kind so far, also between the rows.
+    sizes: Vec<f64>,
+}
+
+impl Trace {
+    /// Without rows, for so many coordinates and outputs.
+    pub(crate) fn new(coordinates: usize, outputs: usize) -> Self {
+        let n = coordinates;
+        let outputs = (2 * n..2 * n + outputs).map(|k| k..k + 1);
+        let kinds: Vec<_> = [0..n, n..2 * n].into_iter().chain(outputs).collect();
+        Self {
+            sizes: vec![0.0; kinds.len()],
+            kinds,
+            rows: Vec::new(),
+        }
+    }
+
+    /// Looks at all numbers of one time, and keeps them as a row if they are to be compared.
+    pub(crate) fn pass(&mut self, row: &[f64], keeps: bool) {
+        for (size, kind) in self.sizes.iter_mut().zip(&self.kinds) {
+            let numbers = row[kind.clone()].iter();
+            *size = numbers.fold(*size, |size, x| size.max(x.abs()));
+        }
+        if keeps {
+            self.rows.extend_from_slice(row);
+        }
+    }
+
+    /// How many numbers a row has.
+    pub(crate) fn width(&self) -> usize {
+        self.kinds.last().map_or(0, |kind| kind.end)
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.rows.chunks_exact(self.width().max(1))
+    }
+}
+
+/// The largest relative difference at each time, of each kind: over the largest number of that kind that either run has passed. Infinite where
+/// something is not finite.
+pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
+    let finite = |x: f64| if x.is_finite() { x } else { f64::INFINITY };
+    let mut differences = Vec::new();
+    for (k, kind) in a.kinds.iter().enumerate() {
+        let scale = a.sizes[k].max(b.sizes[k]);
+        let relative = |(a, b): (&[f64], &[f64])| {
+            let pairs = a[kind.clone()].iter().zip(&b[kind.clone()]);
+            let largest = pairs.fold(0.0, |most: f64, (a, b)| most.max(finite((a - b).abs())));
+            // Zero of zero is no error.
+            if largest == 0.0 {
+                0.0
+            } else {
+                finite(largest / scale)
+            }
+        };
+        differences.push(a.rows().zip(b.rows()).map(relative).collect());
+    }
+    differences
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trace(rows: &[[f64; 3]]) -> Trace {
+        let mut trace = Trace::new(1, 1);
+        for row in rows {
+            trace.pass(row, true);
+        }
+        trace
+    }
+
+    #[test]
+    fn every_kind_has_a_scale_of_its_own() {
+        let a = trace(&[[1.0, 100.0, 0.0], [2.0, 50.0, 0.0]]);
+        let b = trace(&[[1.0, 101.0, 0.0], [2.1, 50.0, 0.0]]);
+        let expected = [[0.0, 0.1 / 2.1], [1.0 / 101.0, 0.0], [0.0, 0.0]];
+        for (found, expected) in difference(&a, &b).iter().zip(expected) {
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_between_the_rows_count_for_the_scale() {
+        let (mut a, b) = (trace(&[[1.0, 1e-9, 1.0]]), trace(&[[1.0, 0.0, 1.0]]));
+        a.pass(&[1.0, 1.0, 1.0], false);
+        assert_eq!(difference(&a, &b)[1], [1e-9]);
+    }
+
+    #[test]
+    fn what_is_no_number_is_an_infinite_error() {
+        let (a, b) = (trace(&[[f64::NAN, 1.0, 1.0]]), trace(&[[1.0, 1.0, 1.0]]));
+        assert_eq!(difference(&a, &b)[0], [f64::INFINITY]);
+    }
+}

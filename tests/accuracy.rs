@@ -1,0 +1,343 @@
+//! Estimated errors against true ones, and runs that pick their element and step.
+
+use tfe::accuracy::Estimated;
+use tfe::prelude::*;
+use tfe::{Consistent, RunErrorKind};
+
+#[dynamics(coordinates(q), lagrangian = dot(q)^2/2 + cos(q), output(height) = -cos(q))]
+struct Pendulum;
+
+#[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2)/2 - 1/sqrt(x^2 + y^2))]
+struct Kepler;
+
+/// After ten units of time from rest at two radians; 32 digits of arithmetic.
+const PENDULUM_END: ([f64; 1], [f64; 1]) = ([0.7131481806013794], [-1.5313085041358347]);
+/// Eccentricity 0.6, twenty units of time from the pericentre; 32 digits of arithmetic.
+const KEPLER_END: ([f64; 2], [f64; 2]) = (
+    [-0.770_075_578_411_240_4, 0.788_344_816_994_424_4],
+    [-0.894_183_731_988_691_5, -0.123_461_764_158_440_96],
+);
+
+fn kepler_start() -> State<2> {
+    State {
+        q: [0.4, 0.0],
+        p: [0.0, 2.0],
+    }
+}
+
+/// The error at the end as it is estimated: over the largest coordinate and the largest momentum of the motion.
+fn true_error<const N: usize>(motion: &Motion<N>, (q, p): ([f64; N], [f64; N])) -> f64 {
+    let of = |exact: &[f64; N], part: fn(&tfe::Node<N>) -> &[f64; N]| {
+        let size = motion
+            .states()
+            .iter()
+            .flat_map(part)
+            .map(|x| x.abs())
+            .fold(0.0, f64::max);
+        let off = exact
+            .iter()
+            .zip(part(motion.last()))
+            .map(|(a, b)| (a - b).abs());
+        off.fold(0.0, f64::max) / size
+    };
+    of(&q, |node| &node.q).max(of(&p, |node| &node.p))
+}
+
+fn at_end<T>(motion: &Estimated<T>) -> f64 {
+    motion.error_estimates().last().expect("an estimate").1
+}
+
+/// Estimates over true errors on a grid of elements and steps, where the true error is between `floor` and a hundredth.
+fn ratios<M: Model<N>, const N: usize>(
+    model: &M,
+    start: State<N>,
+    span: f64,
+    exact: ([f64; N], [f64; N]),
+    steps: &[f64],
+) -> Vec<(Element, f64, f64)> {
+    let elements = [
+        Element::primal(3),
+        Element::primal(4).lobatto(),
+        Element::mixed(2),
+        Element::mixed(4),
+        Element::mixed(7),
+        Element::mixed(12),
+        Element::energy_conserving(3),
+        Element::radau(4),
+        Element::three_field(5),
+    ];
+    let mut ratios = Vec::new();
+    for element in elements {
+        for &step in steps {
+            let simulation = Simulation::new(model).element(element).step(step);
+            // Some steps are too long to be solved.
+            let Ok(motion) = simulation.run(start, 0.0..span) else {
+                continue;
+            };
+            let error = true_error(&motion, exact);
+            if (1e-12..1e-2).contains(&error) {
+                let estimated = simulation.run_estimated(start, 0.0..span);
+                let ratio = estimated.map_or(f64::INFINITY, |motion| at_end(&motion) / error);
+                ratios.push((element, step, ratio));
+            }
+        }
+    }
+    ratios
+}
+
+/// Nine elements, eleven steps, two motions: an element of one node more is so much better that the difference is the error.
+#[test]
+fn estimates_are_true_errors_within_a_factor_of_two() {
+    let steps = [
+        1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05, 0.03, 0.02,
+    ];
+    let pendulum = Pendulum.state([2.0], [0.0]);
+    let mut all = ratios(&Pendulum, pendulum, 10.0, PENDULUM_END, &steps);
+    all.extend(ratios(
+        &Kepler,
+        kepler_start(),
+        20.0,
+        KEPLER_END,
+        &steps.map(|h| h / 2.0),
+    ));
+    let good = all
+        .iter()
+        .filter(|(.., ratio)| (0.5..=2.0).contains(ratio))
+        .count();
+    for (element, step, ratio) in &all {
+        if !(0.5..=2.0).contains(ratio) {
+            println!("{element} {step}: {ratio:.2}");
+        }
+    }
+    println!("{good} of {}", all.len());
+    assert!(all.len() > 100, "only {} points", all.len());
+    assert!(100 * good >= 95 * all.len(), "{good} of {}", all.len());
+}
+
+/// Asked for ε, off by no more, with no more than five runs.
+#[test]
+fn accuracy_is_met() {
+    for digits in 2..=12 {
+        let accuracy = 10_f64.powi(-digits);
+        let start = Pendulum.state([2.0], [0.0]);
+        let pendulum = Simulation::new(&Pendulum)
+            .accuracy(accuracy)
+            .run(start, 0.0..10.0);
+        let pendulum = pendulum.expect("a pendulum");
+        let kepler = Simulation::new(&Kepler)
+            .accuracy(accuracy)
+            .run(kepler_start(), 0.0..20.0);
+        let kepler = kepler.expect("a planet");
+        let errors = [
+            true_error(pendulum.motion(), PENDULUM_END),
+            true_error(kepler.motion(), KEPLER_END),
+        ];
+        for (error, (estimate, picked)) in errors.into_iter().zip([
+            (pendulum.error_estimate(), pendulum.picked()),
+            (kepler.error_estimate(), kepler.picked()),
+        ]) {
+            let picked = picked.expect("picked");
+            println!("{accuracy:.0e}: {error:.1e} ({estimate:.1e}), {picked}");
+            assert!(
+                error <= accuracy && estimate <= accuracy,
+                "{accuracy}: {error}, {estimate}"
+            );
+            assert_eq!(picked.error_estimate, estimate);
+            assert!((2..=5).contains(&picked.attempts.len()), "{picked}");
+        }
+        let height = pendulum.error_estimate_of("height").expect("declared");
+        assert!(height <= accuracy && pendulum.error_estimate_of("width").is_none());
+    }
+}
+
+#[test]
+fn what_was_chosen_before_stays() {
+    let start = Pendulum.state([2.0], [0.0]);
+    let simulation = Simulation::new(&Pendulum).element(Primal::<4>).step(0.05);
+    let motion = simulation
+        .accuracy(1e-6)
+        .run(start, 0.0..10.0)
+        .expect("runs");
+    let picked = motion.picked().expect("picked");
+    assert_eq!(picked.element, Primal::<4>.into());
+    assert!(picked.step <= 0.05);
+    assert!(true_error(motion.motion(), PENDULUM_END) <= 1e-6);
+    // Backwards from the end, and the recorded nodes are those that were asked for.
+    let (q, p) = PENDULUM_END;
+    let back = Simulation::new(&Pendulum).record_every(2).accuracy(1e-9);
+    let back = back.run(State { q, p }, 10.0..0.0).expect("runs");
+    assert_eq!(back.last().t, 0.0);
+    assert!(true_error(back.motion(), ([2.0], [0.0])) <= 1e-9);
+    assert!((back.states().len() as u64) < back.statistics().steps);
+}
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = select(t < 1, 1, -1))]
+struct Switched;
+
+/// x = 1 − cos t up to the switch at one, then −1 + a cos(t − 1) + b sin(t − 1); an impulse at three adds to the momentum.
+#[test]
+fn breaks_and_impulses_are_ends_of_elements() {
+    let (x, v) = (1.0 - 1.0_f64.cos(), 1.0_f64.sin());
+    let until_three = |s: f64| {
+        (
+            -1.0 + (x + 1.0) * s.cos() + v * s.sin(),
+            v * s.cos() - (x + 1.0) * s.sin(),
+        )
+    };
+    let (x3, v3) = until_three(2.0);
+    let v3 = v3 + 0.5;
+    let exact = -1.0 + (x3 + 1.0) * 1.0_f64.cos() + v3 * 1.0_f64.sin();
+    let simulation = Simulation::new(&Switched).break_at(1.0).impulse(3.0, [0.5]);
+    let start = Switched.state([0.0], [0.0]);
+    let motion = simulation
+        .accuracy(1e-10)
+        .run(start, 0.0..4.0)
+        .expect("runs");
+    assert!(
+        (motion.last().q[0] - exact).abs() < 1e-10,
+        "{}",
+        motion.last().q[0] - exact
+    );
+    assert!(motion.states().iter().any(|node| node.t == 1.0));
+}
+
+#[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y, constraint(rod) = x^2 + y^2 - l^2)]
+struct RodPendulum {
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
+/// The same pendulum in Cartesian coordinates, from rest at two radians.
+#[test]
+fn constraints_are_no_obstacle() {
+    let rod = RodPendulum {
+        m: 1.0,
+        l: 1.0,
+        g: 1.0,
+    };
+    let start = rod
+        .consistent_state([2.0_f64.sin(), -2.0_f64.cos()], [0.0, 0.0])
+        .map(|Consistent { state, .. }| state)
+        .expect("a start");
+    let motion = Simulation::new(&rod)
+        .accuracy(1e-8)
+        .run(start, 0.0..10.0)
+        .expect("runs");
+    let angle = PENDULUM_END.0[0];
+    let off = [
+        motion.last().q[0] - angle.sin(),
+        motion.last().q[1] + angle.cos(),
+    ];
+    assert!(off.iter().all(|x| x.abs() <= 1e-8), "{off:?}");
+}
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
+struct Oscillator;
+
+#[test]
+fn linear_models_too() {
+    let start = Oscillator.state([1.0], [0.0]);
+    let motion = Simulation::new(&Oscillator)
+        .accuracy(1e-9)
+        .run(start, 0.0..100.0)
+        .expect("runs");
+    assert!((motion.last().q[0] - 100.0_f64.cos()).abs() <= 1e-9);
+}
+
+#[dynamics(
+    coordinates(a, b),
+    lagrangian = dot(a)^2 + dot(b)^2/2 + dot(a)*dot(b)*cos(a - b) + 9.81*(2*cos(a) + cos(b)),
+)]
+struct DoublePendulum;
+
+/// A chaotic motion: what cannot be had is refused, with the motion, its error and how far it is good.
+#[test]
+fn what_cannot_be_met_is_an_error_with_a_horizon() {
+    let start = DoublePendulum.state([3.0, 3.1], [0.0, 0.0]);
+    let outcome = Simulation::new(&DoublePendulum)
+        .accuracy(1e-9)
+        .run(start, 0.0..60.0);
+    let error = outcome.expect_err("errors grow by e every third of a second");
+    let RunErrorKind::AccuracyMissed {
+        asked,
+        estimate,
+        until,
+    } = *error.kind()
+    else {
+        panic!("{error}");
+    };
+    assert!(asked == 1e-9 && estimate > 1e-9, "{error}");
+    let until = until.expect("the beginning is good");
+    assert!(1.0 < until && until < 40.0, "{until}");
+    assert_eq!(error.partial().last().t, 60.0);
+    // Up to there it can be had.
+    let shorter = Simulation::new(&DoublePendulum)
+        .accuracy(1e-9)
+        .run(start, 0.0..until / 2.0);
+    let shorter = shorter.expect("a shorter motion");
+    assert_eq!(shorter.horizon(1e-9), Some(until / 2.0));
+
+    let round_off = Simulation::new(&Pendulum).accuracy(1e-18);
+    let error = round_off
+        .run(Pendulum.state([2.0], [0.0]), 0.0..10.0)
+        .expect_err("roundings");
+    assert!(
+        matches!(error.kind(), RunErrorKind::AccuracyMissed { .. }),
+        "{error}"
+    );
+    assert!(true_error(error.partial(), PENDULUM_END) < 1e-12);
+}
+
+#[test]
+fn what_is_no_accuracy_is_refused() {
+    for accuracy in [0.0, -1e-3, 1.0, f64::NAN, f64::INFINITY] {
+        let outcome = Simulation::new(&Pendulum)
+            .accuracy(accuracy)
+            .run(Pendulum.state([1.0], [0.0]), 0.0..1.0);
+        let error = outcome.expect_err("no number between 0 and 1");
+        assert!(
+            matches!(error.kind(), RunErrorKind::Accuracy { .. }),
+            "{error}"
+        );
+    }
+    let start = Pendulum.state([f64::NAN], [0.0]);
+    let error = Simulation::new(&Pendulum)
+        .accuracy(1e-3)
+        .run(start, 0.0..1.0)
+        .expect_err("no start");
+    assert!(
+        matches!(error.kind(), RunErrorKind::Start { .. }),
+        "{error}"
+    );
+    let start = Pendulum.state([1.0], [0.0]);
+    let error = Simulation::new(&Pendulum)
+        .accuracy(1e-3)
+        .run(start, 0.0..f64::NAN)
+        .expect_err("no span");
+    assert!(matches!(error.kind(), RunErrorKind::Span { .. }), "{error}");
+    // Nothing to do, and no error.
+    let motion = Simulation::new(&Pendulum)
+        .accuracy(1e-3)
+        .run(start, 2.0..2.0)
+        .expect("an empty span");
+    assert_eq!((motion.last().t, motion.error_estimate()), (2.0, 0.0));
+}
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + 1/x)]
+struct Fall;
+
+/// A fall into the centre ends in a run's own error, with the motion so far.
+#[test]
+fn a_motion_that_ends_keeps_what_there_is() {
+    let start = Fall.state([1.0], [0.0]);
+    let error = Simulation::new(&Fall)
+        .accuracy(1e-6)
+        .run(start, 0.0..2.0)
+        .expect_err("falls at 1.11");
+    println!("{error}");
+    assert!(
+        error.partial().states().len() > 1
+            || matches!(error.kind(), RunErrorKind::AccuracyMissed { .. })
+    );
+}
