@@ -1,0 +1,196 @@
+//! What is picked for an accuracy, and what trial would have found.
+
+use crate::Scene;
+use crate::scenes::short;
+use crate::truth::Truth;
+use std::error::Error;
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+use tfe::charts::{Axis, Chart, ChartError, Scale, Section, Style};
+use tfe::prelude::*;
+
+/// One accuracy.
+pub struct Pick {
+    asked: f64,
+    /// What came of it, or why nothing did.
+    outcome: Result<Run, String>,
+}
+
+struct Run {
+    error: f64,
+    estimate: f64,
+    element: Element,
+    step: f64,
+    runs: usize,
+    seconds: f64,
+    /// Of the best way that trial finds, where there is any.
+    best: Option<f64>,
+}
+
+/// Asks for accuracies, and tries elements, steps and tolerances of the scene.
+pub fn measure<M: Model<N>, const N: usize>(
+    model: &M,
+    truth: &Truth<N>,
+    problem: WorkPrecision<'_, M, State<N>>,
+) -> Result<Vec<Pick>, Box<dyn Error>> {
+    let (nodes, digits): (&[usize], &[i32]) = if cfg!(debug_assertions) {
+        (&[5, 9], &[4, 8])
+    } else {
+        (&[3, 4, 5, 7, 9, 12], &[4, 5, 6, 7, 8, 9, 10, 11])
+    };
+    let tried = problem
+        .elements(nodes.iter().map(|nodes| Element::mixed(*nodes)))
+        .tolerances((3..13).map(|digits| 10_f64.powi(-digits)))
+        .repeat_for(Duration::from_millis(3))
+        .run()?;
+    // Both ways are timed as they are used: by a simulation that keeps the end.
+    let simulation = Simulation::new(model).record_every(usize::MAX);
+    let span = 0.0..truth.end;
+    let mut picks = Vec::new();
+    for digits in digits {
+        let asked = 10_f64.powi(-digits);
+        let accurate = simulation.clone().accuracy(asked);
+        let best = tried.fastest(asked).map(|point| {
+            let by_hand = simulation.clone().element(point.element).step(point.step);
+            let by_hand = by_hand.tolerance(point.tolerance);
+            least_seconds(|| by_hand.run(truth.start, span.clone()).is_ok())
+        });
+        let outcome = accurate.run(truth.start, span.clone());
+        let outcome = outcome
+            .map_err(|error| error.to_string())
+            .map(|motion| Run {
+                error: truth.error(motion.last()),
+                estimate: motion.error_estimate(),
+                element: motion
+                    .picked()
+                    .map_or(Element::mixed(2), |picked| picked.element),
+                step: motion.picked().map_or(f64::NAN, |picked| picked.step),
+                runs: motion.picked().map_or(0, |picked| picked.attempts.len()),
+                seconds: least_seconds(|| accurate.run(truth.start, span.clone()).is_ok()),
+                best,
+            });
+        picks.push(Pick { asked, outcome });
+    }
+    Ok(picks)
+}
+
+/// The least of several goes.
+fn least_seconds(mut go: impl FnMut() -> bool) -> f64 {
+    let begin = Instant::now();
+    let mut least = f64::INFINITY;
+    for k in 0.. {
+        if k >= 5 && begin.elapsed() > Duration::from_millis(30) {
+            break;
+        }
+        let clock = Instant::now();
+        black_box(go());
+        least = least.min(clock.elapsed().as_secs_f64());
+    }
+    least
+}
+
+impl Run {
+    fn ratio(&self) -> Option<f64> {
+        Some(self.seconds / self.best?)
+    }
+}
+
+impl Pick {
+    fn row(&self, title: &str) -> [String; 8] {
+        let asked = format!("{:.0e}", self.asked);
+        let title = title.to_owned();
+        let Ok(run) = &self.outcome else {
+            let none = String::new;
+            return [
+                title,
+                asked,
+                "refused".to_owned(),
+                none(),
+                none(),
+                none(),
+                none(),
+                none(),
+            ];
+        };
+        let met = if run.error <= self.asked {
+            ""
+        } else {
+            " (missed)"
+        };
+        [
+            title,
+            asked,
+            format!("{:.1e}{met}", run.error),
+            format!("{:.1e}", run.estimate),
+            format!("{}, h = {}", run.element, short(run.step)),
+            run.runs.to_string(),
+            format!("{:.1}", 1e6 * run.seconds),
+            run.ratio()
+                .map_or_else(|| "—".to_owned(), |ratio| format!("{ratio:.2}")),
+        ]
+    }
+
+    /// A line of the printed table.
+    pub fn line(&self, title: &str) -> String {
+        let [title, asked, error, estimate, way, runs, time, ratio] = self.row(title);
+        format!(
+            "  {title:<26} {asked:>6}  true {error:>8}  estimated {estimate:>8}  {way:<26} {runs} runs {time:>8} µs  {ratio:>5} of the best"
+        )
+    }
+}
+
+/// Table and charts.
+pub fn section(scenes: &[Scene]) -> Result<Section, ChartError> {
+    let mut errors = Chart::new("The true error of what was asked for")
+        .x(Axis::new("accuracy asked for").scale(Scale::Logarithmic))
+        .y(Axis::new("true error").scale(Scale::Logarithmic));
+    let mut times = Chart::new("Time beside the best element, step and tolerance by trial")
+        .x(Axis::new("accuracy asked for").scale(Scale::Logarithmic))
+        .y(Axis::new("times the best").scale(Scale::Logarithmic));
+    let mut ratios = Vec::new();
+    let (mut count, mut met) = (0, 0);
+    for scene in scenes {
+        let runs = || {
+            let picks = scene.picks.iter();
+            picks.filter_map(|pick| Some((pick.asked, pick.outcome.as_ref().ok()?)))
+        };
+        count += scene.picks.len();
+        met += runs().filter(|(asked, run)| run.error <= *asked).count();
+        ratios.extend(runs().filter_map(|(_, run)| run.ratio()));
+        let points = runs().map(|(asked, run)| (asked, run.error));
+        errors = errors.series(scene.title, Style::LineWithMarkers, points);
+        let points = runs().filter_map(|(asked, run)| Some((asked, run.ratio()?)));
+        times = times.series(scene.title, Style::LineWithMarkers, points);
+    }
+    let ends = [(1e-11, 1e-11), (1e-4, 1e-4)];
+    errors = errors.series("asked for", Style::Reference, ends);
+    times = times.series("twice", Style::Reference, [(1e-11, 2.0), (1e-4, 2.0)]);
+    ratios.sort_by(f64::total_cmp);
+    let median = ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN);
+    let within = ratios.iter().filter(|ratio| **ratio <= 2.0).count();
+    let summary = format!(
+        "The accuracy is met in {met} of {count} cases. All runs of the search together take {median:.2} times (median) the time of the best way that trial finds, and at most twice in {within} of {}.",
+        ratios.len()
+    );
+    println!("\n{summary}\n");
+    let rows = scenes
+        .iter()
+        .flat_map(|scene| scene.picks.iter().map(|pick| pick.row(scene.title)));
+    Ok(Section::new("What an accuracy needs")
+        .paragraph(summary)
+        .figure(errors.to_svg()?, "True errors")
+        .figure(times.to_svg()?, "Times")
+        .table(
+            [
+                "scene",
+                "asked",
+                "true error",
+                "estimated",
+                "picked",
+                "runs",
+                "µs",
+                "times the best",
+            ],
+            rows,
+        ))
+}

@@ -1,0 +1,47 @@
+//! What runs are compared with.
+
+use tfe::prelude::*;
+
+/// A motion that is far more accurate than all others, by steps so short that only roundings are left.
+pub struct Truth<const N: usize> {
+    pub start: State<N>,
+    pub end: f64,
+    last: Node<N>,
+    /// The largest coordinate and the largest momentum.
+    sizes: (f64, f64),
+}
+
+impl<const N: usize> Truth<N> {
+    pub fn of<M: Model<N>>(model: &M, start: State<N>, end: f64) -> Result<Self, tfe::RunError<N>> {
+        let simulation = Simulation::new(model).element(Mixed::<10>);
+        let steps = if cfg!(debug_assertions) {
+            4000.0
+        } else {
+            20_000.0
+        };
+        let fine = simulation
+            .step(end / steps)
+            .record_every(10)
+            .run(start, 0.0..end)?;
+        let size = |part: fn(&Node<N>) -> &[f64; N]| {
+            let numbers = fine.states().iter().flat_map(part);
+            numbers.fold(0.0, |most: f64, x| most.max(x.abs()))
+        };
+        Ok(Self {
+            start,
+            end,
+            last: *fine.last(),
+            sizes: (size(|node| &node.q), size(|node| &node.p)),
+        })
+    }
+
+    /// The larger relative error of coordinates and momenta at the end.
+    pub fn error(&self, end: &Node<N>) -> f64 {
+        let largest = |a: &[f64; N], b: &[f64; N]| {
+            let pairs = a.iter().zip(b);
+            pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
+        };
+        let q = largest(&end.q, &self.last.q) / self.sizes.0;
+        q.max(largest(&end.p, &self.last.p) / self.sizes.1)
+    }
+}
