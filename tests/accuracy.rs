@@ -341,3 +341,82 @@ fn a_motion_that_ends_keeps_what_there_is() {
             || matches!(error.kind(), RunErrorKind::AccuracyMissed { .. })
     );
 }
+
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + a/3*(q[i+1]-q[i])^3),
+    output(strain[i in 0..n-1]) = q[i+1] - q[i],
+)]
+struct Chain {
+    n: usize,
+    a: f64,
+}
+
+/// The same for a chain of any length, against a run with steps so short that only roundings are left.
+#[test]
+fn families_know_their_errors_too() {
+    let chain = Chain { n: 40, a: 0.25 };
+    let q: Vec<f64> = (0..chain.n).map(|i| (0.7 * i as f64).cos()).collect();
+    let start = chain.state(q, vec![0.0; chain.n]);
+    let fine = Simulation::new(&chain).element(Mixed::<10>).step(0.01);
+    let fine = fine
+        .record_every(100)
+        .run(start.clone(), 0.0..20.0)
+        .expect("runs");
+    let size = |part: fn(&tfe::family::FamilyNode) -> &Vec<f64>| {
+        let numbers = fine.states().iter().flat_map(part);
+        numbers.fold(0.0, |most: f64, x| most.max(x.abs()))
+    };
+    let (size_q, size_p) = (size(|node| &node.q), size(|node| &node.p));
+    let error = |node: &tfe::family::FamilyNode| {
+        let largest = |a: &[f64], b: &[f64]| {
+            let pairs = a.iter().zip(b);
+            pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
+        };
+        let q = largest(&node.q, &fine.last().q) / size_q;
+        q.max(largest(&node.p, &fine.last().p) / size_p)
+    };
+    for accuracy in [1e-4, 1e-8, 1e-11] {
+        let motion = Simulation::new(&chain)
+            .accuracy(accuracy)
+            .run(start.clone(), 0.0..20.0);
+        let motion = motion.expect("a chain");
+        let (off, estimate) = (error(motion.last()), motion.error_estimate());
+        println!(
+            "{accuracy:.0e}: {off:.1e} ({estimate:.1e}), {}",
+            motion.picked().expect("picked")
+        );
+        assert!(
+            off <= accuracy && estimate <= accuracy,
+            "{accuracy}: {off}, {estimate}"
+        );
+        assert!(motion.error_estimate_of("strain[7]").expect("declared") <= accuracy);
+    }
+    for (element, step) in [
+        (Element::mixed(3), 0.1),
+        (Element::mixed(5), 0.5),
+        (Element::mixed(12), 2.0),
+    ] {
+        let simulation = Simulation::new(&chain).element(element).step(step);
+        let motion = simulation
+            .run_estimated(start.clone(), 0.0..20.0)
+            .expect("a chain");
+        let ratio = at_end(&motion) / error(motion.last());
+        assert!((0.5..=2.0).contains(&ratio), "{element}: {ratio}");
+    }
+    let mut short = start.clone();
+    short.q.pop();
+    let error = Simulation::new(&chain)
+        .accuracy(1e-6)
+        .run(short, 0.0..1.0)
+        .expect_err("a short vector");
+    assert!(matches!(error.kind(), RunErrorKind::Family(_)), "{error}");
+    let error = Simulation::new(&chain)
+        .accuracy(2.0)
+        .run(start, 0.0..1.0)
+        .expect_err("no accuracy");
+    assert!(
+        matches!(error.kind(), RunErrorKind::Accuracy { .. }),
+        "{error}"
+    );
+}

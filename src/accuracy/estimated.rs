@@ -13,7 +13,7 @@ pub struct Estimated<T> {
     times: Vec<f64>,
     /// Of each kind at each time: coordinates, momenta, one output after the other.
     errors: Vec<Vec<f64>>,
-    outputs: &'static [&'static str],
+    outputs: Vec<String>,
     picked: Option<Picked>,
 }
 
@@ -22,7 +22,7 @@ impl<T> Estimated<T> {
         motion: T,
         times: Vec<f64>,
         errors: Vec<Vec<f64>>,
-        outputs: &'static [&'static str],
+        outputs: Vec<String>,
         picked: Option<Picked>,
     ) -> Self {
         Self {
@@ -53,7 +53,7 @@ impl<T> Estimated<T> {
 
     /// The largest estimated error of one declared output over its largest value; `None` where the model declares no such name.
     pub fn error_estimate_of(&self, output: &str) -> Option<f64> {
-        let at = self.outputs.iter().position(|name| *name == output)?;
+        let at = self.outputs.iter().position(|name| name == output)?;
         // After coordinates and momenta.
         let errors = self.errors.get(2 + at)?;
         Some(errors.iter().copied().fold(0.0, f64::max))

@@ -1,4 +1,6 @@
-//! Runs with an estimate of their error.
+//! Runs with an estimate of their error: what models of both kinds of length have in common, and those of fixed size.
+
+mod family;
 
 use super::mesh::Mesh;
 use super::{Simulation, check_constraints, check_start};
@@ -7,20 +9,106 @@ use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
 use std::ops::Range;
 use tfe_runtime::step::{Control, Stepper};
-use tfe_runtime::{Element, Form, Model, Solve, State, constrained};
+use tfe_runtime::{Element, Form, Model, Solve, State, Statistics, StepError, constrained};
 
 /// An iteration that takes more is no bargain.
 const MOST_ITERATIONS: u32 = 25;
 
-/// What there is of the motion: the last one over the whole span; as long as there is none, the state that went farthest.
-enum Kept<const N: usize> {
-    Nothing,
-    Part(f64, State<N>),
-    Motion(Box<Motion<N>>),
+/// A run that can be made with other elements and steps.
+pub(super) trait Repeatable<const N: usize> {
+    type State: Clone;
+    type Stepper;
+    type Motion;
+
+    /// The element; the default one where none was chosen.
+    fn element(&self) -> Element;
+    fn control(&self) -> Control;
+    fn coordinates(&self) -> usize;
+    /// The names of all outputs.
+    fn outputs(&self) -> Vec<String>;
+    /// A stepper; the inside of its steps is asked for only if they are to be recorded.
+    fn stepper(
+        &self,
+        element: Element,
+        control: Control,
+        is_recorded: bool,
+    ) -> Result<Self::Stepper, RunErrorKind>;
+    /// One element of the mesh: its start, end and length.
+    fn advance(
+        &self,
+        stepper: &mut Self::Stepper,
+        element: (f64, f64, f64),
+        mesh: &Mesh<N>,
+        state: &mut Self::State,
+    ) -> Result<(), StepError>;
+    fn set_tolerance(stepper: &mut Self::Stepper, tolerance: f64);
+    fn statistics(stepper: &Self::Stepper) -> Statistics;
+    /// Coordinates, momenta and outputs, one after the other.
+    fn row(&self, stepper: &mut Self::Stepper, t: f64, state: &Self::State, row: &mut [f64]);
+    /// The steps of a mesh as motion; every end of an element is shown to `passed`.
+    fn record(
+        &self,
+        stepper: &mut Self::Stepper,
+        mesh: &Mesh<N>,
+        start: (f64, &Self::State),
+        passed: &mut Passing<'_, Self::Stepper, Self::State>,
+    ) -> Result<Self::Motion, Broken<Self::Motion>>;
+    /// A motion of the start and one other state.
+    fn part(&self, start: (f64, &Self::State), end: (f64, &Self::State)) -> Self::Motion;
+    /// A mesh of equal parts between times.
+    fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind>;
 }
 
-impl<const N: usize> Kept<N> {
-    fn keep_part(&mut self, start: f64, t: f64, state: State<N>) {
+/// Is shown the end of every element: the stepper, the time, the state.
+pub(super) type Passing<'a, T, S> = dyn FnMut(&mut T, f64, &S) + 'a;
+
+/// Why a recorded run has stopped, and what there is of it.
+pub(super) type Broken<T> = Box<(RunErrorKind, T)>;
+
+/// What is seen of a run.
+struct Watcher {
+    trace: Trace,
+    /// Room for one time.
+    row: Vec<f64>,
+}
+
+impl Watcher {
+    /// One that has seen the start.
+    fn new<R: Repeatable<N>, const N: usize>(
+        run: &R,
+        stepper: &mut R::Stepper,
+        (t, start): (f64, &R::State),
+    ) -> Self {
+        let trace = Trace::new(run.coordinates(), run.outputs().len());
+        let mut watcher = Self {
+            row: vec![0.0; trace.width()],
+            trace,
+        };
+        watcher.pass(run, stepper, (t, start), false);
+        watcher
+    }
+
+    fn pass<R: Repeatable<N>, const N: usize>(
+        &mut self,
+        run: &R,
+        stepper: &mut R::Stepper,
+        (t, state): (f64, &R::State),
+        keeps: bool,
+    ) {
+        run.row(stepper, t, state, &mut self.row);
+        self.trace.pass(&self.row, keeps);
+    }
+}
+
+/// What there is of the motion: the last one that was recorded; as long as there is none, the state that went farthest.
+enum Kept<T, S> {
+    Nothing,
+    Part(f64, S),
+    Motion(T),
+}
+
+impl<T, S> Kept<T, S> {
+    fn keep_part(&mut self, start: f64, t: f64, state: S) {
         let farthest = match self {
             Self::Nothing => start,
             Self::Part(farthest, _) => *farthest,
@@ -32,26 +120,180 @@ impl<const N: usize> Kept<N> {
     }
 }
 
-/// Why and where a run that was not recorded has stopped.
-struct Stop<const N: usize> {
-    kind: RunErrorKind,
-    t: f64,
-    state: State<N>,
+/// Why a run has stopped, and where.
+type Stop<S> = (RunErrorKind, f64, S);
+
+/// A run of which nothing is kept but what it is compared by, at `times`.
+fn follow<R: Repeatable<N>, const N: usize>(
+    run: &R,
+    stepper: &mut R::Stepper,
+    (t0, start): (f64, &R::State),
+    mesh: &Mesh<N>,
+    times: &[f64],
+) -> Result<Trace, Stop<R::State>> {
+    let mut watcher = Watcher::new(run, stepper, (t0, start));
+    let mut times = times.iter().peekable();
+    let mut state = start.clone();
+    for (element, (t, next, h)) in mesh.elements().enumerate() {
+        if let Err(source) = run.advance(stepper, (t, next, h), mesh, &mut state) {
+            let kind = RunErrorKind::Solve {
+                element,
+                time: t,
+                step: h,
+                source,
+            };
+            return Err((kind, t, state));
+        }
+        let keeps = times.next_if_eq(&&next).is_some();
+        watcher.pass(run, stepper, (next, &state), keeps);
+    }
+    Ok(watcher.trace)
 }
 
-/// What is seen of a run.
-struct Watcher<const N: usize> {
-    trace: Trace,
-    /// Room for one time.
-    row: Vec<f64>,
-    /// The last one, where outputs need it.
-    velocity: [f64; N],
+/// A run over a mesh beside one of higher order (T-98).
+fn estimated<R: Repeatable<N>, const N: usize>(
+    run: &R,
+    (t0, start): (f64, &R::State),
+    mesh: &Mesh<N>,
+) -> Result<Estimated<R::Motion>, Broken<R::Motion>> {
+    let (element, control) = (run.element(), run.control());
+    let mut stepper = match run.stepper(element, control, true) {
+        Ok(stepper) => stepper,
+        Err(kind) => return Err(Box::new((kind, run.part((t0, start), (t0, start))))),
+    };
+    let mut watcher = Watcher::new(run, &mut stepper, (t0, start));
+    let mut times = Vec::new();
+    let motion = run.record(&mut stepper, mesh, (t0, start), &mut |stepper, t, state| {
+        times.push(t);
+        watcher.pass(run, stepper, (t, state), true);
+    })?;
+    let other = || {
+        // The same steps with one node more, or two steps for each of the same number where there are no more.
+        let more = Element::mixed(element.nodes() + 1);
+        let start = (t0, start);
+        if more.validate().is_ok() {
+            let mut stepper = run.stepper(more, control, false)?;
+            return follow(run, &mut stepper, start, mesh, &times).map_err(|stop| stop.0);
+        }
+        let nodes: Vec<f64> = [t0].iter().chain(&times).copied().collect();
+        let lengths = nodes.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        let half = lengths.fold(0.0, f64::max) * (0.5 + 1e-9);
+        let mut stepper = run.stepper(Element::mixed(element.nodes()), control, false)?;
+        let mesh = run.even(&nodes, half)?;
+        follow(run, &mut stepper, start, &mesh, &times).map_err(|stop| stop.0)
+    };
+    match other() {
+        Ok(other) => {
+            let errors = difference(&watcher.trace, &other);
+            Ok(Estimated::new(motion, times, errors, run.outputs(), None))
+        }
+        Err(kind) => Err(Box::new((kind, motion))),
+    }
 }
 
-/// A run to be that picks its element and its step; made by [`Simulation::accuracy`].
+/// A run with the element and the step that meet an accuracy (T-99).
+fn accurate<R: Repeatable<N>, const N: usize>(
+    run: &R,
+    start: &R::State,
+    asked: &Asked,
+) -> Result<Estimated<R::Motion>, Broken<R::Motion>> {
+    let t0 = asked.span.start;
+    let mut kept = Kept::Nothing;
+    let outcome = find(run, start, asked, &mut kept);
+    let motion = match kept {
+        Kept::Motion(motion) => motion,
+        Kept::Nothing => run.part((t0, start), (t0, start)),
+        Kept::Part(t, state) => run.part((t0, start), (t, &state)),
+    };
+    let found = match outcome {
+        Ok(found) => found,
+        Err(kind) => return Err(Box::new((kind, motion))),
+    };
+    let (times, errors) = (found.times, found.errors);
+    let estimated = Estimated::new(motion, times, errors, run.outputs(), Some(found.picked));
+    if found.is_met {
+        return Ok(estimated);
+    }
+    let kind = RunErrorKind::AccuracyMissed {
+        asked: asked.accuracy,
+        estimate: estimated.error_estimate(),
+        until: estimated.horizon(asked.accuracy),
+    };
+    Err(Box::new((kind, estimated.into_motion())))
+}
+
+fn find<R: Repeatable<N>, const N: usize>(
+    run: &R,
+    start: &R::State,
+    asked: &Asked,
+    kept: &mut Kept<R::Motion, R::State>,
+) -> Result<Found, RunErrorKind> {
+    let t0 = asked.span.start;
+    let mut last: Option<(bool, R::Stepper)> = None;
+    search(asked, &mut |way: &Way<'_>| {
+        let mesh = run.even(way.cuts, way.step)?;
+        let (_, stepper) = match last.take() {
+            Some((by_iteration, stepper)) if by_iteration == way.by_iteration => {
+                last.insert((by_iteration, stepper))
+            }
+            _ => {
+                let mut control = run.control();
+                if way.by_iteration {
+                    control.solve = Solve::FixedPoint;
+                    control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
+                }
+                let stepper = run.stepper(way.element, control, true)?;
+                last.insert((way.by_iteration, stepper))
+            }
+        };
+        R::set_tolerance(stepper, way.tolerance);
+        let before = R::statistics(stepper);
+        let times = &way.cuts[1..];
+        let trace = if way.keeps {
+            let mut watcher = Watcher::new(run, stepper, (t0, start));
+            let mut times = times.iter().peekable();
+            let motion = run.record(stepper, &mesh, (t0, start), &mut |stepper, t, state| {
+                let keeps = times.next_if_eq(&&t).is_some();
+                watcher.pass(run, stepper, (t, state), keeps);
+            });
+            let motion = motion.map_err(|broken| {
+                let (kind, part) = *broken;
+                if !matches!(kept, Kept::Motion(_)) {
+                    *kept = Kept::Motion(part);
+                }
+                kind
+            })?;
+            *kept = Kept::Motion(motion);
+            watcher.trace
+        } else {
+            follow(run, stepper, (t0, start), &mesh, times).map_err(|(kind, t, state)| {
+                kept.keep_part(t0, t, state);
+                kind
+            })?
+        };
+        let after = R::statistics(stepper);
+        Ok(Ran {
+            trace,
+            contracts: after.newton_iterations == before.newton_iterations
+                && after.products == before.products,
+        })
+    })
+}
+
+/// What is asked of a run is a number between 0 and 1.
+fn check_accuracy(accuracy: f64) -> Result<(), RunErrorKind> {
+    if accuracy > 0.0 && accuracy < 1.0 {
+        Ok(())
+    } else {
+        Err(RunErrorKind::Accuracy { asked: accuracy })
+    }
+}
+
+/// A run to be that picks its element and its step; made by [`Simulation::accuracy`] and
+/// [`FamilySimulation::accuracy`](crate::family::FamilySimulation::accuracy).
 #[derive(Clone, Debug)]
-pub struct Accurate<'m, M, const N: usize> {
-    simulation: Simulation<'m, M, N>,
+pub struct Accurate<S> {
+    simulation: S,
     accuracy: f64,
 }
 
@@ -81,7 +323,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # }
     /// ```
     #[must_use]
-    pub fn accuracy(self, accuracy: f64) -> Accurate<'m, M, N> {
+    pub fn accuracy(self, accuracy: f64) -> Accurate<Self> {
         Accurate {
             simulation: self,
             accuracy,
@@ -123,129 +365,15 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         start: State<N>,
         span: Range<f64>,
     ) -> Result<Estimated<Motion<N>>, RunError<N>> {
-        let mut watcher = self.watcher(span.start, &start);
-        let mut times = Vec::new();
-        let ends_only = self.record_every != 1;
-        let motion = self.drive(start, &span, ends_only, |_, passed| {
-            times.push(passed.end);
-            self.pass(&mut watcher, passed.end, passed.after, true);
-            Ok(())
-        })?;
-        let other = match self.finer(start, &span, &times) {
-            Ok(other) => other,
-            Err(kind) => return Err(RunError::new(kind, motion)),
-        };
-        let errors = difference(&watcher.trace, &other);
-        Ok(Estimated::new(motion, times, errors, M::OBSERVABLES, None))
-    }
-
-    /// The same steps with one node more, or two steps for each of the same element where there are no more nodes.
-    fn finer(
-        &self,
-        start: State<N>,
-        span: &Range<f64>,
-        times: &[f64],
-    ) -> Result<Trace, RunErrorKind> {
-        let element = self.chosen_element();
-        let more = Element::mixed(element.nodes() + 1);
-        let companion = |element| self.companion(element, self.control);
-        let (companion, mesh) = if more.validate().is_ok() {
-            (companion(more), self.mesh(span)?)
-        } else {
-            let nodes: Vec<f64> = [span.start].iter().chain(times).copied().collect();
-            let lengths = nodes.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-            let half = lengths.fold(0.0, f64::max) * (0.5 + 1e-9);
-            let mesh = Mesh::even(&nodes, half, &self.impulses)?;
-            (companion(Element::mixed(element.nodes())), mesh)
-        };
-        let mut stepper = companion.stepper()?.ends_only();
-        self.follow(&mut stepper, start, &mesh, times)
-            .map_err(|stop| stop.kind)
-    }
-
-    /// A run of which nothing is kept but what it is compared by, at `times`.
-    fn follow(
-        &self,
-        stepper: &mut Stepper<'m, M, N>,
-        start: State<N>,
-        mesh: &Mesh<N>,
-        times: &[f64],
-    ) -> Result<Trace, Stop<N>> {
-        let mut elements = mesh.elements().enumerate().peekable();
-        let t0 = elements.peek().map_or(0.0, |(_, (t, ..))| *t);
-        let mut watcher = self.watcher(t0, &start);
-        let mut times = times.iter().peekable();
-        let mut state = start;
-        while let Some((element, (t, next, h))) = elements.next() {
-            let impulses = mesh.impulses_in(t, next, elements.peek().is_none());
-            if let Err(source) = stepper.advance(t, h, &mut state, impulses) {
-                let kind = RunErrorKind::Solve {
-                    element,
-                    time: t,
-                    step: h,
-                    source,
-                };
-                return Err(Stop { kind, t, state });
-            }
-            let keeps = times.next_if_eq(&&next).is_some();
-            self.pass(&mut watcher, next, &state, keeps);
-        }
-        Ok(watcher.trace)
-    }
-
-    /// A trace that has seen the start.
-    fn watcher(&self, t: f64, start: &State<N>) -> Watcher<N> {
-        let trace = Trace::new(N, M::OBSERVABLES.len());
-        let mut watcher = Watcher {
-            row: vec![0.0; trace.width()],
-            velocity: [0.0; N],
-            trace,
-        };
-        self.pass(&mut watcher, t, start, false);
-        watcher
-    }
-
-    /// Shows a state with its outputs to the trace.
-    fn pass(&self, watcher: &mut Watcher<N>, t: f64, state: &State<N>, keeps: bool) {
-        let Watcher {
-            row,
-            velocity,
-            trace,
-        } = watcher;
-        row[..N].copy_from_slice(&state.q);
-        row[N..2 * N].copy_from_slice(&state.p);
-        if const { !M::OBSERVABLES.is_empty() } {
-            let z = match M::FORM {
-                Form::Hamiltonian => state.p,
-                Form::Lagrangian => {
-                    *velocity =
-                        constrained::velocity_of(self.model, t, &state.q, &state.p, velocity)
-                            .unwrap_or([f64::NAN; N]);
-                    *velocity
-                }
-            };
-            self.model.observables(t, &state.q, &z, &mut row[2 * N..]);
-        }
-        trace.pass(row, keeps);
-    }
-
-    /// The same run with another element, of which nothing is recorded.
-    fn companion(&self, element: Element, control: Control) -> Self {
-        Self {
-            element: Some(element),
-            control,
-            record_every: usize::MAX,
-            progress: false,
-            ..self.clone()
-        }
-    }
-
-    fn stepper(&self) -> Result<Stepper<'m, M, N>, RunErrorKind> {
-        Stepper::new(self.model, self.chosen_element(), self.control).map_err(RunErrorKind::Element)
+        let beginning = || Motion::from_start(self.model, span.start, &start);
+        let mesh = self.prepare(&start, &span).map(|(mesh, _)| mesh);
+        let mesh = mesh.map_err(|kind| RunError::new(kind, beginning()))?;
+        estimated(self, (span.start, &start), &mesh)
+            .map_err(|broken| RunError::new(broken.0, broken.1))
     }
 }
 
-impl<M: Model<N>, const N: usize> Accurate<'_, M, N> {
+impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
     /// Runs over the span with the element and the step that meet the accuracy.
     ///
     /// # Errors
@@ -256,145 +384,141 @@ impl<M: Model<N>, const N: usize> Accurate<'_, M, N> {
         start: State<N>,
         span: Range<f64>,
     ) -> Result<Estimated<Motion<N>>, RunError<N>> {
+        let run = &self.simulation;
         if span.start == span.end {
-            let motion = self.simulation.run(start, span)?;
+            let motion = run.run(start, span)?;
+            let outputs = run.outputs();
             return Ok(Estimated::new(
                 motion,
                 Vec::new(),
                 Vec::new(),
-                M::OBSERVABLES,
+                outputs,
                 None,
             ));
         }
-        let mut found = Kept::Nothing;
-        let outcome = self.find(start, &span, &mut found);
-        let motion = match found {
-            Kept::Motion(motion) => *motion,
-            Kept::Nothing => Motion::from_start(self.simulation.model, span.start, &start),
-            Kept::Part(t, state) => {
-                let model = self.simulation.model;
-                let mut motion = Motion::from_start(model, span.start, &start);
-                if t != span.start {
-                    motion.record(model, t, &state);
-                }
-                motion
-            }
+        let refused = |kind| {
+            let motion = Motion::from_start(run.model, span.start, &start);
+            RunError::new(kind, motion)
         };
-        let found = match outcome {
-            Ok(found) => found,
-            Err(kind) => return Err(RunError::new(kind, motion)),
-        };
-        let estimated = Estimated::new(
-            motion,
-            found.times,
-            found.errors,
-            M::OBSERVABLES,
-            Some(found.picked),
-        );
-        if found.is_met {
-            return Ok(estimated);
-        }
-        let kind = RunErrorKind::AccuracyMissed {
-            asked: self.accuracy,
-            estimate: estimated.error_estimate(),
-            until: estimated.horizon(self.accuracy),
-        };
-        Err(RunError::new(kind, estimated.into_motion()))
-    }
-
-    fn find(
-        &self,
-        start: State<N>,
-        span: &Range<f64>,
-        kept: &mut Kept<N>,
-    ) -> Result<Found, RunErrorKind> {
-        let simulation = &self.simulation;
-        let accuracy = self.accuracy;
-        if !(accuracy > 0.0 && accuracy < 1.0) {
-            return Err(RunErrorKind::Accuracy { asked: accuracy });
-        }
-        check_start(&start)?;
-        // Checks span, breaks and impulses.
-        let h = (span.end - span.start) / 1000.0;
-        Mesh::new(span, h, &simulation.breaks, &simulation.impulses)?;
-        check_constraints(simulation.model, span.start, h, &start)?;
+        self.check(&start, &span).map_err(refused)?;
+        let impulses = run.impulses.iter().map(|one| one.time);
         let asked = Asked {
-            accuracy,
+            accuracy: self.accuracy,
             span: span.clone(),
             // An impulse inside an element costs it its order.
-            breaks: simulation
-                .breaks
-                .iter()
-                .copied()
-                .chain(simulation.impulses.iter().map(|one| one.time))
-                .collect(),
-            element: simulation.element,
-            longest: simulation.step,
-            may_iterate: simulation.control.solve == Solve::Auto
+            breaks: run.breaks.iter().copied().chain(impulses).collect(),
+            element: run.element,
+            longest: run.step,
+            may_iterate: run.control.solve == Solve::Auto
                 && const { !M::FACTS.linear && M::CONSTRAINTS.is_empty() },
         };
-        let mut steppers: Option<(bool, Stepper<'_, M, N>)> = None;
-        search(&asked, &mut |way: &Way<'_>| {
-            let control = Control {
-                tolerance: way.tolerance,
-                // One that contracts badly is no faster than Newton's method.
-                ..if way.by_iteration {
-                    Control {
-                        solve: Solve::FixedPoint,
-                        max_iterations: MOST_ITERATIONS,
-                        ..simulation.control
-                    }
-                } else {
-                    simulation.control
-                }
-            };
-            let companion = simulation.companion(way.element, control);
-            let mesh = Mesh::even(way.cuts, way.step, &simulation.impulses)?;
-            let (_, stepper) = match steppers.take() {
-                Some((by_iteration, stepper)) if by_iteration == way.by_iteration => {
-                    steppers.insert((by_iteration, stepper))
-                }
-                _ => {
-                    let stepper = match simulation.record_every {
-                        1 => companion.stepper()?,
-                        _ => companion.stepper()?.ends_only(),
-                    };
-                    steppers.insert((way.by_iteration, stepper))
-                }
-            };
-            stepper.set_tolerance(way.tolerance);
-            let before = *stepper.statistics();
-            let times = &way.cuts[1..];
-            let trace = if way.keeps {
-                let recorded = Simulation {
-                    record_every: simulation.record_every,
-                    progress: simulation.progress,
-                    ..companion
-                };
-                let mut watcher = simulation.watcher(span.start, &start);
-                let mut times = times.iter().peekable();
-                let motion = recorded.drive_over(start, span.start, &mesh, stepper, |_, passed| {
-                    let keeps = times.next_if_eq(&&passed.end).is_some();
-                    simulation.pass(&mut watcher, passed.end, passed.after, keeps);
-                    Ok(())
-                });
-                let motion = motion.map_err(|error| error.kind().clone())?;
-                *kept = Kept::Motion(Box::new(motion));
-                watcher.trace
-            } else {
-                simulation
-                    .follow(stepper, start, &mesh, times)
-                    .map_err(|stop| {
-                        kept.keep_part(span.start, stop.t, stop.state);
-                        stop.kind
-                    })?
-            };
-            let after = stepper.statistics();
-            Ok(Ran {
-                trace,
-                contracts: after.newton_iterations == before.newton_iterations
-                    && after.products == before.products,
-            })
+        accurate(run, &start, &asked).map_err(|broken| RunError::new(broken.0, broken.1))
+    }
+
+    fn check(&self, start: &State<N>, span: &Range<f64>) -> Result<(), RunErrorKind> {
+        let run = &self.simulation;
+        check_accuracy(self.accuracy)?;
+        check_start(start)?;
+        // Of span, breaks and impulses.
+        let h = (span.end - span.start) / 1000.0;
+        Mesh::new(span, h, &run.breaks, &run.impulses)?;
+        check_constraints(run.model, span.start, h, start)
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
+    type State = State<N>;
+    type Stepper = Stepper<'m, M, N>;
+    type Motion = Motion<N>;
+
+    fn element(&self) -> Element {
+        self.chosen_element()
+    }
+
+    fn control(&self) -> Control {
+        self.control
+    }
+
+    fn coordinates(&self) -> usize {
+        N
+    }
+
+    fn outputs(&self) -> Vec<String> {
+        M::OBSERVABLES.iter().map(ToString::to_string).collect()
+    }
+
+    fn stepper(
+        &self,
+        element: Element,
+        control: Control,
+        is_recorded: bool,
+    ) -> Result<Stepper<'m, M, N>, RunErrorKind> {
+        let stepper = Stepper::new(self.model, element, control).map_err(RunErrorKind::Element)?;
+        Ok(if is_recorded && self.record_every == 1 {
+            stepper
+        } else {
+            stepper.ends_only()
         })
+    }
+
+    fn advance(
+        &self,
+        stepper: &mut Stepper<'m, M, N>,
+        (t, next, h): (f64, f64, f64),
+        mesh: &Mesh<N>,
+        state: &mut State<N>,
+    ) -> Result<(), StepError> {
+        let impulses = mesh.impulses_in(t, next, mesh.end() == Some(next));
+        stepper.advance(t, h, state, impulses)
+    }
+
+    fn set_tolerance(stepper: &mut Stepper<'m, M, N>, tolerance: f64) {
+        stepper.set_tolerance(tolerance);
+    }
+
+    fn statistics(stepper: &Stepper<'m, M, N>) -> Statistics {
+        *stepper.statistics()
+    }
+
+    fn row(&self, _: &mut Stepper<'m, M, N>, t: f64, state: &State<N>, row: &mut [f64]) {
+        row[..N].copy_from_slice(&state.q);
+        row[N..2 * N].copy_from_slice(&state.p);
+        if const { M::OBSERVABLES.is_empty() } {
+            return;
+        }
+        let z = match M::FORM {
+            Form::Hamiltonian => state.p,
+            Form::Lagrangian => {
+                constrained::velocity_of(self.model, t, &state.q, &state.p, &[0.0; N])
+                    .unwrap_or([f64::NAN; N])
+            }
+        };
+        self.model.observables(t, &state.q, &z, &mut row[2 * N..]);
+    }
+
+    fn record(
+        &self,
+        stepper: &mut Stepper<'m, M, N>,
+        mesh: &Mesh<N>,
+        (t, start): (f64, &State<N>),
+        passed: &mut Passing<'_, Stepper<'m, M, N>, State<N>>,
+    ) -> Result<Motion<N>, Broken<Motion<N>>> {
+        self.drive_over(*start, t, mesh, stepper, |stepper, element| {
+            passed(stepper, element.end, element.after);
+            Ok(())
+        })
+        .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))
+    }
+
+    fn part(&self, (t0, start): (f64, &State<N>), (t, end): (f64, &State<N>)) -> Motion<N> {
+        let mut motion = Motion::from_start(self.model, t0, start);
+        if t != t0 {
+            motion.record(self.model, t, end);
+        }
+        motion
+    }
+
+    fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind> {
+        Mesh::even(cuts, step, &self.impulses)
     }
 }

@@ -1,5 +1,6 @@
 //! Runs of models of run-time length, and which kind of run `Simulation::new` gives.
 
+use super::accurate::{Broken, Passing};
 use super::mesh::Mesh;
 use super::{Simulation, progress};
 use crate::error::RunErrorKind;
@@ -78,12 +79,13 @@ impl<M: FamilyModel> Runs<M, 0> for RunTimeLength {
 /// Lagrangian may have any kinetic energy and holonomic constraints: `constraint(rod[i in 0..n-1]) = …`.
 #[derive(Debug)]
 pub struct FamilySimulation<'m, M> {
-    model: &'m M,
-    element: Element,
-    step: Option<f64>,
-    control: Control,
+    pub(super) model: &'m M,
+    /// The default where it is not chosen.
+    pub(super) element: Option<Element>,
+    pub(super) step: Option<f64>,
+    pub(super) control: Control,
     record_every: usize,
-    breaks: Vec<f64>,
+    pub(super) breaks: Vec<f64>,
     progress: bool,
 }
 
@@ -102,7 +104,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     pub fn new(model: &'m M) -> Self {
         Self {
             model,
-            element: Element::from(Mixed::<4>),
+            element: None,
             step: None,
             control: Control::default(),
             record_every: 1,
@@ -115,7 +117,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     /// with Gauss points.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
-        self.element = element.into();
+        self.element = Some(element.into());
         self
     }
 
@@ -179,17 +181,44 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         start: FamilyState,
         span: Range<f64>,
     ) -> Result<FamilyMotion, FamilyRunError> {
-        let refused = |kind| {
-            let partial = FamilyMotion::empty(self.model, span.start, &start);
-            FamilyRunError::new(kind, partial)
-        };
+        let refused = |kind| self.refused(kind, span.start, &start);
+        let (mut stepper, _) = self.stepper(span.start, &start).map_err(refused)?;
+        let mesh = self.mesh(&span).map_err(refused)?;
+        self.drive_over((span.start, &start), &mesh, &mut stepper, &mut |_, _, _| {})
+            .map_err(|broken| FamilyRunError::new(broken.0, broken.1))
+    }
+
+    pub(super) fn refused(
+        &self,
+        kind: RunErrorKind,
+        t: f64,
+        start: &FamilyState,
+    ) -> FamilyRunError {
+        FamilyRunError::new(kind, FamilyMotion::empty(self.model, t, start))
+    }
+
+    pub(super) fn chosen_element(&self) -> Element {
+        self.element.unwrap_or_else(|| Element::from(Mixed::<4>))
+    }
+
+    pub(super) fn mesh(&self, span: &Range<f64>) -> Result<Mesh<0>, RunErrorKind> {
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
-        let (mut stepper, v) = self.stepper(span.start, &start).map_err(refused)?;
-        let mesh = Mesh::<0>::new(&span, step, &self.breaks, &[]).map_err(refused)?;
-        let mut motion = FamilyMotion::from_start(self.model, span.start, &start, Ok(v));
+        Mesh::new(span, step, &self.breaks, &[])
+    }
+
+    /// Runs over a mesh with a stepper at rest, and shows the end of every element to `passed`.
+    pub(super) fn drive_over(
+        &self,
+        (t0, start): (f64, &FamilyState),
+        mesh: &Mesh<0>,
+        stepper: &mut FamilyStepper<'m, M>,
+        passed: &mut Passing<'_, FamilyStepper<'m, M>, FamilyState>,
+    ) -> Result<FamilyMotion, Broken<FamilyMotion>> {
+        let velocity = stepper.velocity(t0, start);
+        let mut motion = FamilyMotion::from_start(self.model, t0, start, velocity);
         let mut bar = progress::Bar::new(self.progress, mesh.steps());
         let mut failure = None;
-        let mut state = start;
+        let mut state = start.clone();
         for (element, (t, next, h)) in mesh.elements().enumerate() {
             if let Err(source) = stepper.advance(t, h, &mut state) {
                 if motion.last().t != t {
@@ -206,6 +235,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             if self.record_every == 1 {
                 motion.keep_element(stepper.dense(t, next));
             }
+            passed(stepper, next, &state);
             let last = element + 1 == mesh.steps();
             if last || (element + 1) % self.record_every == 0 {
                 motion.record(self.model, next, &state, stepper.velocity(next, &state));
@@ -215,7 +245,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         motion.set_statistics(*stepper.statistics());
         match failure {
             None => Ok(motion),
-            Some(kind) => Err(FamilyRunError::new(kind, motion)),
+            Some(kind) => Err(Box::new((kind, motion))),
         }
     }
 
@@ -247,7 +277,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     }
 
     /// A stepper and the velocity at the start, if model, element and start are good.
-    fn stepper(
+    pub(super) fn stepper(
         &self,
         t: f64,
         start: &FamilyState,
@@ -270,7 +300,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
                 return Err(RunErrorKind::Start { coordinate, q, p });
             }
         }
-        let stepper = FamilyStepper::new(self.model, self.element, self.control);
+        let stepper = FamilyStepper::new(self.model, self.chosen_element(), self.control);
         let mut stepper = stepper.map_err(RunErrorKind::Family)?;
         // A run records velocities: what has none is refused before it begins.
         let velocity = stepper.velocity(t, start).map_err(RunErrorKind::Family)?;
@@ -327,7 +357,7 @@ pub struct FamilyRunError {
 }
 
 impl FamilyRunError {
-    fn new(kind: RunErrorKind, partial: FamilyMotion) -> Self {
+    pub(super) fn new(kind: RunErrorKind, partial: FamilyMotion) -> Self {
         Self {
             kind,
             partial: Box::new(partial),

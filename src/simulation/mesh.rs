@@ -101,6 +101,11 @@ impl<const N: usize> Mesh<N> {
         Ok(mesh)
     }
 
+    /// The end of the last element.
+    pub(crate) fn end(&self) -> Option<f64> {
+        self.segments.last().map(|segment| segment.end)
+    }
+
     /// How many elements there are.
     pub(crate) fn steps(&self) -> usize {
         self.segments.iter().map(|segment| segment.steps).sum()

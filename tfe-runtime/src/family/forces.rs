@@ -22,7 +22,7 @@ use alloc::vec;
 pub(super) struct Forces<'m, M> {
     model: &'m M,
     table: SchemeTable,
-    control: Control,
+    pub(super) control: Control,
     problem: Problem,
     registers: Registers,
     pub(super) statistics: Statistics,

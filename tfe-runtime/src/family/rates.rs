@@ -33,7 +33,7 @@ const REST: f64 = 1e-5;
 pub(super) struct Rates<'m, M> {
     model: &'m M,
     table: SchemeTable,
-    control: Control,
+    pub(super) control: Control,
     pub(super) statistics: Statistics,
     constraints: usize,
     matrix: Blocked,

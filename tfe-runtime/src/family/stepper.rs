@@ -136,6 +136,15 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
         self.legendre.velocity(self.model, t, state)
     }
 
+    /// Changes what iterations may leave from the next step on: [`Control::tolerance`].
+    pub fn set_tolerance(&mut self, tolerance: f64) {
+        match &mut self.way {
+            Way::Forces(forces) => forces.control.tolerance = tolerance,
+            #[cfg(feature = "sparse")]
+            Way::Rates(rates) => rates.control.tolerance = tolerance,
+        }
+    }
+
     /// What the steps so far have cost.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {

@@ -1,0 +1,208 @@
+//! Runs of models of run-time length with an estimate of their error.
+
+use super::super::family::{FamilyRunError, FamilySimulation};
+use super::{Accurate, Broken, Passing, Repeatable, accurate, check_accuracy, estimated};
+use crate::accuracy::{Asked, Estimated};
+use crate::error::RunErrorKind;
+use crate::motion::family::FamilyMotion;
+use crate::simulation::mesh::Mesh;
+use std::ops::Range;
+use tfe_runtime::family::{FamilyModel, FamilyState, FamilyStepper};
+use tfe_runtime::step::Control;
+use tfe_runtime::{Element, Form, Solve, Statistics, StepError};
+
+impl<M: FamilyModel> FamilySimulation<'_, M> {
+    /// Picks element and step so that the estimated error is at or below `accuracy`, as [`Simulation::accuracy`](crate::Simulation::accuracy) does: largest errors over
+    /// all sites, each over the largest number of its kind.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(
+    ///     coordinates(q[n]),
+    ///     lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + a/3*(q[i+1]-q[i])^3),
+    /// )]
+    /// struct Chain { n: usize, a: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let chain = Chain { n: 100, a: 0.25 };
+    /// let q: Vec<f64> = (0..chain.n).map(|i| (0.1 * i as f64).cos()).collect();
+    /// let start = chain.state(q, vec![0.0; chain.n]);
+    /// let motion = Simulation::new(&chain).accuracy(1e-8).run(start, 0.0..20.0)?;
+    /// assert!(motion.error_estimate() <= 1e-8);
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn accuracy(self, accuracy: f64) -> Accurate<Self> {
+        Accurate {
+            simulation: self,
+            accuracy,
+        }
+    }
+
+    /// Runs over the span as [`run`](Self::run) does, and estimates the error at every node by a second run with an element of higher order (T-98), as
+    /// [`Simulation::run_estimated`](crate::Simulation::run_estimated) does.
+    ///
+    /// # Errors
+    /// [`FamilyRunError`], as from [`run`](Self::run), of either run.
+    pub fn run_estimated(
+        &self,
+        start: FamilyState,
+        span: Range<f64>,
+    ) -> Result<Estimated<FamilyMotion>, FamilyRunError> {
+        let refused = |kind| self.refused(kind, span.start, &start);
+        self.stepper(span.start, &start).map_err(refused)?;
+        let mesh = self.mesh(&span).map_err(refused)?;
+        estimated(self, (span.start, &start), &mesh)
+            .map_err(|broken| FamilyRunError::new(broken.0, broken.1))
+    }
+}
+
+impl<M: FamilyModel> Accurate<FamilySimulation<'_, M>> {
+    /// Runs over the span with the element and the step that meet the accuracy.
+    ///
+    /// # Errors
+    /// [`FamilyRunError`], as from [`FamilySimulation::run`]; [`RunErrorKind::AccuracyMissed`] where no step was found that meets the accuracy, with the best motion
+    /// in [`partial`](FamilyRunError::partial).
+    pub fn run(
+        &self,
+        start: FamilyState,
+        span: Range<f64>,
+    ) -> Result<Estimated<FamilyMotion>, FamilyRunError> {
+        let run = &self.simulation;
+        let refused = |kind| run.refused(kind, span.start, &start);
+        check_accuracy(self.accuracy).map_err(refused)?;
+        run.stepper(span.start, &start).map_err(refused)?;
+        run.mesh(&span).map_err(refused)?;
+        if span.start == span.end {
+            let motion = run.run(start.clone(), span.clone())?;
+            let outputs = run.outputs();
+            return Ok(Estimated::new(
+                motion,
+                Vec::new(),
+                Vec::new(),
+                outputs,
+                None,
+            ));
+        }
+        let asked = Asked {
+            accuracy: self.accuracy,
+            span: span.clone(),
+            breaks: run.breaks.clone(),
+            element: run.element,
+            longest: run.step,
+            // Without sparse factorisations there is nothing else.
+            may_iterate: run.control.solve == Solve::Auto
+                && const { M::FACTS.separable && !M::CONSTRAINED },
+        };
+        accurate(run, &start, &asked).map_err(|broken| FamilyRunError::new(broken.0, broken.1))
+    }
+}
+
+impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
+    type State = FamilyState;
+    type Stepper = FamilyStepper<'m, M>;
+    type Motion = FamilyMotion;
+
+    fn element(&self) -> Element {
+        self.chosen_element()
+    }
+
+    fn control(&self) -> Control {
+        self.control
+    }
+
+    fn coordinates(&self) -> usize {
+        self.model.len()
+    }
+
+    fn outputs(&self) -> Vec<String> {
+        let columns = 0..self.model.columns();
+        columns
+            .map(|column| self.model.column_name(column).to_string())
+            .collect()
+    }
+
+    fn stepper(
+        &self,
+        element: Element,
+        control: Control,
+        _: bool,
+    ) -> Result<FamilyStepper<'m, M>, RunErrorKind> {
+        FamilyStepper::new(self.model, element, control).map_err(RunErrorKind::Family)
+    }
+
+    fn advance(
+        &self,
+        stepper: &mut FamilyStepper<'m, M>,
+        (t, _, h): (f64, f64, f64),
+        _: &Mesh<0>,
+        state: &mut FamilyState,
+    ) -> Result<(), StepError> {
+        stepper.advance(t, h, state)
+    }
+
+    fn set_tolerance(stepper: &mut FamilyStepper<'m, M>, tolerance: f64) {
+        stepper.set_tolerance(tolerance);
+    }
+
+    fn statistics(stepper: &FamilyStepper<'m, M>) -> Statistics {
+        *stepper.statistics()
+    }
+
+    fn row(
+        &self,
+        stepper: &mut FamilyStepper<'m, M>,
+        t: f64,
+        state: &FamilyState,
+        row: &mut [f64],
+    ) {
+        let n = state.q.len();
+        row[..n].copy_from_slice(&state.q);
+        row[n..2 * n].copy_from_slice(&state.p);
+        if row.len() == 2 * n {
+            return;
+        }
+        let velocity;
+        let z = match M::FORM {
+            Form::Hamiltonian => &state.p,
+            Form::Lagrangian => {
+                velocity = stepper
+                    .velocity(t, state)
+                    .unwrap_or_else(|_| vec![f64::NAN; n]);
+                &velocity
+            }
+        };
+        self.model.observables(t, &state.q, z, &mut row[2 * n..]);
+    }
+
+    fn record(
+        &self,
+        stepper: &mut FamilyStepper<'m, M>,
+        mesh: &Mesh<0>,
+        start: (f64, &FamilyState),
+        passed: &mut Passing<'_, FamilyStepper<'m, M>, FamilyState>,
+    ) -> Result<FamilyMotion, Broken<FamilyMotion>> {
+        self.drive_over(start, mesh, stepper, passed)
+    }
+
+    fn part(
+        &self,
+        (t0, start): (f64, &FamilyState),
+        (t, end): (f64, &FamilyState),
+    ) -> FamilyMotion {
+        let Ok((mut stepper, velocity)) = self.stepper(t0, start) else {
+            return FamilyMotion::empty(self.model, t0, start);
+        };
+        let mut motion = FamilyMotion::from_start(self.model, t0, start, Ok(velocity));
+        if t != t0 {
+            motion.record(self.model, t, end, stepper.velocity(t, end));
+        }
+        motion
+    }
+
+    fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<0>, RunErrorKind> {
+        Mesh::even(cuts, step, &[])
+    }
+}
