@@ -32,3 +32,26 @@ fn five_links_save_a_third() {
     let counts = counted(model).expect("the declaration is right");
     assert!(3.0 * weighted(counts) <= 2.0 * least_published(model));
 }
+
+/// What the macro emits for a pendulum with gravity, mass and length: characters without spaces. All kernels, and nothing for what the model has not: no forces, no
+/// constraints, no outputs.
+#[test]
+fn emitted_code_keeps_to_a_budget() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tfe-macros/golden/pendulum.rs");
+    let golden = std::fs::read_to_string(path).expect("a golden file");
+    let code = golden
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("///"));
+    let characters: usize = code
+        .flat_map(str::chars)
+        .filter(|c| !c.is_whitespace())
+        .count();
+    println!("{characters} characters");
+    assert!(characters <= 3400, "{characters} characters");
+    for absent in ["first.force[", "fn constraint", "fn observables"] {
+        assert!(
+            !golden.contains(absent),
+            "`{absent}` is emitted for a model that has none"
+        );
+    }
+}
