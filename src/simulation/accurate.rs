@@ -3,6 +3,7 @@
 mod family;
 
 use super::mesh::Mesh;
+use super::progress::Bar;
 use super::{Simulation, check_constraints, check_start};
 use crate::accuracy::{Asked, Estimated, Found, Ran, Trace, Way, difference, search};
 use crate::error::{RunError, RunErrorKind};
@@ -23,6 +24,8 @@ pub(super) trait Repeatable<const N: usize> {
     /// The element; the default one where none was chosen.
     fn element(&self) -> Element;
     fn control(&self) -> Control;
+    /// Whether progress is to be shown.
+    fn progress(&self) -> bool;
     fn coordinates(&self) -> usize;
     /// The names of all outputs.
     fn outputs(&self) -> Vec<String>;
@@ -134,6 +137,7 @@ fn follow<R: Repeatable<N>, const N: usize>(
     let mut watcher = Watcher::new(run, stepper, (t0, start));
     let mut times = times.iter().peekable();
     let mut state = start.clone();
+    let mut bar = Bar::new(run.progress(), mesh.steps());
     for (element, (t, next, h)) in mesh.elements().enumerate() {
         if let Err(source) = run.advance(stepper, (t, next, h), mesh, &mut state) {
             let kind = RunErrorKind::Solve {
@@ -146,6 +150,7 @@ fn follow<R: Repeatable<N>, const N: usize>(
         }
         let keeps = times.next_if_eq(&&next).is_some();
         watcher.pass(run, stepper, (next, &state), keeps);
+        bar.advance();
     }
     Ok(watcher.trace)
 }
@@ -437,6 +442,10 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
 
     fn control(&self) -> Control {
         self.control
+    }
+
+    fn progress(&self) -> bool {
+        self.progress
     }
 
     fn coordinates(&self) -> usize {

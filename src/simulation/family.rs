@@ -86,7 +86,7 @@ pub struct FamilySimulation<'m, M> {
     pub(super) control: Control,
     record_every: usize,
     pub(super) breaks: Vec<f64>,
-    progress: bool,
+    pub(super) progress: bool,
 }
 
 // Not derived: the model is borrowed, it need not be `Clone`.

@@ -113,6 +113,10 @@ impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
         self.control
     }
 
+    fn progress(&self) -> bool {
+        self.progress
+    }
+
     fn coordinates(&self) -> usize {
         self.model.len()
     }
