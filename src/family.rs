@@ -38,6 +38,6 @@ pub use crate::motion::family::{FamilyMotion, FamilyNode, FamilyOutputs, FamilyR
 pub use crate::simulation::family::{FamilyRunError, FamilySimulation, FamilySteps, Runs};
 pub use tfe_runtime::family::{
     Block, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, Gradient, Pattern,
-    constraint_residual, energy, momenta, state, velocity,
+    STRIDE, Sweep, constraint_residual, energy, momenta, state, velocity,
 };
 pub use tfe_runtime::length::{Declared, FixedLength, RunTimeLength};

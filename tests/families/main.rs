@@ -15,4 +15,5 @@ mod outputs;
 mod rates;
 #[cfg(feature = "sparse")]
 mod stiff;
+mod strides;
 mod work_precision;

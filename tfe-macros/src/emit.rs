@@ -1,6 +1,7 @@
 //! Programs of the engine as Rust statements.
 
 use crate::balance::balance;
+use crate::family::strides::Strides;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,6 +20,8 @@ pub(crate) struct Emitter<'a> {
     by_entries: bool,
     /// The places of results hold zeros already.
     onto_zeros: bool,
+    /// Every place of L_q is written just once.
+    assigns: bool,
     /// What velocities and momenta are called.
     z: Ident,
     /// How often each temporary is read.
@@ -48,6 +51,7 @@ impl<'a> Emitter<'a> {
             second,
             by_entries: false,
             onto_zeros: false,
+            assigns: false,
             z: format_ident!("z"),
             reads: BTreeMap::new(),
             indices: BTreeSet::new(),
@@ -72,23 +76,91 @@ impl<'a> Emitter<'a> {
     }
 
     /// The same, for places that hold zeros when the kernel begins.
-    pub(crate) fn onto_zeros(mut self, onto_zeros: bool) -> Self {
-        self.onto_zeros = onto_zeros;
+    pub(crate) fn onto_zeros(mut self) -> Self {
+        self.onto_zeros = true;
         self
+    }
+
+    /// The same, where every place of L_q is written just once.
+    pub(crate) fn assigning(mut self, assigns: bool) -> Self {
+        self.assigns = assigns;
+        self
+    }
+
+    /// The body of a kernel that borrows its slices by `lend`, anew after each stride of the loop, and says how far it has come.
+    pub(crate) fn in_strides(
+        mut self,
+        program: &Program,
+        Strides { at, lowest, .. }: Strides,
+        lend: &TokenStream,
+    ) -> Option<TokenStream> {
+        self.survey(&program.statements);
+        let (before, rest) = program.statements.split_at(at);
+        let (turns, after) = rest.split_first()?;
+        let Statement::Loop {
+            variable,
+            start,
+            end,
+            body,
+        } = turns
+        else {
+            return None;
+        };
+        let before = self.statements(before);
+        let (variable, start, end) = (loop_name(*variable), index(start), index(end));
+        let body = self.statements(body);
+        let after = self.statements(after);
+        let by = index(&Affine::constant(lowest.saturating_abs()));
+        let below = match lowest {
+            ..0 => less(&quote!(__to), &by),
+            0 => quote!(__to),
+            1.. => quote!(__to + #by),
+        };
+        let parameters = self.parameters();
+        Some(quote! {
+            let __end = #end;
+            if __end <= __tfe::STRIDE {
+                // Slices that are arguments are known to lie apart.
+                let (q, z, first) = __sweep.slices();
+                return self.forces_inline(t, q, z, first);
+            }
+            #parameters
+            #lend
+            #before
+            let mut __from = #start;
+            while __from < __end {
+                let __to = __tfe::STRIDE.saturating_add(__from).min(__end);
+                #lend
+                for #variable in __from..__to { #body }
+                // What is left at the end belongs to whoever called.
+                if __to < __end {
+                    __sweep.passed(#below);
+                }
+                __from = __to;
+            }
+            #lend
+            #after
+        })
     }
 
     /// The body of a kernel.
     pub(crate) fn body(mut self, program: &Program) -> Body {
         self.survey(&program.statements);
         let statements = self.statements(&program.statements);
+        let parameters = self.parameters();
+        Body {
+            statements: quote!(#parameters #statements),
+            value: self.value,
+        }
+    }
+
+    /// The parameters that have been read so far.
+    fn parameters(&self) -> TokenStream {
         let parameters = self.parameters.iter().map(|(field, local)| {
             let field = identifier(field);
             quote!(let #local = t.like(self.#field);)
         });
-        Body {
-            statements: quote!(#(#parameters)* #statements),
-            value: self.value,
-        }
+        quote!(#(#parameters)*)
     }
 
     /// Counts reads and collects indices.
@@ -197,6 +269,9 @@ impl<'a> Emitter<'a> {
             }
             Statement::Store { output, .. } => {
                 let place = self.place(output);
+                if self.assigns && matches!(output, Output::ByQ(_)) {
+                    return quote!(#place = #value;);
+                }
                 quote!(#place += #value;)
             }
             Statement::Accumulate { target, .. } => {
@@ -489,7 +564,7 @@ fn written(statement: &Statement) -> Option<&Operand> {
 }
 
 /// What a statement reads; of a loop, nothing.
-fn operands(statement: &Statement) -> Vec<&Operand> {
+pub(crate) fn operands(statement: &Statement) -> Vec<&Operand> {
     match statement {
         Statement::Let { operation, .. } => match operation {
             Operation::Copy(a) | Operation::Negate(a) | Operation::IntegerPower(a, _) => vec![a],

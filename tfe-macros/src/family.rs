@@ -3,12 +3,14 @@
 mod constraint;
 mod observable;
 mod sites;
+pub(crate) mod strides;
 
 use crate::emit::{self, Body, Emitter};
 use crate::page;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use std::collections::BTreeMap;
+use strides::Strides;
 use syn::ItemStruct;
 use tfe_symbolic::declared::{Declared, Extent, Form, Requirement};
 use tfe_symbolic::derivation::Derivation;
@@ -52,6 +54,29 @@ enum Given {
 impl Kernels<'_> {
     /// The body of a kernel, with its slices cut to the length of the model so that the compiler knows it.
     fn body(&self, program: &Program, given: Given) -> Body {
+        let cut = self.cut(given);
+        let emitter = Emitter::new(&[], TokenStream::new()).by_entries();
+        let emitter = match given {
+            Given::Forces => {
+                let strides = self.strides(program);
+                let assigns = strides.is_some_and(|strides| strides.assigns);
+                emitter.onto_zeros().assigning(assigns)
+            }
+            Given::Nothing | Given::First => emitter,
+        };
+        let body = emitter.body(program);
+        let statements = body.statements;
+        Body {
+            statements: quote! {
+                #cut
+                #statements
+            },
+            ..body
+        }
+    }
+
+    /// Cuts the slices to the length of the model.
+    fn cut(&self, given: Given) -> TokenStream {
         let dof = &self.dof;
         let forced = self.derivation.structure().forced;
         let cut = |array: TokenStream, is_written: bool| match is_written {
@@ -68,19 +93,43 @@ impl Kernels<'_> {
                 let first = __tfe::Gradient { z: #z, q: &mut first.q[..#dof], force: #force };
             },
         };
+        quote! {
+            let (q, z) = (&q[..#dof], &z[..#dof]);
+            #cut
+        }
+    }
+
+    /// The one loop of a kernel over the sites of the one array of coordinates.
+    fn strides(&self, program: &Program) -> Option<Strides> {
+        match &self.declared.coordinates[..] {
+            [array] => strides::of(program, array.length.as_ref()?),
+            _ => None,
+        }
+    }
+
+    /// The kernel of forces with its loop over sites in strides; nothing where there is no such loop.
+    fn in_strides(&self, program: &Program) -> Option<TokenStream> {
+        let strides = self.strides(program)?;
+        let cut = self.cut(Given::Forces);
+        let lend = quote! {
+            let (q, z, first) = __sweep.slices();
+            #cut
+        };
         let body = Emitter::new(&[], TokenStream::new())
             .by_entries()
-            .onto_zeros(given == Given::Forces)
-            .body(program);
-        let statements = body.statements;
-        Body {
-            statements: quote! {
-                let (q, z) = (&q[..#dof], &z[..#dof]);
-                #cut
-                #statements
-            },
-            ..body
-        }
+            .onto_zeros()
+            .assigning(strides.assigns)
+            .in_strides(program, strides, &lend)?;
+        Some(quote! {
+            #[inline(always)]
+            fn forces_in_strides<R: __tfe::Real, __S: __tfe::Sweep<R>>(
+                &self,
+                t: R,
+                __sweep: &mut __S,
+            ) {
+                #body
+            }
+        })
     }
 
     fn program(&self, request: Request) -> Program {
@@ -111,9 +160,15 @@ impl Kernels<'_> {
             ..first
         };
         let first = self.body(&self.program(first), Given::First).statements;
-        let forces = self
-            .body(&self.derivation.forces(), Given::Forces)
-            .statements;
+        let forces = self.derivation.forces();
+        let assigns = self.strides(&forces).filter(|strides| strides.assigns);
+        let assigns = assigns.map(|_| {
+            quote!(
+                const ASSIGNS: bool = true;
+            )
+        });
+        let in_strides = self.in_strides(&forces);
+        let forces = self.body(&forces, Given::Forces).statements;
         let mass = self.body(&self.program(mass), Given::Nothing).statements;
         let second = self.body(&self.program(second), Given::First).statements;
         let form = match self.declared.form {
@@ -141,6 +196,7 @@ impl Kernels<'_> {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;
                     const MOMENTA_MOVE: bool = #momenta_move;
+                    #assigns
 
                     fn len(&self) -> usize {
                         #dof
@@ -176,6 +232,8 @@ impl Kernels<'_> {
                     ) {
                         #forces
                     }
+
+                    #in_strides
 
                     fn mass<R: __tfe::Real, __E: __tfe::Entries<R>>(
                         &self,

@@ -65,6 +65,18 @@ pub struct Gradient<'a, R> {
     pub force: &'a mut [R],
 }
 
+/// What a kernel of forces works on: it lends slices, and hears how far the kernel has come.
+pub trait Sweep<R> {
+    /// Coordinates, velocities or momenta, and the places of L_q (or H_q) and Q; that of L_v is empty.
+    fn slices(&mut self) -> (&[R], &[R], Gradient<'_, R>);
+
+    /// The kernel neither reads nor writes below this coordinate any more.
+    fn passed(&mut self, below: usize);
+}
+
+/// Sites between two words of a kernel about how far it has come: so few that slices of so many sites stay in a cache, so many that a word costs nothing.
+pub const STRIDE: usize = 1024;
+
 /// The blocks of second derivatives; z stands for velocities or momenta.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Block {
@@ -122,9 +134,20 @@ pub trait FamilyModel {
     /// Its first derivatives, and the generalized force.
     fn first<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>);
 
-    /// L_q (or H_q) and Q alone, into slices that hold zeros: whoever reads them last sets them to zero while they are at hand. Written into
+    /// Whether [`forces_inline`](Self::forces_inline) writes every place of L_q, whatever was there.
+    const ASSIGNS: bool = false;
+
+    /// L_q (or H_q) and Q alone, into slices that hold zeros (but L_q with [`ASSIGNS`](Self::ASSIGNS)): whoever reads them last sets them to zero while they are at hand. Written into
     /// the place of the call, so that it is compiled for the instruction set of that place.
     fn forces_inline<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>);
+
+    /// The same on slices that are lent, with a word now and then about how far it has come: where more sites than [`STRIDE`] are run through in one
+    /// loop.
+    #[inline(always)]
+    fn forces_in_strides<R: Real, S: Sweep<R>>(&self, t: R, sweep: &mut S) {
+        let (q, z, first) = sweep.slices();
+        self.forces_inline(t, q, z, first);
+    }
 
     /// The contributions to ∂²/∂z∂z.
     fn mass<R: Real, E: Entries<R>>(&self, t: R, q: &[R], z: &[R], entries: &mut E);

@@ -1,9 +1,10 @@
 //! The one thing that the iteration of families asks of a model, so that everything else is compiled once, not once a model.
 
-use super::{FamilyModel, Gradient};
+use super::FamilyModel;
+use super::registers::Running;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use crate::quad::Quad;
-use crate::real::{Lanes, Real};
+use crate::real::Lanes;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use pulp::x86::V3;
 
@@ -11,59 +12,41 @@ use pulp::x86::V3;
 pub(super) trait Kernel {
     /// In registers of AVX2.
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-    fn in_quads(&self, isa: V3, here: Here<'_, Quad>);
+    fn in_quads(&self, isa: V3, t: Quad, running: &mut Running<'_, Quad, V3>);
 
     /// With plain numbers.
-    fn in_lanes(&self, here: Here<'_, Lanes<4>>);
-}
-
-/// Where the points are, and where derivatives go.
-pub(super) struct Here<'a, V> {
-    pub(super) t: V,
-    pub(super) q: &'a [V],
-    pub(super) z: &'a [V],
-    /// Zeros.
-    pub(super) by_q: &'a mut [V],
-    /// Zeros; empty where there are no forces.
-    pub(super) force: &'a mut [V],
-}
-
-impl<V: Real> Here<'_, V> {
-    #[inline(always)]
-    fn evaluate<M: FamilyModel>(self, model: &M) {
-        let first = Gradient {
-            z: &mut [],
-            q: self.by_q,
-            force: self.force,
-        };
-        model.forces_inline(self.t, self.q, self.z, first);
-    }
+    fn in_lanes(&self, t: Lanes<4>, running: &mut Running<'_, Lanes<4>, ()>);
 }
 
 impl<M: FamilyModel> Kernel for M {
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-    fn in_quads(&self, isa: V3, here: Here<'_, Quad>) {
-        isa.vectorize(InRegisters { model: self, here });
+    fn in_quads(&self, isa: V3, t: Quad, running: &mut Running<'_, Quad, V3>) {
+        isa.vectorize(InRegisters {
+            model: self,
+            t,
+            running,
+        });
     }
 
-    fn in_lanes(&self, here: Here<'_, Lanes<4>>) {
-        here.evaluate(self);
+    fn in_lanes(&self, t: Lanes<4>, running: &mut Running<'_, Lanes<4>, ()>) {
+        self.forces_in_strides(t, running);
     }
 }
 
 /// The same in code for one instruction set.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-struct InRegisters<'a, M> {
+struct InRegisters<'a, 'b, M> {
     model: &'a M,
-    here: Here<'a, Quad>,
+    t: Quad,
+    running: &'a mut Running<'b, Quad, V3>,
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl<M: FamilyModel> pulp::NullaryFnOnce for InRegisters<'_, M> {
+impl<M: FamilyModel> pulp::NullaryFnOnce for InRegisters<'_, '_, M> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        self.here.evaluate(self.model);
+        self.model.forces_in_strides(self.t, self.running);
     }
 }

@@ -1,10 +1,11 @@
 //! The unknowns in the widest registers of the processor, and the fixed-point iteration.
 
-use super::FamilyState;
 use super::kernel::Kernel;
 use super::lanes::Scale;
 use super::space::{Kind, Leg, Pass, Problem, Sizes, Space};
+use super::{FamilyState, Gradient, Sweep};
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
+use crate::points::four::Four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use crate::quad::Quad;
 use crate::real::Lanes;
@@ -48,7 +49,7 @@ impl Registers {
             self.run(Pass::Stand, problem, leg);
             // The forces at the start, at all points.
             let standing = Leg { h: 0.0, ..leg };
-            self.evaluate(kernel, problem, standing, 0);
+            self.evaluate(kernel, problem, standing, 0, false);
             self.run(Pass::Spread, problem, leg);
         }
         self.run(Pass::Begin { is_warm }, problem, leg);
@@ -74,8 +75,7 @@ impl Registers {
         while iterations < most {
             let mut sizes = Sizes::NONE;
             for group in 0..problem.tables.groups {
-                self.evaluate(kernel, problem, leg, group);
-                sizes = sizes.and(self.run(Pass::Settle { group }, problem, leg));
+                sizes = sizes.and(self.evaluate(kernel, problem, leg, group, true));
             }
             iterations += 1;
             match monitor.judge(scale.increment(sizes)) {
@@ -109,7 +109,7 @@ impl Registers {
     ) {
         for group in 0..problem.tables.groups {
             self.run(Pass::Place { group }, problem, leg);
-            self.evaluate(kernel, problem, leg, group);
+            self.evaluate(kernel, problem, leg, group, false);
             self.run(Pass::Rest { group, rest }, problem, leg);
         }
     }
@@ -163,17 +163,33 @@ impl Registers {
         }
     }
 
-    /// L_q and Q where the points of the group are placed.
-    fn evaluate(&mut self, kernel: &dyn Kernel, problem: &Problem, leg: Leg<'_>, group: usize) {
+    /// L_q and Q where the points of the group are placed; with `settles` they are taken for its forces as soon as they are done, and the next group is placed.
+    fn evaluate(
+        &mut self,
+        kernel: &dyn Kernel,
+        problem: &Problem,
+        leg: Leg<'_>,
+        group: usize,
+        settles: bool,
+    ) -> Sizes {
         let times = problem.tables.nodes[group].map(|node| leg.t + leg.h * node);
+        let place = Place {
+            problem,
+            leg,
+            group,
+            settles,
+        };
         match self {
             #[cfg(all(feature = "simd", target_arch = "x86_64"))]
             Self::Quads(space, isa) => {
-                let t = Quad::of(*isa, times);
-                kernel.in_quads(*isa, space.here(t));
+                let mut running = Running::new(space, *isa, place);
+                kernel.in_quads(*isa, Quad::of(*isa, times), &mut running);
+                running.finish()
             }
             Self::Lanes(space) => {
-                kernel.in_lanes(space.here(Lanes(times)));
+                let mut running = Running::new(space, (), place);
+                kernel.in_lanes(Lanes(times), &mut running);
+                running.finish()
             }
         }
     }
@@ -181,14 +197,105 @@ impl Registers {
     fn run(&mut self, pass: Pass<'_>, problem: &Problem, leg: Leg<'_>) -> Sizes {
         match self {
             #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            Self::Quads(space, isa) => isa.vectorize(InRegisters {
-                space,
-                problem,
-                leg,
-                pass,
-            }),
-            Self::Lanes(space) => pass.run(space, problem, leg),
+            Self::Quads(space, isa) => isa.run(pass, space, problem, leg),
+            Self::Lanes(space) => ().run(pass, space, problem, leg),
         }
+    }
+}
+
+/// Runs passes in code for one instruction set.
+pub(super) trait Passes<V>: Copy {
+    fn run(self, pass: Pass<'_>, space: &mut Space<V>, problem: &Problem, leg: Leg<'_>) -> Sizes;
+}
+
+impl Passes<Lanes<4>> for () {
+    fn run(
+        self,
+        pass: Pass<'_>,
+        space: &mut Space<Lanes<4>>,
+        problem: &Problem,
+        leg: Leg<'_>,
+    ) -> Sizes {
+        pass.run(space, problem, leg)
+    }
+}
+
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl Passes<Quad> for pulp::x86::V3 {
+    fn run(
+        self,
+        pass: Pass<'_>,
+        space: &mut Space<Quad>,
+        problem: &Problem,
+        leg: Leg<'_>,
+    ) -> Sizes {
+        self.vectorize(InRegisters {
+            space,
+            problem,
+            leg,
+            pass,
+        })
+    }
+}
+
+/// Where a kernel runs.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    problem: &'a Problem,
+    leg: Leg<'a>,
+    group: usize,
+    settles: bool,
+}
+
+/// A kernel that runs through the sites of a group, and what follows behind it.
+pub(super) struct Running<'a, V, P> {
+    space: &'a mut Space<V>,
+    passes: P,
+    place: Place<'a>,
+    /// Coordinates whose forces are settled.
+    settled: usize,
+    sizes: Sizes,
+}
+
+impl<'a, V: Four, P: Passes<V>> Running<'a, V, P> {
+    fn new(space: &'a mut Space<V>, passes: P, place: Place<'a>) -> Self {
+        Self {
+            space,
+            passes,
+            place,
+            settled: 0,
+            sizes: Sizes::NONE,
+        }
+    }
+
+    fn finish(mut self) -> Sizes {
+        let n = self.space.len();
+        self.passed(n);
+        self.sizes
+    }
+}
+
+impl<V: Four, P: Passes<V>> Sweep<V> for Running<'_, V, P> {
+    #[inline(always)]
+    fn slices(&mut self) -> (&[V], &[V], Gradient<'_, V>) {
+        self.space.slices()
+    }
+
+    fn passed(&mut self, below: usize) {
+        let Place {
+            problem,
+            leg,
+            group,
+            settles,
+        } = self.place;
+        if !settles || below <= self.settled {
+            return;
+        }
+        let range = self.settled..below;
+        let pass = Pass::Settle { group, range };
+        let sizes = self.passes.run(pass, self.space, problem, leg);
+        self.sizes = self.sizes.and(sizes);
+        self.settled = below;
     }
 }
 

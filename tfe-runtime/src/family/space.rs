@@ -6,12 +6,11 @@
 //!
 //! The same equations as those of fixed-size models, with another order in memory: for each group of four points all coordinates, so that
 //! loops run through memory once. Long chains do not fit into a cache: a pass that compares forces with those before places the next
-//! group of points too, while they are at hand.
+//! group of points too, while they are at hand, and follows a kernel that runs through its sites in strides.
 
 use super::inertia::Inertia;
-use super::kernel::Here;
 use super::lanes::{add_exactly, at_points, product, rows};
-use super::{FamilyModel, FamilyState};
+use super::{FamilyModel, FamilyState, Gradient};
 use crate::double_double::DoubleDouble;
 use crate::model::Form;
 use crate::points::end::moved;
@@ -20,6 +19,7 @@ use crate::points::sweep::Largest;
 use crate::points::tables::{MAX_GROUPS, Tables};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// Everything that does not depend on the kind of register.
 #[derive(Clone, Debug)]
@@ -36,6 +36,8 @@ pub(super) struct Kind {
     form: Form,
     /// Whether there are forces Q, which may depend on velocities (momenta).
     forced: bool,
+    /// Whether the kernel adds to zeros.
+    adds: bool,
 }
 
 impl Kind {
@@ -43,6 +45,7 @@ impl Kind {
         Self {
             form: M::FORM,
             forced: M::FACTS.forced,
+            adds: !M::ASSIGNS,
         }
     }
 }
@@ -84,8 +87,8 @@ pub(super) enum Pass<'a> {
     /// Places the points of a group.
     #[cfg(feature = "sparse")]
     Place { group: usize },
-    /// Takes the derivatives at hand for the forces of a group, and places the next one.
-    Settle { group: usize },
+    /// Takes the derivatives at hand for the forces of a group at some coordinates, and places them at the points of the next one.
+    Settle { group: usize, range: Range<usize> },
     /// What the derivatives at hand are beyond the forces of a group, the points of one coordinate next to each other.
     #[cfg(feature = "sparse")]
     Rest { group: usize, rest: &'a mut [f64] },
@@ -149,10 +152,12 @@ impl Pass<'_> {
             Pass::Begin { is_warm } => space.begin::<G>(problem, leg, is_warm),
             #[cfg(feature = "sparse")]
             Pass::Place { group } => space.place::<G>(problem, leg, group),
-            Pass::Settle { group } if space.kind.forced => {
-                return space.settle::<G, true>(problem, leg, group);
+            Pass::Settle { group, range } if space.kind.forced => {
+                return space.settle::<G, true>(problem, leg, group, range);
             }
-            Pass::Settle { group } => return space.settle::<G, false>(problem, leg, group),
+            Pass::Settle { group, range } => {
+                return space.settle::<G, false>(problem, leg, group, range);
+            }
             #[cfg(feature = "sparse")]
             Pass::Rest { group, rest } => space.rest(&problem.tables, group, rest),
             Pass::End { end, low } => return space.end(problem, leg, end, low),
@@ -211,15 +216,20 @@ impl<V: Four> Space<V> {
         }
     }
 
-    /// What a kernel is given.
-    pub(super) fn here(&mut self, t: V) -> Here<'_, V> {
-        Here {
-            t,
-            q: &self.q,
-            z: &self.z,
-            by_q: &mut self.by_q,
+    /// What a kernel is lent.
+    #[inline(always)]
+    pub(super) fn slices(&mut self) -> (&[V], &[V], Gradient<'_, V>) {
+        let first = Gradient {
+            z: &mut [],
+            q: &mut self.by_q,
             force: &mut self.force,
-        }
+        };
+        (&self.q, &self.z, first)
+    }
+
+    /// The number of coordinates.
+    pub(super) fn len(&self) -> usize {
+        self.n
     }
 
     /// Coordinates and velocities (momenta) of the group at hand, a row of n for each point.
@@ -349,7 +359,7 @@ impl<V: Four> Space<V> {
             q[a] = first.position(start[a], drift[a], &accelerations);
         }
         if self.kind.forced {
-            self.place_rates(problem, leg, &first);
+            self.place_rates(problem, leg, &first, 0..n);
         }
     }
 
@@ -359,6 +369,7 @@ impl<V: Four> Space<V> {
         problem: &Problem,
         leg: Leg<'_>,
         group: usize,
+        range: Range<usize>,
     ) -> Sizes {
         let (like, n, kind) = (self.like, self.n, self.kind);
         let zero = like.like(0.0);
@@ -373,9 +384,12 @@ impl<V: Four> Space<V> {
         let drift = &self.drift[next * n..][..n];
         let forces = &mut self.forces[..G * n];
         let q = &mut self.q[..n];
-        for a in 0..n {
+        let range = range.start..range.end.min(n);
+        for a in range.clone() {
             let mut force = kind.signed(by_q[a]);
-            by_q[a] = zero;
+            if kind.adds {
+                by_q[a] = zero;
+            }
             if FORCED {
                 force += forced[a];
                 forced[a] = zero;
@@ -389,7 +403,7 @@ impl<V: Four> Space<V> {
             q[a] = placement.position(start[a], drift[a], &accelerations);
         }
         if FORCED {
-            self.place_rates(problem, leg, &placement);
+            self.place_rates(problem, leg, &placement, range);
         }
         Sizes {
             changed: changed.get(),
@@ -411,7 +425,7 @@ impl<V: Four> Space<V> {
             self.q[a] = placement.position(start[a], drift[a], &accelerations);
         }
         if self.kind.forced {
-            self.place_rates(problem, leg, &placement);
+            self.place_rates(problem, leg, &placement, 0..n);
         }
     }
 
@@ -422,6 +436,7 @@ impl<V: Four> Space<V> {
         problem: &Problem,
         leg: Leg<'_>,
         placement: &Placement<V, G>,
+        range: Range<usize>,
     ) {
         let (like, n) = (self.like, self.n);
         let forces = &self.forces[..G * n];
@@ -429,14 +444,14 @@ impl<V: Four> Space<V> {
         match self.kind.form {
             Form::Lagrangian => {
                 let (start, inverse) = (&problem.velocity[..n], &problem.inertia.inverse[..n]);
-                for a in 0..n {
+                for a in range {
                     let rates = at_points::<V, G>(forces, n, a, like.like(inverse[a]));
                     z[a] = placement.rate(start[a], &rates);
                 }
             }
             Form::Hamiltonian => {
                 let start = &leg.start.p[..n];
-                for a in 0..n {
+                for a in range {
                     let rates = at_points::<V, G>(forces, n, a, like.like(1.0));
                     z[a] = placement.rate(start[a], &rates);
                 }

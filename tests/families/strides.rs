@@ -1,0 +1,99 @@
+//! Kernels that say how far they have come: nothing below that is read or written again, and the forces are those of the kernel at once.
+
+use tfe::dynamics;
+use tfe::family::{FamilyModel, Gradient, STRIDE, Sweep};
+
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + a/3*(q[i+1]-q[i])^3),
+)]
+struct Chain {
+    n: usize,
+    a: f64,
+}
+
+/// Neighbours of neighbours, the first two and the last one held, masses by site.
+#[dynamics(
+    coordinates(q[n]), momenta(p[n]),
+    hamiltonian = sum(i in 0..n, p[i]^2/(2*m[i])) + sum(i in 2..n-1, exp(q[i] - q[i-2]) + q[i+1]^4/4),
+)]
+struct Far {
+    n: usize,
+    m: Vec<f64>,
+}
+
+/// Spoils what has been passed.
+struct Spoiler {
+    q: Vec<f64>,
+    z: Vec<f64>,
+    by_q: Vec<f64>,
+    taken: Vec<f64>,
+    words: usize,
+}
+
+impl Spoiler {
+    fn take(&mut self, below: usize) {
+        for a in self.taken.len()..below {
+            self.taken.push(self.by_q[a]);
+            (self.q[a], self.z[a], self.by_q[a]) = (f64::NAN, f64::NAN, f64::NAN);
+        }
+    }
+}
+
+impl Sweep<f64> for Spoiler {
+    fn slices(&mut self) -> (&[f64], &[f64], Gradient<'_, f64>) {
+        let first = Gradient {
+            z: &mut [],
+            q: &mut self.by_q,
+            force: &mut [],
+        };
+        (&self.q, &self.z, first)
+    }
+
+    fn passed(&mut self, below: usize) {
+        self.words += 1;
+        self.take(below);
+    }
+}
+
+/// How often the kernel says something.
+#[track_caller]
+fn words<M: FamilyModel>(model: &M) -> usize {
+    let n = model.len();
+    let q: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).sin()).collect();
+    let z: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).cos()).collect();
+    // Whoever writes every place does not mind what is there.
+    let by_q = vec![if M::ASSIGNS { 7.0 } else { 0.0 }; n];
+    let mut expected = by_q.clone();
+    let first = Gradient {
+        z: &mut [],
+        q: &mut expected,
+        force: &mut [],
+    };
+    model.forces_inline(0.0, &q, &z, first);
+    let (taken, words) = (Vec::new(), 0);
+    let mut spoiler = Spoiler {
+        q,
+        z,
+        by_q,
+        taken,
+        words,
+    };
+    model.forces_in_strides(0.0, &mut spoiler);
+    spoiler.take(n);
+    assert_eq!(spoiler.taken, expected);
+    spoiler.words
+}
+
+#[test]
+fn what_was_passed_is_done() {
+    for (n, expected) in [(2, 0), (STRIDE, 0), (STRIDE + 2, 1), (5 * STRIDE, 4)] {
+        let a = 0.25;
+        assert_eq!(words(&Chain { n, a }), expected, "{n} sites");
+    }
+    const { assert!(Chain::ASSIGNS && !Far::ASSIGNS) };
+    for n in [4, 3 * STRIDE] {
+        let m = (0..n).map(|i| 1.0 + i as f64).collect();
+        println!("{n}: {}", words(&Far { n, m }));
+    }
+}

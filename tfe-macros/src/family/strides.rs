@@ -1,0 +1,106 @@
+//! Which kernels run through their sites in one loop, so that they can say how far they have come.
+
+use crate::emit::operands;
+use tfe_symbolic::input::{Affine, IndexSymbol, Input};
+use tfe_symbolic::program::{Operand, Output, Program, Statement};
+
+/// The only loop of a kernel, and the lowest coordinate that a turn touches, counted from the loop's index.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Strides {
+    /// Which of the statements it is.
+    pub(crate) at: usize,
+    /// The coordinate i + lowest.
+    pub(crate) lowest: i64,
+    /// Whether every place of L_q is written just once: as a value, not as a sum on what is there.
+    pub(crate) assigns: bool,
+}
+
+/// None where coordinates are touched in any other order.
+pub(crate) fn of(program: &Program, coordinates: &Affine) -> Option<Strides> {
+    let is_loop = |statement: &Statement| matches!(statement, Statement::Loop { .. });
+    let at = program.statements.iter().position(is_loop)?;
+    let (before, rest) = program.statements.split_at(at);
+    let (
+        Statement::Loop {
+            variable,
+            start,
+            end,
+            body,
+        },
+        after,
+    ) = rest.split_first()?
+    else {
+        return None;
+    };
+    if body.iter().chain(after).any(is_loop) {
+        return None;
+    }
+    let turn = Affine::symbol(IndexSymbol::Loop(*variable));
+    let mut places = touched(body).map(|place| beyond(place, &turn));
+    let lowest = places.try_fold(i64::MAX, |lowest, place| Some(lowest.min(place?)))?;
+    // What comes after the loop belongs to coordinates that its last turns have left open.
+    let is_behind = |place: &Affine| beyond(place, end).is_some_and(|by| by >= lowest);
+    if !(lowest < i64::MAX && touched(after).all(is_behind)) {
+        return None;
+    }
+    // One place a turn from the first coordinate on, and the last coordinate after the loop.
+    let assigns = match (&stored(before)[..], &stored(body)[..], &stored(after)[..]) {
+        ([], [turn_place], [last]) => beyond(turn_place, &turn).is_some_and(|by| {
+            beyond(start, &Affine::constant(-by)) == Some(0)
+                && beyond(last, end) == Some(by)
+                && beyond(coordinates, last) == Some(1)
+        }),
+        _ => false,
+    };
+    Some(Strides {
+        at,
+        lowest,
+        assigns,
+    })
+}
+
+/// The places of L_q that statements write.
+fn stored(statements: &[Statement]) -> Vec<&Affine> {
+    let mut places = Vec::new();
+    for statement in statements {
+        if let Statement::Store {
+            output: Output::ByQ(place),
+            ..
+        } = statement
+        {
+            places.push(place);
+        }
+    }
+    places
+}
+
+/// place − from, where that is a constant.
+fn beyond(place: &Affine, from: &Affine) -> Option<i64> {
+    (place.terms == from.terms).then(|| place.constant - from.constant)
+}
+
+/// The coordinates that statements read or write.
+fn touched(statements: &[Statement]) -> impl Iterator<Item = &Affine> {
+    statements.iter().flat_map(|statement| {
+        let written = match statement {
+            Statement::Store {
+                output: Output::ByQ(place) | Output::ByZ(place) | Output::Force(place),
+                ..
+            } => Some(place),
+            _ => None,
+        };
+        operands(statement)
+            .into_iter()
+            .filter_map(read)
+            .chain(written)
+    })
+}
+
+fn read(operand: &Operand) -> Option<&Affine> {
+    match operand {
+        Operand::Input(
+            Input::Coordinate(place) | Input::Velocity(place) | Input::Momentum(place),
+        ) => Some(place),
+        _ => None,
+    }
+}
