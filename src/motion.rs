@@ -277,12 +277,14 @@ impl<const N: usize> Motion<N> {
     }
 
     /// Writes the recorded nodes as CSV: time, coordinates, velocities, momenta, energy, observables, reactions, with a header line. Numbers are
-    /// written so that they read back exactly.
+    /// written so that they read back exactly. With a time transformation the first column is `tau`, and `t` is among the coordinates.
     ///
     /// # Errors
     /// Those of the file system.
     pub fn write_csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
-        let mut header = vec!["t".to_owned()];
+        let is_coordinate = self.names.iter().any(|name| name.to_string() == "t");
+        let time = if is_coordinate { "tau" } else { "t" };
+        let mut header = vec![time.to_owned()];
         header.extend(self.names.iter().map(ToString::to_string));
         header.extend(self.names.iter().map(|name| format!("{name}_dot")));
         header.extend(self.names.iter().map(|name| format!("p_{name}")));

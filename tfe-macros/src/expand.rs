@@ -2,7 +2,7 @@
 
 use crate::emit::{self, Emitter};
 use crate::source_map::SourceMap;
-use crate::{constraint, fallback, family, input, page, solver};
+use crate::{constraint, fallback, family, input, page, solver, state};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;
@@ -402,30 +402,31 @@ impl<'a> Kernels<'a> {
             Form::Lagrangian => (quote!(v), "velocities"),
             Form::Hamiltonian => (quote!(p), "momenta"),
         };
+        // Beside the coordinate `t` the time of the steps has another name.
+        let time = match self.declared.time_transformation {
+            None => quote!(t),
+            Some(_) => quote!(tau),
+        };
         let count = Literal::usize_unsuffixed(self.declared.observables.len());
         let observables = self.declared.observables.iter().enumerate().map(|(k, Observable { name, .. })| {
             let (method, k) = (emit::identifier(name), Literal::usize_unsuffixed(k));
-            let doc = format!(" The observable `{name}` at time `t`, coordinates `q` and {second_doc} `{second}`.");
+            let doc = format!(" The observable `{name}` at time `{time}`, coordinates `q` and {second_doc} `{second}`.");
             quote! {
                 #[doc = #doc]
-                #vis fn #method(&self, t: f64, q: [f64; #dof], #second: [f64; #dof]) -> f64 {
+                #vis fn #method(&self, #time: f64, q: [f64; #dof], #second: [f64; #dof]) -> f64 {
                     let mut values = [0.0; #count];
-                    #path::__private::Model::observables(self, t, &q, &#second, &mut values);
+                    #path::__private::Model::observables(self, #time, &q, &#second, &mut values);
                     values[#k]
                 }
             }
         });
         let structure = page::structure(self.declared, self.derivation, path);
+        let state = state::methods(self.declared, vis, path);
         quote! {
             #[automatically_derived]
             #[allow(dead_code)]
             impl #impl_generics #name #type_generics #where_clause {
-                /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
-                ///
-                /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
-                #vis fn state(&self, q: [f64; #dof], v: [f64; #dof]) -> #path::__private::State<#dof> {
-                    #path::__private::state(self, 0.0, q, v)
-                }
+                #state
 
                 /// What was derived from the declaration: a page when printed.
                 #vis fn structure() -> #path::__private::Structure {

@@ -7,7 +7,7 @@ use crate::source_map::SourceMap;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{quote, quote_spanned};
 use std::collections::BTreeSet;
-use syn::{Data, DeriveInput, ItemStruct};
+use syn::{Data, DeriveInput, ItemStruct, Visibility};
 use tfe_symbolic::ast::{Array, ExprKind, Item};
 use tfe_symbolic::diagnostic::{Bag, Diagnostic};
 use tfe_symbolic::parse;
@@ -45,8 +45,9 @@ fn field_span(name: &str, item: &ItemStruct) -> (Span, Span) {
 /// Stub implementations for a type whose declaration is wrong: uses of the model type-check, so only the mistake itself is reported.
 pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
     let guess = Guess::from(text, item);
-    let (path, dof) = (&guess.path, &guess.dof);
+    let (path, dof) = (&guess.path, &guess.extended_dof());
     let (name, vis) = (&item.ident, &item.vis);
+    let states = guess.states(vis);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
     let form = if guess.hamiltonian {
         quote!(Hamiltonian)
@@ -116,9 +117,7 @@ pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
         #[automatically_derived]
         #[allow(dead_code, missing_docs, clippy::all)]
         impl #impl_generics #name #type_generics #where_clause {
-            #vis fn state(&self, q: [f64; #dof], _: [f64; #dof]) -> #path::__private::State<#dof> {
-                #path::__private::State { q, p: q }
-            }
+            #states
 
             #vis fn structure() -> #path::__private::Structure {
                 ::core::unimplemented!()
@@ -178,6 +177,8 @@ struct Guess {
     /// The number of coordinates is known at run time only.
     run_time: bool,
     hamiltonian: bool,
+    /// The time is one coordinate more.
+    transformed: bool,
     outputs: Vec<Ident>,
     /// Which of them are declared by site.
     by_site: BTreeSet<String>,
@@ -191,6 +192,7 @@ impl Guess {
             dof: quote!(1),
             run_time: false,
             hamiltonian: false,
+            transformed: false,
             outputs: Vec::new(),
             by_site: BTreeSet::new(),
             solvers: Vec::new(),
@@ -206,6 +208,7 @@ impl Guess {
                     guess.run_time = has_field_as_length(&arrays, item);
                 }
                 Some(Item::Hamiltonian(_)) => guess.hamiltonian = true,
+                Some(Item::TimeTransformation(_)) => guess.transformed = true,
                 Some(Item::Output { name, range, .. }) => {
                     guess.outputs.push(identifier(&name.node));
                     if range.is_some() {
@@ -223,10 +226,46 @@ impl Guess {
         }
         // A name that clashes has been reported; rustc would repeat it.
         let mut seen = BTreeSet::from(["state".to_owned(), "structure".to_owned()]);
+        if guess.transformed {
+            seen.insert("state_at".to_owned());
+        }
         guess.outputs.retain(|name| seen.insert(name.to_string()));
         let mut seen = BTreeSet::from([item.ident.to_string()]);
         guess.solvers.retain(|name| seen.insert(name.to_string()));
         guess
+    }
+
+    /// The number of coordinates of a state.
+    fn extended_dof(&self) -> TokenStream {
+        let dof = &self.dof;
+        match dof.to_string().parse::<usize>() {
+            Ok(fixed) if self.transformed => {
+                let extended = Literal::usize_unsuffixed(fixed + 1);
+                quote!(#extended)
+            }
+            _ => quote!(#dof),
+        }
+    }
+
+    /// `state`, and `state_at` where the model would have it.
+    fn states(&self, vis: &Visibility) -> TokenStream {
+        let (path, dof, extended) = (&self.path, &self.dof, self.extended_dof());
+        if !self.transformed {
+            return quote! {
+                #vis fn state(&self, q: [f64; #dof], _: [f64; #dof]) -> #path::__private::State<#dof> {
+                    #path::__private::State { q, p: q }
+                }
+            };
+        }
+        quote! {
+            #vis fn state(&self, q: [f64; #dof], p: [f64; #dof]) -> #path::__private::State<#extended> {
+                self.state_at(0.0, q, p)
+            }
+
+            #vis fn state_at(&self, t: f64, _: [f64; #dof], _: [f64; #dof]) -> #path::__private::State<#extended> {
+                #path::__private::State { q: [t; #extended], p: [t; #extended] }
+            }
+        }
     }
 }
 

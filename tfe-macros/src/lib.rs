@@ -13,6 +13,7 @@ mod input;
 mod page;
 mod solver;
 mod source_map;
+mod state;
 #[cfg(test)]
 mod tests;
 
@@ -24,6 +25,12 @@ use proc_macro::TokenStream;
 /// `let`, `force(...)`, `dissipation`, `constraint(...)`, `output(...)` and `solver(...)` as the model needs. `sensitivity(omega, k[2])` asks for the derivatives by
 /// parameters, that is by fields of type `f64` and by elements of array fields, and by the time. Everything is differentiated symbolically while
 /// the crate compiles; mistakes are reported under the token that is wrong, all of them at once.
+///
+/// `time_transformation = g`, beside a Hamiltonian with a known number of coordinates, makes steps equal in a time τ of their own, dt = g dτ with g > 0 any expression of
+/// coordinates, momenta, parameters and `t`: short steps where g is small. The time becomes the last coordinate, `t`, with a momentum `p_t` that is −H along the motion, so
+/// that states have one entry more; `state(q, p)` makes such a state of the coordinates and momenta (not velocities) as declared, at t = 0, and `state_at(t, q, p)` at another time.
+/// Formulas stay as they are, `t` and `dot()` in them mean the time of the model. Energies of a motion are those of the extended model, g (H + p_t), zero but for errors: an
+/// `output` shows H. It does not go with `constraint` and `sensitivity`, and elements must step in phase space (`Mixed`, `Primal` reduced, `EnergyConserving`, `Radau`).
 ///
 /// `coordinates(q[n])` with `n` a field of type `usize` declares a model of run-time length: sums stay loops, state and parameters (`Vec<f64>`) live on the heap, and the
 /// code is the same for every length. `Simulation::new` runs both kinds. There, `constraint(rod[i in 0..n-1]) = ...` (of positions and the time) and `output(strain[i in 0..n-1]) = ...`

@@ -77,6 +77,28 @@ fn a_hamiltonian() {
 }
 
 #[test]
+fn steps_in_a_time_of_their_own() {
+    check(
+        "time_transformation",
+        quote!(
+            coordinates(q),
+            momenta(p),
+            hamiltonian = p ^ 2 / 2 - cos(q) - a * q * cos(omega * t),
+            time_transformation = 1 / (1 + q ^ 2),
+            force(q) = -c * p,
+            output(energy) = p ^ 2 / 2 - cos(q),
+        ),
+        quote!(
+            struct Forced {
+                a: f64,
+                omega: f64,
+                c: f64,
+            }
+        ),
+    );
+}
+
+#[test]
 fn a_family_of_run_time_length() {
     check(
         "family",

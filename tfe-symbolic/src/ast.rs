@@ -51,6 +51,8 @@ pub enum Item {
     },
     /// `dissipation = value`
     Dissipation(Expr),
+    /// `time_transformation = rate`: dt = rate dτ
+    TimeTransformation(Expr),
     /// `constraint(name) = value` or `constraint(name[i in a..b]) = value`
     Constraint {
         /// The name of the constraint.

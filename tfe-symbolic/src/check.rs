@@ -4,6 +4,7 @@
 //! [`lower`](crate::lower).
 
 mod solver;
+mod transformation;
 
 use std::collections::BTreeMap;
 
@@ -20,6 +21,8 @@ pub const MAX_COORDINATES: usize = 10_000;
 
 /// The methods that the macro gives every model; outputs become methods beside them.
 const METHODS: &[&str] = &["state", "structure"];
+/// One more of models with a time transformation.
+const CLOCK_METHOD: &str = "state_at";
 
 /// Functions that are no elementary functions, with their numbers of arguments.
 pub const SPECIAL_FUNCTIONS: &[(&str, usize)] = &[
@@ -109,6 +112,8 @@ pub struct Model {
     pub forces: Vec<(Expr, Expr)>,
     /// The Rayleigh function.
     pub dissipation: Option<Expr>,
+    /// The rate dt/dτ, and where the argument stands.
+    pub time_transformation: Option<(Expr, Span)>,
     /// The constraints: name, range of a family, value.
     pub constraints: Vec<(Name, Option<Range>, Expr)>,
     /// The observables: name, range of the sites, value.
@@ -182,6 +187,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
             Item::Lagrangian(value) => model.set_energy(Form::Lagrangian, value, span, bag),
             Item::Hamiltonian(value) => model.set_energy(Form::Hamiltonian, value, span, bag),
             Item::Dissipation(value) => model.dissipation = Some(value),
+            Item::TimeTransformation(rate) => model.time_transformation = Some((rate, span)),
             Item::Force { target, value } => model.forces.push((target, value)),
             Item::Constraint { name, range, value } => {
                 model.constraints.push((name, range, value));
@@ -201,6 +207,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
     model.sizes(bag);
     model.outputs(bag);
     model.constraint_names(bag);
+    model.transformation(bag);
     if incomplete {
         // What seems to be missing may be what could not be read.
         return model;
@@ -228,6 +235,7 @@ fn once(item: &Item) -> Option<&'static str> {
         Item::Lagrangian(_) => Some("lagrangian"),
         Item::Hamiltonian(_) => Some("hamiltonian"),
         Item::Dissipation(_) => Some("dissipation"),
+        Item::TimeTransformation(_) => Some("time_transformation"),
         Item::Sensitivity(_) => Some("sensitivity"),
         Item::Crate(_) => Some("crate"),
         _ => None,
@@ -412,7 +420,7 @@ impl Model {
             .map(|(name, symbol)| (name.clone(), symbol))
             .collect();
         for (Spanned { node: name, span }, symbol) in names {
-            if let Some(kind) = reserved(&name, false) {
+            if let Some(kind) = reserved(&name, false).or_else(|| self.clock_momentum(&name)) {
                 bag.push(span, kind);
             }
             match self.symbols.get(&name) {
@@ -507,14 +515,14 @@ impl Model {
             {
                 bag.push(range.variable.span.join(range.end.span), Kind::OutputFamily);
             }
-            if let Some(kind) = reserved(name, false) {
+            if let Some(kind) = reserved(name, false).or_else(|| self.clock_momentum(name)) {
                 bag.push(*span, kind);
             }
             // An output may be called like the `let` that it shows; a coordinate or momentum has
             // its column in the results already.
             let taken = match self.symbols.get(name) {
                 Some(symbol @ (Symbol::Coordinate(_) | Symbol::Momentum(_))) => Some(symbol.role()),
-                _ if METHODS.contains(&name.as_str()) => Some(Role::Method),
+                _ if self.is_method(name) => Some(Role::Method),
                 _ => names.contains(&name.as_str()).then_some(Role::Output),
             };
             if let Some(taken) = taken {
@@ -528,6 +536,11 @@ impl Model {
             }
             names.push(name);
         }
+    }
+
+    /// Whether the macro gives the model a method of this name.
+    fn is_method(&self, name: &str) -> bool {
+        METHODS.contains(&name) || (self.time_transformation.is_some() && name == CLOCK_METHOD)
     }
 
     /// Names of constraints stand in no formula, but in results beside outputs.

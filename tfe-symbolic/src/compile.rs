@@ -91,9 +91,10 @@ fn broken_let(argument: &str, offset: usize) -> Option<Spanned<Item>> {
 }
 
 /// The arguments that formulas cannot refer to.
-const NAMELESS: [&str; 9] = [
+const NAMELESS: [&str; 10] = [
     "lagrangian",
     "hamiltonian",
+    "time_transformation",
     "force",
     "dissipation",
     "constraint",

@@ -149,6 +149,20 @@ impl fmt::Display for Parameter {
     }
 }
 
+/// The coordinate that a time transformation adds: the time of the model.
+pub const CLOCK: &str = "t";
+/// Its momentum.
+pub const CLOCK_MOMENTUM: &str = "p_t";
+
+/// Steps in a time τ of their own, dt = g dτ; the model is then the extended one, with the Hamiltonian g (H + p_t).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimeTransformation {
+    /// H(q, p, t) as declared, with t the last coordinate; p_t = −H at the start.
+    pub hamiltonian: ExprId,
+    /// The flat index of the coordinate t: the number of coordinates as declared.
+    pub clock: usize,
+}
+
 /// A constraint: one scalar equation; in models of run-time length one for each site of a range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Constraint {
@@ -239,7 +253,7 @@ pub struct Declared {
     pub name: String,
     /// Lagrangian or Hamiltonian.
     pub form: Form,
-    /// The number of coordinates: a constant, or exactly one const parameter.
+    /// The number of coordinates, that of a time transformation included: a constant, or exactly one const parameter.
     pub dof: Affine,
     /// The coordinates, in the order of the flat vector `q`.
     pub coordinates: Vec<CoordinateArray>,
@@ -251,6 +265,8 @@ pub struct Declared {
     pub energy: ExprId,
     /// The Rayleigh function D; Q = −∂D/∂v.
     pub dissipation: Option<ExprId>,
+    /// The time of the steps, where it is not that of the model.
+    pub time_transformation: Option<TimeTransformation>,
     /// The generalized forces; several on one coordinate add up.
     pub forces: Vec<Force>,
     /// The constraints, in order.

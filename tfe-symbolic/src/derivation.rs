@@ -163,6 +163,39 @@ impl Derivation {
         self.program_of(|array| matches!(array, Array::ByQ | Array::Force))
     }
 
+    /// The program of H as declared, as the value of the energy function, of a model with a time transformation; the time is its last
+    /// coordinate.
+    ///
+    /// Nothing for models without one.
+    ///
+    /// ```
+    /// use tfe_symbolic::compile::declare;
+    /// use tfe_symbolic::context::Context;
+    /// use tfe_symbolic::derivation::Derivation;
+    /// use tfe_symbolic::program::Request;
+    ///
+    /// let text = "coordinates(q), momenta(p), hamiltonian = p^2 - q*t, time_transformation = 2 + q";
+    /// let declared = declare(text, &Context::default()).expect("no mistakes in it");
+    /// let hamiltonian = Derivation::hamiltonian(&declared).expect("a time transformation");
+    /// assert_eq!(
+    ///     hamiltonian.to_string(),
+    ///     "t0 = p[0] * p[0]\n\
+    ///      t1 = q[0] * q[1]\n\
+    ///      t2 = t0 - t1\n\
+    ///      E = t2\n"
+    /// );
+    /// ```
+    pub fn hamiltonian(declared: &Declared) -> Option<Program> {
+        let transformation = declared.time_transformation?;
+        let entry = Entry {
+            nest: Vec::new(),
+            place: Place::scalar(Array::Value),
+            value: transformation.hamiltonian,
+        };
+        let draft = Draft::of(declared.graph.clone(), vec![entry]);
+        Some(Draft::best(vec![draft]))
+    }
+
     fn program_of(&self, is_wanted: impl Fn(Array) -> bool) -> Program {
         let draft = |entries: &Vec<Entry>| {
             let wanted = entries.iter().filter(|entry| is_wanted(entry.place.array));

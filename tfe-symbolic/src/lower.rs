@@ -16,6 +16,7 @@ mod scalar;
 mod sensitivity;
 mod sites;
 mod sums;
+mod transformation;
 mod usage;
 mod vector;
 
@@ -61,6 +62,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     for (target, value) in &model.forces {
         forces.extend(lowerer.force(target, value));
     }
+    let rate = lowerer.rate_of_time();
     let observables = lowerer.observables();
     let constraints = lowerer.constraints();
     lowerer.check_solvers(&constraints);
@@ -81,7 +83,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         };
         slots.iter().map(array).collect()
     };
-    Some(Declared {
+    let declared = Declared {
         name: context.struct_name.clone(),
         form,
         dof: model.dof.clone(),
@@ -90,6 +92,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         graph,
         energy: energy?,
         dissipation,
+        time_transformation: None,
         forces,
         constraints,
         observables,
@@ -99,7 +102,17 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         used_fields,
         requirements,
         notation: Notation::of(model),
-    })
+    };
+    let Some((rate, (_, span))) = rate.zip(model.time_transformation.as_ref()) else {
+        return Some(declared);
+    };
+    match transformation::extended(declared, rate) {
+        Ok(declared) => Some(declared),
+        Err(kind) => {
+            bag.push(*span, kind);
+            None
+        }
+    }
 }
 
 /// What a formula evaluates to. `None` in the functions below stands for "reported already".

@@ -23,6 +23,10 @@ impl Notation {
         if let Some(value) = &model.dissipation {
             formulas.push(format!("D = {}", formula(value)));
         }
+        if let Some((rate, _)) = &model.time_transformation {
+            formulas.push(format!("dt/dτ = {}", formula(rate)));
+            formulas.push("H̃ = dt/dτ (H + p_t)".to_owned());
+        }
         for (target, value) in &model.forces {
             formulas.push(format!("Q({}) = {}", formula(target), formula(value)));
         }

@@ -41,6 +41,7 @@ pub const ARGUMENTS: &[&str] = &[
     "let",
     "lagrangian",
     "hamiltonian",
+    "time_transformation",
     "force",
     "dissipation",
     "constraint",
@@ -101,6 +102,7 @@ pub fn parse_item(text: &str, offset: usize, bag: &mut Bag) -> Option<Spanned<It
         "hamiltonian" => Rule::hamiltonian,
         "force" => Rule::force,
         "dissipation" => Rule::dissipation,
+        "time_transformation" => Rule::time_transformation,
         "constraint" => Rule::constraint,
         "output" => Rule::output,
         "sensitivity" => Rule::sensitivity,
@@ -209,6 +211,9 @@ impl Builder<'_> {
             Rule::lagrangian => Item::Lagrangian(self.expression(parts.next(Rule::expression)?)?),
             Rule::hamiltonian => Item::Hamiltonian(self.expression(parts.next(Rule::expression)?)?),
             Rule::dissipation => Item::Dissipation(self.expression(parts.next(Rule::expression)?)?),
+            Rule::time_transformation => {
+                Item::TimeTransformation(self.expression(parts.next(Rule::expression)?)?)
+            }
             Rule::force => Item::Force {
                 target: self.expression(parts.next(Rule::expression)?)?,
                 value: self.expression(parts.next(Rule::expression)?)?,

@@ -201,6 +201,7 @@ impl fmt::Display for Item {
             Self::Hamiltonian(value) => write!(f, "hamiltonian = {value}"),
             Self::Force { target, value } => write!(f, "force({target}) = {value}"),
             Self::Dissipation(value) => write!(f, "dissipation = {value}"),
+            Self::TimeTransformation(rate) => write!(f, "time_transformation = {rate}"),
             Self::Constraint {
                 name,
                 range: Some(range),

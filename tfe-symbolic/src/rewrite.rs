@@ -6,7 +6,7 @@ use crate::input::{Affine, IndexSymbol, LoopVariable};
 use crate::table::Map;
 
 /// The most terms that [`Graph::unroll`] writes out, over all sums of an expression.
-const UNROLL_LIMIT: u64 = 4096;
+pub(crate) const UNROLL_LIMIT: u64 = 4096;
 
 /// Old expressions and what became of them; lookups only.
 #[derive(Default)]

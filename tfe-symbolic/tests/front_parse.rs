@@ -295,6 +295,7 @@ fn item() -> impl Strategy<Value = Item> {
         expr().prop_map(Item::Lagrangian),
         expr().prop_map(Item::Hamiltonian),
         expr().prop_map(Item::Dissipation),
+        expr().prop_map(Item::TimeTransformation),
         (name(), expr()).prop_map(|(name, value)| Item::Let {
             name: spanned(name),
             value

@@ -274,6 +274,25 @@ kinds! {
         /// The constraint.
         constraint: String,
     },
+    /// A time transformation beside a Lagrangian.
+    TransformationOfLagrangian,
+    /// A time transformation of a model whose number of coordinates is not known here.
+    TransformationOfFamily {
+        /// The length.
+        length: String,
+    },
+    /// A time transformation beside an argument that does not go with it.
+    TransformationWith {
+        /// `constraint` or `sensitivity`.
+        argument: &'static str,
+    },
+    /// `time_transformation = -1`
+    TransformationNotPositive,
+    /// Forces beside a time transformation, where velocities cannot be written out.
+    PowerOfLoop {
+        /// The longest sum that is written out.
+        limit: usize,
+    },
     // ---- names ----
     /// A name that nothing declares.
     UnknownSymbol {
@@ -459,6 +478,13 @@ kinds! {
         nodes: u32,
         /// It admits holonomic ones.
         velocity: bool,
+    },
+    /// `solver(...)` with an element that has velocities as unknowns, beside a time transformation.
+    SolverOfTransformation {
+        /// The element as written.
+        element: String,
+        /// Its nodes.
+        nodes: u32,
     },
 }
 

@@ -75,6 +75,18 @@ impl Kind {
             Self::NoEnergy => "the model has neither a Lagrangian nor a Hamiltonian".into(),
             Self::TwoEnergies => "the model has both a Lagrangian and a Hamiltonian".into(),
             Self::NoMomenta => "a Hamiltonian needs momenta".into(),
+            Self::TransformationOfLagrangian => "a time transformation needs a hamiltonian".into(),
+            Self::TransformationOfFamily { length } => format!(
+                "a time transformation needs a number of coordinates known here, but `{length}` is generic"
+            ),
+            Self::TransformationWith { argument } => {
+                format!("a time transformation does not go with `{argument}`")
+            }
+            Self::TransformationNotPositive => "the rate of the time is not positive".into(),
+            Self::PowerOfLoop { .. } => {
+                "the power of the forces cannot be written out where a Hamiltonian is summed in a loop"
+                    .into()
+            }
             Self::MomentaWithLagrangian => "a model with a Lagrangian declares no momenta".into(),
             Self::MomentaMismatch {
                 coordinates,
@@ -210,6 +222,9 @@ impl Kind {
             Self::SolverOfFamily { length } => {
                 format!("a solver needs sizes known here, but `{length}` is generic")
             }
+            Self::SolverOfTransformation { element, .. } => {
+                format!("element `{element}` does not admit a time transformation")
+            }
             Self::SolverOfConstraints {
                 element, velocity, ..
             } => {
@@ -323,7 +338,8 @@ impl Kind {
                  available"
                     .into()
             }
-            Self::SolverOfConstraints { nodes, .. } => format!("use `Mixed::<{nodes}>`"),
+            Self::SolverOfConstraints { nodes, .. }
+            | Self::SolverOfTransformation { nodes, .. } => format!("use `Mixed::<{nodes}>`"),
             Self::ListInRange { .. } => {
                 "bound the range by numbers and fields of type `usize`".into()
             }
@@ -331,6 +347,22 @@ impl Kind {
             Self::NoEnergy => "add `lagrangian = …` or `hamiltonian = …`".into(),
             Self::TwoEnergies => "keep one of them".into(),
             Self::NoMomenta => "add `momenta(…)`, one for each coordinate, in their order".into(),
+            Self::TransformationOfLagrangian => {
+                "declare the model by `momenta(…)` and `hamiltonian = …`".into()
+            }
+            Self::TransformationOfFamily { .. } => {
+                "give the coordinates a length known here, such as `q[10]`".into()
+            }
+            Self::TransformationWith {
+                argument: "constraint",
+            } => "choose coordinates that satisfy the constraints, or remove one of the two".into(),
+            Self::TransformationWith { .. } => "remove one of the two".into(),
+            Self::TransformationNotPositive => {
+                "write dt/dτ, such as the distance from a singularity".into()
+            }
+            Self::PowerOfLoop { limit } => format!(
+                "make the length a number of at most {limit}, or remove `time_transformation`"
+            ),
             Self::MomentaWithLagrangian => {
                 "remove `momenta`; they follow from the Lagrangian as ∂L/∂v".into()
             }

@@ -1,0 +1,335 @@
+/// # Derived model
+/// ```text
+/// H = ½ p² − cos q − a q cos(ω t)
+/// dt/dτ = 1/(1 + q²)
+/// H̃ = dt/dτ (H + p_t)
+/// Q(q) = −c p
+/// coordinates: q, t      momenta: p, p_t      parameters: a, ω, c
+/// operations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other
+/// operations, gradient: 6 +−, 16 ×, 1 ÷, 2 sin/cos, 0 other
+/// operations, gradient and second derivatives: 11 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other
+/// declared by             Hamiltonian, 2 coordinates
+/// depends on time         no
+/// forces                  yes
+/// linear                  no
+/// quadratic in p          yes
+/// constant H_pp           no
+/// separable (H_pq = 0)    no
+/// cyclic coordinates      none
+/// pattern H_pp            (0,0)
+/// pattern H_pq            (0,0) (1,0)
+/// pattern H_qq            (0,0) (0,1) (1,0) (1,1)
+/// pattern Q_p             (0,0) (1,0)
+/// pattern Q_q             (0,0) (1,0)
+/// ```
+struct Forced {
+    a: f64,
+    omega: f64,
+    c: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<2> for Forced {
+        const FORM: __tfe::Form = __tfe::Form::Hamiltonian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: false,
+            forced: true,
+            quadratic_in_z: true,
+            constant_mass: false,
+            linear: false,
+            separable: false,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
+            let a = t.like(self.a);
+            let omega = t.like(self.omega);
+            let cos_q = q[0].cos();
+            let t0 = omega * q[1];
+            let t1 = t0.cos();
+            let t2 = z[0] * z[0];
+            let t3 = t.like(0.5) * t2;
+            let t4 = t3 - cos_q;
+            let t5 = q[0] * a;
+            let t6 = t1 * t5;
+            let t7 = t4 - t6;
+            let t8 = z[1] + t7;
+            let t9 = q[0] * q[0];
+            let t10 = t9 + t.like(1.0);
+            t8 / t10
+        }
+        const LANES: bool = true;
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            let a = t.like(self.a);
+            let c = t.like(self.c);
+            let omega = t.like(self.omega);
+            let t0 = omega * q[1];
+            let (t1, t2) = t0.sin_cos();
+            let (sin_q, cos_q) = q[0].sin_cos();
+            let t3 = q[0] * q[0];
+            let t4 = t.like(1.0) + t3;
+            let t5 = t.like(1.0) / t4;
+            let t6 = t5 * z[0];
+            first.z[0] = t6;
+            first.z[1] = t5;
+            let t7 = a * t2;
+            let t8 = sin_q - t7;
+            let t9 = q[0] * t5;
+            let t10 = z[0] * z[0];
+            let t11 = t.like(0.5) * t10;
+            let t12 = t11 - cos_q;
+            let t13 = q[0] * t7;
+            let t14 = t12 - t13;
+            let t15 = z[1] + t14;
+            let t16 = t.like(2.0) * t15;
+            let t17 = t9 * t16;
+            let t18 = t8 - t17;
+            first.q[0] = t5 * t18;
+            let t19 = omega * a;
+            let t20 = t1 * t19;
+            first.q[1] = t9 * t20;
+            let t21 = t6 * c;
+            first.force[0] = -t21;
+            first.force[1] = z[0] * t21;
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            let a = t.like(self.a);
+            let c = t.like(self.c);
+            let omega = t.like(self.omega);
+            let t0 = omega * q[1];
+            let (t1, t2) = t0.sin_cos();
+            let (sin_q, cos_q) = q[0].sin_cos();
+            let t3 = q[0] * q[0];
+            let t4 = t.like(1.0) + t3;
+            let t5 = t.like(1.0) / t4;
+            let t6 = t5 * z[0];
+            first.z[0] = t6;
+            first.z[1] = t5;
+            let t7 = a * t2;
+            let t8 = sin_q - t7;
+            let t9 = q[0] * t5;
+            let t10 = z[0] * z[0];
+            let t11 = t.like(0.5) * t10;
+            let t12 = t11 - cos_q;
+            let t13 = q[0] * t7;
+            let t14 = t12 - t13;
+            let t15 = z[1] + t14;
+            let t16 = t.like(2.0) * t15;
+            let t17 = t9 * t16;
+            let t18 = t8 - t17;
+            first.q[0] = t5 * t18;
+            let t19 = omega * a;
+            let t20 = t1 * t19;
+            first.q[1] = t9 * t20;
+            let t21 = t6 * c;
+            first.force[0] = -t21;
+            first.force[1] = z[0] * t21;
+            zz[0][0] = t5;
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            second: &mut __tfe::Second<R, 2>,
+        ) {
+            let a = t.like(self.a);
+            let c = t.like(self.c);
+            let omega = t.like(self.omega);
+            let t0 = omega * q[1];
+            let (t1, t2) = t0.sin_cos();
+            let (sin_q, cos_q) = q[0].sin_cos();
+            let t3 = q[0] * q[0];
+            let t4 = t.like(1.0) + t3;
+            let t5 = t.like(1.0) / t4;
+            let t6 = t5 * z[0];
+            first.z[0] = t6;
+            first.z[1] = t5;
+            let t7 = a * t2;
+            let t8 = sin_q - t7;
+            let t9 = q[0] * t5;
+            let t10 = t.like(2.0) * t9;
+            let t11 = q[0] * t7;
+            let t12 = z[0] * z[0];
+            let t13 = t.like(0.5) * t12;
+            let t14 = t13 - cos_q;
+            let t15 = t11 - t14;
+            let t16 = t15 - z[1];
+            let t17 = t10 * t16;
+            let t18 = t8 + t17;
+            first.q[0] = t5 * t18;
+            let t19 = omega * t9;
+            let t20 = a * t1;
+            first.q[1] = t19 * t20;
+            let t21 = t6 * c;
+            first.force[0] = -t21;
+            let t22 = z[0] * t21;
+            first.force[1] = t22;
+            second.zz[0][0] = t5;
+            let t23 = t6 * t10;
+            second.zq[0][0] = -t23;
+            let t24 = t5 * t10;
+            second.zq[1][0] = -t24;
+            let t25 = t10 * t8;
+            let t26 = cos_q - t25;
+            let t27 = t17 + t18;
+            let t28 = q[0] * t27;
+            let t29 = t28 - t16;
+            let t30 = t.like(2.0) * t5;
+            let t31 = t29 * t30;
+            let t32 = t26 - t31;
+            second.qq[0][0] = t5 * t32;
+            let t33 = t5 * omega;
+            let t34 = t19 * t10;
+            let t35 = t33 - t34;
+            let t36 = t20 * t35;
+            second.qq[0][1] = t36;
+            second.qq[1][0] = t36;
+            let t37 = omega * t7;
+            second.qq[1][1] = t19 * t37;
+            let t38 = t5 * c;
+            second.force_z[0][0] = -t38;
+            second.force_z[1][0] = t.like(2.0) * t21;
+            second.force_q[0][0] = t21 * t10;
+            let t39 = t22 * t10;
+            second.force_q[1][0] = -t39;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("q"),
+                1 => __tfe::CoordinateName::single("t"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["energy"];
+        fn observables<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            values: &mut [R],
+        ) {
+            let cos_q = q[0].cos();
+            let t0 = z[0] * z[0];
+            let t1 = t.like(0.5) * t0;
+            values[0] = t1 - cos_q;
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl Forced {
+    /// The state with coordinates `q` and momenta `p` at the time t = 0 of the model: t and p_t = −H(q, p, t) come last.
+    fn state(&self, q: [f64; 1], p: [f64; 1]) -> ::tfe::__private::State<2> {
+        self.state_at(0.0, q, p)
+    }
+    /// The state with coordinates `q` and momenta `p` at the time `t` of the model: t and p_t = −H(q, p, t) come last.
+    fn state_at(&self, t: f64, q: [f64; 1], p: [f64; 1]) -> ::tfe::__private::State<2> {
+        let mut state = ::tfe::__private::State {
+            q: [t; 2],
+            p: [0.0; 2],
+        };
+        state.q[..1].copy_from_slice(&q);
+        state.p[..1].copy_from_slice(&p);
+        state.p[1] = -self.__tfe_hamiltonian(t, &state.q, &state.p);
+        state
+    }
+    #[allow(unused_variables, non_snake_case)]
+    fn __tfe_hamiltonian<R: ::tfe::__private::Real>(
+        &self,
+        t: R,
+        q: &[R; 2],
+        z: &[R; 2],
+    ) -> R {
+        let a = t.like(self.a);
+        let omega = t.like(self.omega);
+        let cos_q = q[0].cos();
+        let t0 = omega * q[1];
+        let t1 = t0.cos();
+        let t2 = z[0] * z[0];
+        let t3 = t.like(0.5) * t2;
+        let t4 = t3 - cos_q;
+        let t5 = q[0] * a;
+        let t6 = t1 * t5;
+        t4 - t6
+    }
+    /// What was derived from the declaration: a page when printed.
+    fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "Forced",
+            form: ::tfe::__private::Form::Hamiltonian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: false,
+                forced: true,
+                quadratic_in_z: true,
+                constant_mass: false,
+                linear: false,
+                separable: false,
+            },
+            cyclic: &[],
+            value: ::tfe::__private::Operations {
+                additions: 4,
+                multiplications: 6,
+                divisions: 1,
+                sines: 2,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 6,
+                multiplications: 16,
+                divisions: 1,
+                sines: 2,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 11,
+                multiplications: 32,
+                divisions: 1,
+                sines: 2,
+                functions: 0,
+            },
+            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 16 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 11 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no\nseparable (H_pq = 0)    no\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
+        }
+    }
+    /// The observable `energy` at time `tau`, coordinates `q` and momenta `p`.
+    fn energy(&self, tau: f64, q: [f64; 2], p: [f64; 2]) -> f64 {
+        let mut values = [0.0; 1];
+        ::tfe::__private::Model::observables(self, tau, &q, &p, &mut values);
+        values[0]
+    }
+}

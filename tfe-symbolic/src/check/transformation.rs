@@ -1,0 +1,68 @@
+//! What a time transformation asks of the arguments beside it.
+
+use super::Model;
+use crate::declared::{CLOCK_MOMENTUM, Family, Form, Rule, Solver};
+use crate::diagnostic::{Bag, Kind, Role};
+use crate::input::IndexSymbol;
+
+impl Model {
+    /// A Hamiltonian, a number of coordinates known here, and nothing that p_t = −H stands in the way of.
+    pub(super) fn transformation(&self, bag: &mut Bag) {
+        let Some((_, span)) = self.time_transformation else {
+            return;
+        };
+        if let Some((Form::Lagrangian, _)) = self.energy {
+            bag.push(span, Kind::TransformationOfLagrangian);
+        }
+        if let Some(length) = self.unknown_size() {
+            bag.push(span, Kind::TransformationOfFamily { length });
+        }
+        for (argument, is_there) in [
+            ("constraint", !self.constraints.is_empty()),
+            ("sensitivity", !self.sensitivities.is_empty()),
+        ] {
+            if is_there {
+                bag.push(span, Kind::TransformationWith { argument });
+            }
+        }
+        for (solver, (element, span)) in self.solvers.iter().zip(&self.solver_elements) {
+            if needs_velocities(solver) {
+                let (element, nodes) = (element.clone(), solver.nodes);
+                bag.push(*span, Kind::SolverOfTransformation { element, nodes });
+            }
+        }
+    }
+
+    /// The name of the length of an array of coordinates, where that is no number.
+    fn unknown_size(&self) -> Option<String> {
+        // A length with a mistake looks like a field, too.
+        if self.coordinates.iter().any(super::Slots::has_wrong_length) {
+            return None;
+        }
+        match self.dof.terms.first() {
+            Some((IndexSymbol::ConstParameter(length) | IndexSymbol::Field(length), _)) => {
+                Some(length.clone())
+            }
+            _ => None,
+        }
+    }
+
+    /// The momentum of the time, where there is one, has its name already.
+    pub(super) fn clock_momentum(&self, name: &str) -> Option<Kind> {
+        let is_taken = self.time_transformation.is_some() && name == CLOCK_MOMENTUM;
+        is_taken.then(|| Kind::NameClash {
+            name: name.to_owned(),
+            taken: Role::Momentum,
+        })
+    }
+}
+
+/// Whether velocities are unknowns of the element: p_t has none, H̃ is linear in it.
+fn needs_velocities(solver: &Solver) -> bool {
+    match (solver.family, solver.rule) {
+        (Family::ThreeField, _) => true,
+        (Family::Primal, Rule::Gauss(points)) => points + 1 != solver.nodes,
+        (Family::Primal, rule) => rule != Rule::Reduced,
+        (Family::Mixed | Family::EnergyConserving | Family::Radau, _) => false,
+    }
+}

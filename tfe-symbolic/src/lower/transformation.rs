@@ -1,0 +1,148 @@
+//! Steps in a time τ of their own, dt = g dτ: the model extended by its time as a coordinate.
+
+use super::{Lowerer, Setting};
+use crate::constant::Constant;
+use crate::declared::{
+    CLOCK, CLOCK_MOMENTUM, CoordinateArray, Declared, Force, TimeTransformation,
+};
+use crate::diagnostic::Kind;
+use crate::differentiate::derivative;
+use crate::graph::{ExprId, Graph, Node};
+use crate::input::{Affine, Input};
+use crate::rewrite::{Mapping, UNROLL_LIMIT, substitute};
+
+impl Lowerer<'_> {
+    /// g of `time_transformation = g`, without loops.
+    pub(super) fn rate_of_time(&mut self) -> Option<ExprId> {
+        let (value, _) = self.model.time_transformation.as_ref()?;
+        let setting = Setting {
+            dot: self.usual_dot,
+            linear_loops: true,
+        };
+        let rate = self.within(setting, |lowerer| {
+            let rate = lowerer.scalar(value)?;
+            lowerer.no_loop(rate, value.span)
+        })?;
+        // Without H there is a message already.
+        self.hamiltonian?;
+        let constant = self.graph.as_constant(rate);
+        if constant.is_some_and(|rate| !(rate.to_f64() > 0.0)) {
+            self.report(value.span, Kind::TransformationNotPositive);
+            return None;
+        }
+        Some(rate)
+    }
+}
+
+/// The model in the time τ, for a Hamiltonian model with a known number N of coordinates:
+///
+/// ```text
+/// H̃(q, t, p, p_t) = g (H + p_t) ,     Q̃ = g Q ,     Q̃_t = −g Σ Q_a ∂H/∂p_a
+/// ```
+///
+/// with t for the time wherever it stood, as coordinate N.
+///
+/// # Errors
+/// [`Kind::PowerOfLoop`] if there are forces and the velocities ∂H/∂p cannot be written out.
+pub(super) fn extended(mut model: Declared, rate: ExprId) -> Result<Declared, Kind> {
+    let Some(clock) = model.dof.as_constant() else {
+        // Reported where it is declared.
+        return Ok(model);
+    };
+    let index = Affine::constant(clock);
+    let graph = &mut model.graph;
+    let rate = with_clock(graph, rate, &index);
+    let hamiltonian = with_clock(graph, model.energy, &index);
+    for force in &mut model.forces {
+        force.value = with_clock(graph, force.value, &index);
+    }
+    for observable in &mut model.observables {
+        observable.value = with_clock(graph, observable.value, &index);
+    }
+    let power = power(graph, &model.forces, hamiltonian)?;
+    for force in &mut model.forces {
+        force.value = graph.multiply(rate, force.value);
+    }
+    if !graph.as_constant(power).is_some_and(Constant::is_zero) {
+        let loss = graph.multiply(rate, power);
+        model.forces.push(Force {
+            ranges: Vec::new(),
+            target: index.clone(),
+            value: graph.negate(loss),
+        });
+    }
+    let momentum = graph.input(Input::Momentum(index.clone()));
+    let balance = graph.add(hamiltonian, momentum);
+    model.energy = graph.multiply(rate, balance);
+    model.time_transformation = Some(TimeTransformation {
+        hamiltonian,
+        clock: usize::try_from(clock).unwrap_or_default(),
+    });
+    model.coordinates.push(single(CLOCK, &index));
+    model.momenta.push(single(CLOCK_MOMENTUM, &index));
+    model.dof = Affine::constant(clock + 1);
+    Ok(model)
+}
+
+fn single(name: &str, index: &Affine) -> CoordinateArray {
+    CoordinateArray {
+        name: name.to_owned(),
+        first: index.clone(),
+        length: None,
+    }
+}
+
+/// The expression with a coordinate in place of the time.
+fn with_clock(graph: &mut Graph, id: ExprId, clock: &Affine) -> ExprId {
+    let mut mapping = Mapping::default();
+    for old in graph.reachable(&[id]) {
+        let new = match graph.node(old).clone() {
+            Node::Input(Input::Time) => graph.input(Input::Coordinate(clock.clone())),
+            node => graph.remake(&node, &mapping),
+        };
+        mapping.set(old, new);
+    }
+    mapping.of(id)
+}
+
+/// Σ Q_a ∂H/∂p_a
+fn power(graph: &mut Graph, forces: &[Force], hamiltonian: ExprId) -> Result<ExprId, Kind> {
+    let mut power = graph.integer(0);
+    if forces.is_empty() {
+        return Ok(power);
+    }
+    let too_long = || Kind::PowerOfLoop {
+        limit: UNROLL_LIMIT as usize,
+    };
+    let hamiltonian = graph.unroll(hamiltonian).map_err(|_| too_long())?;
+    if graph.contains_sum(hamiltonian) {
+        return Err(too_long());
+    }
+    for force in forces {
+        for (target, value) in written_out(graph, force) {
+            let velocity = derivative(graph, hamiltonian, &Input::Momentum(target));
+            let part = graph.multiply(value, velocity);
+            power = graph.add(power, part);
+        }
+    }
+    Ok(power)
+}
+
+/// The force on each coordinate that it acts on.
+fn written_out(graph: &mut Graph, force: &Force) -> Vec<(Affine, ExprId)> {
+    let mut forces = vec![(force.target.clone(), force.value)];
+    for range in &force.ranges {
+        let turns = range.start.as_constant().zip(range.end.as_constant());
+        let (start, end) = turns.unwrap_or_default();
+        let mut each = Vec::new();
+        for at in (start..end).map(Affine::constant) {
+            for (target, value) in &forces {
+                let target = substitute(target, range.variable, &at);
+                let value = graph.substitute_loop(*value, range.variable, &at);
+                each.push((target, value));
+            }
+        }
+        forces = each;
+    }
+    forces
+}
