@@ -83,6 +83,8 @@ const LEAST_FACTOR: f64 = 0.4;
 const MOST_FACTOR: f64 = 0.87;
 /// However much shorter the second step, errors are not believed to fall by more.
 const MOST_GAIN: f64 = 700.0;
+/// The same where iterations of both runs end nearly alike: what they leave may have grown, and does not fall at all.
+const MOST_GAIN_MEASURED: f64 = 30.0;
 /// Errors do not fall smoothly where steps meet a pericentre now here, now there: by the estimate, steps longer by this factor have to be enough too.
 const LONGER: f64 = 1.2;
 /// The same where it was measured how errors fall with the step.
@@ -93,6 +95,8 @@ const LEFT: f64 = 0.1;
 const AIM: f64 = 1.13;
 /// By what factor a step that contracts is shorter than one that is accurate where Newton's method pays.
 const STIFF: f64 = 3.0;
+/// Steps that differ by less tell nothing.
+const SAME: f64 = 1.01;
 /// Differences below it that do not fall are of roundings.
 const ROUNDINGS: f64 = 1e-6;
 
@@ -149,15 +153,22 @@ pub(crate) fn search(asked: &Asked, run: &mut Runner<'_>) -> Result<Found, RunEr
         let taken = even_steps(&cuts, way.step);
         let mut here = way.clone();
         if !way.keeps {
-            // Its error is so much larger than that of the run that it is compared with.
-            here.tolerance *= (COARSER.powf(element.order() as f64) / 20.0).max(1.0);
+            // Its error is so much larger than that of the run that it is compared with; and errors of iterations that grow with the motion show in the comparison.
+            here.tolerance *= (COARSER.powf(element.order() as f64) / 3.0).max(1.0);
         }
         match run(&here) {
             Ok(ran) => match ladder.climb(taken, ran) {
                 Verdict::Enough => break,
-                Verdict::Shorter(wanted) => way.step = wanted.min(step),
+                Verdict::Shorter(wanted) => {
+                    way.step = wanted.min(step);
+                    if way.keeps {
+                        // For the same reason.
+                        way.tolerance = (0.1 * way.tolerance).max(TIGHTEST);
+                    }
+                }
                 Verdict::Floor if way.tolerance > TIGHTEST => {
                     way.tolerance *= 1e-2;
+                    way.step = taken * MOST_FACTOR;
                     ladder.apart = None;
                 }
                 Verdict::Floor => break,
@@ -251,7 +262,8 @@ impl Ladder {
         let ratio = longer / step;
         let power = match (self.apart, self.attempts.iter().rev().nth(1)) {
             (Some(earlier), Some(first)) if earlier <= RESOLVED => {
-                Some((earlier / apart).ln() / (first.step / longer).ln())
+                let power = (earlier / apart).ln() / (first.step / longer).ln();
+                Some(power).filter(|power| power.is_finite())
             }
             _ => None,
         };
@@ -259,17 +271,17 @@ impl Ladder {
             attempt.error_estimate = Some(apart);
         }
         let at_floor = power.is_some_and(|power| power < 1.0) && apart < ROUNDINGS;
-        let longer = if power.is_some() {
-            LONGER_MEASURED
+        let (longer, most_gain) = if power.is_some() {
+            (LONGER_MEASURED, MOST_GAIN_MEASURED)
         } else {
-            LONGER
+            (LONGER, MOST_GAIN)
         };
         // A power that is not measured is that of the element only where errors are known to fall with it.
         let power = power.map(|power| power.clamp(1.0, self.order));
-        let known = power.is_some() || contracts;
+        let known = (power.is_some() || contracts) && ratio > SAME;
         let power = power.unwrap_or(self.order);
-        let gain = if apart <= RESOLVED {
-            (ratio.powf(power) - 1.0).min(MOST_GAIN)
+        let gain = if apart <= RESOLVED && ratio > SAME {
+            (ratio.powf(power) - 1.0).min(most_gain)
         } else {
             1.0
         };
@@ -385,4 +397,81 @@ fn even_steps(cuts: &[f64], step: f64) -> f64 {
 
 fn largest(errors: &[Vec<f64>]) -> f64 {
     errors.iter().flatten().copied().fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs that are off by what `error` says of element, step and tolerance, over ten units of time.
+    fn found(
+        accuracy: f64,
+        contracts: bool,
+        error: impl Fn(&Way<'_>, f64) -> f64,
+    ) -> Result<(Found, f64), RunErrorKind> {
+        let asked = Asked {
+            accuracy,
+            span: 0.0..10.0,
+            breaks: vec![3.0],
+            element: None,
+            longest: None,
+            may_iterate: true,
+        };
+        let mut last = 0.0;
+        let found = search(&asked, &mut |way| {
+            let mut trace = Trace::new(1, 0);
+            let step = even_steps(way.cuts, way.step);
+            for t in &way.cuts[1..] {
+                last = error(way, step) * (t - way.cuts[0]) / 10.0;
+                trace.pass(&[1.0 + last, 1.0], true);
+            }
+            Ok(Ran { trace, contracts })
+        })?;
+        Ok((found, last))
+    }
+
+    /// Errors h^p: the estimate is right, and the step no shorter than safety asks for.
+    #[test]
+    fn finds_the_step_of_a_power_law() {
+        for accuracy in [1e-2, 1e-4, 1e-6, 1e-9, 1e-12] {
+            let law = |way: &Way<'_>, step: f64| step.powi(way.element.order() as i32);
+            let (found, error) = found(accuracy, true, law).expect("runs");
+            assert!(found.is_met && error <= accuracy, "{accuracy}: {error}");
+            let estimate = found.picked.error_estimate - LEFT * accuracy;
+            // Not below the error; above it where a fall by more than `MOST_GAIN` is not believed.
+            assert!(estimate > 0.95 * error, "{estimate}, {error}");
+            let order = found.picked.element.order() as f64;
+            let longest = accuracy.powf(1.0 / order);
+            assert!(found.picked.step > longest / 2.0, "{}", found.picked.step);
+            assert_eq!(found.times.last(), Some(&10.0));
+            assert!(found.times.contains(&3.0));
+        }
+    }
+
+    /// Errors that fall with h² alone, whatever the element promises, where Newton's method makes the steps: the power is measured, and the error met.
+    #[test]
+    fn measures_an_order_that_is_reduced() {
+        let (found, error) = found(1e-6, false, |_, step| 1e-3 * step * step).expect("runs");
+        assert!(found.is_met && error <= 1e-6, "{error}");
+        assert!(found.picked.attempts.len() > 2);
+    }
+
+    /// What roundings leave does not fall, and what iterations leave falls with the tolerance alone.
+    #[test]
+    fn knows_what_cannot_be_had_and_tightens_what_can() {
+        let noise = |step: f64| (1e5 * step).sin();
+        let (refused, _) = found(1e-12, true, |_, step| 1e-10 * noise(step)).expect("runs");
+        assert!(!refused.is_met && refused.picked.error_estimate >= 1e-12);
+        let by_tolerance = |way: &Way<'_>, step: f64| 1e4 * way.tolerance * noise(step);
+        let (found, error) = found(1e-6, true, by_tolerance).expect("runs");
+        assert!(found.is_met && error.abs() <= 1e-6, "{error}");
+    }
+
+    #[test]
+    fn what_is_never_finite_is_refused() {
+        let outcome = found(1e-6, true, |_, _| f64::NAN);
+        assert!(outcome.is_err() || outcome.is_ok_and(|(found, _)| !found.is_met));
+        let outcome = found(1e-6, true, |way, _| if way.keeps { f64::NAN } else { 0.0 });
+        assert!(outcome.is_ok_and(|(found, _)| !found.is_met));
+    }
 }
