@@ -1,7 +1,6 @@
 //! Programs of the engine as Rust statements.
 
 use crate::balance::balance;
-use crate::family::strides::Strides;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::{BTreeMap, BTreeSet};
@@ -87,62 +86,6 @@ impl<'a> Emitter<'a> {
         self
     }
 
-    /// The body of a kernel that borrows its slices by `lend`, anew after each stride of the loop, and says how far it has come.
-    pub(crate) fn in_strides(
-        mut self,
-        program: &Program,
-        Strides { at, lowest, .. }: Strides,
-        lend: &TokenStream,
-    ) -> Option<TokenStream> {
-        self.survey(&program.statements);
-        let (before, rest) = program.statements.split_at(at);
-        let (turns, after) = rest.split_first()?;
-        let Statement::Loop {
-            variable,
-            start,
-            end,
-            body,
-        } = turns
-        else {
-            return None;
-        };
-        let before = self.statements(before);
-        let (variable, start, end) = (loop_name(*variable), index(start), index(end));
-        let body = self.statements(body);
-        let after = self.statements(after);
-        let by = index(&Affine::constant(lowest.saturating_abs()));
-        let below = match lowest {
-            ..0 => less(&quote!(__to), &by),
-            0 => quote!(__to),
-            1.. => quote!(__to + #by),
-        };
-        let parameters = self.parameters();
-        Some(quote! {
-            let __end = #end;
-            if __end <= __tfe::STRIDE {
-                // Slices that are arguments are known to lie apart.
-                let (q, z, first) = __sweep.slices();
-                return self.forces_inline(t, q, z, first);
-            }
-            #parameters
-            #lend
-            #before
-            let mut __from = #start;
-            while __from < __end {
-                let __to = __tfe::STRIDE.saturating_add(__from).min(__end);
-                #lend
-                for #variable in __from..__to { #body }
-                // What is left at the end belongs to whoever called.
-                if __to < __end {
-                    __sweep.passed(#below);
-                }
-                __from = __to;
-            }
-            #lend
-            #after
-        })
-    }
-
     /// The body of a kernel.
     pub(crate) fn body(mut self, program: &Program) -> Body {
         self.survey(&program.statements);
@@ -155,7 +98,7 @@ impl<'a> Emitter<'a> {
     }
 
     /// The parameters that have been read so far.
-    fn parameters(&self) -> TokenStream {
+    pub(crate) fn parameters(&self) -> TokenStream {
         let parameters = self.parameters.iter().map(|(field, local)| {
             let field = identifier(field);
             quote!(let #local = t.like(self.#field);)
@@ -164,7 +107,7 @@ impl<'a> Emitter<'a> {
     }
 
     /// Counts reads and collects indices.
-    fn survey(&mut self, statements: &[Statement]) {
+    pub(crate) fn survey(&mut self, statements: &[Statement]) {
         for statement in statements {
             if let Statement::Loop { variable, body, .. } = statement {
                 self.indices.insert(variable.to_string());
@@ -178,7 +121,7 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    fn statements(&mut self, statements: &[Statement]) -> TokenStream {
+    pub(crate) fn statements(&mut self, statements: &[Statement]) -> TokenStream {
         let mut tokens = TokenStream::new();
         let mut rest = statements;
         while let [statement, after @ ..] = rest {
@@ -651,7 +594,7 @@ pub(crate) fn index(affine: &Affine) -> TokenStream {
 }
 
 /// `a - b`, or zero where `b` is larger.
-fn less(a: &TokenStream, b: &TokenStream) -> TokenStream {
+pub(crate) fn less(a: &TokenStream, b: &TokenStream) -> TokenStream {
     let operators = ["+", "*"];
     if a.clone()
         .into_iter()

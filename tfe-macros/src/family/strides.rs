@@ -1,6 +1,8 @@
 //! Which kernels run through their sites in one loop, so that they can say how far they have come.
 
-use crate::emit::operands;
+use crate::emit::{Emitter, index, less, loop_name, operands};
+use proc_macro2::TokenStream;
+use quote::quote;
 use tfe_symbolic::input::{Affine, IndexSymbol, Input};
 use tfe_symbolic::program::{Operand, Output, Program, Statement};
 
@@ -102,5 +104,63 @@ fn read(operand: &Operand) -> Option<&Affine> {
             Input::Coordinate(place) | Input::Velocity(place) | Input::Momentum(place),
         ) => Some(place),
         _ => None,
+    }
+}
+
+impl Emitter<'_> {
+    /// The body of a kernel that borrows its slices by `lend`, anew after each stride of the loop, and says how far it has come.
+    pub(crate) fn in_strides(
+        mut self,
+        program: &Program,
+        Strides { at, lowest, .. }: Strides,
+        lend: &TokenStream,
+    ) -> Option<TokenStream> {
+        self.survey(&program.statements);
+        let (before, rest) = program.statements.split_at(at);
+        let (turns, after) = rest.split_first()?;
+        let Statement::Loop {
+            variable,
+            start,
+            end,
+            body,
+        } = turns
+        else {
+            return None;
+        };
+        let before = self.statements(before);
+        let (variable, start, end) = (loop_name(*variable), index(start), index(end));
+        let body = self.statements(body);
+        let after = self.statements(after);
+        let by = index(&Affine::constant(lowest.saturating_abs()));
+        let below = match lowest {
+            ..0 => less(&quote!(__to), &by),
+            0 => quote!(__to),
+            1.. => quote!(__to + #by),
+        };
+        let parameters = self.parameters();
+        Some(quote! {
+            let __end = #end;
+            if __end <= __tfe::STRIDE {
+                // Slices that are arguments are known to lie apart.
+                let (q, z, first) = __sweep.slices();
+                return self.forces_inline(t, q, z, first);
+            }
+            #parameters
+            #lend
+            #before
+            let mut __from = #start;
+            while __from < __end {
+                let __to = __tfe::STRIDE.saturating_add(__from).min(__end);
+                #lend
+                for #variable in __from..__to { #body }
+                // What is left at the end belongs to whoever called.
+                if __to < __end {
+                    __sweep.passed(#below);
+                }
+                __from = __to;
+            }
+            #lend
+            #after
+        })
     }
 }
