@@ -27,6 +27,8 @@ pub(super) trait Repeatable<const N: usize> {
     /// Whether progress is to be shown.
     fn progress(&self) -> bool;
     fn coordinates(&self) -> usize;
+    /// How many outputs there are.
+    fn columns(&self) -> usize;
     /// The names of all outputs.
     fn outputs(&self) -> Vec<String>;
     /// A stepper; the inside of its steps is asked for only if they are to be recorded.
@@ -82,7 +84,7 @@ impl Watcher {
         stepper: &mut R::Stepper,
         (t, start): (f64, &R::State),
     ) -> Self {
-        let trace = Trace::new(run.coordinates(), run.outputs().len());
+        let trace = Trace::new(run.coordinates(), run.columns());
         let mut watcher = Self {
             row: vec![0.0; trace.width()],
             trace,
@@ -450,6 +452,10 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
 
     fn coordinates(&self) -> usize {
         N
+    }
+
+    fn columns(&self) -> usize {
+        M::OBSERVABLES.len()
     }
 
     fn outputs(&self) -> Vec<String> {

@@ -121,9 +121,12 @@ impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
         self.model.len()
     }
 
+    fn columns(&self) -> usize {
+        self.model.columns()
+    }
+
     fn outputs(&self) -> Vec<String> {
-        let columns = 0..self.model.columns();
-        columns
+        (0..self.columns())
             .map(|column| self.model.column_name(column).to_string())
             .collect()
     }
