@@ -139,7 +139,11 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
         element: Element,
         control: Control,
     ) -> Result<Stepper<'_, M, N>, RunErrorKind> {
-        Stepper::new(self, element, control).map_err(RunErrorKind::Element)
+        let stepper = Stepper::new(self, element, control);
+        // As in a simulation of which the ends of elements are kept.
+        stepper
+            .map(Stepper::ends_only)
+            .map_err(RunErrorKind::Element)
     }
 
     #[inline]

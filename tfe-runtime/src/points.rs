@@ -60,6 +60,9 @@ pub(crate) struct Points<const N: usize> {
     /// The largest coordinate at the start, and the largest velocity or momentum.
     distance: f64,
     speed: f64,
+    /// The end of the last step, and what rounding took from it.
+    pub(crate) end: State<N>,
+    pub(crate) end_low: State<N>,
     /// Scratch of cold starts.
     cold: Vec<f64>,
     is_warm: bool,
@@ -77,7 +80,7 @@ pub(crate) struct Inertia<const N: usize> {
     pub(crate) inverse_diagonal: [f64; N],
     /// What rounding took from the inverse of the diagonal.
     pub(crate) inverse_low: [f64; N],
-    /// M⁻¹ (or H_pp), row by row; nothing where it is not constant.
+    /// M⁻¹ (or H_pp), row by row; nothing where it is not constant, or diagonal.
     pub(crate) inverse: Vec<[f64; N]>,
 }
 
@@ -91,9 +94,9 @@ pub(crate) struct Leg<'a, const N: usize> {
 }
 
 /// What has come of a step.
-pub(crate) struct Outcome<const N: usize> {
-    /// End and what rounding took from it, if the iteration has converged.
-    pub(crate) end: Option<(State<N>, State<N>)>,
+pub(crate) struct Outcome {
+    /// The iteration has converged: the end of the step is there.
+    pub(crate) arrived: bool,
     pub(crate) iterations: u32,
     /// The last increment, relative, and its ratio to that before.
     pub(crate) residual: f64,
@@ -112,7 +115,7 @@ impl<const N: usize> Points<N> {
             return None;
         }
         let inertia = Inertia::of(model)?;
-        let tables = Tables::new(scheme);
+        let tables = Tables::of(scheme);
         let groups = tables.groups;
         let rows = || vec![[[0.0; 4]; N]; groups];
         let varied = if M::FACTS.constant_mass { 0 } else { groups };
@@ -133,6 +136,8 @@ impl<const N: usize> Points<N> {
             velocity: [0.0; N],
             distance: 0.0,
             speed: 0.0,
+            end: State::ZERO,
+            end_low: State::ZERO,
             cold: vec![0.0; 2 * scheme.points() * N],
             is_warm: false,
             last_step: 0.0,
@@ -163,7 +168,7 @@ impl<const N: usize> Points<N> {
         control: &Control,
         leg: Leg<'_, N>,
         yielding: bool,
-    ) -> Outcome<N>
+    ) -> Outcome
     where
         M: Model<N>,
     {
@@ -181,7 +186,7 @@ impl<const N: usize> Points<N> {
             yielding,
         };
         let outcome = job.run();
-        self.is_warm = outcome.end.is_some();
+        self.is_warm = outcome.arrived;
         outcome
     }
 
@@ -254,36 +259,62 @@ impl<const N: usize> Inertia<N> {
         if is_second_order::<M, N>() && first.z != [0.0; N] {
             return None;
         }
-        let inverse = Block::of(&mass).ok()?.inverse();
-        let (mass, inverse) = match M::FORM {
-            Form::Lagrangian => (mass, inverse),
-            Form::Hamiltonian => (inverse, mass),
-        };
-        let mut diagonal = Some([0.0; N]);
-        for a in 0..N {
-            for b in 0..N {
-                if a == b {
-                    if let Some(diagonal) = &mut diagonal {
-                        diagonal[a] = mass[a][a];
-                    }
-                } else if mass[a][b] != 0.0 {
-                    diagonal = None;
-                }
-            }
+        if let Some(diagonal) = diagonal_of(&mass) {
+            return Self::of_diagonal(diagonal, M::FORM);
         }
-        let (mut inverse_diagonal, mut inverse_low) = ([0.0; N], [0.0; N]);
+        let inverse = Block::of(&mass).ok()?.inverse();
+        let inverse = match M::FORM {
+            Form::Lagrangian => inverse,
+            Form::Hamiltonian => mass,
+        };
+        let mut inverse_diagonal = [0.0; N];
         for a in 0..N {
             inverse_diagonal[a] = inverse[a][a];
-            let exact = DoubleDouble::ONE.over(DoubleDouble::new(mass[a][a]));
-            inverse_low[a] = exact.minus(DoubleDouble::new(inverse[a][a])).high;
         }
         Some(Self {
-            diagonal,
+            diagonal: None,
             inverse_diagonal,
-            inverse_low,
+            inverse_low: [0.0; N],
             inverse: inverse.to_vec(),
         })
     }
+
+    /// From the diagonal of L_vv or H_pp; nothing if a mass is zero, infinite or no number.
+    fn of_diagonal(given: [f64; N], form: Form) -> Option<Self> {
+        let (mut masses, mut inverse, mut inverse_low) = ([0.0; N], [0.0; N], [0.0; N]);
+        for a in 0..N {
+            let reciprocal = 1.0 / given[a];
+            if !(given[a].is_finite() && reciprocal.is_finite()) {
+                return None;
+            }
+            (masses[a], inverse[a]) = match form {
+                Form::Lagrangian => (given[a], reciprocal),
+                Form::Hamiltonian => (reciprocal, given[a]),
+            };
+            let exact = DoubleDouble::ONE.over(DoubleDouble::new(masses[a]));
+            inverse_low[a] = exact.minus(DoubleDouble::new(inverse[a])).high;
+        }
+        Some(Self {
+            diagonal: Some(masses),
+            inverse_diagonal: inverse,
+            inverse_low,
+            inverse: Vec::new(),
+        })
+    }
+}
+
+/// The diagonal of a matrix that has nothing else.
+fn diagonal_of<const N: usize>(matrix: &[[f64; N]; N]) -> Option<[f64; N]> {
+    let mut diagonal = [0.0; N];
+    for a in 0..N {
+        diagonal[a] = matrix[a][a];
+        for b in 0..N {
+            if a != b && matrix[a][b] != 0.0 {
+                return None;
+            }
+        }
+    }
+    Some(diagonal)
 }
 
 /// Whether the equations are M q̈ = f.
@@ -449,7 +480,8 @@ pub(crate) mod tests {
                             low: &low,
                         };
                         let outcome = points.advance(model, &table, &control, leg, true);
-                        (state, low) = outcome.end.unwrap();
+                        assert!(outcome.arrived);
+                        (state, low) = (points.end, points.end_low);
                         turn(step, &mut state);
                     }
                     (state, low)

@@ -79,6 +79,15 @@ impl<const N: usize> State<N> {
         q: [0.0; N],
         p: [0.0; N],
     };
+
+    /// Whether all numbers are equal, without a branch for each.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let mut same = true;
+        for a in 0..N {
+            same &= (self.q[a] == other.q[a]) & (self.p[a] == other.p[a]);
+        }
+        same
+    }
 }
 
 impl<const N: usize> Memory<N> {
@@ -273,7 +282,7 @@ where
             return Err(StepError::NonFinite);
         }
         let scheme = self.tables.view();
-        let Some(last) = memory.last.filter(|last| last.end == *state) else {
+        let Some(last) = memory.last.filter(|last| last.end.is_same(state)) else {
             parts.momenta.fill(state.p);
             parts.unknowns.fill(0.0);
             return Ok(false);

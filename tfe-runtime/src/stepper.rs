@@ -248,7 +248,7 @@ where
         };
         let start = *state;
         let mut low = match &self.memory.last {
-            Some(last) if last.end == start => self.memory.low,
+            Some(last) if last.end.is_same(&start) => self.memory.low,
             _ => State::ZERO,
         };
         let start_low = low;
@@ -280,18 +280,16 @@ where
             points.forget();
             return Together::LeftToOthers;
         }
-        let low = match &self.memory.last {
-            Some(last) if last.end == *state => self.memory.low,
-            _ => {
-                points.forget();
-                State::ZERO
-            }
-        };
+        let last = self.memory.last.as_ref();
+        if !last.is_some_and(|last| last.end.is_same(state)) {
+            points.forget();
+            self.memory.low = State::ZERO;
+        }
         let leg = Leg {
             t,
             h,
             start: state,
-            low: &low,
+            low: &self.memory.low,
         };
         let outcome = points.advance(self.model, &self.table, &self.control, leg, yielding);
         let statistics = &mut self.memory.statistics;
@@ -300,7 +298,7 @@ where
         statistics.fixed_point_iterations += iterations;
         statistics.residual_evaluations += iterations * points.len() as u64;
         statistics.contraction = Contraction::of(outcome.contraction);
-        let Some((end, end_low)) = outcome.end else {
+        if !outcome.arrived {
             if self.skipped {
                 // Nothing there that an ordinary step could continue.
                 self.memory.last = None;
@@ -320,19 +318,19 @@ where
             } else {
                 StepError::NonFinite
             });
-        };
+        }
         self.memory.last = Some(Last {
             t,
             h,
             start: *state,
-            start_low: low,
-            end,
+            start_low: self.memory.low,
+            end: points.end,
         });
-        self.memory.low = end_low;
+        *state = points.end;
+        self.memory.low = points.end_low;
         self.memory.preference.confirm_fixed_point();
         self.memory.statistics.steps += 1;
         self.memory.forget_factors();
-        *state = end;
         self.skipped = self.ends_only;
         if !self.ends_only {
             self.write_back(h);

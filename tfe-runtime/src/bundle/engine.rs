@@ -51,7 +51,7 @@ impl<const N: usize> Engine<N> {
         M: Model<N>,
     {
         let inertia = Inertia::of(model)?;
-        let tables = Tables::new(&table.view());
+        let tables = Tables::of(&table.view());
         let work = Work::new(tables.points, !M::FACTS.constant_mass);
         Some(Self {
             tables,

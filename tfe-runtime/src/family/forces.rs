@@ -53,7 +53,7 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
         let n = model.len();
         let problem = Problem {
             inertia: Inertia::of(model)?,
-            tables: Tables::new(&table.view()),
+            tables: Tables::of(&table.view()),
             velocity: vec![0.0; n],
             velocity_low: vec![0.0; n],
         };

@@ -2,17 +2,12 @@
 
 use super::four::{Four, Precise, block, put};
 use super::{Leg, Points};
-use crate::model::State;
 
 impl<const N: usize> Points<N> {
     /// Start plus h times the integrals of the rates of first-order equations.
     #[inline(always)]
-    pub(super) fn end<V: Four, const EXACT: bool>(
-        &self,
-        like: V,
-        leg: &Leg<'_, N>,
-    ) -> (State<N>, State<N>) {
-        let (mut end, mut end_low) = (State::ZERO, State::ZERO);
+    pub(super) fn finish<V: Four, const EXACT: bool>(&mut self, like: V, leg: &Leg<'_, N>) {
+        let (end, end_low) = (&mut self.end, &mut self.end_low);
         let (weights, h) = (&self.tables.weights, like.like(leg.h));
         for at in (0..N).step_by(4) {
             let velocity = weights.sums::<_, N, EXACT>(like, &self.rates, at);
@@ -26,17 +21,16 @@ impl<const N: usize> Points<N> {
             put(q_low, &mut end_low.q, at);
             put(p_low, &mut end_low.p, at);
         }
-        (end, end_low)
     }
 
     /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) of second-order equations.
     #[inline(always)]
-    pub(super) fn end_second_order<V: Four, const EXACT: bool>(
-        &self,
+    pub(super) fn finish_second_order<V: Four, const EXACT: bool>(
+        &mut self,
         like: V,
         leg: &Leg<'_, N>,
-    ) -> (State<N>, State<N>) {
-        let (mut end, mut end_low) = (State::ZERO, State::ZERO);
+    ) {
+        let (end, end_low) = (&mut self.end, &mut self.end_low);
         let (mut lever, mut lever_low) = ([0.0; N], [0.0; N]);
         let (forces, h) = (&self.forces, like.like(leg.h));
         for at in (0..N).step_by(4) {
@@ -75,7 +69,6 @@ impl<const N: usize> Points<N> {
             put(q_low, &mut end_low.q, at);
             put(p_low, &mut end_low.p, at);
         }
-        (end, end_low)
     }
 }
 

@@ -74,7 +74,11 @@ pub(crate) fn block<V: Four>(like: V, numbers: &[f64], at: usize) -> V {
 /// Writes them back, as far as there are so many.
 #[inline(always)]
 pub(crate) fn put<V: Four>(four: V, numbers: &mut [f64], at: usize) {
-    let end = numbers.len().min(at + 4);
+    if let Some(place) = numbers[at..].first_chunk_mut() {
+        *place = four.lanes();
+        return;
+    }
+    let end = numbers.len();
     numbers[at..end].copy_from_slice(&four.lanes()[..end - at]);
 }
 

@@ -99,18 +99,23 @@ impl<const N: usize> Points<N> {
         let (h, square) = (like.like(leg.h), like.like(leg.h * leg.h));
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
         let zero = like.like(0.0);
-        let forces = &mut self.forces;
-        let count = forces.len();
+        let count = self.forces.len();
+        let forces = &mut self.forces[..count];
         let products = &self.products[..count];
         let more_products = &self.more_products[..count];
         let drift = &self.drift[..count];
         let nodes = &self.tables.nodes[..count];
         for c in 0..count {
+            let moved = if self.inertia.diagonal.is_some() {
+                self.inertia
+                    .moved::<V, true>(square, &products[c], &drift[c])
+            } else {
+                self.inertia
+                    .moved::<V, false>(square, &products[c], &drift[c])
+            };
             let (mut q, mut z) = ([zero; N], [zero; N]);
             for a in 0..N {
-                let rate = self.inertia.row(like, &products[c], a);
-                let moved = like.with(drift[c][a]) + square * rate;
-                q[a] = like.like(leg.start.q[a]) + moved;
+                q[a] = like.like(leg.start.q[a]) + moved[a];
                 if const { M::FACTS.forced } {
                     z[a] = match M::FORM {
                         Form::Lagrangian => {
@@ -127,14 +132,20 @@ impl<const N: usize> Points<N> {
             let mut first = no_derivatives(like);
             V::first(model, t, &q, &z, &mut first);
             for a in 0..N {
-                let force = match M::FORM {
-                    Form::Lagrangian => first.q[a] + first.force[a],
-                    Form::Hamiltonian => first.force[a] - first.q[a],
+                let given = match M::FORM {
+                    Form::Lagrangian => first.q[a],
+                    Form::Hamiltonian => -first.q[a],
+                };
+                let force = if const { M::FACTS.forced } {
+                    given + first.force[a]
+                } else {
+                    given
                 };
                 // As accelerations: momenta of light and heavy bodies say nothing beside each other.
                 let inverse = like.like(self.inertia.inverse_diagonal[a]);
                 changed.raise(inverse * (force - like.with(forces[c][a])));
-                size.raise(inverse * force);
+                // What is not finite shows in the change.
+                size.raise_finite(inverse * force);
                 forces[c][a] = force.lanes();
             }
         }

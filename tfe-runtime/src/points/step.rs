@@ -20,7 +20,7 @@ where
     M: Model<N>,
 {
     /// In the registers of the processor.
-    pub(super) fn run(self) -> Outcome<N> {
+    pub(super) fn run(self) -> Outcome {
         // Without kernels for lanes the constant is false, and the compiler drops the call.
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
         if let (Some(isa), true) = (self.points.isa, M::LANES) {
@@ -31,7 +31,7 @@ where
 
     /// The whole step.
     #[inline(always)]
-    fn step<V: Four>(self, like: V) -> Outcome<N> {
+    fn step<V: Four>(self, like: V) -> Outcome {
         let Self {
             points,
             model,
@@ -86,25 +86,23 @@ where
             }
         }
         // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
-        let mut end = None;
+        let mut arrived = false;
         if converged {
-            let reached = if const { is_second_order::<M, N>() } {
+            if const { is_second_order::<M, N>() } {
                 if is_rough {
-                    points.end_second_order::<V, false>(like, &leg)
+                    points.finish_second_order::<V, false>(like, &leg);
                 } else {
-                    points.end_second_order::<V, true>(like, &leg)
+                    points.finish_second_order::<V, true>(like, &leg);
                 }
             } else if is_rough {
-                points.end::<V, false>(like, &leg)
+                points.finish::<V, false>(like, &leg);
             } else {
-                points.end::<V, true>(like, &leg)
-            };
-            if is_finite(&reached.0) {
-                end = Some(reached);
+                points.finish::<V, true>(like, &leg);
             }
+            arrived = is_finite(&points.end);
         }
         Outcome {
-            end,
+            arrived,
             iterations,
             residual: monitor.last(),
             contraction: monitor.rate(),
@@ -120,9 +118,9 @@ struct InRegisters<'a, M, const N: usize> {
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for InRegisters<'_, M, N> {
-    type Output = Outcome<N>;
+    type Output = Outcome;
     #[inline(always)]
-    fn call(self) -> Outcome<N> {
+    fn call(self) -> Outcome {
         self.job.step(crate::quad::Quad::of(self.isa, [0.0; 4]))
     }
 }

@@ -30,6 +30,12 @@ impl<V: Precise> Largest<V> {
         self.sum += value;
     }
 
+    /// The same for a value of which others tell whether it is finite.
+    #[inline(always)]
+    pub(crate) fn raise_finite(&mut self, value: V) {
+        self.size = value.abs().larger(self.size);
+    }
+
     /// One for each lane; NaN where one value of that lane was not finite.
     #[inline(always)]
     pub(crate) fn by_lane(self) -> V {
@@ -269,6 +275,26 @@ impl<const N: usize> Inertia<N> {
             }
         }
         product
+    }
+
+    /// How far four points have moved: drift + h² M⁻¹ · products.
+    #[inline(always)]
+    pub(super) fn moved<V: Four, const DIAGONAL: bool>(
+        &self,
+        square: V,
+        products: &Row<N>,
+        drift: &Row<N>,
+    ) -> [V; N] {
+        let mut moved = [square; N];
+        for a in 0..N {
+            let rate = if const { DIAGONAL } {
+                square.like(self.inverse_diagonal[a]) * square.with(products[a])
+            } else {
+                self.row(square, products, a)
+            };
+            moved[a] = square.with(drift[a]) + square * rate;
+        }
+        moved
     }
 
     /// One line of it times the numbers at four points.

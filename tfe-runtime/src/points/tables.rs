@@ -2,6 +2,8 @@
 
 use super::Row;
 use super::four::Four;
+#[cfg(feature = "std")]
+use crate::Element;
 use crate::double_double::DoubleDouble;
 use crate::scheme::{SchemeRef, SchemeTable, Tables as _};
 use crate::step::set_extrapolation;
@@ -58,24 +60,31 @@ impl Matrix {
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
-        let columns = self.columns.as_chunks::<C>().0;
+        let (columns, zero) = (self.columns.as_chunks::<C>().0, like.like(0.0));
         let (whole, rest) = columns.as_chunks::<4>();
         let ([rows], [products]) = (rows.as_chunks::<C>().0, products.as_chunks_mut::<C>().0)
         else {
             return;
         };
-        let zero = like.like(0.0);
-        for a in 0..N {
-            // Two sums, of even and of odd columns: with few coordinates, additions in a row are what takes time.
-            let mut sums = [[zero; C]; 2];
-            // Whole groups of columns are written out by the compiler.
-            for (columns, row) in whole.iter().zip(rows) {
-                for lane in 0..4 {
-                    let value = like.like(row[a][lane]);
-                    for c in 0..C {
-                        sums[lane % 2][c] += like.with(columns[lane][c]) * value;
-                    }
+        // Two sums, of even and of odd columns: with few coordinates, additions in a row are what takes time.
+        if let ([whole], []) = (whole.as_chunks::<C>().0, rest) {
+            // Groups without gaps are written out by the compiler.
+            for a in 0..N {
+                let mut sums = first_two(like, &whole[0], &rows[0][a]);
+                add(like, &mut sums, &whole[0][2..], &rows[0][a][2..]);
+                for (columns, row) in whole[1..].iter().zip(&rows[1..]) {
+                    add(like, &mut sums, columns, &row[a]);
                 }
+                for c in 0..C {
+                    products[c][a] = (sums[0][c] + sums[1][c]).lanes();
+                }
+            }
+            return;
+        }
+        for a in 0..N {
+            let mut sums = [[zero; C]; 2];
+            for (columns, row) in whole.iter().zip(rows) {
+                add(like, &mut sums, columns, &row[a]);
             }
             if let Some(row) = rows.get(whole.len()) {
                 for (column, value) in rest.iter().zip(&row[a]) {
@@ -95,6 +104,39 @@ impl Matrix {
     #[inline(always)]
     pub(crate) fn columns(&self) -> core::slice::ChunksExact<'_, f64> {
         self.columns.as_flattened().chunks_exact(4 * self.groups)
+    }
+}
+
+/// The products of the first two columns with their values.
+#[inline(always)]
+fn first_two<V: Four, const C: usize>(
+    like: V,
+    columns: &[[[f64; 4]; C]; 4],
+    values: &[f64; 4],
+) -> [[V; C]; 2] {
+    let mut products = [[like; C]; 2];
+    for lane in 0..2 {
+        let value = like.like(values[lane]);
+        for c in 0..C {
+            products[lane][c] = like.with(columns[lane][c]) * value;
+        }
+    }
+    products
+}
+
+/// Adds the products of columns with their values.
+#[inline(always)]
+fn add<V: Four, const C: usize>(
+    like: V,
+    sums: &mut [[V; C]; 2],
+    columns: &[[[f64; 4]; C]],
+    values: &[f64],
+) {
+    for (lane, (column, value)) in columns.iter().zip(values).enumerate() {
+        let value = like.like(*value);
+        for c in 0..C {
+            sums[lane % 2][c] += like.with(column[c]) * value;
+        }
     }
 }
 
@@ -212,9 +254,31 @@ pub(crate) struct Tables {
     scratch: Vec<f64>,
 }
 
+/// The tables computed so far.
+#[cfg(feature = "std")]
+static KNOWN: std::sync::Mutex<Vec<(Element, Tables)>> = std::sync::Mutex::new(Vec::new());
+
 impl Tables {
-    /// Of an element that is a Runge–Kutta method.
-    pub(crate) fn new(scheme: &SchemeRef<'_>) -> Self {
+    /// Of an element that is a Runge–Kutta method. With the feature `std` they are computed once in a program.
+    pub(crate) fn of(scheme: &SchemeRef<'_>) -> Self {
+        #[cfg(feature = "std")]
+        {
+            // A panic elsewhere leaves the list as good as it was.
+            let mut known = KNOWN
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner);
+            if let Some((_, tables)) = known.iter().find(|(of, _)| *of == scheme.element) {
+                return tables.clone();
+            }
+            let tables = Self::computed(scheme);
+            known.push((scheme.element, tables.clone()));
+            tables
+        }
+        #[cfg(not(feature = "std"))]
+        Self::computed(scheme)
+    }
+
+    fn computed(scheme: &SchemeRef<'_>) -> Self {
         let points = scheme.points();
         let coefficient = |i: usize, j: usize| DoubleDouble {
             high: scheme.position[i * points + j],
