@@ -3,15 +3,15 @@
 mod error;
 mod fit;
 mod given;
-mod grid;
-mod measure;
-mod measurements;
-mod output;
+pub(crate) mod grid;
+pub(crate) mod measure;
+pub(crate) mod measurements;
+pub(crate) mod output;
 mod peer;
 mod point;
-mod reference;
-mod rounds;
-mod subject;
+pub(crate) mod reference;
+pub(crate) mod rounds;
+pub(crate) mod subject;
 
 use grid::Grid;
 use measure::{Measure, Way};
@@ -383,10 +383,15 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
     }
 
     fn report(&self, line: fmt::Arguments<'_>) {
-        if self.progress {
-            // Progress that cannot be shown is no reason to stop.
-            let _ = writeln!(std::io::stderr(), "{line}");
-        }
+        report(self.progress, line);
+    }
+}
+
+/// A line of progress on standard error, where it is wanted.
+pub(crate) fn report(is_wanted: bool, line: fmt::Arguments<'_>) {
+    if is_wanted {
+        // Progress that cannot be shown is no reason to stop.
+        let _ = writeln!(std::io::stderr(), "{line}");
     }
 }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// A span in equal steps; the last one may be shorter.
 #[derive(Clone, Debug)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     start: f64,
     end: f64,
     /// As it was asked for, positive.
@@ -33,7 +33,7 @@ const LOOKS: usize = 1000;
 const MOST_STEPS: f64 = 1e15;
 
 impl Grid {
-    pub(super) fn new(span: &Range<f64>, step: f64) -> Result<Self, WorkPrecisionError> {
+    pub(crate) fn new(span: &Range<f64>, step: f64) -> Result<Self, WorkPrecisionError> {
         let Range { start, end } = *span;
         if !(start.is_finite() && end.is_finite() && start != end && (end - start).is_finite()) {
             return Err(WorkPrecisionError::Span { start, end });
@@ -68,16 +68,16 @@ impl Grid {
     }
 
     /// The step that was asked for, without its sign.
-    pub(super) fn step(&self) -> f64 {
+    pub(crate) fn step(&self) -> f64 {
         self.step
     }
 
-    pub(super) fn steps(&self) -> usize {
+    pub(crate) fn steps(&self) -> usize {
         self.steps
     }
 
     /// The time of the k-th node: a product, not a sum, and the end of the span exactly.
-    pub(super) fn node(&self, k: usize) -> f64 {
+    pub(crate) fn node(&self, k: usize) -> f64 {
         if k >= self.steps {
             self.end
         } else {
@@ -86,7 +86,7 @@ impl Grid {
     }
 
     /// Start, end and length of the k-th element.
-    pub(super) fn element(&self, k: usize) -> (f64, f64, f64) {
+    pub(crate) fn element(&self, k: usize) -> (f64, f64, f64) {
         let (t, next) = (self.node(k), self.node(k + 1));
         let h = if self.whole || k + 1 < self.steps {
             self.length

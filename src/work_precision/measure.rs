@@ -12,7 +12,7 @@ use tfe_runtime::Element;
 use tfe_runtime::step::Control;
 
 /// The most repetitions of a run: the best of a hundred is not much above the best of a thousand.
-pub(super) const MOST_REPETITIONS: u32 = 100;
+const MOST_REPETITIONS: u32 = 100;
 
 /// What all runs have in common.
 pub(super) struct Measure<'a, M, S> {
@@ -23,10 +23,10 @@ pub(super) struct Measure<'a, M, S> {
 
 /// One way to cross the span.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way<'g> {
-    pub(super) element: Element,
-    pub(super) control: Control,
-    pub(super) grid: &'g Grid,
+pub(crate) struct Way<'g> {
+    pub(crate) element: Element,
+    pub(crate) control: Control,
+    pub(crate) grid: &'g Grid,
 }
 
 impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
@@ -93,8 +93,32 @@ impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
 /// By what factor the error may be larger than with the tightest tolerance.
 const SHOWS: f64 = 1.25;
 
+/// The best of several times of one run.
+#[derive(Debug)]
+pub(crate) struct Best<'a> {
+    /// Seconds of the fastest so far.
+    pub(crate) seconds: &'a mut f64,
+    pub(crate) repetitions: &'a mut u32,
+    /// What all of them took.
+    pub(crate) spent: &'a mut Duration,
+}
+
+impl Best<'_> {
+    /// Repeats the run until it has taken `until` in all, or cannot be repeated.
+    pub(crate) fn repeat(self, until: Duration, mut run: impl FnMut() -> Option<Duration>) {
+        while *self.spent < until && *self.repetitions < MOST_REPETITIONS {
+            let Some(time) = run() else {
+                break;
+            };
+            *self.spent += time;
+            *self.seconds = self.seconds.min(time.as_secs_f64());
+            *self.repetitions += 1;
+        }
+    }
+}
+
 /// Moves `state` over some elements of the grid, and says how long that took.
-pub(super) fn advance<M: Subject<S>, S: PhasePoint>(
+pub(crate) fn advance<M: Subject<S>, S: PhasePoint>(
     stepper: &mut M::Stepper<'_>,
     grid: &Grid,
     elements: Range<usize>,
@@ -181,7 +205,7 @@ impl<'a, M: Subject<S>, S: PhasePoint> Observer<'a, M, S> {
 }
 
 /// Keeps the larger one; `f64::max` would drop a NaN.
-pub(super) fn largest(so_far: &mut f64, value: f64) {
+pub(crate) fn largest(so_far: &mut f64, value: f64) {
     if !(value <= *so_far) {
         *so_far = value;
     }

@@ -227,7 +227,7 @@ impl Measurements {
 }
 
 /// Those of (cost, error, what) that no other beats, the cheapest first.
-fn pareto<T>(mut all: Vec<(f64, f64, T)>) -> Vec<(f64, f64, T)> {
+pub(crate) fn pareto<T>(mut all: Vec<(f64, f64, T)>) -> Vec<(f64, f64, T)> {
     all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut least = f64::INFINITY;
     all.retain(|(_, error, _)| {

@@ -4,6 +4,8 @@ use super::error::SaveError;
 use super::measurements::Measurements;
 use super::peer::PeerPoint;
 use super::point::{Measured, Point};
+#[cfg(feature = "charts")]
+use crate::charts::{Chart, ChartError, Page, Section};
 use std::fs;
 use std::path::Path;
 
@@ -23,31 +25,7 @@ impl Measurements {
     /// [`SaveError::UnknownEnding`]; [`SaveError::Io`]; [`SaveError::NoCharts`] for pictures without the feature `charts`;
     /// [`SaveError::Chart`] where there is nothing to draw.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), SaveError> {
-        const KNOWN: &[&str] = &[".svg", ".csv", ".html"];
-        let path = path.as_ref();
-        let ending = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
-        let ending = ending.as_ref().and_then(|ending| ending.to_str());
-        match ending {
-            Some("csv") => fs::write(path, self.to_csv()).map_err(|source| SaveError::Io {
-                path: path.to_owned(),
-                source,
-            }),
-            #[cfg(feature = "charts")]
-            Some("svg") => Ok(self.chart().save(path)?),
-            #[cfg(feature = "charts")]
-            Some("html" | "htm") => {
-                let page = crate::charts::Page::new(&self.title).section(self.section()?);
-                Ok(page.save(path)?)
-            }
-            #[cfg(not(feature = "charts"))]
-            Some("svg" | "html" | "htm") => Err(SaveError::NoCharts {
-                path: path.to_owned(),
-            }),
-            _ => Err(SaveError::UnknownEnding {
-                path: path.to_owned(),
-                known: KNOWN,
-            }),
-        }
+        self.save_as(path.as_ref())
     }
 
     /// All points as text: a header, then a line for each, those that failed with their error in the last column. Numbers read back
@@ -66,6 +44,73 @@ impl Measurements {
             }
         }
         text
+    }
+}
+
+impl Report for Measurements {
+    #[cfg(feature = "charts")]
+    fn title(&self) -> &str {
+        &self.title
+    }
+
+    fn csv(&self) -> String {
+        self.to_csv()
+    }
+
+    #[cfg(feature = "charts")]
+    fn picture(&self) -> Chart {
+        self.chart()
+    }
+
+    #[cfg(feature = "charts")]
+    fn part(&self) -> Result<Section, ChartError> {
+        self.section()
+    }
+}
+
+/// Results that are a table, a chart, or a section of a page.
+pub(crate) trait Report {
+    /// The title of a page.
+    #[cfg(feature = "charts")]
+    fn title(&self) -> &str;
+
+    /// All figures.
+    fn csv(&self) -> String;
+
+    /// The chart.
+    #[cfg(feature = "charts")]
+    fn picture(&self) -> Chart;
+
+    /// Chart and table.
+    #[cfg(feature = "charts")]
+    fn part(&self) -> Result<Section, ChartError>;
+
+    /// Writes what the ending of the file name asks for.
+    fn save_as(&self, path: &Path) -> Result<(), SaveError> {
+        const KNOWN: &[&str] = &[".svg", ".csv", ".html"];
+        let ending = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
+        let ending = ending.as_ref().and_then(|ending| ending.to_str());
+        match ending {
+            Some("csv") => fs::write(path, self.csv()).map_err(|source| SaveError::Io {
+                path: path.to_owned(),
+                source,
+            }),
+            #[cfg(feature = "charts")]
+            Some("svg") => Ok(self.picture().save(path)?),
+            #[cfg(feature = "charts")]
+            Some("html" | "htm") => {
+                let page = Page::new(self.title()).section(self.part()?);
+                Ok(page.save(path)?)
+            }
+            #[cfg(not(feature = "charts"))]
+            Some("svg" | "html" | "htm") => Err(SaveError::NoCharts {
+                path: path.to_owned(),
+            }),
+            _ => Err(SaveError::UnknownEnding {
+                path: path.to_owned(),
+                known: KNOWN,
+            }),
+        }
     }
 }
 
@@ -145,7 +190,7 @@ fn figures(measured: &Measured) -> Vec<String> {
 }
 
 /// In the shortest form that reads back exactly.
-fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     if value.is_finite() {
         format!("{value:?}")
     } else {
@@ -154,6 +199,6 @@ fn number(value: f64) -> String {
 }
 
 /// A text that may hold commas.
-fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\"").replace('\n', " "))
 }

@@ -1,6 +1,6 @@
 //! Curves of other integrators.
 
-use super::measure::MOST_REPETITIONS;
+use super::measure::Best;
 use super::point::Cost;
 use super::reference::Known;
 use super::subject::PhasePoint;
@@ -157,15 +157,13 @@ impl<S: PhasePoint> Rival<'_, S> {
             let Ok(measured) = &mut point.outcome else {
                 continue;
             };
-            while *spent < until && measured.repetitions < MOST_REPETITIONS {
-                // It has run before, with the same setting.
-                let Ok(run) = (self.run)(point.setting) else {
-                    break;
-                };
-                *spent += run.time;
-                measured.seconds = measured.seconds.min(run.time.as_secs_f64());
-                measured.repetitions += 1;
-            }
+            let best = Best {
+                seconds: &mut measured.seconds,
+                repetitions: &mut measured.repetitions,
+                spent,
+            };
+            // It has run before, with the same setting.
+            best.repeat(until, || (self.run)(point.setting).ok().map(|run| run.time));
         }
     }
 }

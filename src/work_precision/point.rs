@@ -20,7 +20,7 @@ pub enum Cost {
 impl Cost {
     /// The label of an axis.
     #[cfg(feature = "charts")]
-    pub(super) fn label(self) -> &'static str {
+    pub(crate) fn label(self) -> &'static str {
         match self {
             Self::Time => "time of the run (s)",
             Self::Evaluations => "evaluations of derivatives",

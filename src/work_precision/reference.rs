@@ -239,54 +239,99 @@ fn computed<M: Subject<S>, S: PhasePoint>(
     times: &[f64],
     believed: f64,
 ) -> Result<Known<S>, WorkPrecisionError> {
-    /// Below it, a difference that no longer falls is one of roundings; above it, the motion is not resolved yet.
-    const RESOLVED: f64 = 1e-6;
-    /// Of steps so different that this is not enough, the longest are not worth a comparison.
-    const MOST_HALVINGS: u32 = 24;
     let element = Element::from(Mixed::<8>);
     let steps = || grids.iter().map(Grid::step);
     let longest = steps().fold(0.0, f64::max);
     let shortest = steps().fold(f64::INFINITY, f64::min);
-    let least = (shortest / 4.0).min(longest / 64.0);
-    let (mut last, mut failure) = (None, None);
-    let mut best: Option<Known<S>> = None;
-    for halvings in 0..MOST_HALVINGS {
-        let step = longest * 0.5_f64.powi(halvings as i32);
-        if step < least {
-            break;
-        }
-        match run(model, element, start, times, (longest, halvings)) {
-            Err(kind) => failure = Some(kind),
-            Ok(states) => {
-                let scale = Scale::of(states.iter().chain([start.1]));
-                if let Some(coarse) = last.replace(states.clone()) {
-                    let uncertainty = difference(scale, &coarse, &states);
-                    let before = best.as_ref().map(Known::uncertainty);
-                    if before.is_none_or(|before| uncertainty < before) {
-                        best = Some(Known {
-                            states: times.iter().copied().zip(states).collect(),
-                            scale,
-                            summary: Reference::Computed {
-                                element,
-                                step,
-                                uncertainty: uncertainty.max(believed),
-                            },
+    let halving = Halving {
+        longest,
+        least: (shortest / 4.0).min(longest / 64.0),
+        enough: believed,
+    };
+    let scale = |states: &[S]| Scale::of(states.iter().chain([start.1]));
+    let settled = halving.settle(
+        |halvings| run(model, element, start, times, (longest, halvings)),
+        |coarse: &Vec<S>, fine| difference(scale(fine), coarse, fine),
+    );
+    let settled = settled.map_err(|failure| match failure {
+        Some(kind) => WorkPrecisionError::ReferenceRun(kind),
+        // Two runs end the loop at the earliest, and one of them failed if there was nothing to compare.
+        None => WorkPrecisionError::NoSteps,
+    })?;
+    Ok(Known {
+        scale: scale(&settled.run),
+        states: times.iter().copied().zip(settled.run).collect(),
+        summary: Reference::Computed {
+            element,
+            step: settled.step,
+            uncertainty: settled.uncertainty.max(believed),
+        },
+    })
+}
+
+/// How far a step is halved for a run that others are compared with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Halving {
+    /// The first step.
+    pub(crate) longest: f64,
+    /// No step is shorter.
+    pub(crate) least: f64,
+    /// Two runs that agree so well are enough.
+    pub(crate) enough: f64,
+}
+
+/// A run that no longer changes as its step is halved, or changes least.
+#[derive(Clone, Debug)]
+pub(crate) struct Settled<T> {
+    pub(crate) run: T,
+    pub(crate) step: f64,
+    /// Its distance from the run with twice the step.
+    pub(crate) uncertainty: f64,
+}
+
+impl Halving {
+    /// Runs with the first step halved 0, 1, 2, … times, until two of them agree or no longer approach each other: the finer one of the two
+    /// that agree best; else the last failure, if any run failed.
+    pub(crate) fn settle<T: Clone>(
+        self,
+        mut run: impl FnMut(u32) -> Result<T, RunErrorKind>,
+        distance: impl Fn(&T, &T) -> f64,
+    ) -> Result<Settled<T>, Option<RunErrorKind>> {
+        /// Below it, a difference that no longer falls is one of roundings; above it, the motion is not resolved yet.
+        const RESOLVED: f64 = 1e-6;
+        /// Of steps so different that this is not enough, the longest are not worth a comparison.
+        const MOST_HALVINGS: u32 = 24;
+        let (mut last, mut failure) = (None, None);
+        let mut best: Option<Settled<T>> = None;
+        for halvings in 0..MOST_HALVINGS {
+            let step = self.longest * 0.5_f64.powi(halvings as i32);
+            if step < self.least {
+                break;
+            }
+            match run(halvings) {
+                Err(kind) => failure = Some(kind),
+                Ok(fine) => {
+                    let Some(coarse) = last.replace(fine.clone()) else {
+                        continue;
+                    };
+                    let uncertainty = distance(&coarse, &fine);
+                    let before = best.as_ref().map(|best| best.uncertainty);
+                    if before.is_none_or(|before| uncertainty < before || before.is_nan()) {
+                        best = Some(Settled {
+                            run: fine,
+                            step,
+                            uncertainty,
                         });
                     }
                     let settled = before
                         .is_some_and(|before| before < RESOLVED && uncertainty > before / 4.0);
-                    if settled || uncertainty <= believed {
+                    if settled || uncertainty <= self.enough {
                         break;
                     }
                 }
             }
         }
-    }
-    match (best, failure) {
-        (Some(known), _) => Ok(known),
-        (None, Some(kind)) => Err(WorkPrecisionError::ReferenceRun(kind)),
-        // Two runs end the loop at the earliest, and one of them failed if there was nothing to compare.
-        (None, None) => Err(WorkPrecisionError::NoSteps),
+        best.ok_or(failure)
     }
 }
 

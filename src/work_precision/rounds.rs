@@ -2,7 +2,7 @@
 //!
 //! A processor is not equally fast at all times. Of runs that are repeated in turn, none has all of its repetitions in a slow moment.
 
-use super::measure::{MOST_REPETITIONS, Measure, Way};
+use super::measure::{Best, Measure, Way};
 use super::peer::{Peer, Rival};
 use super::point::Point;
 use super::reference::Known;
@@ -11,7 +11,7 @@ use std::time::Duration;
 use tfe_runtime::step::Control;
 
 /// How often all runs have their turn after the first.
-const ROUNDS: u32 = 4;
+pub(crate) const ROUNDS: u32 = 4;
 
 /// A point of a curve, which may be repeated.
 pub(super) struct Timed<'g> {
@@ -63,15 +63,13 @@ impl<'g> Timed<'g> {
         let Ok(measured) = &mut self.point.outcome else {
             return;
         };
-        while self.spent < until && measured.repetitions < MOST_REPETITIONS {
-            // It has run before, from the same start.
-            let Ok(time) = measure.time(self.way) else {
-                break;
-            };
-            self.spent += time;
-            measured.seconds = measured.seconds.min(time.as_secs_f64());
-            measured.repetitions += 1;
-        }
+        let best = Best {
+            seconds: &mut measured.seconds,
+            repetitions: &mut measured.repetitions,
+            spent: &mut self.spent,
+        };
+        // It has run before, from the same start.
+        best.repeat(until, || measure.time(self.way).ok());
     }
 }
 

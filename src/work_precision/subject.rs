@@ -12,7 +12,7 @@ use tfe_runtime::constrained;
 use tfe_runtime::family::{self, FamilyModel, FamilyState, FamilyStepper};
 use tfe_runtime::legendre;
 use tfe_runtime::step::{Control, Stepper};
-use tfe_runtime::{Element, Model, State, Statistics, StepError};
+use tfe_runtime::{Element, Form, Model, State, Statistics, StepError};
 
 /// A state as numbers: [`State`] of models of fixed size, [`FamilyState`] of those of run-time length.
 pub trait PhasePoint: Clone {
@@ -120,6 +120,12 @@ pub trait Steppable<S> {
     /// The largest |φ| and |A v + a|.
     fn residuals(&self, t: f64, state: &S, velocity: &Self::Velocity) -> (f64, f64);
 
+    /// The names of the outputs, in order.
+    fn output_names(&self) -> Result<Vec<String>, RunErrorKind>;
+
+    /// The outputs at a state, in that order; NaN where they need a velocity and the momentum belongs to none.
+    fn outputs(&self, stepper: &mut Self::Stepper<'_>, t: f64, state: &S) -> Vec<f64>;
+
     /// Refuses a start from which no simulation makes the step `over`.
     fn check_start(&self, start: &S, over: Range<f64>, h: f64) -> Result<(), RunErrorKind>;
 }
@@ -192,6 +198,25 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
         (position, rate)
     }
 
+    fn output_names(&self) -> Result<Vec<String>, RunErrorKind> {
+        let names = M::OBSERVABLES.iter();
+        Ok(names.map(|name| (*name).to_owned()).collect())
+    }
+
+    fn outputs(&self, _: &mut Stepper<'_, M, N>, t: f64, state: &State<N>) -> Vec<f64> {
+        let mut values = vec![0.0; M::OBSERVABLES.len()];
+        let z = match M::FORM {
+            Form::Lagrangian => {
+                let rest = [0.0; N];
+                let velocity = constrained::velocity_of(self, t, &state.q, &state.p, &rest);
+                velocity.unwrap_or([f64::NAN; N])
+            }
+            Form::Hamiltonian => state.p,
+        };
+        self.observables(t, &state.q, &z, &mut values);
+        values
+    }
+
     fn check_start(&self, start: &State<N>, over: Range<f64>, h: f64) -> Result<(), RunErrorKind> {
         let run = Simulation::new(self).step(h).run(*start, over);
         match run.as_ref().map_err(RunError::kind) {
@@ -262,6 +287,26 @@ impl<M: FamilyModel> Steppable<FamilyState> for M {
 
     fn residuals(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>) -> (f64, f64) {
         family::constraint_residual(self, t, &state.q, velocity)
+    }
+
+    fn output_names(&self) -> Result<Vec<String>, RunErrorKind> {
+        // Sites may be counted by lists that are too short.
+        self.check().map_err(RunErrorKind::Family)?;
+        let columns = 0..self.columns();
+        Ok(columns.map(|at| self.column_name(at).to_string()).collect())
+    }
+
+    fn outputs(&self, stepper: &mut FamilyStepper<'_, M>, t: f64, state: &FamilyState) -> Vec<f64> {
+        let mut values = vec![0.0; self.columns()];
+        match <M as FamilyModel>::FORM {
+            Form::Lagrangian => {
+                let velocity = stepper.velocity(t, state);
+                let velocity = velocity.unwrap_or_else(|_| vec![f64::NAN; self.len()]);
+                self.observables(t, &state.q, &velocity, &mut values);
+            }
+            Form::Hamiltonian => self.observables(t, &state.q, &state.p, &mut values),
+        }
+        values
     }
 
     fn check_start(
