@@ -13,6 +13,7 @@ mod csv;
 pub mod ensemble;
 pub mod error;
 pub mod family;
+pub mod fidelity;
 pub mod linearised;
 pub mod motion;
 pub mod periodic;
@@ -29,6 +30,7 @@ pub use constraints::{
 pub use continuation::{Branch, Continuation};
 pub use ensemble::Ensemble;
 pub use error::{AtError, RunError, RunErrorKind};
+pub use fidelity::Fidelity;
 pub use linearised::Linearised;
 pub use motion::{Motion, Node, Outputs};
 pub use periodic::{Orbit, PeriodicOrbit};
@@ -45,9 +47,9 @@ pub use work_precision::WorkPrecision;
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
     pub use crate::{
-        BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Ensemble, Mixed,
-        Model, Motion, Node, PeriodicOrbit, Primal, Radau, Simulation, Solve, State, ThreeField,
-        WorkPrecision, dynamics, stability,
+        BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Ensemble,
+        Fidelity, Mixed, Model, Motion, Node, PeriodicOrbit, Primal, Radau, Simulation, Solve,
+        State, ThreeField, WorkPrecision, dynamics, stability,
     };
 }
 

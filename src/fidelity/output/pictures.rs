@@ -1,0 +1,89 @@
+//! Charts and sections of pages.
+
+use super::HEADINGS;
+use crate::charts::{Axis, Chart, ChartError, Scale, Section, Style};
+use crate::fidelity::{Choice, Ladder, Rung};
+
+/// Runs further off have lost the motion, and are not drawn.
+const LOST: f64 = 10.0;
+
+impl Ladder {
+    /// Cost against error, both logarithmic: the front of each rung, and a vertical line where the error of its model ends it. Runs that failed are
+    /// counted in the legend.
+    pub fn chart(&self) -> Chart {
+        let logarithmic = |label: &str| Axis::new(label).scale(Scale::Logarithmic);
+        let mut chart = Chart::new(&self.title)
+            .x(logarithmic("largest relative error of the outputs"))
+            .y(logarithmic(self.cost.label()))
+            .size(900, 560);
+        for rung in &self.rungs {
+            let front = self.places(rung);
+            if !front.is_empty() {
+                chart = chart.series(name(rung), Style::LineWithMarkers, front);
+            }
+        }
+        let all = || self.rungs.iter().flat_map(|rung| self.places(rung));
+        let costs = all().map(|place| place.1).filter(|cost| *cost > 0.0);
+        let (least, most) = costs.fold((f64::INFINITY, 0.0_f64), |(least, most), cost| {
+            (least.min(cost), most.max(cost))
+        });
+        if least < most {
+            let ends = |error| [(error, least), (error, most)];
+            for rung in &self.rungs {
+                let drawn = rung.model_error.filter(|error| *error < LOST);
+                if let Some(error) = drawn {
+                    let name = format!("model error of {}", rung.name);
+                    chart = chart.series(name, Style::Reference, ends(error));
+                }
+            }
+        }
+        chart
+    }
+
+    /// Error and cost of the front of a rung.
+    fn places(&self, rung: &Rung) -> Vec<(f64, f64)> {
+        let place = |one: &Choice| (one.error, one.cost(self.cost));
+        let front = rung.front(self.cost);
+        let drawn = front.into_iter().filter(|one| one.error < LOST);
+        drawn.map(place).collect()
+    }
+
+    /// A section of a page: what was compared, the chart, a table of choices and one of rungs.
+    ///
+    /// # Errors
+    /// [`ChartError::NoData`] where no run reached its end.
+    pub fn section(&self) -> Result<Section, ChartError> {
+        let text = format!(
+            "Errors are the largest of the outputs ({}), each relative to its largest value. Reference: the last rung, {}. Times are of the steps \
+             alone, on one processor, the best of several runs.",
+            self.outputs.join(", "),
+            self.reference
+        );
+        let choices = self.accuracies.iter().map(|accuracy| self.row(*accuracy));
+        let rung = |rung: &Rung| {
+            let error = rung.model_error;
+            [
+                rung.name.clone(),
+                error.map_or_else(|| "—".to_owned(), |error| format!("{error:.1e}")),
+                rung.points.len().to_string(),
+                rung.failed().to_string(),
+            ]
+        };
+        Ok(Section::new(&self.title)
+            .paragraph(text)
+            .figure(self.chart().to_svg()?, &self.title)
+            .table(HEADINGS, choices)
+            .table(
+                ["rung", "model error", "runs", "failed"],
+                self.rungs.iter().map(rung),
+            ))
+    }
+}
+
+/// The name of a rung in the legend.
+fn name(rung: &Rung) -> String {
+    match rung.failed() {
+        0 => rung.name.clone(),
+        failed => format!("{}, {failed} failed", rung.name),
+    }
+}

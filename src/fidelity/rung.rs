@@ -1,0 +1,84 @@
+//! One model of the scene, whatever its type.
+
+use crate::error::RunErrorKind;
+use crate::work_precision::grid::Grid;
+use crate::work_precision::measure::{Way, advance};
+use crate::work_precision::{PhasePoint, Subject};
+use std::time::Duration;
+use tfe_runtime::Statistics;
+
+/// A model with its start.
+pub(super) struct Scene<'m, M, S> {
+    pub(super) model: &'m M,
+    pub(super) start: S,
+}
+
+/// Which outputs of a run are looked at, and when.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outputs<'c> {
+    /// Their columns among those of the model.
+    pub(super) columns: &'c [usize],
+    /// The number of equal parts of the span; every grid has a whole number of steps in each.
+    pub(super) parts: usize,
+}
+
+/// What was seen of a run.
+#[derive(Clone, Debug)]
+pub(super) struct Seen {
+    /// A row at the start, and one at the end of each part.
+    pub(super) rows: Vec<Vec<f64>>,
+    /// What the steps took.
+    pub(super) time: Duration,
+    pub(super) statistics: Statistics,
+}
+
+/// What is asked of a model, with its type forgotten. What is timed knows the type.
+pub(super) trait Runs {
+    /// The names of the outputs.
+    fn names(&self) -> Result<Vec<String>, RunErrorKind>;
+
+    /// Refuses a start from which no run begins.
+    fn check_start(&self, grid: &Grid) -> Result<(), RunErrorKind>;
+
+    /// Makes the run, with the clock stopped while it is looked at.
+    fn look(&self, way: Way<'_>, outputs: Outputs<'_>) -> Result<Seen, RunErrorKind>;
+
+    /// Makes the run without looking.
+    fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind>;
+}
+
+impl<M: Subject<S>, S: PhasePoint> Runs for Scene<'_, M, S> {
+    fn names(&self) -> Result<Vec<String>, RunErrorKind> {
+        self.model.output_names()
+    }
+
+    fn check_start(&self, grid: &Grid) -> Result<(), RunErrorKind> {
+        let (t, next, h) = grid.element(0);
+        self.model.check_start(&self.start, t..next, h)
+    }
+
+    fn look(&self, way: Way<'_>, outputs: Outputs<'_>) -> Result<Seen, RunErrorKind> {
+        let mut stepper = self.model.stepper(way.element, way.control)?;
+        let (grid, mut state, mut time) = (way.grid, self.start.clone(), Duration::ZERO);
+        let steps = grid.steps() / outputs.parts;
+        let mut rows = Vec::with_capacity(outputs.parts + 1);
+        for part in 0..=outputs.parts {
+            let node = part * steps;
+            let from = node.saturating_sub(steps);
+            time += advance::<M, S>(&mut stepper, grid, from..node, &mut state)?;
+            let all = self.model.outputs(&mut stepper, grid.node(node), &state);
+            rows.push(outputs.columns.iter().map(|at| all[*at]).collect());
+        }
+        Ok(Seen {
+            rows,
+            time,
+            statistics: M::statistics(&stepper),
+        })
+    }
+
+    fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind> {
+        let (grid, mut state) = (way.grid, self.start.clone());
+        let mut stepper = self.model.stepper(way.element, way.control)?;
+        advance::<M, S>(&mut stepper, grid, 0..grid.steps(), &mut state)
+    }
+}

@@ -1,0 +1,286 @@
+//! Ladders of models: errors of models against closed forms, choices, what is refused.
+
+use std::time::Duration;
+use tfe::fidelity::{FidelityError, Ladder};
+use tfe::prelude::*;
+use tfe::work_precision::{Cost, SaveError};
+
+#[dynamics(
+    coordinates(theta),
+    lagrangian = dot(theta)^2/2 - w^2/2*theta^2,
+    output(angle) = theta, output(linear_only) = theta,
+)]
+struct Linear {
+    w: f64,
+}
+
+#[dynamics(
+    coordinates(theta),
+    lagrangian = dot(theta)^2/2 - w^2*(theta^2/2 - theta^4/24),
+    output(angle) = theta,
+)]
+struct Cubic {
+    w: f64,
+}
+
+#[dynamics(
+    coordinates(theta),
+    lagrangian = dot(theta)^2/2 + w^2*cos(theta),
+    output(rate) = dot(theta), output(angle) = theta,
+)]
+struct Full {
+    w: f64,
+}
+
+/// The same pendulum, its bob on a rod: two coordinates and a constraint.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - w^2*y,
+    constraint(rod) = x^2 + y^2 - 1,
+    output(x_bob) = x,
+)]
+struct Bob {
+    w: f64,
+}
+
+/// Pendulums side by side, of which the first is looked at.
+#[dynamics(
+    coordinates(theta[n]),
+    lagrangian = sum(i in 0..n, dot(theta[i])^2/2 + w^2*cos(theta[i])),
+    output(angle) = theta[0],
+    output(each[i in 0..n]) = theta[i],
+)]
+struct Many {
+    n: usize,
+    w: f64,
+}
+
+const W: f64 = 3.0;
+const END: f64 = 20.0;
+
+fn amplitude() -> f64 {
+    5.0_f64.to_radians()
+}
+
+/// Errors and evaluations are tested, not times.
+fn ladder<'m>(span: std::ops::Range<f64>) -> Fidelity<'m> {
+    Fidelity::new(span)
+        .repeat_for(Duration::ZERO)
+        .against(Cost::Evaluations)
+}
+
+fn pendulums() -> Ladder {
+    let (linear, cubic, full) = (Linear { w: W }, Cubic { w: W }, Full { w: W });
+    let a = amplitude();
+    ladder(0.0..END)
+        .rung("linear", &linear, linear.state([a], [0.0]))
+        .rung("cubic", &cubic, cubic.state([a], [0.0]))
+        .rung("full", &full, full.state([a], [0.0]))
+        .run()
+        .unwrap()
+}
+
+/// The largest |cos ωt − cos ω't| at the ends of sixteen parts, with ω' = ω (1 − lag).
+fn of_phase(lag: f64) -> f64 {
+    let times = (1..=16).map(|k| W * END * f64::from(k) / 16.0);
+    times
+        .map(|phase| (phase.cos() - (phase * (1.0 - lag)).cos()).abs())
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn errors_of_models_are_those_of_their_frequencies() {
+    let ladder = pendulums();
+    assert_eq!(ladder.outputs(), ["angle"]);
+    let error = |rung: usize| ladder.rungs()[rung].model_error();
+    let a = amplitude();
+    // ω/ω₀ = 1 − a²/16 of the full pendulum, 1 of the linear one; the energy that the cubic one leaves out, ω₀² a⁶/720 on average times 5/16, makes a⁴/384.
+    let (linear, cubic) = (error(0).unwrap(), error(1).unwrap());
+    assert!(
+        (linear / of_phase(a.powi(2) / 16.0) - 1.0).abs() < 0.1,
+        "{linear:e}"
+    );
+    assert!(
+        (cubic / of_phase(a.powi(4) / 384.0) - 1.0).abs() < 0.1,
+        "{cubic:e}"
+    );
+    assert_eq!(error(2), None);
+}
+
+#[test]
+fn each_accuracy_takes_the_model_it_needs() {
+    let ladder = pendulums();
+    let [linear, cubic] = [0, 1].map(|rung: usize| ladder.rungs()[rung].model_error().unwrap());
+    let rung = |accuracy| ladder.cheapest(accuracy).map(|choice| choice.rung.as_str());
+    assert!(rung(1e-1).is_some());
+    // No linear run is taken where its model is too coarse, however lucky its steps; nor a cubic one.
+    for k in 0..200 {
+        let accuracy = 0.1 * 0.9_f64.powi(k);
+        let chosen = rung(accuracy);
+        assert!(
+            accuracy >= linear || chosen != Some("linear"),
+            "{accuracy:e}"
+        );
+        assert!(accuracy >= cubic || chosen != Some("cubic"), "{accuracy:e}");
+    }
+    let best = ladder.cheapest(1e-9).unwrap();
+    assert!(best.rung == "full" && best.error <= 1e-9);
+    // Where it is good enough, it is also the cheapest.
+    assert_eq!(rung(linear), Some("linear"));
+    let cheaper = ladder.cheapest(1e-2).unwrap().evaluations;
+    assert!(cheaper < best.evaluations);
+    // What the reference does not know is refused.
+    assert!(!ladder.is_known(ladder.reference().uncertainty()));
+    assert_eq!(ladder.cheapest(1e-30), None);
+}
+
+#[test]
+fn costs_rise_as_errors_fall_and_tables_say_so() {
+    let ladder = pendulums();
+    for rung in ladder.rungs() {
+        let front = rung.front(Cost::Evaluations);
+        assert!(!front.is_empty() && rung.failed() == 0);
+        for pair in front.windows(2) {
+            assert!(pair[0].error > pair[1].error && pair[0].evaluations < pair[1].evaluations);
+        }
+    }
+    let text = ladder.to_string();
+    assert_eq!(text.lines().count(), 1 + 10 + 2 + 1, "{text}");
+    assert!(text.contains("error of the model `cubic`"), "{text}");
+    let csv = ladder.to_csv();
+    let runs: usize = ladder.rungs().iter().map(|rung| rung.points().len()).sum();
+    assert_eq!(csv.lines().count(), 1 + runs);
+    let columns = |line: &str| line.split(',').count();
+    assert!(csv.lines().all(|line| columns(line) == 13), "{csv}");
+    let unknown = ladder.save("ladder.txt").unwrap_err();
+    assert!(matches!(unknown, SaveError::UnknownEnding { .. }));
+    #[cfg(feature = "charts")]
+    {
+        let svg = ladder.chart().to_svg().unwrap();
+        assert!(svg.contains("model error of linear") && svg.contains("full"));
+    }
+}
+
+#[test]
+fn rungs_may_differ_in_length_and_kind() {
+    let (many, full) = (Many { n: 3, w: W }, Full { w: W });
+    let ladder = ladder(0.0..4.0)
+        .rung("many", &many, many.state([1.0, 0.3, 0.2], [0.0; 3]))
+        .rung("full", &full, full.state([1.0], [0.0]))
+        .accuracies([1e-4, 1e-8])
+        .run()
+        .unwrap();
+    // One model twice: no error of the model is to be found above the smallest accuracy.
+    let many = &ladder.rungs()[0];
+    assert!(
+        many.model_error().is_none_or(|error| error < 1e-8),
+        "{many:?}"
+    );
+    assert!(many.choices().any(|choice| choice.error < 1e-8));
+    assert!(ladder.cheapest(1e-8).is_some());
+}
+
+#[test]
+fn runs_that_fail_are_points_with_reasons() {
+    let bob = Bob { w: W };
+    let off = State {
+        q: [0.5, 0.5],
+        p: [0.0; 2],
+    };
+    let (x, y) = 0.5_f64.sin_cos();
+    let ladder = ladder(0.0..2.0)
+        .rung("off its rod", &bob, off)
+        .rung("bob", &bob, bob.state([x, -y], [0.0; 2]))
+        .elements([Mixed::<3>.into()])
+        .accuracies([1e-3])
+        .run()
+        .unwrap();
+    let failed = &ladder.rungs()[0];
+    assert_eq!((failed.points().len(), failed.failed()), (1, 1));
+    let reason = failed.points()[0].outcome.as_ref().unwrap_err();
+    assert!(reason.to_string().contains("constraint"), "{reason}");
+    assert_eq!(ladder.cheapest(1e-3).unwrap().rung, "bob");
+    assert!(
+        ladder
+            .to_csv()
+            .lines()
+            .nth(1)
+            .unwrap()
+            .contains("constraint")
+    );
+}
+
+#[test]
+fn what_is_no_ladder() {
+    let (linear, bob, full) = (Linear { w: W }, Bob { w: W }, Full { w: W });
+    let start = || State { q: [0.1], p: [0.0] };
+    let two = || {
+        ladder(0.0..1.0)
+            .rung("linear", &linear, start())
+            .rung("full", &full, start())
+    };
+    #[track_caller]
+    fn check(ladder: &Fidelity<'_>, expected: impl Fn(&FidelityError) -> bool, words: &str) {
+        let error = ladder.run().unwrap_err();
+        assert!(expected(&error), "{error:?}");
+        assert!(error.to_string().contains(words), "{error}");
+    }
+    use FidelityError as E;
+    let none = ladder(0.0..1.0);
+    check(&none, |one| matches!(one, E::NoRungs), ".rung(");
+    let wrong = two().outputs(["linear_only"]);
+    let is = |one: &E| matches!(one, E::UnknownOutput { rung, .. } if rung == "full");
+    check(&wrong, is, "`rate`, `angle`");
+    let apart = two().rung(
+        "bob",
+        &bob,
+        State {
+            q: [0.0, -1.0],
+            p: [0.0; 2],
+        },
+    );
+    let is = |one: &E| matches!(one, E::NoOutputs { declared } if declared.len() == 3);
+    check(&apart, is, "`x_bob`");
+    let is = |one: &E| matches!(one, E::NoOutputs { .. });
+    check(&two().outputs([""; 0]), is, "output(name)");
+    let twice = two().rung("full", &full, start());
+    check(&twice, |one| matches!(one, E::SameName { .. }), "`full`");
+    check(
+        &two().elements([]),
+        |one| matches!(one, E::NoElements),
+        ".elements(",
+    );
+    let is = |one: &E| matches!(one, E::Element(_));
+    check(&two().elements([Element::mixed(99)]), is, "99");
+    for accuracy in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let is = |one: &E| matches!(one, E::Accuracy { .. });
+        check(&two().accuracies([accuracy]), is, "accuracy");
+    }
+    for parts in [0, usize::MAX] {
+        check(
+            &two().parts(parts),
+            |one| matches!(one, E::Parts { .. }),
+            "parts",
+        );
+    }
+    for span in [1.0..1.0, 0.0..f64::NAN, 0.0..f64::INFINITY, -1e308..1e308] {
+        let bad = ladder(span).rung("full", &full, start());
+        check(&bad, |one| matches!(one, E::Span { .. }), "span");
+    }
+    let nowhere = ladder(0.0..1.0).rung(
+        "full",
+        &full,
+        State {
+            q: [f64::NAN],
+            p: [0.0],
+        },
+    );
+    check(
+        &nowhere,
+        |one| matches!(one, E::Reference(_)),
+        "nothing to compare with",
+    );
+    let many = Many { n: 0, w: W };
+    let empty = ladder(0.0..1.0).rung("many", &many, many.state([], []));
+    check(&empty, |one| matches!(one, E::Model { .. }), "`many`");
+}
