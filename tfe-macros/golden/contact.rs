@@ -12,7 +12,7 @@
 /// forces                  yes
 /// linear                  no
 /// quadratic in v          yes
-/// constant L_vv           yes
+/// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0) (1,1)
@@ -241,6 +241,8 @@ impl Contact {
                 separable: true,
             },
             cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
             value: ::tfe::__private::Operations {
                 additions: 4,
                 multiplications: 10,
@@ -262,7 +264,7 @@ impl Contact {
                 sines: 1,
                 functions: 1,
             },
-            page: "gap = x − r cos θ\nL = ½ m (x\u{307}² + r² θ\u{307}²) − m g x − (½ k gap² if gap < 0 else 0)\nD = ½ c θ\u{307}²\ncoordinates: x, θ      parameters: m, r, g, k, c\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient: 2 +−, 11 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient and second derivatives: 3 +−, 14 ×, 0 ÷, 1 sin/cos, 1 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_v             (1,1)\npattern Q_q             zero",
+            page: "gap = x − r cos θ\nL = ½ m (x\u{307}² + r² θ\u{307}²) − m g x − (½ k gap² if gap < 0 else 0)\nD = ½ c θ\u{307}²\ncoordinates: x, θ      parameters: m, r, g, k, c\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient: 2 +−, 11 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient and second derivatives: 3 +−, 14 ×, 0 ÷, 1 sin/cos, 1 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_v             (1,1)\npattern Q_q             zero",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.

@@ -11,7 +11,7 @@
 /// forces                  yes
 /// linear                  no
 /// quadratic in v          yes
-/// constant L_vv           yes
+/// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0) (i+1,i+1)
@@ -298,6 +298,8 @@ impl Family {
                 separable: true,
             },
             cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
             value: ::tfe::__private::Operations {
                 additions: 6,
                 multiplications: 11,
@@ -319,7 +321,7 @@ impl Family {
                 sines: 0,
                 functions: 0,
             },
-            page: "L = ½ s\u{307}² + Σ_{i = 0..n} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..w} (½ k (q[i + 1] − q[i])² + a/3 (q[i + 1] − q[i])³)) − ½ k (q[0] − s)²\nQ(q[n − 1]) = −q\u{307}[n − 1]\ncoordinates: s, q[n]      parameters: n, w, m, k, a\noperations, value: 6 +−, 11 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 7 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 16 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, n+1 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (i+1,i+1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1) (i+1,i+1) (i+1,i+2) (i+2,i+1) (i+2,i+2)\npattern Q_v             (n,n)\npattern Q_q             zero",
+            page: "L = ½ s\u{307}² + Σ_{i = 0..n} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..w} (½ k (q[i + 1] − q[i])² + a/3 (q[i + 1] − q[i])³)) − ½ k (q[0] − s)²\nQ(q[n − 1]) = −q\u{307}[n − 1]\ncoordinates: s, q[n]      parameters: n, w, m, k, a\noperations, value: 6 +−, 11 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 7 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 16 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, n+1 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (i+1,i+1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1) (i+1,i+1) (i+1,i+2) (i+2,i+1) (i+2,i+2)\npattern Q_v             (n,n)\npattern Q_q             zero",
         }
     }
     /// The observable `extension` at time `t`, coordinates `q` and velocities `v`.

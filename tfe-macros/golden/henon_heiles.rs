@@ -10,7 +10,7 @@
 /// forces                  no
 /// linear                  no
 /// quadratic in p          yes
-/// constant H_pp           yes
+/// constant H_pp           yes, diagonal
 /// separable (H_pq = 0)    yes
 /// cyclic coordinates      none
 /// pattern H_pp            (0,0) (1,1)
@@ -175,6 +175,8 @@ impl HenonHeiles {
                 separable: true,
             },
             cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
             value: ::tfe::__private::Operations {
                 additions: 5,
                 multiplications: 7,
@@ -196,7 +198,7 @@ impl HenonHeiles {
                 sines: 0,
                 functions: 0,
             },
-            page: "H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)\ncoordinates: x, y      momenta: px, py      parameters: λ\noperations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in p          yes\nconstant H_pp           yes\nseparable (H_pq = 0)    yes\ncyclic coordinates      none\npattern H_pp            (0,0) (1,1)\npattern H_pq            zero\npattern H_qq            (0,0) (0,1) (1,0) (1,1)",
+            page: "H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)\ncoordinates: x, y      momenta: px, py      parameters: λ\noperations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in p          yes\nconstant H_pp           yes, diagonal\nseparable (H_pq = 0)    yes\ncyclic coordinates      none\npattern H_pp            (0,0) (1,1)\npattern H_pq            zero\npattern H_qq            (0,0) (0,1) (1,0) (1,1)",
         }
     }
 }

@@ -11,9 +11,10 @@
 /// forces                  no
 /// linear                  no
 /// quadratic in v          yes
-/// constant L_vv           yes
+/// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
 /// cyclic coordinates      q[2]
+/// conserved momenta       p[2]
 /// pattern L_vv            (0,0) (1,1) (2,2)
 /// pattern L_vq            zero
 /// pattern L_qq            zero
@@ -232,6 +233,8 @@ impl KnifeEdge {
                 separable: true,
             },
             cyclic: &["phi"],
+            conserved: &["phi"],
+            diagonal_mass: true,
             value: ::tfe::__private::Operations {
                 additions: 3,
                 multiplications: 9,
@@ -253,7 +256,7 @@ impl KnifeEdge {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m (x\u{307}² + y\u{307}²) + ½ j φ\u{307}² + m g sin α x\n0 = x\u{307} sin φ − y\u{307} cos φ      (blade)\ncoordinates: x, y, φ      parameters: m, j, g, α\noperations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 3 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      q[2]\npattern L_vv            (0,0) (1,1) (2,2)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             blade (velocity)",
+            page: "L = ½ m (x\u{307}² + y\u{307}²) + ½ j φ\u{307}² + m g sin α x\n0 = x\u{307} sin φ − y\u{307} cos φ      (blade)\ncoordinates: x, y, φ      parameters: m, j, g, α\noperations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 3 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      q[2]\nconserved momenta       p[2]\npattern L_vv            (0,0) (1,1) (2,2)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             blade (velocity)",
         }
     }
 }

@@ -11,7 +11,7 @@
 /// forces                  no
 /// linear                  no
 /// quadratic in v          yes
-/// constant L_vv           yes
+/// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0) (1,1)
@@ -212,6 +212,8 @@ impl RodPendulum {
                 separable: true,
             },
             cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
             value: ::tfe::__private::Operations {
                 additions: 2,
                 multiplications: 5,
@@ -233,7 +235,7 @@ impl RodPendulum {
                 sines: 0,
                 functions: 0,
             },
-            page: "L = ½ m (x\u{307}² + y\u{307}²) − m g y\n0 = x² + y² − l²      (rod)\ncoordinates: x, y      parameters: m, l, g\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             rod (holonomic, quadratic)",
+            page: "L = ½ m (x\u{307}² + y\u{307}²) − m g y\n0 = x² + y² − l²      (rod)\ncoordinates: x, y      parameters: m, l, g\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             rod (holonomic, quadratic)",
         }
     }
 }

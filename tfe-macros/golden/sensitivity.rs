@@ -12,7 +12,7 @@
 /// forces                  yes
 /// linear                  no
 /// quadratic in v          yes
-/// constant L_vv           yes
+/// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0)
@@ -232,6 +232,8 @@ impl Duffing {
                 separable: true,
             },
             cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
             value: ::tfe::__private::Operations {
                 additions: 2,
                 multiplications: 8,
@@ -253,7 +255,7 @@ impl Duffing {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m x\u{307}² − ½ k[0] x² − k[1]/4 x⁴\nD = ½ c x\u{307}²\nQ(x) = amplitude cos(ω t)\ncoordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c\noperations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)\npattern Q_v             (0,0)\npattern Q_q             zero",
+            page: "L = ½ m x\u{307}² − ½ k[0] x² − k[1]/4 x⁴\nD = ½ c x\u{307}²\nQ(x) = amplitude cos(ω t)\ncoordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c\noperations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)\npattern Q_v             (0,0)\npattern Q_q             zero",
         }
     }
 }

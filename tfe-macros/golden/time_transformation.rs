@@ -13,7 +13,7 @@
 /// forces                  yes
 /// linear                  no
 /// quadratic in p          yes
-/// constant H_pp           no
+/// constant H_pp           no, diagonal
 /// separable (H_pq = 0)    no
 /// cyclic coordinates      none
 /// pattern H_pp            (0,0)
@@ -302,6 +302,8 @@ impl Forced {
                 separable: false,
             },
             cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
             value: ::tfe::__private::Operations {
                 additions: 4,
                 multiplications: 6,
@@ -323,7 +325,7 @@ impl Forced {
                 sines: 2,
                 functions: 0,
             },
-            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 16 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 11 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no\nseparable (H_pq = 0)    no\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
+            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 16 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 11 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no, diagonal\nseparable (H_pq = 0)    no\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
         }
     }
     /// The observable `energy` at time `tau`, coordinates `q` and momenta `p`.

@@ -177,11 +177,10 @@ pub(crate) fn structure(
         tokens(&kernels.second),
     );
     let names = coordinate_names(declared);
-    let cyclic = derivation
-        .structure()
-        .cyclic
-        .iter()
-        .filter_map(|index| names.get(*index));
+    let found = derivation.structure();
+    let cyclic = found.cyclic.iter().filter_map(|index| names.get(*index));
+    let conserved = found.conserved.iter().filter_map(|index| names.get(*index));
+    let diagonal_mass = found.diagonal_mass;
     let form = match declared.form {
         Form::Lagrangian => quote!(Lagrangian),
         Form::Hamiltonian => quote!(Hamiltonian),
@@ -194,6 +193,8 @@ pub(crate) fn structure(
             form: #private::Form::#form,
             facts: #facts,
             cyclic: &[#(#cyclic),*],
+            conserved: &[#(#conserved),*],
+            diagonal_mass: #diagonal_mass,
             value: #value,
             first: #first,
             second: #second,

@@ -27,8 +27,12 @@ pub struct Structure {
     pub form: Form,
     /// Linear? separable? autonomous? constant mass matrix?
     pub facts: Facts,
-    /// The coordinates that do not appear in the energy function: their momenta are conserved where no force acts on them.
+    /// The coordinates that do not appear in the energy function: their momenta change by forces alone.
     pub cyclic: &'static [&'static str],
+    /// Those of them on which no force acts: their momenta are constant, and `model(Name, routh(…))` makes a model without them.
+    pub conserved: &'static [&'static str],
+    /// The second derivative by z has nothing off its diagonal: where it is constant as well, no matrix is inverted.
+    pub diagonal_mass: bool,
     /// The energy function alone. Loops count once for each pass through their body where the length is known, once otherwise.
     pub value: Operations,
     /// First derivatives and forces.

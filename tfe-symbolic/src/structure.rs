@@ -32,6 +32,8 @@ pub struct Structure {
     pub quadratic_in_z: bool,
     /// ∂²/∂z∂z depends on parameters only.
     pub constant_mass: bool,
+    /// ∂²/∂z∂z has nothing off its diagonal.
+    pub diagonal_mass: bool,
     /// All second derivatives and derivatives of forces depend on parameters and time only, and there are no constraints.
     pub linear: bool,
     /// ∂²/∂z∂q vanishes.
@@ -40,6 +42,8 @@ pub struct Structure {
     pub symmetric_forces: bool,
     /// Coordinates that the energy function does not depend on and no constraint acts on; empty where indices are not literal.
     pub cyclic: Vec<usize>,
+    /// Those of them on which no force acts: their momenta are constant.
+    pub conserved: Vec<usize>,
     /// Pattern of ∂²/∂z∂z
     pub zz: Pattern,
     /// Pattern of ∂²/∂z∂q; row z
@@ -106,6 +110,9 @@ impl Structure {
             Array::ForceQ,
         ]);
         let pattern = |array: Array| Pattern::of(of(array));
+        let zz = pattern(Array::ZZ);
+        let cyclic = cyclic(dof, entries);
+        let conserved = conserved(&cyclic, entries);
         Self {
             form,
             dof: dof.clone(),
@@ -116,8 +123,10 @@ impl Structure {
             linear: !(tangent.z || tangent.q || constraints),
             separable: of(Array::ZQ).next().is_none(),
             symmetric_forces: of(Array::ForceZ).next().is_none() && is_symmetric(entries),
-            cyclic: cyclic(dof, entries),
-            zz: pattern(Array::ZZ),
+            cyclic,
+            conserved,
+            diagonal_mass: zz.is_diagonal(),
+            zz,
             zq: pattern(Array::ZQ),
             qq: pattern(Array::QQ),
             force_z: pattern(Array::ForceZ),
@@ -186,6 +195,20 @@ fn cyclic(dof: &Affine, entries: &[Entry]) -> Vec<usize> {
         .collect()
 }
 
+/// The cyclic coordinates on which no force acts; none where indices of forces are not literal.
+fn conserved(cyclic: &[usize], entries: &[Entry]) -> Vec<usize> {
+    let forces = entries
+        .iter()
+        .filter(|entry| entry.place.array == Array::Force);
+    let pushed: Option<BTreeSet<i64>> = forces.map(|entry| entry.place.row.as_constant()).collect();
+    let Some(pushed) = pushed else {
+        return Vec::new();
+    };
+    let is_free =
+        |index: &&usize| i64::try_from(**index).is_ok_and(|index| !pushed.contains(&index));
+    cyclic.iter().filter(is_free).copied().collect()
+}
+
 impl Pattern {
     fn of<'a>(entries: impl Iterator<Item = &'a Entry>) -> Self {
         let places: BTreeSet<(Affine, Affine)> = entries
@@ -214,6 +237,14 @@ impl Pattern {
         match self {
             Self::Entries(entries) => entries.is_empty(),
             Self::Indexed(entries) => entries.is_empty(),
+        }
+    }
+
+    /// Whether all entries are known to lie on the diagonal.
+    pub fn is_diagonal(&self) -> bool {
+        match self {
+            Self::Entries(entries) => entries.iter().all(|(row, column)| row == column),
+            Self::Indexed(entries) => entries.iter().all(|(row, column)| row == column),
         }
     }
 
@@ -246,6 +277,18 @@ impl fmt::Display for Pattern {
     }
 }
 
+fn listed(indices: &[usize], letter: char) -> String {
+    let names: Vec<String> = indices
+        .iter()
+        .map(|index| format!("{letter}[{index}]"))
+        .collect();
+    if names.is_empty() {
+        "none".to_owned()
+    } else {
+        names.join(" ")
+    }
+}
+
 /// A page for people.
 impl fmt::Display for Structure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -267,27 +310,26 @@ impl fmt::Display for Structure {
         writeln!(
             f,
             "constant {letter}_{z}{z}           {}",
-            yes(self.constant_mass)
+            match (self.constant_mass, self.diagonal_mass) {
+                (true, true) => "yes, diagonal",
+                (true, false) => "yes",
+                (false, true) => "no, diagonal",
+                (false, false) => "no",
+            }
         )?;
         writeln!(
             f,
             "separable ({letter}_{z}q = 0)    {}",
             yes(self.separable)
         )?;
-        let cyclic: Vec<String> = self
-            .cyclic
-            .iter()
-            .map(|index| format!("q[{index}]"))
-            .collect();
-        writeln!(
-            f,
-            "cyclic coordinates      {}",
-            if cyclic.is_empty() {
-                "none".to_owned()
-            } else {
-                cyclic.join(" ")
-            }
-        )?;
+        writeln!(f, "cyclic coordinates      {}", listed(&self.cyclic, 'q'))?;
+        if !self.cyclic.is_empty() {
+            writeln!(
+                f,
+                "conserved momenta       {}",
+                listed(&self.conserved, 'p')
+            )?;
+        }
         writeln!(f, "pattern {letter}_{z}{z}            {}", self.zz)?;
         writeln!(f, "pattern {letter}_{z}q            {}", self.zq)?;
         write!(f, "pattern {letter}_qq            {}", self.qq)?;
