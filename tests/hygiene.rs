@@ -34,6 +34,7 @@ pub mod shadowed {
         force(x) = select(x < 1, -x, sqrt(abs(x))),
         output(elongation) = x,
         solver(Solver, Mixed::<3>),
+        model(Small, truncated(2)),
     )]
     /// A model among them.
     pub struct First {

@@ -2,7 +2,7 @@
 
 use crate::emit::{self, Emitter};
 use crate::source_map::SourceMap;
-use crate::{constraint, fallback, family, input, page, solver, state};
+use crate::{constraint, fallback, family, input, page, solver, state, variant};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;
@@ -45,9 +45,14 @@ pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
 }
 
 /// The struct with the derived model in its documentation, the kernels, the methods, and the specialised solvers.
-fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
+pub(crate) fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
     let derivation = Derivation::of(declared);
     let path = runtime_path(declared);
+    let variants: Vec<_> = declared
+        .variants
+        .iter()
+        .map(|one| variant::expand(one, &item))
+        .collect();
     let documented = item
         .attrs
         .iter()
@@ -57,7 +62,7 @@ fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
     }
     if declared.is_of_run_time_length() {
         let family = family::expand(declared, &derivation, &item, &path);
-        return quote!(#item #family);
+        return quote!(#item #family #(#variants)*);
     }
     let kernels = Kernels::new(declared, &derivation, &item, &path);
     let implementation = kernels.implementation();
@@ -71,6 +76,7 @@ fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
         #implementation
         #methods
         #(#solvers)*
+        #(#variants)*
     }
 }
 

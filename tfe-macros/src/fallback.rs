@@ -1,6 +1,7 @@
 //! What is emitted when the declaration is wrong: every mistake as a `compile_error!`, and stubs that keep rustc from reporting follow-ups.
 
 mod family;
+mod variant;
 
 use crate::emit::identifier;
 use crate::source_map::SourceMap;
@@ -11,6 +12,7 @@ use syn::{Data, DeriveInput, ItemStruct, Visibility};
 use tfe_symbolic::ast::{Array, ExprKind, Item};
 use tfe_symbolic::diagnostic::{Bag, Diagnostic};
 use tfe_symbolic::parse;
+use variant::Variant;
 
 /// `compile_error!` under the tokens that the diagnostic speaks of.
 pub(crate) fn compile_error(
@@ -45,6 +47,20 @@ fn field_span(name: &str, item: &ItemStruct) -> (Span, Span) {
 /// Stub implementations for a type whose declaration is wrong: uses of the model type-check, so only the mistake itself is reported.
 pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
     let guess = Guess::from(text, item);
+    let own = implementations(item, &guess);
+    let solvers = guess
+        .solvers
+        .iter()
+        .map(|solver| solver_stub(solver, item, &guess.path));
+    let variants = guess
+        .variants
+        .iter()
+        .map(|variant| variant::stubs(variant, item, &guess));
+    quote!(#own #(#solvers)* #(#variants)*)
+}
+
+/// The kernels and the methods.
+fn implementations(item: &DeriveInput, guess: &Guess) -> TokenStream {
     let (path, dof) = (&guess.path, &guess.extended_dof());
     let (name, vis) = (&item.ident, &item.vis);
     let states = guess.states(vis);
@@ -56,13 +72,8 @@ pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
     };
     let outputs = &guess.outputs;
     let names = outputs.iter().map(crate::input::plain);
-    let solvers = guess
-        .solvers
-        .iter()
-        .map(|solver| solver_stub(solver, item, path));
     if guess.run_time {
-        let family = family::stubs(item, path, &form, outputs, &guess.by_site);
-        return quote!(#family #(#solvers)*);
+        return family::stubs(item, path, &form, outputs, &guess.by_site);
     }
     quote! {
         const _: () = {
@@ -127,8 +138,6 @@ pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
                 0.0
             })*
         }
-
-        #(#solvers)*
     }
 }
 
@@ -171,6 +180,7 @@ fn solver_stub(solver: &Ident, item: &DeriveInput, path: &TokenStream) -> TokenS
 }
 
 /// What can be told of a wrong declaration.
+#[derive(Clone)]
 struct Guess {
     path: TokenStream,
     dof: TokenStream,
@@ -183,6 +193,7 @@ struct Guess {
     /// Which of them are declared by site.
     by_site: BTreeSet<String>,
     solvers: Vec<Ident>,
+    variants: Vec<Variant>,
 }
 
 impl Guess {
@@ -196,6 +207,7 @@ impl Guess {
             outputs: Vec::new(),
             by_site: BTreeSet::new(),
             solvers: Vec::new(),
+            variants: Vec::new(),
         };
         for range in parse::split_arguments(text) {
             let mut bag = Bag::new();
@@ -216,6 +228,9 @@ impl Guess {
                     }
                 }
                 Some(Item::Solver { name, .. }) => guess.solvers.push(identifier(&name.node)),
+                Some(Item::Model { name, passes }) => {
+                    guess.variants.push(Variant::of(&name.node, &passes));
+                }
                 Some(Item::Crate(path)) => {
                     if let Ok(path) = syn::parse_str::<syn::Path>(&path.node) {
                         guess.path = quote!(#path);
@@ -232,6 +247,9 @@ impl Guess {
         guess.outputs.retain(|name| seen.insert(name.to_string()));
         let mut seen = BTreeSet::from([item.ident.to_string()]);
         guess.solvers.retain(|name| seen.insert(name.to_string()));
+        guess
+            .variants
+            .retain(|variant| seen.insert(variant.name.to_string()));
         guess
     }
 

@@ -16,13 +16,14 @@ mod source_map;
 mod state;
 #[cfg(test)]
 mod tests;
+mod variant;
 
 use proc_macro::TokenStream;
 
 /// Declares a mechanical model on the struct that holds its parameters.
 ///
 /// The arguments are raw tokens, separated by commas: `coordinates(...)`, `lagrangian = ...` or `hamiltonian = ...`, and as many
-/// `let`, `force(...)`, `dissipation`, `constraint(...)`, `output(...)` and `solver(...)` as the model needs. `sensitivity(omega, k[2])` asks for the derivatives by
+/// `let`, `force(...)`, `dissipation`, `constraint(...)`, `output(...)`, `solver(...)` and `model(...)` as the model needs. `sensitivity(omega, k[2])` asks for the derivatives by
 /// parameters, that is by fields of type `f64` and by elements of array fields, and by the time. Everything is differentiated symbolically while
 /// the crate compiles; mistakes are reported under the token that is wrong, all of them at once.
 ///
@@ -35,6 +36,19 @@ use proc_macro::TokenStream;
 /// `coordinates(q[n])` with `n` a field of type `usize` declares a model of run-time length: sums stay loops, state and parameters (`Vec<f64>`) live on the heap, and the
 /// code is the same for every length. `Simulation::new` runs both kinds. There, `constraint(rod[i in 0..n-1]) = ...` (of positions and the time) and `output(strain[i in 0..n-1]) = ...`
 /// stand for one equation or one number for each site, and a field `left` of type `Vec<usize>` is a list of indices, `q[left[b]]`.
+///
+/// `model(Name, pass, pass, ...)`, any number of times, declares another model made from this one by the passes from left to right: a struct `Name` with the fields that it still
+/// uses, and `Name::of(&original)`, which copies them. It has all that a model has; derives of the original below the attribute (`Clone`, `Copy`, `Debug`, `PartialEq`, `Default`),
+/// outputs, and `sensitivity` by parameters that are left, are inherited; solvers are not.
+///
+/// * `truncated(k, q = e, dot(q) = e)`: the Taylor polynomial of degree k ≥ 2 of the Lagrangian about a point (of a Hamiltonian `truncated(k, x = e, p_x = e)`), zero where nothing is said; e
+///   are formulas of parameters. Forces are taken to degree k − 1, the dissipation to degree k; outputs and the time stay as they are, and coordinates keep their meaning. With k = 2 the model is
+///   linear. Not for models with constraints. Of an array without an index all elements are meant; where the number of coordinates is generic, or known at run time only, the point must be the same
+///   for all.
+/// * `frozen(q = e)`: coordinates that follow formulas of parameters and the time, of a Lagrangian with a known number of coordinates. They are no coordinates of the new model; forces on them drop
+///   out.
+///
+/// Velocities `dot(x)` in forces and outputs of a Hamiltonian model mean ∂H/∂p of the Hamiltonian as declared.
 ///
 /// The attribute keeps the struct as it is, implements the kernels that the elements of `tfe` integrate, and adds the methods
 /// `state(q, v)`, `structure()` and one for each `output`.

@@ -196,6 +196,35 @@ fn derivatives_by_parameters() {
 }
 
 #[test]
+fn a_model_made_from_another() {
+    check(
+        "frozen",
+        quote!(
+            coordinates(r, theta),
+            lagrangian = m / 2 * (dot(r) ^ 2 + r ^ 2 * dot(theta) ^ 2) + m * g * r * cos(theta)
+                - k / 2 * (r - l)
+                ^ 2,
+            output(height) = -r * cos(theta),
+            model(Rod, frozen(r = l), truncated(4)),
+        ),
+        quote! {
+            /// A mass on a spring.
+            #[derive(Clone, Debug, PartialEq, PartialOrd)]
+            pub struct SpringPendulum {
+                /// Mass.
+                pub m: f64,
+                /// Length.
+                pub l: f64,
+                /// Acceleration of gravity.
+                pub g: f64,
+                /// Stiffness.
+                pub k: f64,
+            }
+        },
+    );
+}
+
+#[test]
 fn a_holonomic_constraint() {
     check(
         "rod_pendulum",

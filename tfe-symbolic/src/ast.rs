@@ -80,6 +80,13 @@ pub enum Item {
         /// The element it is specialised for.
         element: Spanned<ElementSyntax>,
     },
+    /// `model(Name, truncated(2), frozen(r = l))`: another model, made from this one
+    Model {
+        /// The name of the emitted struct.
+        name: Name,
+        /// What is done to the model, from left to right.
+        passes: Vec<Pass>,
+    },
     /// `crate = path`: where the emitted code finds `tfe` (for renamed dependencies)
     Crate(Spanned<String>),
 }
@@ -113,6 +120,24 @@ pub struct ElementSyntax {
     pub nodes: Spanned<u64>,
     /// `reduced`, `lobatto` or `quadrature` with its argument.
     pub rule: Option<(Name, Option<Spanned<u64>>)>,
+}
+
+/// `truncated(2, x = 1)`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pass {
+    /// `truncated`, `frozen`, `rigid`, `elastic`.
+    pub word: Name,
+    /// What stands between the parentheses.
+    pub entries: Vec<Entry>,
+}
+
+/// `value` or `target = value`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// `x`, `q[2]`, `dot(x)`
+    pub target: Option<Expr>,
+    /// A formula or a name.
+    pub value: Expr,
 }
 
 /// The kinds of expression.

@@ -5,22 +5,26 @@
 
 mod solver;
 mod transformation;
+mod variants;
 
 use std::collections::BTreeMap;
 
-use crate::ast::{Array, Expr, ExprKind, Item, Name, Range, Spanned};
+use crate::ast::{Array, Expr, ExprKind, Item, Name, Pass, Range, Spanned};
 use crate::context::{Context, FieldKind, Length};
 use crate::declared::{Form, Solver};
 use crate::diagnostic::{Bag, Kind, Role, Span, nearest};
 use crate::function::Function;
 use crate::input::{Affine, IndexSymbol};
 pub use solver::{ELEMENTS, MAX_POINTS, RULES};
+pub use variants::PASSES;
 
 /// The most coordinates of literal arrays: beyond it, tables of the engine get out of hand.
 pub const MAX_COORDINATES: usize = 10_000;
 
 /// The methods that the macro gives every model; outputs become methods beside them.
 const METHODS: &[&str] = &["state", "structure"];
+/// The function that the macro gives every model made from another.
+const VARIANT_METHOD: &str = "of";
 /// One more of models with a time transformation.
 const CLOCK_METHOD: &str = "state_at";
 
@@ -122,6 +126,8 @@ pub struct Model {
     pub sensitivities: Vec<Expr>,
     /// The solvers.
     pub solvers: Vec<Solver>,
+    /// The models made from this one: name and passes.
+    pub variants: Vec<(Name, Vec<Pass>)>,
     /// Where `tfe` is.
     pub crate_path: Option<String>,
     /// Whether an argument is missing because of a mistake, so that "unused" would be a rash word.
@@ -200,6 +206,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
                 model.sensitivities = parameters;
             }
             Item::Solver { name, element } => model.solver(&name, &element, context, bag),
+            Item::Model { name, passes } => model.variants.push((name, passes)),
             Item::Crate(path) => model.crate_path = Some(path.node),
         }
     }
@@ -208,6 +215,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
     model.outputs(bag);
     model.constraint_names(bag);
     model.transformation(bag);
+    model.check_variants(context, bag);
     if incomplete {
         // What seems to be missing may be what could not be read.
         return model;
@@ -540,7 +548,9 @@ impl Model {
 
     /// Whether the macro gives the model a method of this name.
     fn is_method(&self, name: &str) -> bool {
-        METHODS.contains(&name) || (self.time_transformation.is_some() && name == CLOCK_METHOD)
+        METHODS.contains(&name)
+            || (self.time_transformation.is_some() && name == CLOCK_METHOD)
+            || (!self.variants.is_empty() && name == VARIANT_METHOD)
     }
 
     /// Names of constraints stand in no formula, but in results beside outputs.

@@ -91,7 +91,7 @@ fn broken_let(argument: &str, offset: usize) -> Option<Spanned<Item>> {
 }
 
 /// The arguments that formulas cannot refer to.
-const NAMELESS: [&str; 10] = [
+const NAMELESS: [&str; 11] = [
     "lagrangian",
     "hamiltonian",
     "time_transformation",
@@ -101,5 +101,6 @@ const NAMELESS: [&str; 10] = [
     "output",
     "sensitivity",
     "solver",
+    "model",
     "crate",
 ];

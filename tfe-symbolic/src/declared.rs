@@ -246,6 +246,17 @@ pub enum Rule {
     Gauss(u32),
 }
 
+/// A model made from another one.
+#[derive(Clone, Debug)]
+pub struct Variant {
+    /// The model; it has no solvers and no variants.
+    pub model: Declared,
+    /// What was done, in words, with formulas between backticks.
+    pub made: String,
+    /// The fields that the model has and the original does not, with what they are: scalars, in order.
+    pub added: Vec<(String, String)>,
+}
+
 /// A declared model, ready to be differentiated.
 #[derive(Clone, Debug)]
 pub struct Declared {
@@ -277,6 +288,8 @@ pub struct Declared {
     pub sensitivities: Vec<Parameter>,
     /// The specialised steppers asked for.
     pub solvers: Vec<Solver>,
+    /// The models made from this one.
+    pub variants: Vec<Variant>,
     /// Where the emitted code finds `tfe`, if the user said so.
     pub crate_path: Option<String>,
     /// The fields that formulas use, in the order of the struct.

@@ -44,6 +44,7 @@ mod print;
 pub mod program;
 mod quadratic;
 mod rebuild;
+mod reduce;
 mod rewrite;
 mod schedule;
 mod sensitivity;

@@ -10,6 +10,7 @@ mod affine;
 mod constraints;
 mod forces;
 mod names;
+mod passes;
 mod rates;
 mod requirements;
 mod scalar;
@@ -30,6 +31,7 @@ use crate::diagnostic::{Bag, Kind, Span};
 use crate::graph::{ExprId, Graph};
 use crate::input::{Affine, LoopVariable};
 use crate::notation::Notation;
+use crate::reduce;
 
 /// The longest sum that is written out wherever it stands.
 pub const SHORT_SUM: u64 = 16;
@@ -71,8 +73,10 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     for at in 0..model.lets.len() {
         lowerer.named(at);
     }
-    lowerer.check_usage(form, energy, &constraints);
     let used_fields = lowerer.used_fields();
+    let variants = lowerer.variants();
+    lowerer.check_usage(form, energy, &constraints);
+    let all_fields = lowerer.used_fields();
     let requirements = std::mem::take(&mut lowerer.requirements);
     let graph = lowerer.graph;
     let arrays = |slots: &[crate::check::Slots]| {
@@ -83,7 +87,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         };
         slots.iter().map(array).collect()
     };
-    let declared = Declared {
+    let mut declared = Declared {
         name: context.struct_name.clone(),
         form,
         dof: model.dof.clone(),
@@ -98,11 +102,21 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         observables,
         sensitivities,
         solvers: model.solvers.clone(),
+        variants: Vec::new(),
         crate_path: model.crate_path.clone(),
         used_fields,
         requirements,
         notation: Notation::of(model),
     };
+    // What is made from a wrong model would repeat its mistakes.
+    if bag.is_empty() {
+        for (name, steps) in &variants {
+            match reduce::variant(&declared, name, steps, &all_fields) {
+                Ok(variant) => declared.variants.push(variant),
+                Err((span, kind)) => bag.push(span, kind),
+            }
+        }
+    }
     let Some((rate, (_, span))) = rate.zip(model.time_transformation.as_ref()) else {
         return Some(declared);
     };

@@ -15,7 +15,8 @@ use pest::iterators::{Pair, Pairs};
 use pest::pratt_parser::{Assoc, Op, PrattParser};
 
 use crate::ast::{
-    Array, BinaryOperator, Comparison, ElementSyntax, Expr, ExprKind, Item, Name, Range, Spanned,
+    Array, BinaryOperator, Comparison, ElementSyntax, Entry, Expr, ExprKind, Item, Name, Pass,
+    Range, Spanned,
 };
 use crate::check::is_function;
 use crate::diagnostic::{Bag, Kind, Span, nearest};
@@ -48,6 +49,7 @@ pub const ARGUMENTS: &[&str] = &[
     "output",
     "sensitivity",
     "solver",
+    "model",
     "crate",
 ];
 
@@ -107,6 +109,7 @@ pub fn parse_item(text: &str, offset: usize, bag: &mut Bag) -> Option<Spanned<It
         "output" => Rule::output,
         "sensitivity" => Rule::sensitivity,
         "solver" => Rule::solver,
+        "model" => Rule::model,
         "crate" => Rule::location,
         "" => {
             let found = found_at(text, blanks);
@@ -235,6 +238,10 @@ impl Builder<'_> {
                 name: self.name(&parts.next(Rule::name)?),
                 element: self.element(parts.next(Rule::element)?)?,
             },
+            Rule::model => Item::Model {
+                name: self.name(&parts.next(Rule::name)?),
+                passes: self.passes(parts)?,
+            },
             Rule::location => {
                 let path = parts.next(Rule::path)?;
                 let span = self.span(&path);
@@ -289,6 +296,36 @@ impl Builder<'_> {
             },
             span,
         ))
+    }
+
+    fn passes(&mut self, parts: Parts<'_>) -> Option<Vec<Pass>> {
+        let mut passes = Vec::new();
+        for pair in parts.0.filter(|pair| pair.as_rule() == Rule::pass) {
+            let mut parts = Parts(pair.into_inner());
+            let word = self.name(&parts.next(Rule::name)?);
+            let mut entries = Vec::new();
+            for pair in parts.0.filter(|pair| pair.as_rule() == Rule::entry) {
+                entries.push(self.entry(pair)?);
+            }
+            passes.push(Pass { word, entries });
+        }
+        Some(passes)
+    }
+
+    /// `value` or `target = value`
+    fn entry(&mut self, pair: Pair<'_, Rule>) -> Option<Entry> {
+        let mut parts = Parts(pair.into_inner());
+        let first = self.expression(parts.next(Rule::expression)?)?;
+        Some(match parts.next(Rule::expression) {
+            None => Entry {
+                target: None,
+                value: first,
+            },
+            Some(value) => Entry {
+                target: Some(first),
+                value: self.expression(value)?,
+            },
+        })
     }
 
     fn integer(&mut self, pair: &Pair<'_, Rule>) -> Option<Spanned<u64>> {

@@ -3,7 +3,8 @@
 use std::fmt;
 
 use crate::ast::{
-    Array, BinaryOperator, Comparison, ElementSyntax, Expr, ExprKind, Item, Range, Spanned,
+    Array, BinaryOperator, Comparison, ElementSyntax, Entry, Expr, ExprKind, Item, Pass, Range,
+    Spanned,
 };
 
 impl BinaryOperator {
@@ -191,6 +192,21 @@ impl fmt::Display for ElementSyntax {
     }
 }
 
+impl fmt::Display for Pass {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}({})", self.word, Listed(&self.entries))
+    }
+}
+
+impl fmt::Display for Entry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.target {
+            Some(target) => write!(f, "{target} = {}", self.value),
+            None => self.value.fmt(f),
+        }
+    }
+}
+
 impl fmt::Display for Item {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -233,6 +249,11 @@ impl fmt::Display for Item {
                 write!(f, "sensitivity({})", parameters.join(", "))
             }
             Self::Solver { name, element } => write!(f, "solver({name}, {element})"),
+            Self::Model { name, passes } => {
+                write!(f, "model({name}")?;
+                passes.iter().try_for_each(|pass| write!(f, ", {pass}"))?;
+                f.write_str(")")
+            }
             Self::Crate(path) => write!(f, "crate = {path}"),
         }
     }

@@ -1,8 +1,9 @@
 //! Whole-expression rewrites: substitution of loop variables, writing sums out, opening sums that are used once.
 
 use crate::constant::Constant;
+use crate::declared::Force;
 use crate::graph::{ExprId, Graph, Node, SumRange, TooLong};
-use crate::input::{Affine, IndexSymbol, LoopVariable};
+use crate::input::{Affine, IndexSymbol, Input, LoopVariable};
 use crate::table::Map;
 
 /// The most terms that [`Graph::unroll`] writes out, over all sums of an expression.
@@ -102,6 +103,26 @@ impl Graph {
                 node => self.remake(&node, &mapping),
             };
             mapping.set(old, new);
+        }
+        mapping.of(id)
+    }
+
+    /// The expression with other leaves; `None` keeps a leaf as it is. New leaves inside sums may mention the loop variables of the old ones.
+    pub(crate) fn with_leaves(
+        &mut self,
+        id: ExprId,
+        new: &mut dyn FnMut(&mut Self, &Input) -> Option<ExprId>,
+    ) -> ExprId {
+        let mut mapping = Mapping::default();
+        for old in self.reachable(&[id]) {
+            let node = self.node(old).clone();
+            let children = node.children();
+            let made = match &node {
+                Node::Input(input) => new(self, input).unwrap_or(old),
+                _ if children.iter().all(|child| mapping.of(*child) == *child) => old,
+                node => self.remake(node, &mapping),
+            };
+            mapping.set(old, made);
         }
         mapping.of(id)
     }
@@ -246,10 +267,28 @@ pub(crate) fn substitute(affine: &Affine, variable: LoopVariable, value: &Affine
     sum
 }
 
+/// The force on each coordinate that it acts on, where its ranges are literal.
+pub(crate) fn written_out(graph: &mut Graph, force: &Force) -> Vec<(Affine, ExprId)> {
+    let mut forces = vec![(force.target.clone(), force.value)];
+    for range in &force.ranges {
+        let turns = range.start.as_constant().zip(range.end.as_constant());
+        let (start, end) = turns.unwrap_or_default();
+        let mut each = Vec::new();
+        for at in (start..end).map(Affine::constant) {
+            for (target, value) in &forces {
+                let target = substitute(target, range.variable, &at);
+                let value = graph.substitute_loop(*value, range.variable, &at);
+                each.push((target, value));
+            }
+        }
+        forces = each;
+    }
+    forces
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::Input;
 
     fn index(depth: u32) -> Affine {
         Affine::symbol(IndexSymbol::Loop(LoopVariable(depth)))

@@ -20,6 +20,7 @@ impl Model {
         for (argument, is_there) in [
             ("constraint", !self.constraints.is_empty()),
             ("sensitivity", !self.sensitivities.is_empty()),
+            ("model", !self.variants.is_empty()),
         ] {
             if is_there {
                 bag.push(span, Kind::TransformationWith { argument });

@@ -293,6 +293,79 @@ kinds! {
         /// The longest sum that is written out.
         limit: usize,
     },
+    // ---- models made from models ----
+    /// `model(Name)`
+    NoPass {
+        /// The name of the model.
+        name: String,
+    },
+    /// `model(Name, linearised(2))`
+    UnknownPass {
+        /// The word.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// Something between the parentheses of a pass that does not belong there, or nothing where something does.
+    PassEntry {
+        /// The pass.
+        pass: &'static str,
+    },
+    /// A degree that is no integer of the range allowed.
+    TruncationDegree {
+        /// The largest.
+        limit: u32,
+    },
+    /// A coordinate or momentum, in an entry of a pass, that the model does not have.
+    UnknownCoordinate {
+        /// What is named.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// An element beyond an array of coordinates, or an index where there is no array.
+    NoSuchElement {
+        /// The element.
+        name: String,
+    },
+    /// A pass that says twice what becomes of a coordinate.
+    RepeatedEntry {
+        /// What is named.
+        name: String,
+    },
+    /// A value that varies with more than it may.
+    PassValue {
+        /// The pass.
+        pass: &'static str,
+    },
+    /// A pass that needs sums written out, where they cannot be.
+    PassOfLength {
+        /// The pass.
+        pass: &'static str,
+    },
+    /// A truncation of a model with constraints.
+    TruncationOfConstraints,
+    /// An energy without derivatives at the point of a truncation.
+    NoTaylorPolynomial,
+    /// A frozen coordinate of a Hamiltonian.
+    FrozenHamiltonian,
+    /// No coordinate is left.
+    NothingLeft {
+        /// The pass.
+        pass: &'static str,
+    },
+    /// A constraint that holds no coordinate after a pass.
+    ConstraintLeft {
+        /// The constraint.
+        name: String,
+    },
+    /// A coordinate without kinetic energy after all passes.
+    MasslessCoordinate {
+        /// The model.
+        model: String,
+        /// The coordinate.
+        name: String,
+    },
     // ---- names ----
     /// A name that nothing declares.
     UnknownSymbol {
@@ -509,6 +582,8 @@ pub enum Role {
     Constraint,
     /// A solver.
     Solver,
+    /// A model made from this one.
+    Model,
     /// The struct itself.
     Struct,
     /// A method that every model has.
@@ -527,6 +602,7 @@ impl fmt::Display for Role {
             Self::Output => "an output",
             Self::Constraint => "a constraint",
             Self::Solver => "a solver",
+            Self::Model => "a model made from this one",
             Self::Struct => "the struct",
             Self::Method => "a method of every model",
         })

@@ -133,6 +133,38 @@ impl Kind {
             Self::ParameterOfConstraint { name, constraint } => {
                 format!("cannot differentiate by `{name}`, which constraint `{constraint}` holds")
             }
+            Self::NoPass { name } => format!("model `{name}` is made by nothing"),
+            Self::UnknownPass { name, .. } => format!("unknown pass `{name}`"),
+            Self::PassEntry { pass } => format!("this does not fit into `{pass}(…)`"),
+            Self::TruncationDegree { limit } => {
+                format!("the degree of a truncation is an integer from 2 to {limit}")
+            }
+            Self::UnknownCoordinate { name, .. } => {
+                format!("`{name}` is not a coordinate of the model")
+            }
+            Self::NoSuchElement { name } => format!("there is no coordinate `{name}`"),
+            Self::RepeatedEntry { name } => format!("`{name}` is given more than once"),
+            Self::PassValue { pass: "frozen" } => {
+                "a frozen coordinate can depend on parameters and the time only".into()
+            }
+            Self::PassValue { .. } => {
+                "the point of a truncation can depend on parameters only".into()
+            }
+            Self::PassOfLength { pass } => {
+                format!("`{pass}` needs sums written out, which is not possible here")
+            }
+            Self::TruncationOfConstraints => "a model with constraints cannot be truncated".into(),
+            Self::NoTaylorPolynomial => {
+                "the model has no Taylor polynomial at the point of the truncation".into()
+            }
+            Self::FrozenHamiltonian => "coordinates of a Hamiltonian cannot be frozen".into(),
+            Self::NothingLeft { pass } => format!("`{pass}` leaves no coordinate"),
+            Self::ConstraintLeft { name } => {
+                format!("constraint `{name}` holds no coordinate any more")
+            }
+            Self::MasslessCoordinate { model, name } => {
+                format!("coordinate `{name}` of model `{model}` has no kinetic energy")
+            }
             Self::UnknownSymbol { name, .. } => format!("unknown name `{name}`"),
             Self::UnknownFunction { name, .. } => format!("unknown function `{name}`"),
             Self::NotAFunction { name } => format!("`{name}` is not a function"),
@@ -274,6 +306,14 @@ impl Kind {
             | Self::UnknownParameter {
                 nearest: Some(nearest),
                 ..
+            }
+            | Self::UnknownPass {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownCoordinate {
+                nearest: Some(nearest),
+                ..
             } => {
                 format!("did you mean `{nearest}`?")
             }
@@ -408,6 +448,41 @@ impl Kind {
                 format!("name each element, as in `{array}[0], {array}[1]`")
             }
             Self::RepeatedParameter { .. } => "name it once".into(),
+            Self::NoPass { name } => format!("say what to do, as in `model({name}, truncated(2))`"),
+            Self::UnknownPass { nearest: None, .. } => {
+                format!("the passes are {}", backticked(crate::check::PASSES))
+            }
+            Self::PassEntry { pass } => format!("write it like `{}`", usage(pass)),
+            Self::TruncationDegree { .. } => "write `truncated(2)` for a linear model".into(),
+            Self::UnknownCoordinate { nearest: None, .. } => {
+                "name a coordinate as declared, such as `x` or `q[2]`; momenta and velocities \
+                 belong to truncations"
+                    .into()
+            }
+            Self::RepeatedEntry { .. } => "give it once".into(),
+            Self::PassValue { .. } => "write numbers and fields of the struct".into(),
+            Self::PassOfLength { pass: "frozen" } => {
+                "give arrays of coordinates literal lengths of at most some thousand".into()
+            }
+            Self::PassOfLength { .. } => {
+                "give arrays of coordinates literal lengths of at most some thousand, or say the \
+                 same of all elements of the only array"
+                    .into()
+            }
+            Self::TruncationOfConstraints => {
+                "choose coordinates that satisfy the constraints, or make them springs by \
+                 `elastic(name = k)` first"
+                    .into()
+            }
+            Self::NoTaylorPolynomial => "give another point, such as `truncated(2, r = l)`".into(),
+            Self::FrozenHamiltonian => "declare the model by a Lagrangian".into(),
+            Self::NothingLeft { .. } => "leave one coordinate at least".into(),
+            Self::ConstraintLeft { .. } => {
+                "freeze fewer coordinates, or declare the constraint in another model".into()
+            }
+            Self::MasslessCoordinate { name, .. } => {
+                format!("freeze `{name}` too, or truncate about another point")
+            }
             Self::NotAFunction { name } => format!("write `{name}*(…)` for a product"),
             Self::FunctionAsValue { name } => format!("write `{name}(…)`"),
             Self::UsedBeforeLet { .. } => "move the `let` up".into(),
@@ -454,6 +529,7 @@ impl Kind {
             | Self::ForceTarget { .. }
             | Self::UnknownFunction { .. }
             | Self::WrongArity { .. }
+            | Self::NoSuchElement { .. }
             | Self::DivisionByZero
             | Self::OutsideDomain { .. }
             | Self::WrongLength { .. }
@@ -487,6 +563,16 @@ fn domain_words(function: Function) -> &'static str {
         Domain::UnitInterval => "between −1 and 1",
         Domain::OpenUnitInterval => "strictly between −1 and 1",
         Domain::AtLeastOne => "from 1 upwards",
+    }
+}
+
+/// A pass as it may be written.
+fn usage(pass: &str) -> &'static str {
+    match pass {
+        "frozen" => "frozen(r = l)",
+        "rigid" => "rigid(rod = k)",
+        "elastic" => "elastic(rod = k)",
+        _ => "truncated(4, theta = 0)",
     }
 }
 

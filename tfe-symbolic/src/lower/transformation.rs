@@ -9,7 +9,7 @@ use crate::diagnostic::Kind;
 use crate::differentiate::derivative;
 use crate::graph::{ExprId, Graph, Node};
 use crate::input::{Affine, Input};
-use crate::rewrite::{Mapping, UNROLL_LIMIT, substitute};
+use crate::rewrite::{Mapping, UNROLL_LIMIT, written_out};
 
 impl Lowerer<'_> {
     /// g of `time_transformation = g`, without loops.
@@ -126,23 +126,4 @@ fn power(graph: &mut Graph, forces: &[Force], hamiltonian: ExprId) -> Result<Exp
         }
     }
     Ok(power)
-}
-
-/// The force on each coordinate that it acts on.
-fn written_out(graph: &mut Graph, force: &Force) -> Vec<(Affine, ExprId)> {
-    let mut forces = vec![(force.target.clone(), force.value)];
-    for range in &force.ranges {
-        let turns = range.start.as_constant().zip(range.end.as_constant());
-        let (start, end) = turns.unwrap_or_default();
-        let mut each = Vec::new();
-        for at in (start..end).map(Affine::constant) {
-            for (target, value) in &forces {
-                let target = substitute(target, range.variable, &at);
-                let value = graph.substitute_loop(*value, range.variable, &at);
-                each.push((target, value));
-            }
-        }
-        forces = each;
-    }
-    forces
 }

@@ -35,6 +35,7 @@ pub(super) fn wanted(rules: &[Rule]) -> String {
             Rule::range => "a range such as `i in 0..3`",
             Rule::path => "a path",
             Rule::element => "an element such as `Mixed::<4>`",
+            Rule::pass => "a pass such as `truncated(2)`",
             Rule::EOI => "the end of the argument",
             _ => continue,
         };

@@ -1,0 +1,12 @@
+//! A truncation to first degree.
+
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k/2*x^2,
+    model(Linear, truncated(1)),
+)]
+struct Model { m: f64, k: f64 }
+
+fn main() {}

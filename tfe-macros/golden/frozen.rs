@@ -1,0 +1,499 @@
+/// A mass on a spring.
+#[derive(Clone, Debug, PartialEq, PartialOrd)]
+///
+/// # Derived model
+/// ```text
+/// L = ½ m (ṙ² + r² θ̇²) + m g r cos θ − ½ k (r − l)²
+/// coordinates: r, θ      parameters: m, l, g, k
+/// operations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other
+/// operations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other
+/// operations, gradient and second derivatives: 3 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other
+/// declared by             Lagrangian, 2 coordinates
+/// depends on time         no
+/// forces                  no
+/// linear                  no
+/// quadratic in v          yes
+/// constant L_vv           no
+/// separable (L_vq = 0)    no
+/// cyclic coordinates      none
+/// pattern L_vv            (0,0) (1,1)
+/// pattern L_vq            (1,0)
+/// pattern L_qq            (0,0) (0,1) (1,0) (1,1)
+/// ```
+pub struct SpringPendulum {
+    /// Mass.
+    pub m: f64,
+    /// Length.
+    pub l: f64,
+    /// Acceleration of gravity.
+    pub g: f64,
+    /// Stiffness.
+    pub k: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<2> for SpringPendulum {
+        const FORM: __tfe::Form = __tfe::Form::Lagrangian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: false,
+            forced: false,
+            quadratic_in_z: true,
+            constant_mass: false,
+            linear: false,
+            separable: false,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
+            let g = t.like(self.g);
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let cos_theta = q[1].cos();
+            let t0 = z[0] * z[0];
+            let t1 = q[0] * z[1];
+            let t2 = t1 * t1;
+            let t3 = t0 + t2;
+            let t4 = t.like(0.5) * t3;
+            let t5 = q[0] * g;
+            let t6 = cos_theta * t5;
+            let t7 = t4 + t6;
+            let t8 = m * t7;
+            let t9 = l - q[0];
+            let t10 = t9 * t9;
+            let t11 = t.like(0.5) * k;
+            let t12 = t10 * t11;
+            t8 - t12
+        }
+        const LANES: bool = true;
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            let g = t.like(self.g);
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let (sin_theta, cos_theta) = q[1].sin_cos();
+            first.z[0] = m * z[0];
+            let t0 = m * q[0];
+            let t1 = z[1] * t0;
+            first.z[1] = q[0] * t1;
+            let t2 = l - q[0];
+            let t3 = k * t2;
+            let t4 = m * g;
+            let t5 = cos_theta * t4;
+            let t6 = t3 + t5;
+            let t7 = z[1] * t1;
+            first.q[0] = t6 + t7;
+            let t8 = g * sin_theta;
+            let t9 = t0 * t8;
+            first.q[1] = -t9;
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            let g = t.like(self.g);
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let (sin_theta, cos_theta) = q[1].sin_cos();
+            first.z[0] = m * z[0];
+            let t0 = m * q[0];
+            let t1 = q[0] * t0;
+            first.z[1] = t1 * z[1];
+            let t2 = l - q[0];
+            let t3 = k * t2;
+            let t4 = m * g;
+            let t5 = cos_theta * t4;
+            let t6 = t3 + t5;
+            let t7 = z[1] * z[1];
+            let t8 = t0 * t7;
+            first.q[0] = t6 + t8;
+            let t9 = g * sin_theta;
+            let t10 = t0 * t9;
+            first.q[1] = -t10;
+            zz[0][0] = m;
+            zz[1][1] = t1;
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            second: &mut __tfe::Second<R, 2>,
+        ) {
+            let g = t.like(self.g);
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let (sin_theta, cos_theta) = q[1].sin_cos();
+            first.z[0] = m * z[0];
+            let t0 = m * q[0];
+            let t1 = q[0] * t0;
+            first.z[1] = t1 * z[1];
+            let t2 = m * g;
+            let t3 = t2 * cos_theta;
+            let t4 = k * l;
+            let t5 = z[1] * z[1];
+            let t6 = m * t5;
+            let t7 = t6 - k;
+            let t8 = q[0] * t7;
+            let t9 = t4 + t8;
+            first.q[0] = t3 + t9;
+            let t10 = t2 * sin_theta;
+            let t11 = q[0] * t10;
+            first.q[1] = -t11;
+            second.zz[0][0] = m;
+            second.zz[1][1] = t1;
+            let t12 = t.like(2.0) * t0;
+            second.zq[1][0] = z[1] * t12;
+            second.qq[0][0] = t7;
+            let t13 = -t10;
+            second.qq[0][1] = t13;
+            second.qq[1][0] = t13;
+            let t14 = q[0] * t3;
+            second.qq[1][1] = -t14;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("r"),
+                1 => __tfe::CoordinateName::single("theta"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height"];
+        fn observables<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            values: &mut [R],
+        ) {
+            let cos_theta = q[1].cos();
+            let t0 = q[0] * cos_theta;
+            values[0] = -t0;
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl SpringPendulum {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    pub fn state(&self, q: [f64; 2], v: [f64; 2]) -> ::tfe::__private::State<2> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    pub fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "SpringPendulum",
+            form: ::tfe::__private::Form::Lagrangian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: false,
+                forced: false,
+                quadratic_in_z: true,
+                constant_mass: false,
+                linear: false,
+                separable: false,
+            },
+            cyclic: &[],
+            value: ::tfe::__private::Operations {
+                additions: 4,
+                multiplications: 10,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 3,
+                multiplications: 10,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 3,
+                multiplications: 15,
+                divisions: 0,
+                sines: 1,
+                functions: 0,
+            },
+            page: "L = ½ m (r\u{307}² + r² θ\u{307}²) + m g r cos θ − ½ k (r − l)²\ncoordinates: r, θ      parameters: m, l, g, k\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           no\nseparable (L_vq = 0)    no\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            (1,0)\npattern L_qq            (0,0) (0,1) (1,0) (1,1)",
+        }
+    }
+    /// The observable `height` at time `t`, coordinates `q` and velocities `v`.
+    pub fn height(&self, t: f64, q: [f64; 2], v: [f64; 2]) -> f64 {
+        let mut values = [0.0; 1];
+        ::tfe::__private::Model::observables(self, t, &q, &v, &mut values);
+        values[0]
+    }
+}
+/// `Rod` from [`SpringPendulum`]: frozen `r = l`; truncated to degree 4.
+#[derive(Clone, Debug, PartialEq)]
+///
+/// # Derived model
+/// ```text
+/// SpringPendulum: frozen r = l; truncated to degree 4
+/// L = m g l + 0.5 m l² θ̇² − 0.5 m g l θ² + 1/24 m g l θ⁴
+/// coordinates: θ      parameters: m, l, g
+/// operations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other
+/// operations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other
+/// operations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other
+/// declared by             Lagrangian, 1 coordinates
+/// depends on time         no
+/// forces                  no
+/// linear                  no
+/// quadratic in v          yes
+/// constant L_vv           yes
+/// separable (L_vq = 0)    yes
+/// cyclic coordinates      none
+/// pattern L_vv            (0,0)
+/// pattern L_vq            zero
+/// pattern L_qq            (0,0)
+/// ```
+pub struct Rod {
+    /// Mass.
+    pub m: f64,
+    /// Length.
+    pub l: f64,
+    /// Acceleration of gravity.
+    pub g: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<1> for Rod {
+        const FORM: __tfe::Form = __tfe::Form::Lagrangian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: false,
+            forced: false,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: false,
+            separable: true,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
+            let g = t.like(self.g);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let t0 = q[0] * q[0];
+            let t1 = g * l;
+            let t2 = t0 * t1;
+            let t3 = t0 * t2;
+            let t4 = t3 / t.like(24.0);
+            let t5 = l * z[0];
+            let t6 = t5 * t5;
+            let t7 = t6 - t2;
+            let t8 = t.like(0.5) * t7;
+            let t9 = t1 + t8;
+            let t10 = t4 + t9;
+            m * t10
+        }
+        const LANES: bool = true;
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            let g = t.like(self.g);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let t0 = m * l;
+            let t1 = l * z[0];
+            first.z[0] = t0 * t1;
+            let t2 = q[0] * q[0];
+            let t3 = q[0] * g;
+            let t4 = t0 * t3;
+            let t5 = t2 * t4;
+            let t6 = t5 / t.like(6.0);
+            first.q[0] = t6 - t4;
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            let g = t.like(self.g);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let t0 = l * m;
+            let t1 = l * t0;
+            first.z[0] = t1 * z[0];
+            let t2 = q[0] * q[0];
+            let t3 = q[0] * g;
+            let t4 = t0 * t3;
+            let t5 = t2 * t4;
+            let t6 = t5 / t.like(6.0);
+            first.q[0] = t6 - t4;
+            zz[0][0] = t1;
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            second: &mut __tfe::Second<R, 1>,
+        ) {
+            let g = t.like(self.g);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let t0 = l * m;
+            let t1 = l * t0;
+            first.z[0] = t1 * z[0];
+            let t2 = t0 * g;
+            let t3 = q[0] * t2;
+            let t4 = q[0] * t3;
+            let t5 = q[0] * t4;
+            let t6 = t5 / t.like(6.0);
+            first.q[0] = t6 - t3;
+            second.zz[0][0] = t1;
+            let t7 = t.like(0.5) * t4;
+            second.qq[0][0] = t7 - t2;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("theta"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height"];
+        fn observables<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            values: &mut [R],
+        ) {
+            let l = t.like(self.l);
+            let cos_theta = q[0].cos();
+            let t0 = l * cos_theta;
+            values[0] = -t0;
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl Rod {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    pub fn state(&self, q: [f64; 1], v: [f64; 1]) -> ::tfe::__private::State<1> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    pub fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "Rod",
+            form: ::tfe::__private::Form::Lagrangian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: false,
+                forced: false,
+                quadratic_in_z: true,
+                constant_mass: true,
+                linear: false,
+                separable: true,
+            },
+            cyclic: &[],
+            value: ::tfe::__private::Operations {
+                additions: 3,
+                multiplications: 8,
+                divisions: 1,
+                sines: 0,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 1,
+                multiplications: 7,
+                divisions: 1,
+                sines: 0,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 2,
+                multiplications: 8,
+                divisions: 1,
+                sines: 0,
+                functions: 0,
+            },
+            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = m g l + 0.5 m l² θ\u{307}² − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+        }
+    }
+    /// The observable `height` at time `t`, coordinates `q` and velocities `v`.
+    pub fn height(&self, t: f64, q: [f64; 1], v: [f64; 1]) -> f64 {
+        let mut values = [0.0; 1];
+        ::tfe::__private::Model::observables(self, t, &q, &v, &mut values);
+        values[0]
+    }
+}
+#[automatically_derived]
+#[allow(dead_code)]
+impl Rod {
+    /// The model with the parameters of a [`SpringPendulum`].
+    pub fn of(original: &SpringPendulum) -> Self {
+        Self {
+            m: ::core::clone::Clone::clone(&original.m),
+            l: ::core::clone::Clone::clone(&original.l),
+            g: ::core::clone::Clone::clone(&original.g),
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Models made from the declared one: `model(Name, truncated(2), frozen(r = l))`.
+
+use crate::emit::identifier;
+use crate::expand;
+use crate::input::plain;
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+use syn::punctuated::Punctuated;
+use syn::{Attribute, Field, Fields, ItemStruct, Meta, Path, Token, parse_quote};
+use tfe_symbolic::declared::Variant;
+
+/// The derives that hold of the model made as they hold of the original.
+const DERIVES: [&str; 5] = ["Clone", "Copy", "Debug", "PartialEq", "Default"];
+
+/// The struct, its kernels and methods as of any model, and `of`, which copies the parameters.
+pub(crate) fn expand(variant: &Variant, original: &ItemStruct) -> TokenStream {
+    let title = format!(
+        " `{}` from [`{}`]: {}.",
+        variant.model.name, original.ident, variant.made
+    );
+    let fields = fields(variant, original);
+    let item = renamed(&variant.model.name, &title, fields, original);
+    let of = of(variant, &item, original);
+    let model = expand::model(&variant.model, item);
+    quote!(#model #of)
+}
+
+/// A struct like the original with another name and other fields.
+pub(crate) fn renamed(
+    name: &str,
+    title: &str,
+    fields: Vec<Field>,
+    original: &ItemStruct,
+) -> ItemStruct {
+    let mut attrs: Vec<Attribute> = vec![parse_quote!(#[doc = #title])];
+    attrs.extend(derives(original));
+    let fields: Punctuated<Field, Token![,]> = fields.into_iter().collect();
+    ItemStruct {
+        attrs,
+        ident: identifier(name),
+        fields: Fields::Named(parse_quote!({ #fields })),
+        semi_token: None,
+        ..original.clone()
+    }
+}
+
+/// The fields that the model still uses, then those added.
+fn fields(variant: &Variant, original: &ItemStruct) -> Vec<Field> {
+    let used = &variant.model.used_fields;
+    let is_used = |field: &&Field| {
+        let name = field.ident.as_ref().map(plain);
+        name.is_some_and(|name| used.contains(&name))
+    };
+    let mut fields: Vec<Field> = original.fields.iter().filter(is_used).cloned().collect();
+    for field in &mut fields {
+        field
+            .attrs
+            .retain(|attribute| attribute.path().is_ident("doc"));
+    }
+    let vis = &original.vis;
+    for (name, doc) in &variant.added {
+        let (name, doc) = (identifier(name), format!(" {doc}"));
+        fields.push(parse_quote!(#[doc = #doc] #vis #name: f64));
+    }
+    fields
+}
+
+/// `#[derive(…)]` with those of [`DERIVES`] that the original has; those above `#[dynamics]` cannot be seen from here.
+fn derives(original: &ItemStruct) -> Option<Attribute> {
+    let mut paths: Vec<Path> = Vec::new();
+    for attribute in &original.attrs {
+        let Meta::List(list) = &attribute.meta else {
+            continue;
+        };
+        if !list.path.is_ident("derive") {
+            continue;
+        }
+        let parse = Punctuated::<Path, Token![,]>::parse_terminated;
+        // What is no list of paths, rustc reports on the original.
+        let own = list.parse_args_with(parse).unwrap_or_default();
+        paths.extend(own.into_iter().filter(is_inherited));
+    }
+    (!paths.is_empty()).then(|| parse_quote!(#[derive(#(#paths),*)]))
+}
+
+fn is_inherited(path: &Path) -> bool {
+    let last = path.segments.last();
+    last.is_some_and(|segment| DERIVES.iter().any(|name| segment.ident == name))
+}
+
+/// `Name::of(&original, k)`
+fn of(variant: &Variant, item: &ItemStruct, original: &ItemStruct) -> TokenStream {
+    let (name, from, vis) = (&item.ident, &original.ident, &item.vis);
+    let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+    let is_added = |name: &str| variant.added.iter().any(|(own, _)| own == name);
+    let added: Vec<_> = variant
+        .added
+        .iter()
+        .map(|(name, _)| identifier(name))
+        .collect();
+    let copied: Vec<_> = item
+        .fields
+        .iter()
+        .filter_map(|field| field.ident.as_ref())
+        .filter(|name| !is_added(&plain(name)))
+        .collect();
+    // A field added may have any name.
+    let argument = if is_added("original") {
+        format_ident!("__original")
+    } else {
+        format_ident!("original")
+    };
+    let argument = if copied.is_empty() {
+        format_ident!("_{argument}")
+    } else {
+        argument
+    };
+    let doc = format!(" The model with the parameters of a [`{from}`].");
+    quote! {
+        #[automatically_derived]
+        #[allow(dead_code)]
+        impl #impl_generics #name #type_generics #where_clause {
+            #[doc = #doc]
+            #vis fn of(#argument: &#from #type_generics #(, #added: f64)*) -> Self {
+                Self {
+                    #(#copied: ::core::clone::Clone::clone(&#argument.#copied),)*
+                    #(#added,)*
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Whether every coordinate of a model made from another one still has kinetic energy.
+
+use super::removal::holds_varying_index;
+use crate::constant::Constant;
+use crate::declared::{CoordinateArray, Declared, Form};
+use crate::differentiate::derivative;
+use crate::input::{Affine, Input};
+
+/// The first coordinate whose momentum holds no velocity, or whose velocity no momentum; those that constraints act on do not count.
+pub(super) fn missing(model: &mut Declared) -> Option<String> {
+    if holds_varying_index(&model.graph, model.energy) {
+        return None;
+    }
+    for (at, name) in (0..).zip(names(&model.coordinates)) {
+        let index = Affine::constant(at);
+        if !is_constrained(model, &index) && is_massless(model, index) {
+            return Some(name);
+        }
+    }
+    None
+}
+
+fn is_constrained(model: &Declared, at: &Affine) -> bool {
+    let holds = |input: &Input| match input {
+        Input::Coordinate(own) | Input::Velocity(own) => own == at,
+        _ => false,
+    };
+    let mut values = model.constraints.iter().map(|constraint| constraint.value);
+    values.any(|value| model.graph.inputs_of(value).iter().any(holds))
+}
+
+fn is_massless(model: &mut Declared, at: Affine) -> bool {
+    let graph = &mut model.graph;
+    match model.form {
+        Form::Lagrangian => {
+            let momentum = derivative(graph, model.energy, &Input::Velocity(at));
+            let is_velocity = |input: &Input| matches!(input, Input::Velocity(_));
+            !graph.inputs_of(momentum).iter().any(is_velocity)
+        }
+        Form::Hamiltonian => {
+            let velocity = derivative(graph, model.energy, &Input::Momentum(at));
+            graph.as_constant(velocity).is_some_and(Constant::is_zero)
+        }
+    }
+}
+
+/// `x`, `q[0]`, `q[1]`, … by number; of arrays of unknown length, nothing.
+pub(super) fn names(arrays: &[CoordinateArray]) -> Vec<String> {
+    let mut names = Vec::new();
+    for array in arrays {
+        match array.length.as_ref().map(Affine::as_constant) {
+            None => names.push(array.name.clone()),
+            Some(Some(length)) => {
+                names.extend((0..length).map(|at| format!("{}[{at}]", array.name)));
+            }
+            Some(None) => return Vec::new(),
+        }
+    }
+    names
+}
