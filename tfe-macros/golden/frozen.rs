@@ -13,7 +13,7 @@
 /// forces                  no
 /// linear                  no
 /// quadratic in v          yes
-/// constant L_vv           no
+/// constant L_vv           no, diagonal
 /// separable (L_vq = 0)    no
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0) (1,1)
@@ -229,6 +229,8 @@ impl SpringPendulum {
                 separable: false,
             },
             cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
             value: ::tfe::__private::Operations {
                 additions: 4,
                 multiplications: 10,
@@ -250,7 +252,7 @@ impl SpringPendulum {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m (r\u{307}² + r² θ\u{307}²) + m g r cos θ − ½ k (r − l)²\ncoordinates: r, θ      parameters: m, l, g, k\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           no\nseparable (L_vq = 0)    no\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            (1,0)\npattern L_qq            (0,0) (0,1) (1,0) (1,1)",
+            page: "L = ½ m (r\u{307}² + r² θ\u{307}²) + m g r cos θ − ½ k (r − l)²\ncoordinates: r, θ      parameters: m, l, g, k\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           no, diagonal\nseparable (L_vq = 0)    no\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            (1,0)\npattern L_qq            (0,0) (0,1) (1,0) (1,1)",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.
@@ -276,7 +278,7 @@ impl SpringPendulum {
 /// forces                  no
 /// linear                  no
 /// quadratic in v          yes
-/// constant L_vv           yes
+/// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0)
@@ -454,6 +456,8 @@ impl Rod {
                 separable: true,
             },
             cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
             value: ::tfe::__private::Operations {
                 additions: 3,
                 multiplications: 8,
@@ -475,7 +479,7 @@ impl Rod {
                 sines: 0,
                 functions: 0,
             },
-            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = m g l + 0.5 m l² θ\u{307}² − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = m g l + 0.5 m l² θ\u{307}² − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.
