@@ -237,7 +237,7 @@ impl<const N: usize> Error for RunError<N> {
 }
 
 /// Why a motion has no value at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AtError {
     /// The time lies outside the span of the motion.
@@ -252,6 +252,18 @@ pub enum AtError {
     /// The element around the time was not recorded (`record_every` keeps only some).
     NotRecorded {
         /// The time asked for.
+        time: f64,
+    },
+    /// The model has no output of this name.
+    NoOutput {
+        /// The name asked for.
+        output: String,
+        /// The outputs that there are.
+        known: &'static [&'static str],
+    },
+    /// The momentum at this time belongs to no velocity.
+    NoVelocity {
+        /// The time.
         time: f64,
     },
 }
@@ -269,6 +281,17 @@ impl fmt::Display for AtError {
                 f,
                 "the element around t = {time} was not recorded; run without `record_every` for dense output"
             ),
+            Self::NoOutput { output, known: [] } => {
+                write!(f, "there is no output `{output}`: the model declares none")
+            }
+            Self::NoOutput { output, known } => write!(
+                f,
+                "there is no output `{output}`; the model has `{}`",
+                known.join("`, `")
+            ),
+            Self::NoVelocity { time } => {
+                write!(f, "the momentum at t = {time} belongs to no velocity")
+            }
         }
     }
 }

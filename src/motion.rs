@@ -9,8 +9,9 @@ use crate::simulation::Warning;
 use std::fmt;
 use std::io;
 use std::path::Path;
+use tfe_runtime::quadrature::Quadrature;
 use tfe_runtime::step::DenseElement;
-use tfe_runtime::{CoordinateName, Model, State, Statistics, constrained, legendre};
+use tfe_runtime::{CoordinateName, Form, Model, State, Statistics, constrained, legendre};
 
 /// A state with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,7 +132,7 @@ impl<const N: usize> Motion<N> {
         self.velocities.push(velocity);
         self.energies.push(energy);
         if !M::OBSERVABLES.is_empty() {
-            let z = if matches!(M::FORM, tfe_runtime::Form::Lagrangian) {
+            let z = if matches!(M::FORM, Form::Lagrangian) {
                 &velocity
             } else {
                 &state.p
@@ -231,6 +232,84 @@ impl<const N: usize> Motion<N> {
             }
             _ => Err(AtError::NotRecorded { time }),
         }
+    }
+
+    /// The integral of an output from the start to every recorded node,
+    ///
+    /// ```text
+    /// ∫ y(t, q, q̇) dt ,     by the s Gauss points of every element, s the degree of its polynomial                   (T-109)
+    /// ```
+    ///
+    /// An element of collocation meets the equations of motion at these points, so the integral is as accurate as the nodes: as if it had been one more
+    /// coordinate. So the angle comes back that `model(Name, routh(phi))` ignores, whose velocity is the output `phi_rate`; so does the work of a force.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// /// A planet; without its angle a motion in the radius alone.
+    /// #[dynamics(
+    ///     coordinates(r, phi),
+    ///     lagrangian = (dot(r)^2 + r^2*dot(phi)^2)/2 + mu/r,
+    ///     model(Radial, routh(phi)),
+    /// )]
+    /// struct Planet { mu: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let planet = Planet { mu: 1.0 };
+    /// let (radial, start) = Radial::of_state(&planet, &planet.state([1.0, 0.0], [0.0, 1.2]));
+    /// let motion = Simulation::new(&radial).element(Mixed::<6>).step(0.1).run(start, 0.0..5.0)?;
+    /// let angle = motion.integral(&radial, "phi_rate")?;
+    /// // The same as with the angle as a coordinate.
+    /// let both = Simulation::new(&planet).element(Mixed::<6>).step(0.1).run(planet.state([1.0, 0.0], [0.0, 1.2]), 0.0..5.0)?;
+    /// assert!((angle[50] - both.last().q[1]).abs() < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`AtError::NoOutput`] for a name that is none, [`AtError::NotRecorded`] where `record_every` left elements out, [`AtError::NoVelocity`] where a
+    /// momentum belongs to no velocity.
+    pub fn integral<M: Model<N>>(&self, model: &M, output: &str) -> Result<Vec<f64>, AtError> {
+        let Some(column) = M::OBSERVABLES.iter().position(|name| *name == output) else {
+            return Err(AtError::NoOutput {
+                output: output.to_owned(),
+                known: M::OBSERVABLES,
+            });
+        };
+        let mut values = vec![0.0; M::OBSERVABLES.len()];
+        let mut velocity = self.velocities[0];
+        let (mut sum, mut integrals) = (0.0, vec![0.0]);
+        let mut rule = Quadrature::gauss(1);
+        for (element, pair) in self.elements.iter().zip(self.nodes.windows(2)) {
+            let (from, to) = (pair[0].t, pair[1].t);
+            if (element.start(), element.end()) != (from, to) {
+                return Err(AtError::NotRecorded { time: from });
+            }
+            if rule.len() != element.degree().max(1) {
+                rule = Quadrature::gauss(element.degree());
+            }
+            for point in 0..rule.len() {
+                let (node, weight) = (rule.node(point), rule.weight(point));
+                let (t, state) = (from + node * (to - from), element.at(node));
+                let z = match M::FORM {
+                    Form::Hamiltonian => state.p,
+                    Form::Lagrangian => {
+                        let found =
+                            constrained::velocity_of(model, t, &state.q, &state.p, &velocity);
+                        velocity = found.map_err(|_| AtError::NoVelocity { time: t })?;
+                        velocity
+                    }
+                };
+                model.observables(t, &state.q, &z, &mut values);
+                sum += weight * (to - from) * values[column];
+            }
+            integrals.push(sum);
+        }
+        if integrals.len() < self.nodes.len() {
+            let time = self.nodes[integrals.len() - 1].t;
+            return Err(AtError::NotRecorded { time });
+        }
+        Ok(integrals)
     }
 
     /// Largest change of the energy over the recorded nodes, relative to the energy at the start (absolute where that is zero):

@@ -98,14 +98,15 @@ fn the_linear_pendulum_is_harmonic() {
     assert!((third.q[0] - expected).abs() < 1e-14, "{:?}", third.q);
 }
 
+fn total(o: tfe::runtime::structure::Operations) -> u32 {
+    o.additions + o.multiplications + o.divisions + o.sines + o.functions
+}
+
 #[test]
 fn structure_tells_what_became_simpler() {
     let (linear, full) = (Linear::structure(), Pendulum::structure());
     assert!(linear.facts.linear && !full.facts.linear);
     assert_eq!((linear.first.sines, full.first.sines), (0, 1));
-    let total = |o: tfe::runtime::structure::Operations| {
-        o.additions + o.multiplications + o.divisions + o.sines + o.functions
-    };
     assert!(total(linear.second) < total(full.second));
     assert!(linear.page.contains("Pendulum: truncated to degree 2"));
     assert_eq!(linear.name, "Linear");
@@ -143,4 +144,118 @@ fn a_frozen_spring_is_a_rod() {
         rod.height(0.0, [0.5], [0.0]),
         PENDULUM.height(0.0, [0.5], [0.0])
     );
+}
+
+/// A heavy symmetric top in Euler angles, its precession φ and spin ψ cyclic.
+#[dynamics(
+    coordinates(phi, theta, psi),
+    lagrangian = a/2*(dot(theta)^2 + dot(phi)^2*sin(theta)^2) + c/2*(dot(psi) + dot(phi)*cos(theta))^2 - mgl*cos(theta),
+    output(height) = cos(theta),
+    output(east) = sin(theta)*sin(phi),
+    output(spin) = dot(psi) + dot(phi)*cos(theta),
+    model(Nutation, routh(psi, phi)),
+)]
+#[derive(Clone, Debug)]
+struct Top {
+    a: f64,
+    c: f64,
+    mgl: f64,
+}
+
+/// The same by its Hamiltonian.
+#[dynamics(
+    coordinates(phi, theta, psi),
+    momenta(p_phi, p_theta, p_psi),
+    hamiltonian = p_theta^2/(2*a) + (p_phi - p_psi*cos(theta))^2/(2*a*sin(theta)^2) + p_psi^2/(2*c) + mgl*cos(theta),
+    model(Nodding, routh(phi, psi)),
+)]
+struct CanonicalTop {
+    a: f64,
+    c: f64,
+    mgl: f64,
+}
+
+const TOP: Top = Top {
+    a: 1.2,
+    c: 0.7,
+    mgl: 2.0,
+};
+
+#[test]
+fn a_top_without_its_cyclic_angles_nods_as_the_whole() {
+    let start = TOP.state([0.3, 0.9, -0.2], [0.4, 0.1, 6.0]);
+    let (nutation, left) = Nutation::of_state(&TOP, &start);
+    assert_eq!((nutation.p_psi, nutation.p_phi), (start.p[2], start.p[0]));
+    let span = 0.0..10.0;
+    let whole = Simulation::new(&TOP).element(Mixed::<6>).step(0.1);
+    let whole = whole.run(start, span.clone()).expect("a motion");
+    let reduced = Simulation::new(&nutation).element(Mixed::<6>).step(0.1);
+    let reduced = reduced.run(left, span).expect("a motion");
+    let [phi, psi] =
+        ["phi_rate", "psi_rate"].map(|rate| reduced.integral(&nutation, rate).expect("recorded"));
+    let energies = whole.energies().iter().zip(reduced.energies());
+    for (whole, reduced) in energies {
+        // The Routhian keeps the energy as a whole.
+        assert!((whole - reduced).abs() < 1e-12 * whole.abs());
+    }
+    for (at, (whole, reduced)) in whole.states().iter().zip(reduced.states()).enumerate() {
+        // Momenta of cyclic coordinates are constant in every stage, so both are one and the same method; a hundred steps of a
+        // hundred roundings each, and angles up to sixty.
+        assert!((whole.q[1] - reduced.q[0]).abs() < 1e-12);
+        assert!((whole.p[1] - reduced.p[0]).abs() < 1e-12);
+        assert!((whole.q[0] - 0.3 - phi[at]).abs() < 1e-11);
+        assert!((whole.q[2] + 0.2 - psi[at]).abs() < 1e-11);
+    }
+    let spin = |motion: &[f64]| motion.iter().copied().fold(0.0, f64::max);
+    let spin = spin(&reduced.outputs().column("spin").expect("declared"));
+    assert!((spin - (6.0 + 0.4 * 0.9_f64.cos())).abs() < 1e-13);
+    // What holds an ignored angle is gone, their velocities have come.
+    assert_eq!(
+        Nutation::OBSERVABLES,
+        ["height", "spin", "psi_rate", "phi_rate"]
+    );
+    let (whole, reduced) = (Top::structure(), Nutation::structure());
+    assert_eq!(whole.conserved, ["phi", "psi"]);
+    assert!(total(reduced.first) < total(whole.first));
+    assert!(total(reduced.second) < total(whole.second));
+}
+
+#[test]
+fn a_hamiltonian_loses_its_cyclic_coordinates_as_well() {
+    let CanonicalTop { a, c, mgl } = CanonicalTop {
+        a: TOP.a,
+        c: TOP.c,
+        mgl: TOP.mgl,
+    };
+    let canonical = CanonicalTop { a, c, mgl };
+    let start = TOP.state([0.3, 0.9, -0.2], [0.4, 0.1, 6.0]);
+    let (nodding, left) = Nodding::of_state(&canonical, &start);
+    let (nutation, _) = Nutation::of_state(&TOP, &start);
+    assert_eq!(left.q, [0.9]);
+    let by_hamiltonian = end(&nodding, left, 2.0, 200);
+    let by_lagrangian = end(&nutation, left, 2.0, 200);
+    assert!(distance(&by_hamiltonian.q, &by_lagrangian.q) < 1e-12);
+    assert!(distance(&by_hamiltonian.p, &by_lagrangian.p) < 1e-12);
+    let rates = [
+        nodding.phi_rate(0.0, [0.9], left.p),
+        nodding.psi_rate(0.0, [0.9], left.p),
+    ];
+    assert!(distance(&rates, &[0.4, 6.0]) < 1e-14);
+}
+
+#[test]
+fn an_integral_says_what_is_missing() {
+    let (nutation, left) = Nutation::of_state(&TOP, &TOP.state([0.0, 0.9, 0.0], [0.4, 0.1, 6.0]));
+    let simulation = Simulation::new(&nutation).step(0.1).record_every(2);
+    let motion = simulation.run(left, 0.0..1.0).expect("a motion");
+    let no_output = motion.integral(&nutation, "phi").expect_err("no output");
+    assert!(
+        no_output
+            .to_string()
+            .contains("`height`, `spin`, `psi_rate`")
+    );
+    assert!(matches!(
+        motion.integral(&nutation, "spin"),
+        Err(tfe::AtError::NotRecorded { .. })
+    ));
 }

@@ -81,7 +81,7 @@ pub(crate) fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
 }
 
 /// Where emitted code finds the runtime: `::tfe`, or what `crate = path` says.
-fn runtime_path(declared: &Declared) -> TokenStream {
+pub(crate) fn runtime_path(declared: &Declared) -> TokenStream {
     match declared
         .crate_path
         .as_deref()

@@ -47,6 +47,9 @@ use proc_macro::TokenStream;
 ///   for all.
 /// * `frozen(q = e)`: coordinates that follow formulas of parameters and the time, of a Lagrangian with a known number of coordinates. They are no coordinates of the new model; forces on them drop
 ///   out.
+/// * `routh(phi, psi)`: cyclic coordinates ignored, on which neither forces nor constraints act. Their momenta become fields `p_phi`, `p_psi`; `Name::of_state(&original, &state)` takes them from a
+///   state and gives what is left of it. Their velocities become outputs `phi_rate`, `psi_rate`, of which `Motion::integral` makes the coordinates again; outputs that hold the coordinates themselves
+///   are left out.
 ///
 /// Velocities `dot(x)` in forces and outputs of a Hamiltonian model mean ∂H/∂p of the Hamiltonian as declared.
 ///

@@ -3,11 +3,11 @@
 use crate::emit::identifier;
 use crate::expand;
 use crate::input::plain;
-use proc_macro2::TokenStream;
+use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 use syn::punctuated::Punctuated;
 use syn::{Attribute, Field, Fields, ItemStruct, Meta, Path, Token, parse_quote};
-use tfe_symbolic::declared::Variant;
+use tfe_symbolic::declared::{Projection, Variant};
 
 /// The derives that hold of the model made as they hold of the original.
 const DERIVES: [&str; 5] = ["Clone", "Copy", "Debug", "PartialEq", "Default"];
@@ -21,8 +21,9 @@ pub(crate) fn expand(variant: &Variant, original: &ItemStruct) -> TokenStream {
     let fields = fields(variant, original);
     let item = renamed(&variant.model.name, &title, fields, original);
     let of = of(variant, &item, original);
+    let of_state = of_state(variant, &item, original);
     let model = expand::model(&variant.model, item);
-    quote!(#model #of)
+    quote!(#model #of #of_state)
 }
 
 /// A struct like the original with another name and other fields.
@@ -129,4 +130,43 @@ fn of(variant: &Variant, item: &ItemStruct, original: &ItemStruct) -> TokenStrea
             }
         }
     }
+}
+
+/// `Name::of_state(&original, &state)`: the conserved momenta are those of a state.
+fn of_state(variant: &Variant, item: &ItemStruct, original: &ItemStruct) -> Option<TokenStream> {
+    let Projection {
+        original: all,
+        kept,
+        held,
+    } = variant.projection.as_ref()?;
+    let (name, from, vis) = (&item.ident, &original.ident, &item.vis);
+    let path = expand::runtime_path(&variant.model);
+    let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+    let left = Literal::usize_unsuffixed(kept.len());
+    let all = Literal::usize_unsuffixed(*all);
+    let [kept, held] = [kept, held].map(|numbers| {
+        let numbers = numbers.iter().copied();
+        numbers.map(Literal::usize_unsuffixed).collect::<Vec<_>>()
+    });
+    let doc = format!(
+        " The model with the parameters of a [`{from}`] and the momenta of a state of it, and what is left of the state."
+    );
+    Some(quote! {
+        #[automatically_derived]
+        #[allow(dead_code)]
+        impl #impl_generics #name #type_generics #where_clause {
+            #[doc = #doc]
+            #vis fn of_state(
+                original: &#from #type_generics,
+                state: &#path::__private::State<#all>,
+            ) -> (Self, #path::__private::State<#left>) {
+                let model = Self::of(original #(, state.p[#held])*);
+                let left = #path::__private::State {
+                    q: [#(state.q[#kept]),*],
+                    p: [#(state.p[#kept]),*],
+                };
+                (model, left)
+            }
+        }
+    })
 }

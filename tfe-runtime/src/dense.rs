@@ -116,6 +116,12 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
+    /// The degree of its polynomials: the number of points at which an element of collocation meets the equations of motion.
+    #[must_use]
+    pub fn degree(&self) -> usize {
+        self.rates.len() / 2
+    }
+
     /// Time at the start.
     #[must_use]
     pub fn start(&self) -> f64 {

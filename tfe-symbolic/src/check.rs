@@ -23,8 +23,8 @@ pub const MAX_COORDINATES: usize = 10_000;
 
 /// The methods that the macro gives every model; outputs become methods beside them.
 const METHODS: &[&str] = &["state", "structure"];
-/// The function that the macro gives every model made from another.
-const VARIANT_METHOD: &str = "of";
+/// The functions that the macro gives models made from another.
+const VARIANT_METHODS: &[&str] = &["of", "of_state"];
 /// One more of models with a time transformation.
 const CLOCK_METHOD: &str = "state_at";
 
@@ -550,7 +550,7 @@ impl Model {
     fn is_method(&self, name: &str) -> bool {
         METHODS.contains(&name)
             || (self.time_transformation.is_some() && name == CLOCK_METHOD)
-            || (!self.variants.is_empty() && name == VARIANT_METHOD)
+            || (!self.variants.is_empty() && VARIANT_METHODS.contains(&name))
     }
 
     /// Names of constraints stand in no formula, but in results beside outputs.

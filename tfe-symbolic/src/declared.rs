@@ -255,6 +255,19 @@ pub struct Variant {
     pub made: String,
     /// The fields that the model has and the original does not, with what they are: scalars, in order.
     pub added: Vec<(String, String)>,
+    /// Where only cyclic coordinates have gone: how a state of the original gives those fields and a state of the model.
+    pub projection: Option<Projection>,
+}
+
+/// Which coordinates and momenta of a model are left in one made from it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Projection {
+    /// How many coordinates there were.
+    pub original: usize,
+    /// The numbers of those that are left, in order.
+    pub kept: Vec<usize>,
+    /// The numbers of those whose momenta are fields now, in the order of the fields.
+    pub held: Vec<usize>,
 }
 
 /// A declared model, ready to be differentiated.

@@ -12,11 +12,12 @@ mod frozen;
 mod inertia;
 mod notation;
 mod removal;
+mod routh;
 mod target;
 mod truncated;
 
 use crate::ast::Name;
-use crate::declared::{Declared, Variant};
+use crate::declared::{Declared, Projection, Variant};
 use crate::diagnostic::{Kind, Span};
 use crate::graph::ExprId;
 pub(crate) use target::Target;
@@ -40,6 +41,8 @@ pub(crate) enum Pass {
     Truncated { degree: u32, point: Vec<Assignment> },
     /// Coordinates that follow given functions.
     Frozen(Vec<Assignment>),
+    /// Cyclic coordinates that are ignored.
+    Routh(Vec<Ignored>),
 }
 
 /// `x = l`
@@ -51,6 +54,13 @@ pub(crate) struct Assignment {
     pub(crate) value: ExprId,
 }
 
+/// `phi`
+#[derive(Clone, Debug)]
+pub(crate) struct Ignored {
+    pub(crate) target: Target,
+    pub(crate) span: Span,
+}
+
 /// A mistake and its place.
 type Mistake = (Span, Kind);
 
@@ -59,14 +69,19 @@ struct Reduction {
     model: Declared,
     /// The fields that passes have added, with what they are.
     added: Vec<(String, String)>,
+    /// The coordinates that are left, by their numbers in the original; as long as only cyclic ones have gone.
+    kept: Vec<usize>,
+    /// Those that have gone, in the order of the fields of their momenta.
+    from_state: Vec<usize>,
 }
 
 impl Reduction {
-    fn pass(&mut self, step: &Step) -> Result<(), Mistake> {
+    fn pass(&mut self, step: &Step, fields: &[String]) -> Result<(), Mistake> {
         let place = |kind| (step.span, kind);
         match &step.pass {
             Pass::Truncated { degree, point } => self.truncate(*degree, point, place),
             Pass::Frozen(held) => self.freeze(held, place),
+            Pass::Routh(ignored) => self.ignore(ignored, fields, place),
         }
     }
 }
@@ -88,14 +103,30 @@ pub(crate) fn variant(
         variants: Vec::new(),
         ..original.clone()
     };
+    let dof = original.dof.as_constant();
+    let dof = dof.and_then(|dof| usize::try_from(dof).ok()).unwrap_or(0);
     let mut reduction = Reduction {
         model,
         added: Vec::new(),
+        kept: (0..dof).collect(),
+        from_state: Vec::new(),
     };
     for step in steps {
-        reduction.pass(step)?;
+        reduction.pass(step, fields)?;
     }
-    let Reduction { mut model, added } = reduction;
+    let Reduction {
+        mut model,
+        added,
+        kept,
+        from_state,
+    } = reduction;
+    // Any other pass changes what momenta mean.
+    let is_routh = |step: &Step| matches!(step.pass, Pass::Routh(_));
+    let projection = steps.iter().all(is_routh).then_some(Projection {
+        original: dof,
+        kept,
+        held: from_state,
+    });
     if let Some(coordinate) = inertia::missing(&mut model) {
         let kind = Kind::MasslessCoordinate {
             model: name.node.clone(),
@@ -107,5 +138,10 @@ pub(crate) fn variant(
     let words: Vec<&str> = steps.iter().map(|step| step.words.as_str()).collect();
     let made = words.join("; ");
     model.notation = notation::of(&model, &original.name, &made);
-    Ok(Variant { model, made, added })
+    Ok(Variant {
+        model,
+        made,
+        added,
+        projection,
+    })
 }

@@ -12,21 +12,24 @@ use tfe_symbolic::ast::Pass;
 pub(super) struct Variant {
     pub(super) name: Ident,
     /// How many coordinates it has less, as far as entries name them one by one.
-    frozen: usize,
+    gone: usize,
+    /// Whether only cyclic coordinates have gone.
+    is_projected: bool,
     /// How many fields it has more.
     added: usize,
 }
 
 impl Variant {
     pub(super) fn of(name: &str, passes: &[Pass]) -> Self {
-        let entries = |word: &str| {
+        let entries = |word: &str| -> usize {
             let own = passes.iter().filter(|pass| pass.word.node == word);
             own.map(|pass| pass.entries.len()).sum()
         };
         Self {
             name: identifier(name),
-            frozen: entries("frozen"),
-            added: entries("elastic"),
+            gone: entries("frozen") + entries("routh"),
+            is_projected: passes.iter().all(|pass| pass.word.node == "routh"),
+            added: entries("elastic") + entries("routh"),
         }
     }
 }
@@ -40,10 +43,12 @@ pub(super) fn stubs(variant: &Variant, item: &DeriveInput, guess: &Guess) -> Tok
         ident: name.clone(),
         ..item.clone()
     };
+    let all = guess.dof.clone();
     let guess = Guess {
-        dof: left(&guess.dof, variant.frozen),
+        dof: left(&guess.dof, variant.gone),
         ..guess.clone()
     };
+    let of_state = variant.is_projected.then(|| of_state(item, &all, &guess));
     let implementations = implementations(&stub, &guess);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
     let generics = &item.generics;
@@ -61,6 +66,22 @@ pub(super) fn stubs(variant: &Variant, item: &DeriveInput, guess: &Guess) -> Tok
             #vis fn of(_: &#original #type_generics #(, #added: f64)*) -> Self {
                 Self {}
             }
+
+            #of_state
+        }
+    }
+}
+
+fn of_state(item: &DeriveInput, all: &TokenStream, guess: &Guess) -> TokenStream {
+    let (original, vis) = (&item.ident, &item.vis);
+    let (_, type_generics, _) = item.generics.split_for_impl();
+    let Guess { path, dof, .. } = guess;
+    quote! {
+        #vis fn of_state(
+            _: &#original #type_generics,
+            _: &#path::__private::State<{ #all }>,
+        ) -> (Self, #path::__private::State<{ #dof }>) {
+            (Self {}, #path::__private::State { q: [0.0; #dof], p: [0.0; #dof] })
         }
     }
 }

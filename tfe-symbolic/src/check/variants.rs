@@ -6,7 +6,7 @@ use crate::context::Context;
 use crate::diagnostic::{Bag, Kind, Role, nearest};
 
 /// What can be done to a model.
-pub const PASSES: &[&str] = &["truncated", "frozen", "rigid", "elastic"];
+pub const PASSES: &[&str] = &["truncated", "frozen", "routh", "rigid", "elastic"];
 
 impl Model {
     /// Names, and the words of the passes; their entries are formulas.

@@ -349,6 +349,33 @@ kinds! {
     NoTaylorPolynomial,
     /// A frozen coordinate of a Hamiltonian.
     FrozenHamiltonian,
+    /// A coordinate to be ignored that formulas hold.
+    NotCyclic {
+        /// The coordinate.
+        name: String,
+    },
+    /// One on which a constraint acts.
+    CyclicConstrained {
+        /// The coordinate.
+        name: String,
+    },
+    /// One on which a force acts, so that its momentum is no constant.
+    CyclicForced {
+        /// The coordinate.
+        name: String,
+    },
+    /// One in whose velocity the Lagrangian is not quadratic.
+    CyclicNotQuadratic {
+        /// The coordinate.
+        name: String,
+    },
+    /// A name that is needed for the momentum or the velocity of an ignored coordinate, and taken.
+    RouthName {
+        /// The name.
+        name: String,
+        /// The coordinate.
+        coordinate: String,
+    },
     /// No coordinate is left.
     NothingLeft {
         /// The pass.

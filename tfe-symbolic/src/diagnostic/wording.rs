@@ -158,6 +158,21 @@ impl Kind {
                 "the model has no Taylor polynomial at the point of the truncation".into()
             }
             Self::FrozenHamiltonian => "coordinates of a Hamiltonian cannot be frozen".into(),
+            Self::NotCyclic { name } => {
+                format!("`{name}` is not cyclic: the energy or a force depends on it")
+            }
+            Self::CyclicConstrained { name } => {
+                format!("`{name}` cannot be ignored: a constraint acts on it")
+            }
+            Self::CyclicForced { name } => {
+                format!("`{name}` cannot be ignored: a force acts on it, so that its momentum is not constant")
+            }
+            Self::CyclicNotQuadratic { name } => {
+                format!("`{name}` cannot be ignored: the Lagrangian is not quadratic in its velocity")
+            }
+            Self::RouthName { name, coordinate } => {
+                format!("`{coordinate}` cannot be ignored: the name `{name}` is taken, and needed for its momentum or velocity")
+            }
             Self::NothingLeft { pass } => format!("`{pass}` leaves no coordinate"),
             Self::ConstraintLeft { name } => {
                 format!("constraint `{name}` holds no coordinate any more")
@@ -475,6 +490,17 @@ impl Kind {
                     .into()
             }
             Self::NoTaylorPolynomial => "give another point, such as `truncated(2, r = l)`".into(),
+            Self::NotCyclic { .. } => {
+                "ignore coordinates only that appear by their velocities; `structure()` lists the cyclic ones".into()
+            }
+            Self::CyclicConstrained { .. } => {
+                "choose coordinates that satisfy the constraint".into()
+            }
+            Self::CyclicForced { name } => {
+                format!("keep `{name}`, or declare the model without the force")
+            }
+            Self::RouthName { name, .. } => format!("give the field or output `{name}` another name"),
+            Self::CyclicNotQuadratic { .. } => "declare the model by a Hamiltonian".into(),
             Self::FrozenHamiltonian => "declare the model by a Lagrangian".into(),
             Self::NothingLeft { .. } => "leave one coordinate at least".into(),
             Self::ConstraintLeft { .. } => {
@@ -570,6 +596,7 @@ fn domain_words(function: Function) -> &'static str {
 fn usage(pass: &str) -> &'static str {
     match pass {
         "frozen" => "frozen(r = l)",
+        "routh" => "routh(phi, psi)",
         "rigid" => "rigid(rod = k)",
         "elastic" => "elastic(rod = k)",
         _ => "truncated(4, theta = 0)",

@@ -5,7 +5,7 @@ use crate::ast::{self, Entry, Expr, ExprKind, Name};
 use crate::diagnostic::Kind;
 use crate::graph::ExprId;
 use crate::input::Input;
-use crate::reduce::{Assignment, MAX_DEGREE, Pass, Step, Target};
+use crate::reduce::{Assignment, Ignored, MAX_DEGREE, Pass, Step, Target};
 
 impl Lowerer<'_> {
     /// The models made from this one: name, and what is done from left to right.
@@ -24,6 +24,7 @@ impl Lowerer<'_> {
         let (lowered, words) = match pass.word.node.as_str() {
             "truncated" => self.truncated(pass)?,
             "frozen" => self.frozen(pass)?,
+            "routh" => self.routh(pass)?,
             _ => return None,
         };
         Some(Step {
@@ -70,6 +71,30 @@ impl Lowerer<'_> {
             Pass::Frozen(held),
             format!("frozen {}", quoted(&pass.entries)),
         ))
+    }
+
+    /// `routh(phi, psi)`
+    fn routh(&mut self, pass: &ast::Pass) -> Option<(Pass, String)> {
+        let wrong = Kind::PassEntry { pass: "routh" };
+        if pass.entries.is_empty() {
+            self.report(pass.word.span, wrong);
+            return None;
+        }
+        let mut ignored = Vec::new();
+        for entry in &pass.entries {
+            let own = target(&entry.value).filter(|target| entry.target.is_none() && !target.rate);
+            let Some(target) = own else {
+                let place = entry.target.as_ref().unwrap_or(&entry.value);
+                self.report(place.span, wrong);
+                return None;
+            };
+            ignored.push(Ignored {
+                target,
+                span: entry.value.span,
+            });
+        }
+        let words = format!("without {}", quoted(&pass.entries));
+        Some((Pass::Routh(ignored), words))
     }
 
     /// All mistakes of a list are reported.

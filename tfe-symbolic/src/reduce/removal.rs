@@ -70,8 +70,8 @@ impl Reduction {
         for force in &mut model.forces {
             force.target = moved(&force.target);
         }
-        model.coordinates = left(&model.coordinates, removed)?;
-        model.momenta = left(&model.momenta, removed)?;
+        model.coordinates = left(&model.coordinates, removed, pass)?;
+        model.momenta = left(&model.momenta, removed, pass)?;
         if model.coordinates.is_empty() {
             return Err(Kind::NothingLeft { pass });
         }
@@ -88,11 +88,15 @@ impl Reduction {
 }
 
 /// The arrays without some of their elements; what is left of an array that lost some is named one by one.
-fn left(arrays: &[CoordinateArray], removed: &[i64]) -> Result<Vec<CoordinateArray>, Kind> {
+fn left(
+    arrays: &[CoordinateArray],
+    removed: &[i64],
+    pass: &'static str,
+) -> Result<Vec<CoordinateArray>, Kind> {
     let mut left = Vec::new();
     let mut next = 0;
     for array in arrays {
-        let unknown = || Kind::PassOfLength { pass: "frozen" };
+        let unknown = || Kind::PassOfLength { pass };
         let first = array.first.as_constant().ok_or_else(unknown)?;
         let length = match &array.length {
             None => 1,
