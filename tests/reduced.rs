@@ -259,3 +259,80 @@ fn an_integral_says_what_is_missing() {
         Err(tfe::AtError::NotRecorded { .. })
     ));
 }
+
+/// A mass on a spring, x and y upwards from the pivot.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y - k/2*(sqrt(x^2 + y^2) - l)^2,
+    output(pull) = k*(sqrt(x^2 + y^2) - l),
+    output(height) = y,
+    model(Stiff, rigid(rod = k)),
+)]
+struct Elastic {
+    m: f64,
+    l: f64,
+    g: f64,
+    k: f64,
+}
+
+/// A mass on a rod.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    constraint(rod) = sqrt(x^2 + y^2) - l,
+    output(height) = y,
+    model(Soft, elastic(rod = k)),
+)]
+struct Rigid {
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
+const RIGID: Rigid = Rigid {
+    m: 1.0,
+    l: 1.0,
+    g: 9.81,
+};
+
+/// The motion from the horizontal over a second.
+fn fall<M: Model<2> + Sync>(model: &M, start: State<2>, steps: u32) -> Motion<2> {
+    let step = 1.0 / f64::from(steps);
+    let simulation = Simulation::new(model).element(Mixed::<5>).step(step);
+    simulation.run(start, 0.0..1.0).expect("a smooth motion")
+}
+
+#[test]
+fn a_rigid_spring_is_a_constraint() {
+    let elastic = Elastic {
+        m: 1.0,
+        l: 1.0,
+        g: 9.81,
+        k: 300.0,
+    };
+    let stiff = Stiff::of(&elastic);
+    assert_eq!([stiff.m, stiff.l, stiff.g], [1.0, 1.0, 9.81]);
+    let one = fall(&stiff, stiff.state([1.0, 0.0], [0.0, 0.0]), 20);
+    let other = fall(&RIGID, RIGID.state([1.0, 0.0], [0.0, 0.0]), 20);
+    for (a, b) in one.states().iter().zip(other.states()) {
+        assert!(distance(&a.q, &b.q) < 1e-13 && distance(&a.p, &b.p) < 1e-13);
+    }
+    assert!(one.constraint_residual().position < 1e-13);
+    // The pull shows k, which is gone.
+    assert_eq!(one.outputs().names(), ["height"]);
+}
+
+#[test]
+fn an_elastic_rod_tends_to_the_rod() {
+    let rod = fall(&RIGID, RIGID.state([1.0, 0.0], [0.0, 0.0]), 2000);
+    let error = |k: f64| {
+        let soft = Soft::of(&RIGID, k);
+        let motion = fall(&soft, soft.state([1.0, 0.0], [0.0, 0.0]), 2000);
+        let pairs = motion.states().iter().zip(rod.states());
+        let errors = pairs.map(|(a, b)| distance(&a.q, &b.q));
+        (1.0 / k, errors.fold(0.0, f64::max))
+    };
+    let points = [1e3, 4e3, 16e3, 64e3].map(error);
+    let order = observed_order(&points, 1e-9, "elastic against rigid");
+    assert!((order - 1.0).abs() < 0.05, "{order} {points:?}");
+}

@@ -50,6 +50,10 @@ use proc_macro::TokenStream;
 /// * `routh(phi, psi)`: cyclic coordinates ignored, on which neither forces nor constraints act. Their momenta become fields `p_phi`, `p_psi`; `Name::of_state(&original, &state)` takes them from a
 ///   state and gives what is left of it. Their velocities become outputs `phi_rate`, `psi_rate`, of which `Motion::integral` makes the coordinates again; outputs that hold the coordinates themselves
 ///   are left out.
+/// * `rigid(rod = k)`: the springs of stiffness k, a field of type `f64`, become constraints. The energy must be linear in k, with a square of a function of positions for its factor; where it is
+///   a sum of several, the constraints are `rod_1`, `rod_2`, …. The field is none of the new model, and outputs that show it are left out.
+/// * `elastic(rod = k)`: the constraint `rod` on positions φ = 0 (all equations of a vector or a range; `rod[2]` for one) becomes a spring of the energy k φ²/2, with k a new field of type `f64`, an
+///   argument of `Name::of(&original, k)` and `pub` if the struct is.
 ///
 /// Velocities `dot(x)` in forces and outputs of a Hamiltonian model mean ∂H/∂p of the Hamiltonian as declared.
 ///

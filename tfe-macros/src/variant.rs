@@ -60,7 +60,7 @@ fn fields(variant: &Variant, original: &ItemStruct) -> Vec<Field> {
     }
     let vis = &original.vis;
     for (name, doc) in &variant.added {
-        let (name, doc) = (identifier(name), format!(" {doc}"));
+        let (name, doc) = (identifier(name), format!(" {doc}."));
         fields.push(parse_quote!(#[doc = #doc] #vis #name: f64));
     }
     fields

@@ -7,11 +7,13 @@
 //! A pass works on lowered expressions, so what it makes is differentiated like anything else. Coordinates are found by their names in the
 //! model at hand, which passes before may have changed; values of entries hold nothing of the state and mean the same in all of them.
 
+mod elastic;
 mod fields;
 mod frozen;
 mod inertia;
 mod notation;
 mod removal;
+mod rigid;
 mod routh;
 mod target;
 mod truncated;
@@ -43,6 +45,10 @@ pub(crate) enum Pass {
     Frozen(Vec<Assignment>),
     /// Cyclic coordinates that are ignored.
     Routh(Vec<Ignored>),
+    /// Springs that become constraints.
+    Rigid(Vec<Spring>),
+    /// Constraints that become springs.
+    Elastic(Vec<Spring>),
 }
 
 /// `x = l`
@@ -59,6 +65,17 @@ pub(crate) struct Assignment {
 pub(crate) struct Ignored {
     pub(crate) target: Target,
     pub(crate) span: Span,
+}
+
+/// `rod = k`
+#[derive(Clone, Debug)]
+pub(crate) struct Spring {
+    /// The name of the constraint.
+    pub(crate) constraint: Target,
+    /// Where it stands.
+    pub(crate) span: Span,
+    /// The field that is the stiffness.
+    pub(crate) stiffness: Name,
 }
 
 /// A mistake and its place.
@@ -82,6 +99,8 @@ impl Reduction {
             Pass::Truncated { degree, point } => self.truncate(*degree, point, place),
             Pass::Frozen(held) => self.freeze(held, place),
             Pass::Routh(ignored) => self.ignore(ignored, fields, place),
+            Pass::Rigid(springs) => springs.iter().try_for_each(|spring| self.stiffen(spring)),
+            Pass::Elastic(springs) => springs.iter().try_for_each(|spring| self.soften(spring)),
         }
     }
 }

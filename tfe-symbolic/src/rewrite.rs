@@ -127,6 +127,27 @@ impl Graph {
         mapping.of(id)
     }
 
+    /// A constant and terms that add up to the expression, sums inside of sums opened.
+    pub(crate) fn terms(&self, id: ExprId) -> (Constant, Vec<(Constant, ExprId)>) {
+        let mut constant = Constant::ZERO;
+        let mut terms = Vec::new();
+        let mut waiting = vec![(Constant::ONE, id)];
+        while let Some((factor, id)) = waiting.pop() {
+            let (multiple, inner) = self.as_multiple(id);
+            let factor = factor * multiple;
+            match (self.as_sum(inner), self.as_constant(inner)) {
+                (Some((own, inner)), _) => {
+                    constant = constant + factor * own;
+                    // From a stack they come in their order.
+                    waiting.extend(inner.iter().rev().map(|(c, x)| (factor * *c, *x)));
+                }
+                (None, Some(value)) => constant = constant + factor * value,
+                (None, None) => terms.push((factor, inner)),
+            }
+        }
+        (constant, terms)
+    }
+
     /// The expression with each sum over a literal range written out; other sums stay.
     ///
     /// # Errors

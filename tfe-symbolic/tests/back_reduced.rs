@@ -334,3 +334,101 @@ fn passes_one_after_another() {
          coordinates: r, θ      parameters: m, l, g, k, c"
     );
 }
+
+const SPRING_IN_A_PLANE: &str = "coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y - k/2*(sqrt(x^2 + y^2) - l)^2";
+
+#[test]
+fn a_spring_becomes_a_rod() {
+    let text = format!(
+        "{SPRING_IN_A_PLANE}, output(height) = y, output(pull) = k*(sqrt(x^2 + y^2) - l), model(Rod, rigid(rod = k))"
+    );
+    let rod = variant(&text, "m g k l");
+    assert_eq!(rod.model.used_fields, ["m", "g", "l"]);
+    let by_hand = "coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y, constraint(rod) = sqrt(x^2 + y^2) - l, output(height) = y";
+    let by_hand = declared(by_hand, "m g l");
+    assert_eq!(rod.model.constraints.len(), 1);
+    assert_eq!(rod.model.constraints[0].name, "rod");
+    assert_eq!(rod.model.constraints[0].kind, by_hand.constraints[0].kind);
+    same(&rod.model, &by_hand, &[0.6, -0.7], &[0.3, 0.4]);
+}
+
+#[test]
+fn springs_of_one_stiffness_become_several_constraints() {
+    let text = "coordinates(q[20]), momenta(p[20]), hamiltonian = sum(i in 0..20, p[i]^2/(2*m)) + k*sum(i in 0..19, (q[i+1] - q[i] - l)^2) + g*q[0],
+        model(Stiff, rigid(link = k))";
+    let stiff = variant(text, "m k l g").model;
+    let names: Vec<&str> = stiff
+        .constraints
+        .iter()
+        .map(|one| one.name.as_str())
+        .collect();
+    assert_eq!(
+        (names.len(), names[0], names[18]),
+        (19, "link_1", "link_19")
+    );
+    let by_hand = "coordinates(q[20]), momenta(p[20]), hamiltonian = sum(i in 0..20, p[i]^2/(2*m)) + g*q[0], constraint(link[i in 0..19]) = q[i] - q[i+1] + l";
+    let by_hand = declared(by_hand, "m l g");
+    let (q, z): (Vec<f64>, Vec<f64>) = (points(20).collect(), points(40).skip(20).collect());
+    let [one, other] = [&stiff, &by_hand].map(|model| run(model, &q, &z));
+    assert!((one.value - other.value).abs() < 1e-13);
+    let mut left: Vec<f64> = one.phi.iter().map(|phi| phi.abs()).collect();
+    let mut right: Vec<f64> = other.phi.iter().map(|phi| phi.abs()).collect();
+    left.sort_by(f64::total_cmp);
+    right.sort_by(f64::total_cmp);
+    assert_eq!(left, right);
+}
+
+#[test]
+fn a_constraint_becomes_a_spring() {
+    let rod = "coordinates(x, y, z), lagrangian = m/2*(dot(x)^2 + dot(y)^2 + dot(z)^2) - m*g*y, constraint(wall) = z - c, constraint(rod) = x^2 + y^2 - l^2, constraint(plane) = z + x*omega";
+    let text =
+        format!("{rod}, model(Soft, elastic(rod = k)), model(Softer, elastic(rod = k, wall = h))");
+    let model = declared(&text, "m g c l omega");
+    let soft = &model.variants[0];
+    let by_hand = "coordinates(x, y, z), lagrangian = m/2*(dot(x)^2 + dot(y)^2 + dot(z)^2) - m*g*y - k/2*(x^2 + y^2 - l^2)^2, constraint(wall) = z - c, constraint(plane) = z + x*omega";
+    same(
+        &soft.model,
+        &declared(by_hand, "m g c l omega k"),
+        &[0.3, 0.5, 0.1],
+        &[0.2, 0.7, -0.4],
+    );
+    assert_eq!(
+        soft.added[0],
+        ("k".to_owned(), "Stiffness in place of `rod`".to_owned())
+    );
+    assert_eq!(soft.model.used_fields, ["m", "g", "c", "l", "omega", "k"]);
+    let rows: Vec<_> = soft
+        .model
+        .constraints
+        .iter()
+        .map(|one| one.row.as_constant())
+        .collect();
+    assert_eq!(rows, [Some(0), Some(1)]);
+    let added: Vec<&str> = model.variants[1]
+        .added
+        .iter()
+        .map(|(name, _)| name.as_str())
+        .collect();
+    assert_eq!(added, ["k", "h"]);
+}
+
+#[test]
+fn families_of_constraints_become_springs() {
+    let written_out = "coordinates(q[4]), lagrangian = sum(i in 0..4, m/2*dot(q[i])^2 - g*q[i]), constraint(link[i in 0..3]) = q[i+1] - q[i] - l, model(Soft, elastic(link = k))";
+    let any_length = "coordinates(q[n]), lagrangian = sum(i in 0..n, m/2*dot(q[i])^2 - g*q[i]), constraint(link[i in 0..n-1]) = q[i+1] - q[i] - l, model(Soft, elastic(link = k))";
+    let by_hand = "coordinates(q[4]), lagrangian = sum(i in 0..4, m/2*dot(q[i])^2 - g*q[i]) - sum(i in 0..3, k/2*(q[i+1] - q[i] - l)^2)";
+    let by_hand = declared(by_hand, "m g l k");
+    let (q, z) = ([0.1, 0.4, -0.3, 0.8], [0.3, 0.1, 0.5, -0.2]);
+    same(&variant(written_out, "m g l").model, &by_hand, &q, &z);
+    let family = variant(any_length, "n m g l").model;
+    assert!(family.is_of_run_time_length());
+    same(&family, &by_hand, &q, &z);
+    let one = written_out.replace("elastic(link = k)", "elastic(link[1] = k)");
+    let one = variant(&one, "m g l").model;
+    let names: Vec<&str> = one
+        .constraints
+        .iter()
+        .map(|one| one.name.as_str())
+        .collect();
+    assert_eq!(names, ["link[0]", "link[2]"]);
+}

@@ -4,6 +4,7 @@ use super::{Guess, implementations};
 use crate::emit::identifier;
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
+use std::collections::BTreeSet;
 use syn::DeriveInput;
 use tfe_symbolic::ast::Pass;
 
@@ -21,15 +22,19 @@ pub(super) struct Variant {
 
 impl Variant {
     pub(super) fn of(name: &str, passes: &[Pass]) -> Self {
-        let entries = |word: &str| -> usize {
-            let own = passes.iter().filter(|pass| pass.word.node == word);
-            own.map(|pass| pass.entries.len()).sum()
+        let entries = |word: &'static str| {
+            let own = passes.iter().filter(move |pass| pass.word.node == word);
+            own.flat_map(|pass| &pass.entries)
         };
+        // One stiffness may stand for several springs.
+        let added: BTreeSet<String> = entries("elastic")
+            .map(|entry| entry.value.to_string())
+            .collect();
         Self {
             name: identifier(name),
-            gone: entries("frozen") + entries("routh"),
+            gone: entries("frozen").count() + entries("routh").count(),
             is_projected: passes.iter().all(|pass| pass.word.node == "routh"),
-            added: entries("elastic") + entries("routh"),
+            added: added.len() + entries("routh").count(),
         }
     }
 }

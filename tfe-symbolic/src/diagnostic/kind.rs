@@ -376,6 +376,25 @@ kinds! {
         /// The coordinate.
         coordinate: String,
     },
+    /// A field whose energy is no square of a function of positions.
+    NotASpring {
+        /// The field.
+        field: String,
+        /// What is found instead.
+        found: String,
+    },
+    /// A constraint, in an entry of a pass, that the model does not have.
+    UnknownConstraint {
+        /// What is named.
+        name: String,
+        /// What may have been meant.
+        nearest: Option<String>,
+    },
+    /// A constraint on velocities that should become a spring.
+    ElasticVelocity {
+        /// The constraint.
+        name: String,
+    },
     /// No coordinate is left.
     NothingLeft {
         /// The pass.

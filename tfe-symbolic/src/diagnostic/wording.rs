@@ -173,6 +173,15 @@ impl Kind {
             Self::RouthName { name, coordinate } => {
                 format!("`{coordinate}` cannot be ignored: the name `{name}` is taken, and needed for its momentum or velocity")
             }
+            Self::NotASpring { field, found } => {
+                format!("`{field}` is not the stiffness of a spring: {found}")
+            }
+            Self::UnknownConstraint { name, .. } => {
+                format!("`{name}` is not a constraint of the model")
+            }
+            Self::ElasticVelocity { name } => {
+                format!("constraint `{name}` holds velocities and cannot become a spring")
+            }
             Self::NothingLeft { pass } => format!("`{pass}` leaves no coordinate"),
             Self::ConstraintLeft { name } => {
                 format!("constraint `{name}` holds no coordinate any more")
@@ -329,6 +338,10 @@ impl Kind {
             | Self::UnknownCoordinate {
                 nearest: Some(nearest),
                 ..
+            }
+            | Self::UnknownConstraint {
+                nearest: Some(nearest),
+                ..
             } => {
                 format!("did you mean `{nearest}`?")
             }
@@ -476,9 +489,9 @@ impl Kind {
             }
             Self::RepeatedEntry { .. } => "give it once".into(),
             Self::PassValue { .. } => "write numbers and fields of the struct".into(),
-            Self::PassOfLength { pass: "frozen" } => {
-                "give arrays of coordinates literal lengths of at most some thousand".into()
-            }
+            Self::PassOfLength {
+                pass: "frozen" | "rigid" | "elastic",
+            } => "give arrays of coordinates literal lengths of at most some thousand".into(),
             Self::PassOfLength { .. } => {
                 "give arrays of coordinates literal lengths of at most some thousand, or say the \
                  same of all elements of the only array"
@@ -502,6 +515,14 @@ impl Kind {
             Self::RouthName { name, .. } => format!("give the field or output `{name}` another name"),
             Self::CyclicNotQuadratic { .. } => "declare the model by a Hamiltonian".into(),
             Self::FrozenHamiltonian => "declare the model by a Lagrangian".into(),
+            Self::NotASpring { .. } => {
+                "name a field of type `f64` whose energy is a square, such as `k/2*(r - l)^2`"
+                    .into()
+            }
+            Self::UnknownConstraint { nearest: None, .. } => "name a constraint as declared".into(),
+            Self::ElasticVelocity { .. } => {
+                "name constraints on positions, or declare a `dissipation` instead".into()
+            }
             Self::NothingLeft { .. } => "leave one coordinate at least".into(),
             Self::ConstraintLeft { .. } => {
                 "freeze fewer coordinates, or declare the constraint in another model".into()

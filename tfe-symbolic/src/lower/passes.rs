@@ -2,10 +2,12 @@
 
 use super::{Lowerer, Setting};
 use crate::ast::{self, Entry, Expr, ExprKind, Name};
-use crate::diagnostic::Kind;
+use crate::check::{Symbol, reserved};
+use crate::context::FieldKind;
+use crate::diagnostic::{Kind, Span, nearest};
 use crate::graph::ExprId;
 use crate::input::Input;
-use crate::reduce::{Assignment, Ignored, MAX_DEGREE, Pass, Step, Target};
+use crate::reduce::{Assignment, Ignored, MAX_DEGREE, Pass, Spring, Step, Target};
 
 impl Lowerer<'_> {
     /// The models made from this one: name, and what is done from left to right.
@@ -25,6 +27,8 @@ impl Lowerer<'_> {
             "truncated" => self.truncated(pass)?,
             "frozen" => self.frozen(pass)?,
             "routh" => self.routh(pass)?,
+            "rigid" => self.rigid(pass)?,
+            "elastic" => self.elastic(pass)?,
             _ => return None,
         };
         Some(Step {
@@ -95,6 +99,106 @@ impl Lowerer<'_> {
         }
         let words = format!("without {}", quoted(&pass.entries));
         Some((Pass::Routh(ignored), words))
+    }
+
+    /// `rigid(rod = k)`
+    fn rigid(&mut self, pass: &ast::Pass) -> Option<(Pass, String)> {
+        let springs = self.springs("rigid", pass, Self::stiffness)?;
+        let words: Vec<String> = springs
+            .iter()
+            .map(|spring| {
+                format!(
+                    "spring `{}` rigid as `{}`",
+                    spring.stiffness, spring.constraint
+                )
+            })
+            .collect();
+        Some((Pass::Rigid(springs), words.join(", ")))
+    }
+
+    /// `elastic(rod = k)`
+    fn elastic(&mut self, pass: &ast::Pass) -> Option<(Pass, String)> {
+        let springs = self.springs("elastic", pass, Self::new_stiffness)?;
+        let words: Vec<String> = springs
+            .iter()
+            .map(|spring| {
+                format!(
+                    "constraint `{}` elastic with stiffness `{}`",
+                    spring.constraint, spring.stiffness
+                )
+            })
+            .collect();
+        Some((Pass::Elastic(springs), words.join(", ")))
+    }
+
+    /// All mistakes of a list are reported.
+    fn springs(
+        &mut self,
+        word: &'static str,
+        pass: &ast::Pass,
+        stiffness: fn(&mut Self, &str, Span) -> Option<()>,
+    ) -> Option<Vec<Spring>> {
+        if pass.entries.is_empty() {
+            self.report(pass.word.span, Kind::PassEntry { pass: word });
+        }
+        let mut springs = Vec::new();
+        for entry in &pass.entries {
+            let constraint = entry.target.as_ref().and_then(target);
+            let constraint = constraint.filter(|target| !target.rate);
+            let span = entry.target.as_ref().unwrap_or(&entry.value).span;
+            let (Some(constraint), ExprKind::Name(name)) = (constraint, &entry.value.node) else {
+                self.report(span, Kind::PassEntry { pass: word });
+                continue;
+            };
+            if stiffness(self, name, entry.value.span).is_some() {
+                springs.push(Spring {
+                    constraint,
+                    span,
+                    stiffness: Name::new(name.clone(), entry.value.span),
+                });
+            }
+        }
+        (springs.len() == pass.entries.len() && !springs.is_empty()).then_some(springs)
+    }
+
+    /// A field of type `f64`.
+    fn stiffness(&mut self, name: &str, span: Span) -> Option<()> {
+        match self.symbol(name) {
+            Some(Symbol::Field(at)) if self.context.fields[*at].kind == FieldKind::Scalar => {
+                Some(())
+            }
+            Some(symbol) => {
+                let found = format!("it is {}", symbol.role());
+                let field = name.to_owned();
+                self.report(span, Kind::NotASpring { field, found });
+                None
+            }
+            None => {
+                let fields = self.context.fields.iter();
+                let scalars = fields.filter(|field| field.kind == FieldKind::Scalar);
+                let kind = Kind::UnknownParameter {
+                    name: name.to_owned(),
+                    nearest: nearest(name, scalars.map(|field| field.name.as_str())),
+                };
+                self.report(span, kind);
+                None
+            }
+        }
+    }
+
+    /// A name that nothing has.
+    fn new_stiffness(&mut self, name: &str, span: Span) -> Option<()> {
+        let taken = self.symbol(name).map(|symbol| Kind::NameClash {
+            name: name.to_owned(),
+            taken: symbol.role(),
+        });
+        match taken.or_else(|| reserved(name, false)) {
+            Some(kind) => {
+                self.report(span, kind);
+                None
+            }
+            None => Some(()),
+        }
     }
 
     /// All mistakes of a list are reported.

@@ -18,6 +18,8 @@ pub(super) fn wanted(rules: &[Rule]) -> String {
             _ if operator && starts_expression(*rule) => continue,
             Rule::open_index | Rule::index if operator => continue,
             Rule::name | Rule::array => "a name",
+            // An expression could begin with a number, too.
+            Rule::identifier if !rules.contains(&Rule::number) => "a name",
             _ if starts_expression(*rule) => "an expression",
             Rule::word_in => "`in`",
             Rule::dots => "`..`",

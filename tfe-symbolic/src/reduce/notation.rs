@@ -40,7 +40,7 @@ pub(super) fn of(model: &Declared, original: &str, made: &str) -> Notation {
 }
 
 /// An expression in mathematical notation; nothing where it is long or holds indices that vary.
-fn text(model: &Declared, value: ExprId) -> Option<String> {
+pub(super) fn text(model: &Declared, value: ExprId) -> Option<String> {
     let mut graph = model.graph.clone();
     let (coordinates, momenta) = (names(&model.coordinates), names(&model.momenta));
     let mut nameless = false;

@@ -147,7 +147,9 @@ impl Reduction {
         if is_singular(graph, polynomial) {
             return Err(Kind::NoTaylorPolynomial);
         }
-        Ok(opened(graph, polynomial))
+        // Derivatives of different order share terms.
+        let (constant, terms) = graph.terms(polynomial);
+        Ok(graph.linear(constant, &terms))
     }
 }
 
@@ -206,23 +208,4 @@ fn is_singular(graph: &Graph, id: ExprId) -> bool {
                 .iter()
                 .all(|child| constant(child).is_some()),
         })
-}
-
-/// The polynomial as one sum: derivatives of different order share terms.
-fn opened(graph: &mut Graph, id: ExprId) -> ExprId {
-    let mut constant = Constant::ZERO;
-    let mut terms = Vec::new();
-    let mut waiting = vec![(Constant::ONE, id)];
-    while let Some((factor, id)) = waiting.pop() {
-        let (multiple, inner) = graph.as_multiple(id);
-        let factor = factor * multiple;
-        match graph.as_sum(inner) {
-            Some((own, inner)) => {
-                constant = constant + factor * own;
-                waiting.extend(inner.iter().map(|(c, x)| (factor * *c, *x)));
-            }
-            None => terms.push((factor, inner)),
-        }
-    }
-    graph.linear(constant, &terms)
 }
