@@ -42,10 +42,7 @@ const PENDULUM: Pendulum = Pendulum {
 };
 
 /// The state at the end of a run of nine nodes, which leave rounding only.
-fn end<M: Model<N>, const N: usize>(model: &M, start: State<N>, span: f64, steps: u32) -> State<N>
-where
-    M: Sync,
-{
+fn end<M: Model<N>, const N: usize>(model: &M, start: State<N>, span: f64, steps: u32) -> State<N> {
     let step = span / f64::from(steps);
     let simulation = Simulation::new(model).element(Mixed::<9>).step(step);
     let motion = simulation.run(start, 0.0..span).expect("a smooth motion");
@@ -296,7 +293,7 @@ const RIGID: Rigid = Rigid {
 };
 
 /// The motion from the horizontal over a second.
-fn fall<M: Model<2> + Sync>(model: &M, start: State<2>, steps: u32) -> Motion<2> {
+fn fall<M: Model<2>>(model: &M, start: State<2>, steps: u32) -> Motion<2> {
     let step = 1.0 / f64::from(steps);
     let simulation = Simulation::new(model).element(Mixed::<5>).step(step);
     simulation.run(start, 0.0..1.0).expect("a smooth motion")
@@ -335,4 +332,98 @@ fn an_elastic_rod_tends_to_the_rod() {
     let points = [1e3, 4e3, 16e3, 64e3].map(error);
     let order = observed_order(&points, 1e-9, "elastic against rigid");
     assert!((order - 1.0).abs() < 0.05, "{order} {points:?}");
+}
+
+/// A chain of any length between walls, springs that harden.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1] - q[i])^2 + a/4*(q[i+1] - q[i])^4)
+        - k/2*(q[0]^2 + q[n-1]^2),
+    output(stretch) = q[n-1] - q[0],
+    model(Harmonic, truncated(2)),
+)]
+struct Chain {
+    n: usize,
+    m: f64,
+    k: f64,
+    a: f64,
+}
+
+/// A chain of rods on a line, which may be springs as well.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - k/2*q[0]^2,
+    constraint(rod[i in 0..n-1]) = q[i+1] - q[i] - l,
+    model(Springs, elastic(rod = stiffness)),
+)]
+struct Rods {
+    n: usize,
+    m: f64,
+    k: f64,
+    l: f64,
+}
+
+/// A lattice whose length is a const parameter.
+#[dynamics(
+    coordinates(q[N]),
+    lagrangian = sum(i in 0..N, dot(q[i])^2/2 - w[i]*(1 - cos(q[i]))),
+    sensitivity(w[0]),
+    model(Small, truncated(2)),
+)]
+#[derive(Clone, Copy)]
+struct Pendulums<const N: usize> {
+    w: [f64; N],
+}
+
+#[test]
+fn a_chain_of_any_length_becomes_harmonic() {
+    let chain = Chain {
+        n: 9,
+        m: 1.3,
+        k: 2.0,
+        a: 5.0,
+    };
+    let harmonic = Harmonic::of(&chain);
+    let Harmonic { n, m, k } = harmonic;
+    assert!(Harmonic::structure().facts.linear);
+    // Mode 2: q_i = sin(2π(i + 1)/(n + 1)) cos ωt, ω = 2 √(k/m) sin(π/(n + 1))
+    let angle = 2.0 * std::f64::consts::PI / (n + 1) as f64;
+    let omega = 2.0 * (k / m).sqrt() * (angle / 2.0).sin();
+    let shape: Vec<f64> = (1..=n).map(|i| (angle * i as f64).sin()).collect();
+    let start = harmonic.state(shape.clone(), vec![0.0; n]);
+    let simulation = Simulation::new(&harmonic).element(Mixed::<9>).step(0.25);
+    let motion = simulation.run(start, 0.0..10.0).expect("a linear motion");
+    let last = motion.states().last().expect("the end");
+    for (q, shape) in last.q.iter().zip(&shape) {
+        assert!((q - shape * (omega * 10.0).cos()).abs() < 1e-13);
+    }
+}
+
+#[test]
+fn rods_of_any_length_become_springs() {
+    let rods = Rods {
+        n: 6,
+        m: 1.0,
+        k: 1.0,
+        l: 0.5,
+    };
+    let springs = Springs::of(&rods, 7.0);
+    assert_eq!((springs.n, springs.l, springs.stiffness), (6, 0.5, 7.0));
+    let relaxed: Vec<f64> = (0..6).map(|i| 0.5 * f64::from(i)).collect();
+    let start = springs.state(relaxed.clone(), vec![0.0; 6]);
+    let simulation = Simulation::new(&springs).element(Mixed::<5>).step(0.1);
+    let motion = simulation.run(start, 0.0..3.0).expect("springs");
+    // Nothing pulls: all forces vanish.
+    let last = motion.states().last().expect("the end");
+    assert!(distance(&last.q, &relaxed) < 1e-13, "{:?}", last.q);
+}
+
+#[test]
+fn a_length_that_is_a_const_parameter() {
+    let pendulums = Pendulums { w: [1.0, 4.0, 9.0] };
+    let small = Small::of(&pendulums);
+    let end = end(&small, small.state([0.5; 3], [0.0; 3]), 2.0, 20);
+    let expected = [1.0, 2.0, 3.0].map(|omega: f64| 0.5 * (2.0 * omega).cos());
+    assert!(distance(&end.q, &expected) < 1e-14, "{end:?}");
+    assert_eq!(<Small<3> as Model<3>>::SENSITIVITIES, ["w[0]"]);
 }

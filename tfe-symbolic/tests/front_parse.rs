@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use tfe_symbolic::ast::{
-    BinaryOperator, Comparison, ElementSyntax, Expr, ExprKind, Item, Range, Spanned,
+    BinaryOperator, Comparison, ElementSyntax, Entry, Expr, ExprKind, Item, Pass, Range, Spanned,
 };
 use tfe_symbolic::compile::declare;
 use tfe_symbolic::context::Context;
@@ -291,7 +291,17 @@ fn item() -> impl Strategy<Value = Item> {
     let ranges = || prop::option::of(range(expr()));
     let rule = prop::option::of((name(), prop::option::of(0..100u64)))
         .prop_map(|rule| rule.map(|(name, argument)| (spanned(name), argument.map(spanned))));
+    let entry = (prop::option::of(expr()), expr());
+    let entry = entry.prop_map(|(target, value)| Entry { target, value });
+    let pass = (name(), prop::collection::vec(entry, 0..3)).prop_map(|(word, entries)| Pass {
+        word: spanned(word),
+        entries,
+    });
     prop_oneof![
+        (name(), prop::collection::vec(pass, 0..3)).prop_map(|(name, passes)| Item::Model {
+            name: spanned(name),
+            passes,
+        }),
         expr().prop_map(Item::Lagrangian),
         expr().prop_map(Item::Hamiltonian),
         expr().prop_map(Item::Dissipation),
