@@ -76,7 +76,8 @@ pub use ladder::{Choice, Ladder, Rung, RungPoint};
 /// ```
 ///
 /// Times are those of the steps alone, on one processor, the best of several repetitions where a run is short, as in
-/// [`WorkPrecision`](crate::WorkPrecision). The reference is a run of the last rung with `Mixed::<9>` whose step is halved until two runs agree to a
+/// [`WorkPrecision`](crate::WorkPrecision); nothing inside elements is asked for, so linear models of fixed size step by a matrix where that pays, as they do with
+/// [`record_every`](crate::Simulation::record_every). The reference is a run of the last rung with `Mixed::<9>` whose step is halved until two runs agree to a
 /// tenth of the smallest accuracy or approach no more; accuracies below twice its uncertainty are not known, and nothing is chosen for them.
 pub struct Fidelity<'m> {
     span: Range<f64>,
@@ -252,6 +253,9 @@ impl<'m> Fidelity<'m> {
         }
         for element in &self.elements {
             element.validate().map_err(FidelityError::Element)?;
+        }
+        if self.accuracies.is_empty() {
+            return Err(FidelityError::NoAccuracies);
         }
         let is_right = |accuracy: &f64| accuracy.is_finite() && *accuracy > 0.0;
         if let Some(&accuracy) = self.accuracies.iter().find(|one| !is_right(one)) {

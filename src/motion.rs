@@ -37,19 +37,20 @@ impl<const N: usize> Node<N> {
 /// The observables that a model declares by `output(name) = …`, one column each, one row a recorded node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outputs {
-    names: &'static [&'static str],
+    names: Vec<CoordinateName>,
     values: Vec<f64>,
 }
 
 impl Outputs {
     /// The names, in the order of declaration.
-    pub fn names(&self) -> &'static [&'static str] {
-        self.names
+    pub fn names(&self) -> &[CoordinateName] {
+        &self.names
     }
 
     /// The values of one observable at the recorded nodes; `None` where the model declares no such name.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
-        let at = self.names.iter().position(|candidate| *candidate == name)?;
+        let is_it = |candidate: &CoordinateName| candidate.to_string() == name;
+        let at = self.names.iter().position(is_it)?;
         Some(
             self.values
                 .iter()
@@ -93,7 +94,9 @@ impl<const N: usize> Motion<N> {
             velocities: Vec::new(),
             energies: Vec::new(),
             outputs: Outputs {
-                names: M::OBSERVABLES,
+                names: (0..model.columns())
+                    .map(|at| model.column_name(at))
+                    .collect(),
                 values: Vec::new(),
             },
             reactions: Reactions {
@@ -131,16 +134,15 @@ impl<const N: usize> Motion<N> {
         }
         self.velocities.push(velocity);
         self.energies.push(energy);
-        if !M::OBSERVABLES.is_empty() {
+        let columns = model.columns();
+        if columns > 0 {
             let z = if matches!(M::FORM, Form::Lagrangian) {
                 &velocity
             } else {
                 &state.p
             };
             let start = self.outputs.values.len();
-            self.outputs
-                .values
-                .resize(start + M::OBSERVABLES.len(), 0.0);
+            self.outputs.values.resize(start + columns, 0.0);
             model.observables(t, &state.q, z, &mut self.outputs.values[start..]);
         }
     }
@@ -368,7 +370,7 @@ impl<const N: usize> Motion<N> {
         header.extend(self.names.iter().map(|name| format!("{name}_dot")));
         header.extend(self.names.iter().map(|name| format!("p_{name}")));
         header.push("energy".to_owned());
-        header.extend(self.outputs.names.iter().map(|name| (*name).to_owned()));
+        header.extend(self.outputs.names.iter().map(ToString::to_string));
         header.extend(
             self.reactions
                 .names

@@ -43,6 +43,16 @@ struct Bob {
     w: f64,
 }
 
+/// The root of an angle that becomes negative.
+#[dynamics(
+    coordinates(theta),
+    lagrangian = dot(theta)^2/2 + w^2*cos(theta),
+    output(angle) = sqrt(theta),
+)]
+struct Lost {
+    w: f64,
+}
+
 /// Pendulums side by side, of which the first is looked at.
 #[dynamics(
     coordinates(theta[n]),
@@ -211,6 +221,29 @@ fn runs_that_fail_are_points_with_reasons() {
 }
 
 #[test]
+fn outputs_that_are_no_numbers_are_never_chosen() {
+    let (lost, full) = (Lost { w: W }, Full { w: W });
+    let start = State { q: [0.1], p: [0.0] };
+    let small = || {
+        ladder(0.0..2.0)
+            .elements([Mixed::<5>.into()])
+            .accuracies([1e-3])
+            .most_steps(128)
+    };
+    let found = small()
+        .rung("lost", &lost, start)
+        .rung("full", &full, start);
+    let found = found.run().unwrap();
+    assert!(found.rungs()[0].choices().all(|one| one.error.is_nan()));
+    assert!(found.rungs()[0].front(Cost::Steps).is_empty());
+    assert_eq!(found.cheapest(1e9).unwrap().rung, "full");
+    let nothing = small()
+        .rung("full", &full, start)
+        .rung("lost", &lost, start);
+    assert_eq!(nothing.run().unwrap_err(), FidelityError::ReferenceValue);
+}
+
+#[test]
 fn what_is_no_ladder() {
     let (linear, bob, full) = (Linear { w: W }, Bob { w: W }, Full { w: W });
     let start = || State { q: [0.1], p: [0.0] };
@@ -252,6 +285,8 @@ fn what_is_no_ladder() {
     );
     let is = |one: &E| matches!(one, E::Element(_));
     check(&two().elements([Element::mixed(99)]), is, "99");
+    let is = |one: &E| matches!(one, E::NoAccuracies);
+    check(&two().accuracies([]), is, ".accuracies(");
     for accuracy in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let is = |one: &E| matches!(one, E::Accuracy { .. });
         check(&two().accuracies([accuracy]), is, "accuracy");

@@ -41,6 +41,8 @@ pub enum FidelityError {
     NoElements,
     /// An element does not exist (number of nodes, quadrature).
     Element(ElementError),
+    /// No accuracy was asked for.
+    NoAccuracies,
     /// An accuracy is not positive, or not finite.
     Accuracy {
         /// What was asked for.
@@ -90,6 +92,9 @@ impl fmt::Display for FidelityError {
                 f.write_str("there is no element to try; name some in `.elements([…])`, or leave that out")
             }
             Self::Element(error) => error.fmt(f),
+            Self::NoAccuracies => f.write_str(
+                "there is no accuracy to meet; name some in `.accuracies([…])`, or leave that out",
+            ),
             Self::Accuracy { accuracy } => write!(
                 f,
                 "an accuracy is {accuracy}, but it must be finite and greater than zero"

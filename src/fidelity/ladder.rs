@@ -117,6 +117,11 @@ pub struct Ladder {
 }
 
 impl Ladder {
+    /// The title of charts.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
     /// All rungs, the last of them the truth, in the order in which they were added.
     pub fn rungs(&self) -> &[Rung] {
         &self.rungs

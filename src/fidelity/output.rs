@@ -40,7 +40,7 @@ impl Ladder {
 
     /// What is chosen for an accuracy: rung, element, step, error, time; or why nothing is.
     fn row(&self, accuracy: f64) -> [String; 6] {
-        let asked = format!("{accuracy:.0e}");
+        let asked = format!("{accuracy:.1e}").replace(".0e", "e");
         match self.cheapest(accuracy) {
             Some(one) => [
                 asked,

@@ -47,6 +47,12 @@ pub(super) trait Runs {
     fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind>;
 }
 
+impl<M: Subject<S>, S: PhasePoint> Scene<'_, M, S> {
+    fn stepper(&self, way: Way<'_>) -> Result<M::Stepper<'_>, RunErrorKind> {
+        self.model.stepper(way.element, way.control)
+    }
+}
+
 impl<M: Subject<S>, S: PhasePoint> Runs for Scene<'_, M, S> {
     fn names(&self) -> Result<Vec<String>, RunErrorKind> {
         self.model.output_names()
@@ -58,7 +64,7 @@ impl<M: Subject<S>, S: PhasePoint> Runs for Scene<'_, M, S> {
     }
 
     fn look(&self, way: Way<'_>, outputs: Outputs<'_>) -> Result<Seen, RunErrorKind> {
-        let mut stepper = self.model.stepper(way.element, way.control)?;
+        let mut stepper = self.stepper(way)?;
         let (grid, mut state, mut time) = (way.grid, self.start.clone(), Duration::ZERO);
         let steps = grid.steps() / outputs.parts;
         let mut rows = Vec::with_capacity(outputs.parts + 1);
@@ -78,7 +84,6 @@ impl<M: Subject<S>, S: PhasePoint> Runs for Scene<'_, M, S> {
 
     fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind> {
         let (grid, mut state) = (way.grid, self.start.clone());
-        let mut stepper = self.model.stepper(way.element, way.control)?;
-        advance::<M, S>(&mut stepper, grid, 0..grid.steps(), &mut state)
+        advance::<M, S>(&mut self.stepper(way)?, grid, 0..grid.steps(), &mut state)
     }
 }

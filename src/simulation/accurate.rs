@@ -455,11 +455,13 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
     }
 
     fn columns(&self) -> usize {
-        M::OBSERVABLES.len()
+        self.model.columns()
     }
 
     fn outputs(&self) -> Vec<String> {
-        M::OBSERVABLES.iter().map(ToString::to_string).collect()
+        let columns = 0..self.model.columns();
+        let name = |at| self.model.column_name(at).to_string();
+        columns.map(name).collect()
     }
 
     fn stepper(
@@ -498,7 +500,7 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
     fn row(&self, _: &mut Stepper<'m, M, N>, t: f64, state: &State<N>, row: &mut [f64]) {
         row[..N].copy_from_slice(&state.q);
         row[N..2 * N].copy_from_slice(&state.p);
-        if const { M::OBSERVABLES.is_empty() } {
+        if self.model.columns() == 0 {
             return;
         }
         let z = match M::FORM {

@@ -206,7 +206,23 @@ impl<'a, M: Subject<S>, S: PhasePoint> Observer<'a, M, S> {
 
 /// Keeps the larger one; `f64::max` would drop a NaN.
 pub(crate) fn largest(so_far: &mut f64, value: f64) {
-    if !(value <= *so_far) {
+    if !(value <= *so_far || so_far.is_nan()) {
         *so_far = value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::largest;
+
+    #[test]
+    fn a_nan_stays_whatever_follows() {
+        let of = |values: [f64; 3]| {
+            let mut so_far = 0.0;
+            values.iter().for_each(|value| largest(&mut so_far, *value));
+            so_far
+        };
+        assert!(of([1.0, f64::NAN, 2.0]).is_nan());
+        assert_eq!(of([1.0, 3.0, 2.0]), 3.0);
     }
 }

@@ -146,7 +146,7 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
         control: Control,
     ) -> Result<Stepper<'_, M, N>, RunErrorKind> {
         let stepper = Stepper::new(self, element, control);
-        // As in a simulation of which the ends of elements are kept.
+        // Nobody asks what is inside an element: linear models step by a matrix where that pays.
         stepper
             .map(Stepper::ends_only)
             .map_err(RunErrorKind::Element)
@@ -199,12 +199,12 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
     }
 
     fn output_names(&self) -> Result<Vec<String>, RunErrorKind> {
-        let names = M::OBSERVABLES.iter();
-        Ok(names.map(|name| (*name).to_owned()).collect())
+        let columns = 0..self.columns();
+        Ok(columns.map(|at| self.column_name(at).to_string()).collect())
     }
 
     fn outputs(&self, _: &mut Stepper<'_, M, N>, t: f64, state: &State<N>) -> Vec<f64> {
-        let mut values = vec![0.0; M::OBSERVABLES.len()];
+        let mut values = vec![0.0; self.columns()];
         let z = match M::FORM {
             Form::Lagrangian => {
                 let rest = [0.0; N];

@@ -278,10 +278,23 @@ pub trait Model<const N: usize> {
     /// The names of the coordinates, in order (`theta1`, `q[0]`, `q[1]`, …).
     fn coordinate_name(index: usize) -> CoordinateName;
 
-    /// The names of the observables.
+    /// The names of the observables as declared.
     const OBSERVABLES: &'static [&'static str] = &[];
 
-    /// The observables, one for each name.
+    /// The number of observables: one for each name. More or others where a model is made of another one at run time.
+    fn columns(&self) -> usize {
+        Self::OBSERVABLES.len()
+    }
+
+    /// The name of an observable.
+    fn column_name(&self, column: usize) -> CoordinateName {
+        match Self::OBSERVABLES.get(column) {
+            Some(name) => CoordinateName::single(name),
+            None => CoordinateName::element("", column),
+        }
+    }
+
+    /// The observables, one for each column.
     fn observables<R: Real>(&self, _t: R, _q: &[R; N], _z: &[R; N], _values: &mut [R]) {}
 }
 
