@@ -15,6 +15,7 @@ pub mod error;
 pub mod family;
 pub mod fidelity;
 pub mod linearised;
+pub mod modal;
 pub mod motion;
 pub mod periodic;
 pub mod periodic_schur;
@@ -32,6 +33,7 @@ pub use ensemble::Ensemble;
 pub use error::{AtError, RunError, RunErrorKind};
 pub use fidelity::Fidelity;
 pub use linearised::Linearised;
+pub use modal::Modal;
 pub use motion::{Motion, Node, Outputs};
 pub use periodic::{Orbit, PeriodicOrbit};
 pub use simulation::{Simulation, Steps, Warning};
@@ -71,8 +73,8 @@ pub use work_precision::WorkPrecision;
 pub mod prelude {
     pub use crate::{
         BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Ensemble,
-        Fidelity, Mixed, Model, Motion, Node, PeriodicOrbit, Primal, Radau, Simulation, Solve,
-        State, ThreeField, WorkPrecision, dynamics, stability,
+        Fidelity, Mixed, Modal, Model, Motion, Node, PeriodicOrbit, Primal, Radau, Simulation,
+        Solve, State, ThreeField, WorkPrecision, dynamics, stability,
     };
 }
 

@@ -7,10 +7,11 @@
 //!
 //! The scenes are those of `speed_accuracy`. First, estimated errors beside true ones for elements of every family and many steps; then, for accuracies from 1e-4 to
 //! 1e-11, what `Simulation::accuracy` picks, the true error, and its time beside that of the best element, step and tolerance that trial finds, all searching
-//! included; last, a chaotic motion and how far it can be had.
+//! included; then a chaotic motion and how far it can be had; last, ladders of models: which of several is just good enough.
 
 mod chaos;
 mod estimates;
+mod ladders;
 mod picks;
 #[path = "../speed_accuracy/scenes/mod.rs"]
 #[allow(dead_code, reason = "the other example compares them with more")]
@@ -127,11 +128,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let picks = picks::section(&scenes)?;
     let chaos = chaos::section()?;
     let path = folder.join("enough.html");
-    Page::new("Enough and no more")
+    let page = Page::new("Enough and no more")
         .section(estimates)
         .section(picks)
-        .section(chaos)
-        .save(&path)?;
+        .section(chaos);
+    let page = ladders::sections()?.into_iter().fold(page, Page::section);
+    page.save(&path)?;
     println!("\n{}", path.display());
     Ok(())
 }

@@ -1,0 +1,269 @@
+//! Modal reduction: a large linear model by its lowest modes.
+
+mod eigen;
+mod error;
+mod full;
+
+use std::fmt;
+use std::marker::PhantomData;
+use tfe_runtime::family::FamilyState;
+use tfe_runtime::{CoordinateName, Facts, First, Form, Model, Real, Second, State};
+
+use crate::work_precision::PhasePoint;
+use eigen::Modes;
+
+pub use error::ModalError;
+pub use full::Reducible;
+
+/// A linear model by its `R` lowest modes: itself a model, with the amplitudes of the modes as coordinates.
+///
+/// ```text
+/// q = q_s + Φ a ,     K Φ = M Φ diag(ω²) ,     Φᵀ M Φ = 1                        (T-112)
+///
+/// L = ½ Σ (ȧ_k² − ω_k² a_k²) + f·a                                               (T-113)
+/// ```
+///
+/// q_s is the static equilibrium, as far as there is one: where a mode has ω = 0 and a force acts on it, the force is f and moves it. The full model
+/// is of run-time length, or of fixed size with `S` its `State<N>`. Its matrices are dense here: n² numbers, and a time that grows as n³, once.
+///
+/// Outputs are those of the full model, so that motions of both have the same columns, and both can be rungs of a [`Fidelity`](crate::Fidelity).
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(
+///     coordinates(q[n]),
+///     lagrangian = sum(i in 0..n, m/2*dot(q[i])^2)
+///         - k/2*q[0]^2 - k/2*q[n-1]^2 - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2),
+///     output(middle) = q[centre],
+/// )]
+/// struct Row { n: usize, centre: usize, m: f64, k: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let row = Row { n: 51, centre: 25, m: 0.5, k: 2.0 };
+/// let reduced: Modal<'_, Row, 4> = Modal::of(&row)?;
+/// let lowest = 2.0 * (row.k / row.m).sqrt() * (std::f64::consts::PI / 104.0).sin();
+/// assert!((reduced.frequencies()[0] / lowest - 1.0).abs() < 1e-12);
+///
+/// // A parabola is nearly the first mode.
+/// let shape: Vec<f64> = (1..=51).map(|i| f64::from(i * (52 - i)) / 676.0).collect();
+/// let start = reduced.reduce(&row.state(shape, vec![0.0; 51]));
+/// let motion = Simulation::new(&reduced).step(0.5).run(start, 0.0..100.0)?;
+/// let middle = motion.outputs().column("middle").ok_or("the row declares it")?;
+/// assert!((middle[0] - 1.0).abs() < 0.01);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Modal<'m, M, const R: usize, S = FamilyState> {
+    full: &'m M,
+    /// ω²
+    squares: [f64; R],
+    /// f
+    load: [f64; R],
+    /// φ_k, one after the other.
+    shapes: Vec<Vec<f64>>,
+    /// M φ_k
+    momenta: Vec<Vec<f64>>,
+    /// q_s
+    rest: Vec<f64>,
+    /// The momenta that belong to no velocity.
+    offset: Vec<f64>,
+    /// The energy at q_s without velocity.
+    energy_at_rest: f64,
+    state: PhantomData<fn() -> S>,
+}
+
+impl<'m, M: Reducible<S>, S: PhasePoint, const R: usize> Modal<'m, M, R, S> {
+    /// The `R` modes of least ω² of a model.
+    ///
+    /// # Errors
+    /// [`ModalError`]: where the model is not linear, depends on time, has forces, dampers, constraints, products of coordinates and velocities, or a kinetic energy that is not
+    /// positive for every velocity; where there are fewer than `R` modes.
+    pub fn of(full: &'m M) -> Result<Self, ModalError> {
+        let quadratic = full.quadratic()?;
+        let coordinates = quadratic.slope_q.len();
+        if R == 0 || R > coordinates {
+            return Err(ModalError::Modes {
+                modes: R,
+                coordinates,
+            });
+        }
+        let Modes {
+            squares,
+            shapes,
+            momenta,
+            load,
+            rest,
+        } = quadratic.modes()?;
+        let mut lowest = Self {
+            full,
+            squares: [0.0; R],
+            load: [0.0; R],
+            shapes: shapes.into_iter().take(R).collect(),
+            momenta: momenta.into_iter().take(R).collect(),
+            energy_at_rest: full.energy_at(&rest, &quadratic.offset),
+            offset: quadratic.offset,
+            rest,
+            state: PhantomData,
+        };
+        lowest.squares.copy_from_slice(&squares[..R]);
+        lowest.load.copy_from_slice(&load[..R]);
+        Ok(lowest)
+    }
+
+    /// Its amplitudes and their rates, a = Φᵀ M (q − q_s) and ȧ = Φᵀ p: what the modes have of a state of the full model.
+    ///
+    /// NaN, from which no run begins, where the state is not as long as the model.
+    pub fn reduce(&self, state: &S) -> State<R> {
+        let n = self.rest.len();
+        if state.q().len() != n || state.p().len() != n {
+            return State {
+                q: [f64::NAN; R],
+                p: [f64::NAN; R],
+            };
+        }
+        let mut reduced = State {
+            q: [0.0; R],
+            p: [0.0; R],
+        };
+        for k in 0..R {
+            reduced.q[k] = product(&self.momenta[k], state.q(), &self.rest);
+            reduced.p[k] = product(&self.shapes[k], state.p(), &self.offset);
+        }
+        reduced
+    }
+
+    /// The state of the full model that belongs to amplitudes and rates.
+    pub fn expand(&self, state: &State<R>) -> S {
+        let q = combination(&self.rest, &self.shapes, &state.q);
+        let p = combination(&self.offset, &self.momenta, &state.p);
+        M::state_of(q, p)
+    }
+}
+
+impl<M, S, const R: usize> Modal<'_, M, R, S> {
+    /// The frequencies ω, the lowest first; zero of a rigid motion, and −√|ω²| of a mode that grows, ω² < 0.
+    pub fn frequencies(&self) -> [f64; R] {
+        self.squares
+            .map(|square| square.abs().sqrt().copysign(square))
+    }
+
+    /// The shape of a mode, φ_k with φ_k·M φ_k = 1, its largest entry positive; `None` beyond the modes.
+    pub fn shape(&self, k: usize) -> Option<&[f64]> {
+        self.shapes.get(k).map(Vec::as_slice)
+    }
+
+    /// The coordinates of the static equilibrium q_s; without one, those without the rigid motions that a force acts on.
+    pub fn equilibrium(&self) -> &[f64] {
+        &self.rest
+    }
+}
+
+/// a·(x − x₀)
+fn product(a: &[f64], x: &[f64], x0: &[f64]) -> f64 {
+    let terms = a.iter().zip(x).zip(x0);
+    terms.map(|((a, x), x0)| a * (x - x0)).sum()
+}
+
+/// x₀ + Σ columns_k a_k
+fn combination<T: Real>(x0: &[f64], columns: &[Vec<f64>], a: &[T]) -> Vec<T> {
+    let mut x: Vec<T> = x0.iter().map(|x0| T::from_f64(*x0)).collect();
+    for (column, a) in columns.iter().zip(a) {
+        for (x, entry) in x.iter_mut().zip(column) {
+            *x += T::from_f64(*entry) * *a;
+        }
+    }
+    x
+}
+
+impl<M: Reducible<S>, S: PhasePoint, const R: usize> Model<R> for Modal<'_, M, R, S> {
+    const FORM: Form = Form::Lagrangian;
+    const FACTS: Facts = Facts {
+        time_dependent: false,
+        forced: false,
+        quadratic_in_z: true,
+        constant_mass: true,
+        linear: true,
+        separable: true,
+    };
+
+    fn energy_function<T: Real>(&self, _t: T, a: &[T; R], rates: &[T; R]) -> T {
+        let half = T::from_f64(0.5);
+        let mut sum = T::from_f64(-self.energy_at_rest);
+        for k in 0..R {
+            let square = T::from_f64(self.squares[k]);
+            sum += half * (rates[k] * rates[k] - square * a[k] * a[k]);
+            sum += T::from_f64(self.load[k]) * a[k];
+        }
+        sum
+    }
+
+    fn first<T: Real>(&self, _t: T, a: &[T; R], rates: &[T; R], first: &mut First<T, R>) {
+        for k in 0..R {
+            first.z[k] = rates[k];
+            first.q[k] = T::from_f64(self.load[k]) - T::from_f64(self.squares[k]) * a[k];
+        }
+    }
+
+    fn first_and_mass<T: Real>(
+        &self,
+        t: T,
+        a: &[T; R],
+        rates: &[T; R],
+        first: &mut First<T, R>,
+        zz: &mut [[T; R]; R],
+    ) {
+        self.first(t, a, rates, first);
+        for (k, row) in zz.iter_mut().enumerate() {
+            row[k] = T::from_f64(1.0);
+        }
+    }
+
+    fn second<T: Real>(
+        &self,
+        t: T,
+        a: &[T; R],
+        rates: &[T; R],
+        first: &mut First<T, R>,
+        second: &mut Second<T, R>,
+    ) {
+        self.first_and_mass(t, a, rates, first, &mut second.zz);
+        for (k, row) in second.qq.iter_mut().enumerate() {
+            row[k] = T::from_f64(-self.squares[k]);
+        }
+    }
+
+    fn coordinate_name(index: usize) -> CoordinateName {
+        CoordinateName::element("mode", index)
+    }
+
+    fn columns(&self) -> usize {
+        self.full.columns_of()
+    }
+
+    fn column_name(&self, column: usize) -> CoordinateName {
+        self.full.column_name_of(column)
+    }
+
+    fn observables<T: Real>(&self, t: T, a: &[T; R], rates: &[T; R], values: &mut [T]) {
+        let q = combination(&self.rest, &self.shapes, a);
+        let z = match M::DECLARED {
+            Form::Lagrangian => {
+                let still = vec![0.0; self.rest.len()];
+                combination(&still, &self.shapes, rates)
+            }
+            Form::Hamiltonian => combination(&self.offset, &self.momenta, rates),
+        };
+        self.full.observables_of(t, &q, &z, values);
+    }
+}
+
+impl<M, S, const R: usize> fmt::Debug for Modal<'_, M, R, S> {
+    /// Its frequencies; the model may have nothing to show.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Modal")
+            .field("coordinates", &self.rest.len())
+            .field("frequencies", &self.frequencies())
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,139 @@
+//! The modes of ½ q̇ᵀ M q̇ − ½ qᵀ K q + f·q.
+
+use super::ModalError;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
+use tfe_runtime::Form;
+
+/// A quadratic energy function, as a Lagrangian.
+#[derive(Clone, Debug)]
+pub struct Quadratic {
+    /// M
+    mass: DMatrix<f64>,
+    /// K
+    stiffness: DMatrix<f64>,
+    /// f, the force at q = 0.
+    pub(super) slope_q: DVector<f64>,
+    /// The momentum without velocity: that of terms linear in velocities, which move nothing.
+    pub(super) offset: Vec<f64>,
+}
+
+/// All modes, the lowest ω² first, and the equilibrium.
+#[derive(Clone, Debug)]
+pub(super) struct Modes {
+    /// ω²
+    pub(super) squares: Vec<f64>,
+    /// φ
+    pub(super) shapes: Vec<Vec<f64>>,
+    /// M φ
+    pub(super) momenta: Vec<Vec<f64>>,
+    /// What is left of f: φ·f of modes with ω = 0.
+    pub(super) load: Vec<f64>,
+    /// q_s
+    pub(super) rest: Vec<f64>,
+}
+
+impl Quadratic {
+    /// From the second derivatives by zz, zq, qq and the first by z and q, all at zero.
+    pub(super) fn new(
+        form: Form,
+        [zz, zq, qq]: [DMatrix<f64>; 3],
+        [slope_z, slope_q]: [DVector<f64>; 2],
+    ) -> Result<Self, ModalError> {
+        let numbers = zz
+            .iter()
+            .chain(&zq)
+            .chain(&qq)
+            .chain(&slope_z)
+            .chain(&slope_q);
+        if !numbers.copied().all(f64::is_finite) {
+            return Err(ModalError::NotFinite);
+        }
+        if let Some(at) = zq.iter().position(|entry| *entry != 0.0) {
+            return Err(ModalError::VelocityCoupling {
+                velocity: at % zq.nrows(),
+                coordinate: at / zq.nrows(),
+            });
+        }
+        Ok(match form {
+            Form::Lagrangian => Self {
+                mass: zz,
+                stiffness: -qq,
+                slope_q,
+                offset: slope_z.as_slice().to_vec(),
+            },
+            Form::Hamiltonian => {
+                // v = M⁻¹ p + b
+                let mass = factors(zz)?.inverse();
+                let offset = -(&mass * slope_z);
+                Self {
+                    mass,
+                    stiffness: qq,
+                    slope_q: -slope_q,
+                    offset: offset.as_slice().to_vec(),
+                }
+            }
+        })
+    }
+
+    /// With M = L Lᵀ: the eigenvectors u of L⁻¹ K L⁻ᵀ give φ = L⁻ᵀ u.
+    pub(super) fn modes(&self) -> Result<Modes, ModalError> {
+        let n = self.slope_q.len();
+        let lower = factors(self.mass.clone())?.unpack();
+        let half = lower.solve_lower_triangular(&self.stiffness);
+        let scaled = half.and_then(|half| lower.solve_lower_triangular(&half.transpose()));
+        let scaled = scaled.ok_or(ModalError::MassNotPositive)?;
+        let symmetric = (&scaled + scaled.transpose()) * 0.5;
+        let most = 100 * (n + 10);
+        let eigen = SymmetricEigen::try_new(symmetric, f64::EPSILON, most);
+        let eigen = eigen.ok_or(ModalError::NoEigenvalues)?;
+        let largest = eigen.eigenvalues.amax();
+        let mut order: Vec<usize> = (0..n).collect();
+        let squares = &eigen.eigenvalues;
+        order.sort_by(|a, b| squares[*a].total_cmp(&squares[*b]));
+        let mut modes = Modes {
+            squares: Vec::with_capacity(n),
+            shapes: Vec::with_capacity(n),
+            momenta: Vec::with_capacity(n),
+            load: Vec::with_capacity(n),
+            rest: vec![0.0; n],
+        };
+        for k in order {
+            let vector = eigen.eigenvectors.column(k).into_owned();
+            let shape = lower.tr_solve_lower_triangular(&vector);
+            let shape = shape.ok_or(ModalError::MassNotPositive)?;
+            // Below the roundings of the largest there is none.
+            let is_rigid = squares[k].abs() <= n as f64 * f64::EPSILON * largest;
+            let square = if is_rigid { 0.0 } else { squares[k] };
+            modes.push(square, positive(shape), self);
+        }
+        Ok(modes)
+    }
+}
+
+impl Modes {
+    fn push(&mut self, square: f64, shape: DVector<f64>, of: &Quadratic) {
+        let force = shape.dot(&of.slope_q);
+        if square != 0.0 {
+            for (rest, entry) in self.rest.iter_mut().zip(&shape) {
+                *rest += entry * force / square;
+            }
+        }
+        self.squares.push(square);
+        self.load.push(if square == 0.0 { force } else { 0.0 });
+        self.momenta.push((&of.mass * &shape).as_slice().to_vec());
+        self.shapes.push(shape.as_slice().to_vec());
+    }
+}
+
+/// With its largest entry positive.
+fn positive(shape: DVector<f64>) -> DVector<f64> {
+    if shape[shape.iamax()] < 0.0 {
+        -shape
+    } else {
+        shape
+    }
+}
+
+fn factors(matrix: DMatrix<f64>) -> Result<Cholesky<f64, Dyn>, ModalError> {
+    Cholesky::new(matrix).ok_or(ModalError::MassNotPositive)
+}
