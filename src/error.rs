@@ -259,7 +259,7 @@ pub enum AtError {
         /// The name asked for.
         output: String,
         /// The outputs that there are.
-        known: &'static [&'static str],
+        known: Vec<String>,
     },
     /// The momentum at this time belongs to no velocity.
     NoVelocity {
@@ -281,7 +281,7 @@ impl fmt::Display for AtError {
                 f,
                 "the element around t = {time} was not recorded; run without `record_every` for dense output"
             ),
-            Self::NoOutput { output, known: [] } => {
+            Self::NoOutput { output, known } if known.is_empty() => {
                 write!(f, "there is no output `{output}`: the model declares none")
             }
             Self::NoOutput { output, known } => write!(

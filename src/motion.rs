@@ -272,13 +272,16 @@ impl<const N: usize> Motion<N> {
     /// [`AtError::NoOutput`] for a name that is none, [`AtError::NotRecorded`] where `record_every` left elements out, [`AtError::NoVelocity`] where a
     /// momentum belongs to no velocity.
     pub fn integral<M: Model<N>>(&self, model: &M, output: &str) -> Result<Vec<f64>, AtError> {
-        let Some(column) = M::OBSERVABLES.iter().position(|name| *name == output) else {
+        let names: Vec<String> = (0..model.columns())
+            .map(|at| model.column_name(at).to_string())
+            .collect();
+        let mut values = vec![0.0; names.len()];
+        let Some(column) = names.iter().position(|name| name == output) else {
             return Err(AtError::NoOutput {
                 output: output.to_owned(),
-                known: M::OBSERVABLES,
+                known: names,
             });
         };
-        let mut values = vec![0.0; M::OBSERVABLES.len()];
         let mut velocity = self.velocities[0];
         let (mut sum, mut integrals) = (0.0, vec![0.0]);
         let mut rule = Quadrature::gauss(1);
