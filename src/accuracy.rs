@@ -9,12 +9,21 @@
 //! accuracy:        E(t) = |y_h(t) − y_H(t)| / ((H/h)^p − 1) ,   h < H                the same element of order p       (T-99)
 //! ```
 //!
+//! Where a model is forced, damped or depends on time, steps may vary: the search then looks for the factor c of a mesh with s(t_{k+1}) − s(t_k) = c, s the
+//! number of steps up to a time in a pilot run with controlled steps (T-102), (T-103); (T-99) holds with C/c in the place of H/h.
+//!
 //! |·| is the largest error of any coordinate over the largest coordinate, the same of momenta and of each declared output, whichever is larger.
 
 mod estimated;
+mod grading;
+mod pilot;
 mod search;
 mod trace;
 
 pub use estimated::{Attempt, Estimated, Picked};
-pub(crate) use search::{Asked, Found, Ran, Way, search};
+pub(crate) use grading::Grading;
+pub(crate) use pilot::{Course, Pair, explore};
+pub(crate) use search::{
+    Asked, Found, Graded, Pilot, Ran, Way, damping_element_for, element_for, factor_for, search,
+};
 pub(crate) use trace::{Trace, difference};

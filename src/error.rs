@@ -50,6 +50,24 @@ pub enum RunErrorKind {
         /// The step asked for.
         step: f64,
     },
+    /// A node is not finite or does not lie beyond the one before it, in the direction of the run.
+    NodeOrder {
+        /// Which node, the first one 0.
+        node: usize,
+        /// Its time.
+        time: f64,
+    },
+    /// The nodes do not begin and end with the span.
+    NodeEnds {
+        /// The first node; `None` where there are none.
+        first: Option<f64>,
+        /// The last node.
+        last: Option<f64>,
+        /// The start of the span.
+        start: f64,
+        /// Its end.
+        end: f64,
+    },
     /// A start value is not finite.
     Start {
         /// Which coordinate.
@@ -159,6 +177,26 @@ impl fmt::Display for RunErrorKind {
             }
             Self::TooManySteps { span, step } => {
                 write!(f, "a span of {span} holds too many steps of {step}")
+            }
+            Self::NodeOrder { node, time } => {
+                write!(
+                    f,
+                    "node {node} at t = {time} does not lie beyond the one before it"
+                )
+            }
+            Self::NodeEnds {
+                first: Some(first),
+                last: Some(last),
+                start,
+                end,
+            } => {
+                write!(
+                    f,
+                    "the nodes go from {first} to {last}, but the span is {start}..{end}"
+                )
+            }
+            Self::NodeEnds { start, end, .. } => {
+                write!(f, "there are no nodes in the span {start}..{end}")
             }
             Self::Start { coordinate, q, p } => {
                 write!(

@@ -48,6 +48,7 @@ pub struct Simulation<'m, M, const N: usize> {
     /// The default where it is not chosen.
     element: Option<Element>,
     step: Option<f64>,
+    nodes: Option<Vec<f64>>,
     control: Control,
     record_every: usize,
     impulses: Vec<Impulse<N>>,
@@ -58,6 +59,7 @@ pub struct Simulation<'m, M, const N: usize> {
 impl<M, const N: usize> Clone for Simulation<'_, M, N> {
     fn clone(&self) -> Self {
         Self {
+            nodes: self.nodes.clone(),
             impulses: self.impulses.clone(),
             breaks: self.breaks.clone(),
             ..*self
@@ -86,6 +88,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             model,
             element: None,
             step: None,
+            nodes: None,
             control: Control::default(),
             record_every: 1,
             impulses: Vec::new(),
@@ -105,6 +108,33 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     #[must_use]
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);
+        self
+    }
+
+    /// The nodes: every element goes from one of these times to the next, and ends at every [break](Self::break_at) besides. They begin and end with the span of the run;
+    /// instead of a [step](Self::step). [`steps`](Self::steps), which has no end, does not use them.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + 1/x)]
+    /// struct Fall;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // From rest at a distance of one, x = cos² u at t = (u + sin u cos u)/√2: shorter steps towards the centre.
+    /// let time = |u: f64| (u + u.sin() * u.cos()) / 2.0_f64.sqrt();
+    /// let nodes: Vec<f64> = (0..=30).map(|k| time(0.05 * f64::from(k))).collect();
+    /// let simulation = Simulation::new(&Fall).element(Mixed::<8>).nodes(nodes.iter().copied());
+    /// let motion = simulation.run(Fall.state([1.0], [0.0]), 0.0..time(1.5))?;
+    /// assert_eq!(motion.states().len(), 31);
+    /// assert!((motion.last().q[0] - 1.5_f64.cos().powi(2)).abs() < 1e-8);
+    /// assert!(simulation.run(Fall.state([1.0], [0.0]), 0.0..1.0).is_err()); // the nodes end elsewhere
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn nodes(mut self, times: impl IntoIterator<Item = f64>) -> Self {
+        self.nodes = Some(times.into_iter().collect());
         self
     }
 
@@ -375,6 +405,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     }
 
     fn mesh(&self, span: &Range<f64>) -> Result<Mesh<N>, RunErrorKind> {
+        if let Some(nodes) = &self.nodes {
+            return Mesh::through(span, nodes, &self.breaks, &self.impulses);
+        }
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
         Mesh::new(span, step, &self.breaks, &self.impulses)
     }

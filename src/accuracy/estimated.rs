@@ -97,8 +97,10 @@ impl<T> Deref for Estimated<T> {
 pub struct Picked {
     /// The element.
     pub element: Element,
-    /// The step, positive; where breaks cut the span the longest one.
+    /// The step, positive; where steps vary, or breaks cut the span, the longest one.
     pub step: f64,
+    /// The shortest step.
+    pub shortest: f64,
     /// The tolerance of the iteration inside elements.
     pub tolerance: f64,
     /// What was asked for.
@@ -118,13 +120,26 @@ pub struct Attempt {
     pub error_estimate: Option<f64>,
 }
 
+impl Picked {
+    /// Whether steps are short where the motion is fast, by more than a span that is no whole number of steps makes them.
+    pub fn varies(&self) -> bool {
+        self.step > 2.0 * self.shortest
+    }
+}
+
 impl fmt::Display for Picked {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let order = self.element.order();
+        write!(f, "{} with ", self.element)?;
+        if self.varies() {
+            write!(f, "steps from {:.3e} to {:.3e}", self.shortest, self.step)?;
+        } else {
+            write!(f, "step {:.3e}", self.step)?;
+        }
         write!(
             f,
-            "{} with step {:.3e} and tolerance {:.0e}: order {order} is the cheapest for {:.0e}; steps of",
-            self.element, self.step, self.tolerance, self.accuracy
+            " and tolerance {:.0e}: order {order} is the cheapest for {:.0e}; steps of",
+            self.tolerance, self.accuracy
         )?;
         for (k, attempt) in self.attempts.iter().enumerate() {
             let comma = if k == 0 { "" } else { "," };

@@ -1,6 +1,8 @@
 //! The search for a step: a probe at the start, then runs over the whole span, each compared with the one before.
 
 use super::estimated::{Attempt, Picked};
+use super::grading::Grading;
+use super::pilot::corners;
 use super::trace::{Trace, difference};
 use crate::error::RunErrorKind;
 use std::ops::Range;
@@ -19,6 +21,18 @@ pub(crate) struct Asked {
     pub(crate) longest: Option<f64>,
     /// Whether there is a fixed-point iteration.
     pub(crate) may_iterate: bool,
+    /// Where steps are to be long and where short; equal steps without it.
+    pub(crate) graded: Option<Graded>,
+}
+
+/// What a pilot run has found.
+#[derive(Clone, Debug)]
+pub(crate) struct Graded {
+    pub(crate) grading: Grading,
+    /// The element for it.
+    pub(crate) element: Element,
+    /// A factor that is near.
+    pub(crate) factor: f64,
 }
 
 /// One way to run.
@@ -28,10 +42,11 @@ pub(crate) struct Way<'a> {
     pub(crate) tolerance: f64,
     /// Whether a step that does not contract counts as one that fails.
     pub(crate) by_iteration: bool,
-    /// The longest step, positive.
+    /// The longest step, positive; with a grading its factor.
     pub(crate) step: f64,
-    /// Start, times of comparison, end; between two of them steps are equal.
+    /// Start, times of comparison, end; between two of them steps are equal, or equal parts of the grading.
     pub(crate) cuts: &'a [f64],
+    pub(crate) grading: Option<&'a Grading>,
     /// Whether it may be the motion that is asked for.
     pub(crate) keeps: bool,
 }
@@ -43,6 +58,9 @@ pub(crate) struct Ran {
     /// Whether a fixed-point iteration contracted in every step. Then steps are short beside all times of the model, and errors fall with the order of the element.
     pub(crate) contracts: bool,
 }
+
+/// What looks where steps have to be short, given the first one that it tries; nothing where equal steps are as good.
+pub(crate) type Pilot<'r> = dyn FnMut(f64) -> Option<Graded> + 'r;
 
 /// What makes a run.
 pub(crate) type Runner<'r> = dyn FnMut(&Way<'_>) -> Result<Ran, RunErrorKind> + 'r;
@@ -81,6 +99,8 @@ const MOST_TIMES: f64 = 64.0;
 /// How much shorter the next step may be, and has to be.
 const LEAST_FACTOR: f64 = 0.4;
 const MOST_FACTOR: f64 = 0.87;
+/// Equal steps up to this number cost less than to look where they may be longer.
+const MANY: f64 = 200.0;
 /// However much shorter the second step, errors are not believed to fall by more.
 const MOST_GAIN: f64 = 700.0;
 /// The same where iterations of both runs end nearly alike: what they leave may have grown, and does not fall at all.
@@ -100,16 +120,114 @@ const SAME: f64 = 1.01;
 /// Differences below it that do not fall are of roundings.
 const ROUNDINGS: f64 = 1e-6;
 
-/// Runs until the estimated error is at or below what is asked.
+/// Runs until the estimated error is at or below what is asked: with equal steps, and where those would be many with steps that vary, if there is a pilot.
 ///
 /// # Errors
 /// What stops runs of every step.
-pub(crate) fn search(asked: &Asked, run: &mut Runner<'_>) -> Result<Found, RunErrorKind> {
-    let element = asked.element.unwrap_or(if asked.accuracy > FEW_POINTS {
+pub(crate) fn search(
+    asked: &Asked,
+    run: &mut Runner<'_>,
+    pilot: Option<&mut Pilot<'_>>,
+) -> Result<Found, RunErrorKind> {
+    if let Some(graded) = &asked.graded {
+        return run_down(asked, graded_way(asked, graded), run);
+    }
+    let even = even_way(asked, run);
+    let Some(pilot) = pilot else {
+        return run_down(asked, even?, run);
+    };
+    let length = (asked.span.end - asked.span.start).abs();
+    let mut even = even;
+    let mut before = Vec::new();
+    if let Ok((way, step)) = &even
+        && length / step <= MANY
+    {
+        match climb(asked, (way.clone(), *step), run, MANY)? {
+            Climbed::Found(found) => return Ok(found),
+            Climbed::TooMany { attempts, step } => {
+                before = attempts;
+                even = even.map(|(way, _)| (way, step));
+            }
+        }
+    }
+    let first = even.as_ref().map_or(1e-3 * length, |(_, step)| *step);
+    let graded = pilot(first);
+    let way = match &graded {
+        Some(graded) => graded_way(asked, graded),
+        None => even?,
+    };
+    let mut found = run_down(asked, way, run)?;
+    before.append(&mut found.picked.attempts);
+    found.picked.attempts = before;
+    Ok(found)
+}
+
+/// Runs with steps as short as they have to be.
+fn run_down(
+    asked: &Asked,
+    way: (Way<'_>, f64),
+    run: &mut Runner<'_>,
+) -> Result<Found, RunErrorKind> {
+    match climb(asked, way, run, f64::INFINITY)? {
+        Climbed::Found(found) => Ok(found),
+        Climbed::TooMany { step, .. } => Err(RunErrorKind::Step { step }),
+    }
+}
+
+/// What has come of runs with shorter and shorter steps.
+enum Climbed {
+    Found(Found),
+    /// Steps would be more than they were allowed to be.
+    TooMany {
+        attempts: Vec<Attempt>,
+        step: f64,
+    },
+}
+
+/// The factor of a grading whose steps are off by `local`: so many of them add up to the accuracy (T-103). The first run takes none longer than the pilot run did: what
+/// that has not seen is not there.
+pub(crate) fn factor_for(accuracy: f64, element: Element, local: f64, steps: f64) -> f64 {
+    let factor = (accuracy / (local * steps)).powf(1.0 / element.order() as f64) / LONGER;
+    factor.min(1.0 / COARSER)
+}
+
+/// The cheapest element of those that are tried.
+pub(crate) fn element_for(accuracy: f64) -> Element {
+    if accuracy > FEW_POINTS {
         Element::mixed(5)
     } else {
         Element::mixed(9)
-    });
+    }
+}
+
+/// The same where Newton's method makes the steps and what is fast has to be damped: its cost rises with the third power of the number of points.
+pub(crate) fn damping_element_for(accuracy: f64) -> Element {
+    if accuracy > FEW_POINTS {
+        Element::radau(5)
+    } else {
+        Element::radau(7)
+    }
+}
+
+/// The way with a grading, and its factor.
+fn graded_way<'a>(asked: &'a Asked, graded: &'a Graded) -> (Way<'a>, f64) {
+    let mut way = Way {
+        element: graded.element,
+        tolerance: 1e-3 * asked.accuracy,
+        by_iteration: false,
+        step: graded.factor,
+        cuts: &[],
+        grading: Some(&graded.grading),
+        keeps: false,
+    };
+    way.step = graded.factor.min(way.lengths(asked).1);
+    let factor = way.step;
+    (way, factor)
+}
+
+/// The way with equal steps, and a step by a probe at the start.
+fn even_way<'a>(asked: &'a Asked, run: &mut Runner<'_>) -> Result<(Way<'a>, f64), RunErrorKind> {
+    let element = asked.element.unwrap_or_else(|| element_for(asked.accuracy));
     let length = (asked.span.end - asked.span.start).abs();
     let longest = asked.longest.map_or(length, |step| step.abs().min(length));
     let mut way = Way {
@@ -118,6 +236,7 @@ pub(crate) fn search(asked: &Asked, run: &mut Runner<'_>) -> Result<Found, RunEr
         by_iteration: asked.may_iterate,
         step: longest,
         cuts: &[],
+        grading: None,
         keeps: false,
     };
     let mut step = probe(asked, &mut way, run);
@@ -139,18 +258,34 @@ pub(crate) fn search(asked: &Asked, run: &mut Runner<'_>) -> Result<Found, RunEr
         }
     }
     let (step, _) = step?;
-    let cuts = cuts(asked, step);
-    way.cuts = &cuts;
+    Ok((way, step))
+}
+
+/// Runs with shorter and shorter steps, the first one about `step`.
+fn climb(
+    asked: &Asked,
+    (way, step): (Way<'_>, f64),
+    run: &mut Runner<'_>,
+    most_steps: f64,
+) -> Result<Climbed, RunErrorKind> {
+    let cuts = cuts(asked, way.grading, step);
+    let mut way = Way { cuts: &cuts, ..way };
+    let element = way.element;
+    let (length, longest) = way.lengths(asked);
     way.tolerance = ITERATION * asked.accuracy / (length / step).max(1.0);
     if asked.accuracy > ROUGH {
         way.tolerance = way.tolerance.max(1.1e-3 * ROUGH);
     }
     way.step = (COARSER * step).min(longest);
-    let mut ladder = Ladder::new(element.order(), asked.accuracy);
+    let mut ladder = Ladder::new(element, asked.accuracy, way.grading.is_some());
     let mut failure = None;
     while ladder.attempts.len() < MOST_RUNS {
+        if length / way.step > most_steps {
+            let (attempts, step) = (ladder.attempts, way.step);
+            return Ok(Climbed::TooMany { attempts, step });
+        }
         way.keeps = ladder.last.is_some();
-        let taken = even_steps(&cuts, way.step);
+        let taken = way.taken();
         let mut here = way.clone();
         if !way.keeps {
             // Its error is so much larger than that of the run that it is compared with; and errors of iterations that grow with the motion show in the comparison.
@@ -183,24 +318,34 @@ pub(crate) fn search(asked: &Asked, run: &mut Runner<'_>) -> Result<Found, RunEr
     let Some((errors, is_met)) = ladder.errors else {
         return Err(failure.unwrap_or(RunErrorKind::Step { step }));
     };
-    Ok(Found {
+    let mut attempts = ladder.attempts;
+    let mut extremes = (step, step);
+    for attempt in &mut attempts {
+        way.step = attempt.step * (1.0 + 4.0 * f64::EPSILON);
+        extremes = way.extremes();
+        attempt.step = extremes.1;
+    }
+    Ok(Climbed::Found(Found {
         is_met,
         picked: Picked {
             element,
-            step: ladder.attempts.last().map_or(step, |attempt| attempt.step),
+            step: extremes.1,
+            shortest: extremes.0,
             tolerance: way.tolerance,
             accuracy: asked.accuracy,
             error_estimate: largest(&errors),
-            attempts: ladder.attempts,
+            attempts,
         },
         times: cuts[1..].to_vec(),
         errors,
-    })
+    }))
 }
 
 /// Runs with shorter and shorter steps.
 struct Ladder {
     order: f64,
+    /// The same where steps vary and are long beside what is fast: there it is the error of the inside of an element that falls, with one power more.
+    reduced: f64,
     accuracy: f64,
     attempts: Vec<Attempt>,
     /// The step and what came of it.
@@ -222,9 +367,16 @@ enum Verdict {
 }
 
 impl Ladder {
-    fn new(order: usize, accuracy: f64) -> Self {
+    fn new(element: Element, accuracy: f64, is_graded: bool) -> Self {
+        let order = element.order() as f64;
+        let reduced = if is_graded {
+            order.min(element.nodes() as f64)
+        } else {
+            order
+        };
         Self {
-            order: order as f64,
+            order,
+            reduced,
             accuracy,
             attempts: Vec::new(),
             last: None,
@@ -271,15 +423,19 @@ impl Ladder {
             attempt.error_estimate = Some(apart);
         }
         let at_floor = power.is_some_and(|power| power < 1.0) && apart < ROUNDINGS;
-        let (longer, most_gain) = if power.is_some() {
+        let order = if contracts { self.order } else { self.reduced };
+        let is_reduced = order < self.order;
+        let (longer, most_gain) = if is_reduced {
+            (LONGER, MOST_GAIN_MEASURED)
+        } else if power.is_some() {
             (LONGER_MEASURED, MOST_GAIN_MEASURED)
         } else {
             (LONGER, MOST_GAIN)
         };
         // A power that is not measured is that of the element only where errors are known to fall with it.
-        let power = power.map(|power| power.clamp(1.0, self.order));
+        let power = power.map(|power| power.clamp(1.0, order));
         let known = (power.is_some() || contracts) && ratio > SAME;
-        let power = power.unwrap_or(self.order);
+        let power = power.unwrap_or(order);
         let gain = if apart <= RESOLVED && ratio > SAME {
             (ratio.powf(power) - 1.0).min(most_gain)
         } else {
@@ -363,20 +519,102 @@ fn probe(
     Err(failure.unwrap_or(RunErrorKind::Step { step: way.step }))
 }
 
+impl Way<'_> {
+    /// The length of the span and the longest step, both as steps are measured.
+    fn lengths(&self, asked: &Asked) -> (f64, f64) {
+        let length = self.between(asked.span.start, asked.span.end);
+        let longest = match self.grading {
+            Some(_) => asked.longest.map_or(length, |_| 1.0),
+            None => asked.longest.map_or(length, |step| step.abs().min(length)),
+        };
+        (length, longest)
+    }
+
+    /// How long it is from a time to a later one, as steps are measured.
+    fn between(&self, from: f64, to: f64) -> f64 {
+        match self.grading {
+            Some(grading) => grading.sum(to) - grading.sum(from),
+            None => (to - from).abs(),
+        }
+    }
+
+    /// The longest step where all parts are cut into equal steps of at most `step`, as steps are measured.
+    fn taken(&self) -> f64 {
+        let parts = self.cuts.windows(2);
+        parts
+            .map(|pair| {
+                let length = self.between(pair[0], pair[1]);
+                length / (length / self.step).ceil().max(1.0)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// All nodes with a grading.
+    pub(crate) fn nodes(&self, grading: &Grading) -> Vec<f64> {
+        let mut nodes: Vec<f64> = self.cuts.first().copied().into_iter().collect();
+        for pair in self.cuts.windows(2) {
+            nodes.extend(grading.nodes(pair[0], pair[1], self.step));
+        }
+        nodes
+    }
+
+    /// The shortest and the longest step in the units of time.
+    fn extremes(&self) -> (f64, f64) {
+        let wider = |(least, most): (f64, f64), length: f64| (least.min(length), most.max(length));
+        let none = (f64::INFINITY, 0.0);
+        match self.grading {
+            Some(grading) => {
+                let nodes = self.nodes(grading);
+                let lengths = nodes.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+                lengths.fold(none, wider)
+            }
+            None => {
+                let parts = self.cuts.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+                let lengths = parts.map(|length| length / (length / self.step).ceil().max(1.0));
+                lengths.fold(none, wider)
+            }
+        }
+    }
+}
+
 /// Start, times of comparison with breaks among them, end.
-fn cuts(asked: &Asked, step: f64) -> Vec<f64> {
+fn cuts(asked: &Asked, grading: Option<&Grading>, step: f64) -> Vec<f64> {
+    match grading {
+        Some(grading) => graded_cuts(asked, grading, step),
+        None => even_cuts(asked, step),
+    }
+}
+
+/// The same far apart both in time and in steps: what is fast is seen by what it leaves.
+fn graded_cuts(asked: &Asked, grading: &Grading, step: f64) -> Vec<f64> {
     let Range { start, end } = asked.span;
-    let direction = (end - start).signum();
-    let mut corners: Vec<f64> = asked.breaks.clone();
-    corners.retain(|t| direction * start < direction * t && direction * t < direction * end);
-    corners.push(end);
-    corners.sort_by(|a, b| (direction * a).total_cmp(&(direction * b)));
-    corners.dedup();
+    let apart = (end - start).abs() / MOST_TIMES;
+    let mut cuts = vec![start];
+    let mut from = start;
+    for to in corners(&asked.span, &asked.breaks) {
+        let (first, last) = (grading.sum(from), grading.sum(to));
+        let parts = ((last - first) / (STEPS_BETWEEN * step)).floor().max(1.0);
+        let mut before = from;
+        for k in 1..parts as usize {
+            let t = grading.time(first + (last - first) * (k as f64 / parts));
+            if (t - before).abs() >= apart && (to - t).abs() >= apart {
+                cuts.push(t);
+                before = t;
+            }
+        }
+        cuts.push(to);
+        from = to;
+    }
+    cuts
+}
+
+fn even_cuts(asked: &Asked, step: f64) -> Vec<f64> {
+    let Range { start, end } = asked.span;
     let length = (end - start).abs();
     let times = (length / (STEPS_BETWEEN * step)).clamp(1.0, MOST_TIMES);
     let mut cuts = vec![start];
     let mut from = start;
-    for to in corners {
+    for to in corners(&asked.span, &asked.breaks) {
         let parts = (times * (to - from).abs() / length).round().max(1.0);
         for k in 1..parts as usize {
             cuts.push(from + (to - from) * (k as f64 / parts));
@@ -385,14 +623,6 @@ fn cuts(asked: &Asked, step: f64) -> Vec<f64> {
         from = to;
     }
     cuts
-}
-
-/// The longest step where all parts are cut into equal steps of at most `step`.
-fn even_steps(cuts: &[f64], step: f64) -> f64 {
-    let lengths = cuts.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    lengths.fold(0.0, |most: f64, length| {
-        most.max(length / (length / step).ceil().max(1.0))
-    })
 }
 
 fn largest(errors: &[Vec<f64>]) -> f64 {
@@ -416,17 +646,22 @@ mod tests {
             element: None,
             longest: None,
             may_iterate: true,
+            graded: None,
         };
         let mut last = 0.0;
-        let found = search(&asked, &mut |way| {
-            let mut trace = Trace::new(1, 0);
-            let step = even_steps(way.cuts, way.step);
-            for t in &way.cuts[1..] {
-                last = error(way, step) * (t - way.cuts[0]) / 10.0;
-                trace.pass(&[1.0 + last, 1.0], true);
-            }
-            Ok(Ran { trace, contracts })
-        })?;
+        let found = search(
+            &asked,
+            &mut |way| {
+                let mut trace = Trace::new(1, 0);
+                let step = way.taken();
+                for t in &way.cuts[1..] {
+                    last = error(way, step) * (t - way.cuts[0]) / 10.0;
+                    trace.pass(&[1.0 + last, 1.0], true);
+                }
+                Ok(Ran { trace, contracts })
+            },
+            None,
+        )?;
         Ok((found, last))
     }
 

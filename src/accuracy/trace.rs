@@ -41,6 +41,25 @@ impl Trace {
         self.kinds.last().map_or(0, |kind| kind.end)
     }
 
+    /// The largest difference of two rows, of each kind.
+    pub(crate) fn apart(&self, a: &[f64], b: &[f64], apart: &mut Vec<f64>) {
+        apart.clear();
+        apart.extend(self.kinds.iter().map(|kind| {
+            let pairs = a[kind.clone()].iter().zip(&b[kind.clone()]);
+            // Infinite where something is not finite, which `f64::max` would drop.
+            pairs.fold(0.0, |most: f64, (a, b)| most.max(finite((a - b).abs())))
+        }));
+    }
+
+    /// The largest number of each kind, those of a row included.
+    pub(crate) fn sizes_with(&self, row: &[f64], sizes: &mut Vec<f64>) {
+        sizes.clear();
+        sizes.extend(self.kinds.iter().zip(&self.sizes).map(|(kind, size)| {
+            let numbers = row[kind.clone()].iter();
+            numbers.fold(*size, |size, x| size.max(x.abs()))
+        }));
+    }
+
     fn rows(&self) -> impl Iterator<Item = &[f64]> {
         self.rows.chunks_exact(self.width().max(1))
     }
@@ -49,7 +68,6 @@ impl Trace {
 /// The largest relative difference at each time, of each kind: over the largest number of that kind that either run has passed. Infinite where
 /// something is not finite.
 pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
-    let finite = |x: f64| if x.is_finite() { x } else { f64::INFINITY };
     let mut differences = Vec::new();
     for (k, kind) in a.kinds.iter().enumerate() {
         let scale = a.sizes[k].max(b.sizes[k]);
@@ -66,6 +84,10 @@ pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
         differences.push(a.rows().zip(b.rows()).map(relative).collect());
     }
     differences
+}
+
+fn finite(x: f64) -> f64 {
+    if x.is_finite() { x } else { f64::INFINITY }
 }
 
 #[cfg(test)]

@@ -1,16 +1,21 @@
 //! Runs with an estimate of their error: what models of both kinds of length have in common, and those of fixed size.
 
+mod beside;
 mod family;
 
 use super::mesh::Mesh;
 use super::progress::Bar;
 use super::{Simulation, check_constraints, check_start};
-use crate::accuracy::{Asked, Estimated, Found, Ran, Trace, Way, difference, search};
+use crate::accuracy::{
+    Asked, Course, Estimated, Found, Graded, Grading, Pilot, Ran, Trace, Way, damping_element_for,
+    difference, element_for, explore, factor_for, search,
+};
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
+use beside::Beside;
 use std::ops::Range;
 use tfe_runtime::step::{Control, Stepper};
-use tfe_runtime::{Element, Form, Model, Solve, State, Statistics, StepError, constrained};
+use tfe_runtime::{Element, Facts, Form, Model, Solve, State, Statistics, StepError, constrained};
 
 /// An iteration that takes more is no bargain.
 const MOST_ITERATIONS: u32 = 25;
@@ -62,6 +67,10 @@ pub(super) trait Repeatable<const N: usize> {
     fn part(&self, start: (f64, &Self::State), end: (f64, &Self::State)) -> Self::Motion;
     /// A mesh of equal parts between times.
     fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind>;
+    /// A mesh of given nodes.
+    fn through(&self, nodes: &[f64]) -> Result<Mesh<N>, RunErrorKind>;
+    /// The nodes that were given.
+    fn nodes(&self) -> Option<&[f64]>;
 }
 
 /// Is shown the end of every element: the stepper, the time, the state.
@@ -203,10 +212,25 @@ fn accurate<R: Repeatable<N>, const N: usize>(
     run: &R,
     start: &R::State,
     asked: &Asked,
+    steps: Steps,
 ) -> Result<Estimated<R::Motion>, Broken<R::Motion>> {
     let t0 = asked.span.start;
     let mut kept = Kept::Nothing;
-    let outcome = find(run, start, asked, &mut kept);
+    let outcome = match (steps, run.nodes()) {
+        (_, Some(nodes)) => {
+            let element = asked.element.unwrap_or_else(|| element_for(asked.accuracy));
+            let given = Asked {
+                graded: graded_by(nodes, element),
+                ..asked.clone()
+            };
+            find(run, start, &given, None, &mut kept)
+        }
+        (Steps::Equal, None) => find(run, start, asked, None, &mut kept),
+        (Steps::Varying { damps }, None) => {
+            let mut pilot = |first| graded(run, start, asked, damps, first);
+            find(run, start, asked, Some(&mut pilot), &mut kept)
+        }
+    };
     let motion = match kept {
         Kept::Motion(motion) => motion,
         Kept::Nothing => run.part((t0, start), (t0, start)),
@@ -233,12 +257,16 @@ fn find<R: Repeatable<N>, const N: usize>(
     run: &R,
     start: &R::State,
     asked: &Asked,
+    pilot: Option<&mut Pilot<'_>>,
     kept: &mut Kept<R::Motion, R::State>,
 ) -> Result<Found, RunErrorKind> {
     let t0 = asked.span.start;
     let mut last: Option<(bool, R::Stepper)> = None;
-    search(asked, &mut |way: &Way<'_>| {
-        let mesh = run.even(way.cuts, way.step)?;
+    let mut make = |way: &Way<'_>| {
+        let mesh = match way.grading {
+            Some(grading) => run.through(&way.nodes(grading))?,
+            None => run.even(way.cuts, way.step)?,
+        };
         let (_, stepper) = match last.take() {
             Some((by_iteration, stepper)) if by_iteration == way.by_iteration => {
                 last.insert((by_iteration, stepper))
@@ -284,7 +312,86 @@ fn find<R: Repeatable<N>, const N: usize>(
             contracts: after.newton_iterations == before.newton_iterations
                 && after.products == before.products,
         })
+    };
+    search(asked, &mut make, pilot)
+}
+
+/// Given nodes as a grading, with the factor 1 the nodes themselves.
+fn graded_by(nodes: &[f64], element: Element) -> Option<Graded> {
+    let lengths = nodes.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    Some(Graded {
+        grading: Grading::new(nodes, &lengths.collect::<Vec<_>>())?,
+        element,
+        factor: 1.0,
     })
+}
+
+/// Where steps have to be short, by a pilot run that begins with the step `first`; `None` where equal steps are as good.
+///
+/// Elements that damp what is fast, or those of Gauss points where nothing is: where the fixed point contracted in nearly all steps.
+fn graded<R: Repeatable<N>, const N: usize>(
+    run: &R,
+    start: &R::State,
+    asked: &Asked,
+    damps: bool,
+    first: f64,
+) -> Option<Graded> {
+    /// The part of steps that Newton's method may have made.
+    const FEW: f64 = 0.1;
+    /// What a step may be off by: with less of it the pilot run is longer than those that follow, with more it may step over what is fast.
+    const LOCAL: f64 = 1e-7;
+    let smooth = asked.element.unwrap_or_else(|| element_for(asked.accuracy));
+    let element = match asked.element {
+        Some(element) => element,
+        None if damps => damping_element_for(asked.accuracy),
+        None => smooth,
+    };
+    let length = (asked.span.end - asked.span.start).abs();
+    let course = Course {
+        span: asked.span.clone(),
+        breaks: asked.breaks.clone(),
+        longest: asked.longest.map_or(length, |step| step.abs().min(length)),
+        power: element.order() as f64 + 1.0,
+        first,
+        local: LOCAL,
+    };
+    let mut pair = Beside::new(run, element, &course, start).ok()?;
+    let grading = explore(&course, &mut pair)?;
+    let element = if asked.element.is_none() && pair.by_newton() < FEW {
+        smooth
+    } else {
+        element
+    };
+    let steps = grading.sum(asked.span.end);
+    Some(Graded {
+        grading,
+        element,
+        factor: factor_for(asked.accuracy, element, course.local, steps),
+    })
+}
+
+/// Which steps a run may have.
+#[derive(Clone, Copy, Debug)]
+enum Steps {
+    Equal,
+    /// Short ones where the motion is fast, where that pays; with elements that damp, if the model runs with them.
+    Varying {
+        damps: bool,
+    },
+}
+
+impl Steps {
+    /// Equal ones keep the structure of models that are conservative and do not depend on time, and step linear ones by a matrix.
+    fn of(facts: &Facts, are_equal: bool, is_constrained: bool) -> Self {
+        let may_vary = facts.time_dependent || (facts.forced && !facts.linear);
+        if may_vary && !are_equal {
+            Self::Varying {
+                damps: !is_constrained,
+            }
+        } else {
+            Self::Equal
+        }
+    }
 }
 
 /// What is asked of a run is a number between 0 and 1.
@@ -302,6 +409,42 @@ fn check_accuracy(accuracy: f64) -> Result<(), RunErrorKind> {
 pub struct Accurate<S> {
     simulation: S,
     accuracy: f64,
+    equal_steps: bool,
+}
+
+impl<S> Accurate<S> {
+    fn new(simulation: S, accuracy: f64) -> Self {
+        Self {
+            simulation,
+            accuracy,
+            equal_steps: false,
+        }
+    }
+
+    /// Forbids steps that vary, as models that are conservative and do not depend on time never have: all steps are equal then, between breaks.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = mu*(1 - x^2)*dot(x))]
+    /// struct VanDerPol { mu: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let oscillator = VanDerPol { mu: 20.0 };
+    /// let start = oscillator.state([2.0], [0.0]);
+    /// let asked = Simulation::new(&oscillator).accuracy(1e-4);
+    /// let graded = asked.clone().run(start, 0.0..40.0)?;
+    /// let equal = asked.equal_steps().run(start, 0.0..40.0)?;
+    /// assert!(2 * graded.states().len() < equal.states().len());
+    /// assert!((graded.last().q[0] - equal.last().q[0]).abs() < 4e-4); // of a motion between −2 and 2
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn equal_steps(mut self) -> Self {
+        self.equal_steps = true;
+        self
+    }
 }
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
@@ -310,6 +453,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ///
     /// An element chosen before stays, a step given before is the longest one allowed. The motion comes with its error and says what was picked and why. Three or
     /// four runs over the span are made, all but the last with longer steps (`docs/theory.md` §14.3); the last two of them tell the error.
+    ///
+    /// Steps are equal, between breaks, for models that are conservative and do not depend on time. For others they are short where the motion is fast, if equal ones
+    /// would be many and steps differ by more than three (`docs/theory.md` §14.5); [`Accurate::equal_steps`] forbids that. [Nodes](Simulation::nodes) given before are refined as a whole.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -331,10 +477,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// ```
     #[must_use]
     pub fn accuracy(self, accuracy: f64) -> Accurate<Self> {
-        Accurate {
-            simulation: self,
-            accuracy,
-        }
+        Accurate::new(self, accuracy)
     }
 
     /// Runs over the span as [`run`](Self::run) does, and estimates the error at every node by a second run with an element of higher order:
@@ -418,8 +561,10 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
             longest: run.step,
             may_iterate: run.control.solve == Solve::Auto
                 && const { !M::FACTS.linear && M::CONSTRAINTS.is_empty() },
+            graded: None,
         };
-        accurate(run, &start, &asked).map_err(|broken| RunError::new(broken.0, broken.1))
+        let steps = Steps::of(&M::FACTS, self.equal_steps, !M::CONSTRAINTS.is_empty());
+        accurate(run, &start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
     }
 
     fn check(&self, start: &State<N>, span: &Range<f64>) -> Result<(), RunErrorKind> {
@@ -428,6 +573,9 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
         check_start(start)?;
         // Of span, breaks and impulses.
         let h = (span.end - span.start) / 1000.0;
+        if run.nodes.is_some() {
+            run.mesh(span)?;
+        }
         Mesh::new(span, h, &run.breaks, &run.impulses)?;
         check_constraints(run.model, span.start, h, start)
     }
@@ -537,5 +685,13 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
 
     fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind> {
         Mesh::even(cuts, step, &self.impulses)
+    }
+
+    fn through(&self, nodes: &[f64]) -> Result<Mesh<N>, RunErrorKind> {
+        Mesh::of_nodes(nodes, &self.breaks, &self.impulses)
+    }
+
+    fn nodes(&self) -> Option<&[f64]> {
+        self.nodes.as_deref()
     }
 }

@@ -83,6 +83,7 @@ pub struct FamilySimulation<'m, M> {
     /// The default where it is not chosen.
     pub(super) element: Option<Element>,
     pub(super) step: Option<f64>,
+    pub(super) nodes: Option<Vec<f64>>,
     pub(super) control: Control,
     record_every: usize,
     pub(super) breaks: Vec<f64>,
@@ -93,6 +94,7 @@ pub struct FamilySimulation<'m, M> {
 impl<M> Clone for FamilySimulation<'_, M> {
     fn clone(&self) -> Self {
         Self {
+            nodes: self.nodes.clone(),
             breaks: self.breaks.clone(),
             ..*self
         }
@@ -106,6 +108,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             model,
             element: None,
             step: None,
+            nodes: None,
             control: Control::default(),
             record_every: 1,
             breaks: Vec::new(),
@@ -125,6 +128,14 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     #[must_use]
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);
+        self
+    }
+
+    /// The nodes: every element goes from one of these times to the next, and ends at every [break](Self::break_at) besides. They begin and end with the span of the run;
+    /// instead of a [step](Self::step). [`steps`](Self::steps), which has no end, does not use them.
+    #[must_use]
+    pub fn nodes(mut self, times: impl IntoIterator<Item = f64>) -> Self {
+        self.nodes = Some(times.into_iter().collect());
         self
     }
 
@@ -202,6 +213,9 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     }
 
     pub(super) fn mesh(&self, span: &Range<f64>) -> Result<Mesh<0>, RunErrorKind> {
+        if let Some(nodes) = &self.nodes {
+            return Mesh::through(span, nodes, &self.breaks, &[]);
+        }
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
         Mesh::new(span, step, &self.breaks, &[])
     }

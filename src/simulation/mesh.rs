@@ -76,20 +76,25 @@ impl<const N: usize> Mesh<N> {
         })
     }
 
+    /// The elements between nodes; of impulses those that act there.
+    pub(crate) fn of_nodes(
+        nodes: &[f64],
+        breaks: &[f64],
+        impulses: &[Impulse<N>],
+    ) -> Result<Self, RunErrorKind> {
+        let (start, end) = ends(nodes);
+        let impulses = acting(start, end, impulses);
+        Self::through(&(start..end), nodes, breaks, &impulses)
+    }
+
     /// The parts between `cuts`, in the order of the run, each in equal steps of at most `step`; of impulses those that act there.
     pub(crate) fn even(
         cuts: &[f64],
         step: f64,
         impulses: &[Impulse<N>],
     ) -> Result<Self, RunErrorKind> {
-        let (start, end) = match cuts {
-            [start, .., end] => (*start, *end),
-            _ => (0.0, 0.0),
-        };
-        let inside = |impulse: &&Impulse<N>| {
-            start.min(end) <= impulse.time && impulse.time <= start.max(end)
-        };
-        let impulses: Vec<_> = impulses.iter().filter(inside).copied().collect();
+        let (start, end) = ends(cuts);
+        let impulses = acting(start, end, impulses);
         let mut mesh = Self::new(&(start..end), end - start, &[], &impulses)?;
         let parts = cuts.windows(2);
         mesh.segments = parts
@@ -98,6 +103,33 @@ impl<const N: usize> Mesh<N> {
                 Segment::new(pair[0], pair[1], (pair[1] - pair[0]) / steps)
             })
             .collect::<Result<_, _>>()?;
+        Ok(mesh)
+    }
+
+    /// The elements between given nodes, which begin and end with the span, cut at every break besides.
+    pub(crate) fn through(
+        span: &Range<f64>,
+        nodes: &[f64],
+        breaks: &[f64],
+        impulses: &[Impulse<N>],
+    ) -> Result<Self, RunErrorKind> {
+        let Range { start, end } = *span;
+        // Of span, breaks and impulses.
+        let mut mesh = Self::new(span, end - start, &[], impulses)?;
+        check_nodes(span, nodes, mesh.direction)?;
+        let direction = mesh.direction;
+        let mut nodes = nodes.to_vec();
+        let ahead =
+            |time: &f64| direction * start < direction * time && direction * time < direction * end;
+        nodes.extend(breaks.iter().copied().filter(ahead));
+        nodes.sort_by(|a, b| (direction * a).total_cmp(&(direction * b)));
+        nodes.dedup();
+        mesh.segments = single_steps(&nodes);
+        for segment in &mut mesh.segments {
+            if breaks.contains(&segment.end) {
+                segment.step = up_to_break(segment.start, segment.end);
+            }
+        }
         Ok(mesh)
     }
 
@@ -135,6 +167,71 @@ impl<const N: usize> Mesh<N> {
         };
         &self.impulses[before(t)..end]
     }
+}
+
+fn ends(times: &[f64]) -> (f64, f64) {
+    match times {
+        [start, .., end] => (*start, *end),
+        _ => (0.0, 0.0),
+    }
+}
+
+/// The impulses between two times.
+fn acting<const N: usize>(start: f64, end: f64, impulses: &[Impulse<N>]) -> Vec<Impulse<N>> {
+    let inside =
+        |impulse: &&Impulse<N>| start.min(end) <= impulse.time && impulse.time <= start.max(end);
+    impulses.iter().filter(inside).copied().collect()
+}
+
+/// The length of an element that ends at a break: shorter by roundings, so that an element with a point at its end finds the force before the break there.
+pub(crate) fn up_to_break(start: f64, end: f64) -> f64 {
+    (end - start) - (end - start).signum() * 4.0 * f64::EPSILON * end.abs()
+}
+
+/// Refuses nodes that are not those of a run over the span.
+fn check_nodes(span: &Range<f64>, nodes: &[f64], direction: f64) -> Result<(), RunErrorKind> {
+    let Range { start, end } = *span;
+    let follows = |k: usize| k == 0 || direction * nodes[k - 1] < direction * nodes[k];
+    let bad = (0..nodes.len()).find(|&k| !(nodes[k].is_finite() && follows(k)));
+    if let Some(node) = bad {
+        let time = nodes[node];
+        return Err(RunErrorKind::NodeOrder { node, time });
+    }
+    let (first, last) = (nodes.first().copied(), nodes.last().copied());
+    if (first, last) == (Some(start), Some(end)) {
+        Ok(())
+    } else {
+        Err(RunErrorKind::NodeEnds {
+            first,
+            last,
+            start,
+            end,
+        })
+    }
+}
+
+/// A segment for each element. Where lengths in a row differ by roundings alone they are made equal to the bit, without changing their sum.
+fn single_steps(nodes: &[f64]) -> Vec<Segment> {
+    let mut segments: Vec<Segment> = Vec::with_capacity(nodes.len().saturating_sub(1));
+    let mut from = 0;
+    while from + 1 < nodes.len() {
+        let first = nodes[from + 1] - nodes[from];
+        let alike = |pair: &&[f64]| {
+            let rounding = 2.0 * f64::EPSILON * pair[0].abs().max(pair[1].abs());
+            (pair[1] - pair[0] - first).abs() <= 2.0 * rounding
+        };
+        let count = nodes[from..].windows(2).take_while(alike).count().max(1);
+        let step = (nodes[from + count] - nodes[from]) / count as f64;
+        segments.extend(nodes[from..=from + count].windows(2).map(|pair| Segment {
+            start: pair[0],
+            end: pair[1],
+            step,
+            steps: 1,
+            whole: true,
+        }));
+        from += count;
+    }
+    segments
 }
 
 /// Whether `time` belongs to the element from `t` to `next`.

@@ -1,7 +1,7 @@
 //! Runs of models of run-time length with an estimate of their error.
 
 use super::super::family::{FamilyRunError, FamilySimulation};
-use super::{Accurate, Broken, Passing, Repeatable, accurate, check_accuracy, estimated};
+use super::{Accurate, Broken, Passing, Repeatable, Steps, accurate, check_accuracy, estimated};
 use crate::accuracy::{Asked, Estimated};
 use crate::error::RunErrorKind;
 use crate::motion::family::FamilyMotion;
@@ -35,10 +35,7 @@ impl<M: FamilyModel> FamilySimulation<'_, M> {
     /// ```
     #[must_use]
     pub fn accuracy(self, accuracy: f64) -> Accurate<Self> {
-        Accurate {
-            simulation: self,
-            accuracy,
-        }
+        Accurate::new(self, accuracy)
     }
 
     /// Runs over the span as [`run`](Self::run) does, and estimates the error at every node by a second run with an element of higher order (T-98), as
@@ -95,8 +92,11 @@ impl<M: FamilyModel> Accurate<FamilySimulation<'_, M>> {
             // Without sparse factorisations there is nothing else.
             may_iterate: run.control.solve == Solve::Auto
                 && const { M::FACTS.separable && !M::CONSTRAINED },
+            graded: None,
         };
-        accurate(run, &start, &asked).map_err(|broken| FamilyRunError::new(broken.0, broken.1))
+        let steps = Steps::of(&M::FACTS, self.equal_steps, M::CONSTRAINED);
+        accurate(run, &start, &asked, steps)
+            .map_err(|broken| FamilyRunError::new(broken.0, broken.1))
     }
 }
 
@@ -211,5 +211,13 @@ impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
 
     fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<0>, RunErrorKind> {
         Mesh::even(cuts, step, &[])
+    }
+
+    fn through(&self, nodes: &[f64]) -> Result<Mesh<0>, RunErrorKind> {
+        Mesh::of_nodes(nodes, &self.breaks, &[])
+    }
+
+    fn nodes(&self) -> Option<&[f64]> {
+        self.nodes.as_deref()
     }
 }

@@ -1,0 +1,246 @@
+//! A run with steps that follow the error of each, to learn where they have to be short.
+
+use super::grading::Grading;
+use std::ops::Range;
+
+/// Two elements of different order over the same step.
+pub(crate) trait Pair {
+    /// Makes a step of both from where the motion is; false where one of them fails.
+    fn attempt(&mut self, t: f64, h: f64) -> bool;
+    /// How far both are apart after that step, of each kind.
+    fn apart(&self) -> &[f64];
+    /// The largest number of each kind, so far and after that step.
+    fn sizes(&self) -> &[f64];
+    /// The motion goes on from where that step has ended.
+    fn keep(&mut self);
+}
+
+/// What a pilot run is asked.
+#[derive(Clone, Debug)]
+pub(crate) struct Course {
+    pub(crate) span: Range<f64>,
+    /// Times at which elements have to end.
+    pub(crate) breaks: Vec<f64>,
+    /// The longest step allowed.
+    pub(crate) longest: f64,
+    /// The first one that is tried.
+    pub(crate) first: f64,
+    /// The power of the step with which errors of one step fall.
+    pub(crate) power: f64,
+    /// What a step may be off by, relative to the largest number of its kind.
+    pub(crate) local: f64,
+}
+
+/// The controller aims at steps shorter by this factor than the estimate would allow.
+const SAFETY: f64 = 0.85;
+/// By which factors steps change.
+const LEAST_FACTOR: f64 = 0.15;
+const MOST_FACTOR: f64 = 5.0;
+/// After a step that fails.
+const FAILED: f64 = 0.25;
+/// A pilot run with more steps costs more than it can save.
+const MOST_STEPS: usize = 200_000;
+/// Steps that are shorter than this part of the time are none.
+const SHORTEST: f64 = 1e-14;
+/// Where steps differ by less, equal ones are as good.
+const VARIES: f64 = 3.0;
+
+/// A step that was kept.
+struct Kept {
+    h: f64,
+    apart: Vec<f64>,
+}
+
+/// The grading with which a step is off by [`Course::local`]; `None` where equal steps are as good, or where no steps were found.
+///
+/// An error e of a step h asks for the step h (local/e)^{1/(p+1)} (T-103).
+pub(crate) fn explore(course: &Course, pair: &mut impl Pair) -> Option<Grading> {
+    let Range { start, end } = course.span;
+    let direction = (end - start).signum();
+    let mut nodes = vec![start];
+    let mut kept: Vec<Kept> = Vec::new();
+    let mut t = start;
+    let mut wanted = course.first.min(course.longest);
+    let mut attempts = 0;
+    for corner in corners(&course.span, &course.breaks) {
+        while t != corner {
+            attempts += 1;
+            let left = (corner - t).abs();
+            // No crumbs before a corner.
+            let parts = (left / wanted).ceil().clamp(1.0, 2.0);
+            let h = if parts == 1.0 {
+                left
+            } else {
+                wanted.min(left / 2.0)
+            };
+            if attempts > MOST_STEPS || !(h > SHORTEST * t.abs().max(left * SHORTEST)) {
+                return None;
+            }
+            let off = if pair.attempt(t, direction * h) {
+                relative(pair.apart(), pair.sizes())
+            } else {
+                f64::NAN
+            };
+            if !off.is_finite() {
+                wanted = FAILED * h;
+                continue;
+            }
+            let longer = SAFETY * course.factor(off);
+            wanted = (h * longer).min(course.longest);
+            if off > course.local {
+                continue;
+            }
+            kept.push(Kept {
+                h,
+                apart: pair.apart().to_vec(),
+            });
+            pair.keep();
+            t = if h == left { corner } else { t + direction * h };
+            nodes.push(t);
+        }
+    }
+    // Numbers of a kind may have been small at first.
+    let sizes = pair.sizes();
+    let steps = kept.iter().map(|one| {
+        let step = one.h * course.factor(relative(&one.apart, sizes));
+        step.min(course.longest)
+    });
+    let steps: Vec<f64> = steps.collect();
+    if varies(course, &kept, &steps) {
+        Grading::new(&nodes, &steps)
+    } else {
+        None
+    }
+}
+
+/// Whether the steps that errors ask for differ; of those that may be longer by more than steps change at once nothing is known.
+fn varies(course: &Course, kept: &[Kept], steps: &[f64]) -> bool {
+    let known = kept
+        .iter()
+        .zip(steps)
+        .filter(|(one, step)| **step < 0.999 * MOST_FACTOR * one.h || **step == course.longest);
+    let (least, most) = known.fold((f64::INFINITY, 0.0), |(least, most), (_, step)| {
+        (f64::min(least, *step), f64::max(most, *step))
+    });
+    most > VARIES * least
+}
+
+/// Breaks inside a span in the order of the run, and its end.
+pub(crate) fn corners(span: &Range<f64>, breaks: &[f64]) -> Vec<f64> {
+    let Range { start, end } = *span;
+    let direction = (end - start).signum();
+    let mut corners = breaks.to_vec();
+    corners.retain(|t| direction * start < direction * t && direction * t < direction * end);
+    corners.push(end);
+    corners.sort_by(|a, b| (direction * a).total_cmp(&(direction * b)));
+    corners.dedup();
+    corners
+}
+
+impl Course {
+    /// By what factor a step may be longer.
+    fn factor(&self, off: f64) -> f64 {
+        let factor = (self.local / off).powf(1.0 / self.power);
+        factor.clamp(LEAST_FACTOR, MOST_FACTOR)
+    }
+}
+
+/// The largest one over its size; zero of zero is none.
+fn relative(apart: &[f64], sizes: &[f64]) -> f64 {
+    let mut most = 0.0;
+    for (apart, size) in apart.iter().zip(sizes) {
+        if *apart == 0.0 {
+            continue;
+        }
+        let off = apart / size;
+        if !(off <= most) {
+            most = off;
+        }
+    }
+    most
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps are off by C(t) h⁵ with C = 1/w(t)⁵, and fail at and above twice w.
+    struct Law<F> {
+        wanted: F,
+        apart: Vec<f64>,
+        kept: usize,
+    }
+
+    impl<F: Fn(f64) -> f64> Pair for Law<F> {
+        fn attempt(&mut self, t: f64, h: f64) -> bool {
+            // The worst of the step.
+            let places = (0..=16).map(|k| t + h * f64::from(k) / 16.0);
+            let wanted = places.map(&self.wanted).fold(f64::INFINITY, f64::min);
+            self.apart = vec![LOCAL * (h.abs() / wanted).powi(5)];
+            h.abs() < 2.0 * wanted
+        }
+
+        fn apart(&self) -> &[f64] {
+            &self.apart
+        }
+
+        fn sizes(&self) -> &[f64] {
+            &[1.0]
+        }
+
+        fn keep(&mut self) {
+            self.kept += 1;
+        }
+    }
+
+    const LOCAL: f64 = 1e-6;
+
+    fn explored(span: Range<f64>, wanted: impl Fn(f64) -> f64) -> (Option<Grading>, usize) {
+        let course = Course {
+            span,
+            breaks: vec![3.0],
+            longest: 1.0,
+            first: 1e-3,
+            power: 5.0,
+            local: LOCAL,
+        };
+        let mut pair = Law {
+            wanted,
+            apart: Vec::new(),
+            kept: 0,
+        };
+        (explore(&course, &mut pair), pair.kept)
+    }
+
+    /// Where steps of w(t) are right, ρ is about 1/w, over four orders of it.
+    #[test]
+    fn gradings_follow_the_errors() {
+        let wanted = |t: f64| 1e-4 + 0.5 * (t - 5.0).abs().min(1.0);
+        for span in [0.0..10.0, 10.0..0.0] {
+            let (grading, kept) = explored(span.clone(), wanted);
+            let grading = grading.expect("steps vary");
+            let (first, last) = (span.start.min(span.end), span.start.max(span.end));
+            let exact: f64 = (0..200_000)
+                .map(|k| 5e-5 / wanted(first + (last - first) * (f64::from(k) + 0.5) / 2e5))
+                .sum();
+            let sum = grading.sum(span.end);
+            // Steps are as short as the worst place in them asks for, and change by factors from one to the next.
+            assert!(sum > 0.9 * exact && sum < 4.0 * exact, "{sum} {exact}");
+            assert!((kept as f64) < 5.0 * exact, "{kept} {exact}");
+            let nodes = grading.nodes(span.start, span.end, 1.0);
+            let lengths = nodes.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+            let shortest = lengths.clone().fold(f64::INFINITY, f64::min);
+            let longest = lengths.fold(0.0, f64::max);
+            assert!(shortest < 4e-4 && longest > 0.2, "{shortest} {longest}");
+        }
+    }
+
+    #[test]
+    fn even_motions_and_dead_ends_have_none() {
+        let gentle = |t: f64| 0.3 + 0.1 * t.sin();
+        assert_eq!(explored(0.0..10.0, gentle).0, None);
+        let wall = |t: f64| if t < 5.0 { 0.1 } else { 0.0 };
+        assert_eq!(explored(0.0..10.0, wall).0, None);
+        assert_eq!(explored(0.0..10.0, |_| f64::NAN).0, None);
+    }
+}

@@ -1,0 +1,140 @@
+//! Two elements over the same steps, for a pilot run.
+
+use super::super::mesh::{Mesh, up_to_break};
+use super::{MOST_ITERATIONS, Repeatable};
+use crate::accuracy::{Course, Pair, Trace};
+use crate::error::RunErrorKind;
+use tfe_runtime::{Element, Statistics};
+
+/// What iterations may leave of what a step may be off by, so that it does not show in differences that count.
+const TOLERANCE: f64 = 1e-3;
+
+/// An element and one of the next order, both from the state that the latter has reached: it goes on from where its own last step has ended.
+pub(super) struct Beside<'r, R: Repeatable<N>, const N: usize> {
+    run: &'r R,
+    /// The one whose errors are asked for, and the one of higher order.
+    steppers: [R::Stepper; 2],
+    state: R::State,
+    /// Where both have ended, and that as numbers.
+    ends: [R::State; 2],
+    rows: [Vec<f64>; 2],
+    trace: Trace,
+    apart: Vec<f64>,
+    sizes: Vec<f64>,
+    mesh: Mesh<N>,
+    breaks: Vec<f64>,
+    end: f64,
+    /// Newton iterations of the last attempt, and steps that were kept: with some of them and all.
+    newton: u64,
+    kept: (usize, usize),
+}
+
+impl<'r, R: Repeatable<N>, const N: usize> Beside<'r, R, N> {
+    pub(super) fn new(
+        run: &'r R,
+        element: Element,
+        course: &Course,
+        start: &R::State,
+    ) -> Result<Self, RunErrorKind> {
+        let Course { span, local, .. } = course;
+        let mut control = run.control();
+        control.tolerance = TOLERANCE * local;
+        control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
+        let stepper = |element| run.stepper(element, control, false);
+        let steppers = [stepper(element)?, stepper(next(element))?];
+        let trace = Trace::new(run.coordinates(), run.columns());
+        let width = trace.width();
+        let mut pair = Self {
+            run,
+            state: start.clone(),
+            ends: [start.clone(), start.clone()],
+            rows: [vec![0.0; width], vec![0.0; width]],
+            trace,
+            apart: Vec::new(),
+            sizes: Vec::new(),
+            mesh: run.even(&[span.start, span.end], (span.end - span.start).abs())?,
+            breaks: course.breaks.clone(),
+            end: span.end,
+            newton: 0,
+            kept: (0, 0),
+            steppers,
+        };
+        let [_, row] = &mut pair.rows;
+        run.row(&mut pair.steppers[1], span.start, start, row);
+        pair.trace.pass(row, false);
+        pair.trace.sizes_with(row, &mut pair.sizes);
+        Ok(pair)
+    }
+
+    /// The part of steps that were made by Newton's method.
+    pub(super) fn by_newton(&self) -> f64 {
+        self.kept.0 as f64 / self.kept.1.max(1) as f64
+    }
+}
+
+/// One of higher order of the same kind, as far as there are any.
+fn next(element: Element) -> Element {
+    let nodes = element.nodes() + 1;
+    let same = if element == Element::radau(element.nodes()) {
+        Element::radau(nodes)
+    } else {
+        Element::mixed(nodes)
+    };
+    if same.validate().is_ok() {
+        same
+    } else {
+        Element::mixed(element.nodes())
+    }
+}
+
+impl<R: Repeatable<N>, const N: usize> Pair for Beside<'_, R, N> {
+    fn attempt(&mut self, t: f64, h: f64) -> bool {
+        let reached = t + h;
+        let is_reached = |time: &&f64| (*time - reached).abs() <= 4.0 * f64::EPSILON * time.abs();
+        // The end of the span to the bit, where an impulse may act.
+        let (next, h) = match self.breaks.iter().find(is_reached) {
+            Some(time) => (*time, up_to_break(t, *time)),
+            None if is_reached(&&self.end) => (self.end, self.end - t),
+            None => (reached, h),
+        };
+        let newton = |stepper: &R::Stepper| {
+            let Statistics {
+                newton_iterations, ..
+            } = R::statistics(stepper);
+            newton_iterations
+        };
+        let before = newton(&self.steppers[1]);
+        for k in [1, 0] {
+            let stepper = &mut self.steppers[k];
+            self.ends[k].clone_from(&self.state);
+            let step = self
+                .run
+                .advance(stepper, (t, next, h), &self.mesh, &mut self.ends[k]);
+            if step.is_err() {
+                return false;
+            }
+            self.run
+                .row(stepper, next, &self.ends[k], &mut self.rows[k]);
+        }
+        self.newton = newton(&self.steppers[1]) - before;
+        let [row, better] = &self.rows;
+        self.trace.apart(row, better, &mut self.apart);
+        self.trace.sizes_with(better, &mut self.sizes);
+        true
+    }
+
+    fn apart(&self) -> &[f64] {
+        &self.apart
+    }
+
+    fn sizes(&self) -> &[f64] {
+        &self.sizes
+    }
+
+    fn keep(&mut self) {
+        self.state.clone_from(&self.ends[1]);
+        self.trace.pass(&self.rows[1], false);
+        self.kept.0 += usize::from(self.newton > 0);
+        self.kept.1 += 1;
+    }
+}
