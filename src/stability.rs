@@ -3,8 +3,8 @@
 mod arnoldi;
 pub(crate) mod chebyshev;
 mod eigenvalues;
-pub(crate) mod frozen;
 mod intervals;
+pub(crate) mod linear_model;
 mod map;
 mod modes;
 mod schur_order;
@@ -14,6 +14,7 @@ mod step;
 pub use arnoldi::{Dominant, DominantError, Iteration, dominant_of};
 pub use eigenvalues::{EigenvalueError, eigenvalues};
 pub use intervals::{IntervalError, UnstableInterval, stability_changes_of, unstable_intervals_of};
+pub use linear_model::{LinearModel, LinearModelError, TimeScales};
 pub use map::{FloquetError, MapError, MapPlan, PointError, PointFailure, StabilityMap};
 pub use modes::{Mode, ModeError, ModeKind, modes};
 pub use step::Transitions;

@@ -1,6 +1,6 @@
 //! What a run notices about itself: steps at which the method grows, not the model.
 
-use crate::stability::frozen::{Frozen, is_a_stable};
+use crate::stability::linear_model::{LinearModel, is_a_stable};
 use std::fmt;
 use tfe_runtime::{Element, Model, State};
 
@@ -103,7 +103,9 @@ impl Watch {
             return;
         }
         self.last = Some(number);
-        let growth = Frozen::at(model, t, state).and_then(|frozen| frozen.growth(element, h));
+        let growth = LinearModel::about(model, t, state)
+            .ok()
+            .and_then(|linear| linear.growth(element, h));
         let continued = self.is_unstable;
         self.is_unstable = growth.is_some();
         let Some(growth) = growth else { return };

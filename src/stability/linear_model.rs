@@ -4,9 +4,12 @@
 //! linear with constant coefficients. Its exact flow over a time h has the eigenvalues e^{λh}; those of an element should be close to them.
 //! Where one is larger, and the model does not account for it, the step lies in an unstable interval of the linearised model.
 
-use super::eigenvalues::{balanced, eigenvalues_of_finite};
+use super::eigenvalues::{EigenvalueError, balanced, eigenvalues, eigenvalues_of_finite};
 use super::sign_functions::Measure;
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
+use std::error::Error;
+use std::f64::consts::TAU;
+use std::fmt;
 use tfe_runtime::{
     CoordinateName, Element, Facts, Family, First, Form, Model, Real, Rule, Second, State,
     legendre, transition,
@@ -35,24 +38,82 @@ pub(crate) struct Growth {
     pub(crate) exact: f64,
 }
 
-/// A model with its second derivatives held fixed: the quadratic Hamiltonian of the motion about a state.
+/// Why there is no linear model about a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LinearModelError {
+    /// Constraints act: second derivatives at a state say nothing about the motions that they allow.
+    Constrained,
+    /// The momentum belongs to no velocity.
+    NoVelocity,
+    /// A second derivative is infinite or not a number.
+    NotFinite,
+}
+
+impl fmt::Display for LinearModelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Constrained => {
+                "a model with constraints has no linear model about a state; `stability::on_constraints` linearises its steps"
+            }
+            Self::NoVelocity => "the momentum of the state belongs to no velocity",
+            Self::NotFinite => "a second derivative of the model is not finite at the state",
+        })
+    }
+}
+
+impl Error for LinearModelError {}
+
+/// A model linearised about a state: its second derivatives held at their values there.
 ///
 /// ```text
-/// H = ½ pᵀH_pp p + pᵀH_pq q + ½ qᵀH_qq q ,     Q = Q_p p + Q_q q
+/// H = ½ pᵀH_pp p + pᵀH_pq q + ½ qᵀH_qq q ,     Q = Q_p p + Q_q q                                       (T-108)
 /// ```
-#[derive(Clone, Debug)]
-pub(crate) struct Frozen<const N: usize> {
+///
+/// q and p are deviations from the state. About an equilibrium it is the model of small motions; elsewhere that of motions beside the one through the state, as long as
+/// that stays near. It is a model as any other, linear with constant coefficients, so that it steps by a matrix.
+/// `model(Name, truncated(2, …))` in `#[dynamics(…)]` declares the same where the state is known beforehand; `Simulation::run_linearised` linearises along a motion.
+///
+/// ```
+/// use tfe::prelude::*;
+/// use tfe::stability::LinearModel;
+///
+/// #[dynamics(coordinates(r, theta), lagrangian = (dot(r)^2 + r^2*dot(theta)^2)/2 + g*r*cos(theta) - k/2*(r - 1)^2)]
+/// struct Spring { g: f64, k: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let spring = Spring { g: 9.0, k: 9e4 };
+/// let hanging = spring.state([1.0001, 0.0], [0.0, 0.0]);
+/// let linear = LinearModel::about(&spring, 0.0, &hanging)?;
+/// let scales = linear.time_scales()?;
+/// // The spring swings a hundred times as fast as the pendulum.
+/// assert!((scales.fastest() - 300.0).abs() < 1e-3 && (scales.slowest() - 3.0).abs() < 1e-3);
+/// println!("{scales}");
+/// let motion = Simulation::new(&linear).step(0.01).run(State { q: [0.0, 1e-3], p: [0.0, 0.0] }, 0.0..1.0)?;
+/// assert!((motion.last().q[1] - 1e-3 * (9.0_f64 / 1.0001).sqrt().cos()).abs() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearModel<const N: usize> {
     second: Second<f64, N>,
 }
 
-impl<const N: usize> Frozen<N> {
-    /// The model as it is at `state`; none where it has no velocity there, or an entry is not finite.
-    pub(crate) fn at<M: Model<N>>(model: &M, t: f64, state: &State<N>) -> Option<Self> {
+impl<const N: usize> LinearModel<N> {
+    /// The model as it is at `state`.
+    ///
+    /// # Errors
+    /// [`LinearModelError`]
+    pub fn about<M: Model<N>>(
+        model: &M,
+        t: f64,
+        state: &State<N>,
+    ) -> Result<Self, LinearModelError> {
         if const { !M::CONSTRAINTS.is_empty() } {
-            // Frozen second derivatives say nothing about motions that constraints hold.
-            return None;
+            return Err(LinearModelError::Constrained);
         }
-        let view = legendre::hamiltonian_view(model, t, &state.q, &state.p).ok()?;
+        let view = legendre::hamiltonian_view(model, t, &state.q, &state.p)
+            .map_err(|_| LinearModelError::NoVelocity)?;
         let Second {
             zz,
             zq,
@@ -60,14 +121,25 @@ impl<const N: usize> Frozen<N> {
             force_z,
             force_q,
         } = &view.second;
-        [zz, zq, qq, force_z, force_q]
+        let mut entries = [zz, zq, qq, force_z, force_q]
             .into_iter()
             .flatten()
-            .flatten()
-            .all(|entry| entry.is_finite())
-            .then_some(Self {
-                second: view.second,
-            })
+            .flatten();
+        if !entries.all(|entry| entry.is_finite()) {
+            return Err(LinearModelError::NotFinite);
+        }
+        Ok(Self {
+            second: view.second,
+        })
+    }
+
+    /// How fast it moves: the eigenvalues of its equations.
+    ///
+    /// # Errors
+    /// [`EigenvalueError`]
+    pub fn time_scales(&self) -> Result<TimeScales, EigenvalueError> {
+        let rates = eigenvalues(&self.generator())?;
+        Ok(TimeScales { rates })
     }
 
     /// The matrix S of ẏ = S y, y = (p, q):
@@ -149,6 +221,84 @@ impl<const N: usize> Frozen<N> {
     }
 }
 
+/// The rates λ of a linear model, whose motions are sums of e^{λt}: whether it is stiff, and what steps see of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimeScales {
+    rates: Vec<Complex<f64>>,
+}
+
+impl TimeScales {
+    /// Rates that are smaller, relative to the largest, are those of free coordinates and rounding.
+    const FREE: f64 = 1e-6;
+    /// Beyond such a ratio of rates a model is called stiff.
+    const STIFF: f64 = 100.0;
+
+    /// All λ.
+    pub fn rates(&self) -> &[Complex<f64>] {
+        &self.rates
+    }
+
+    /// The largest |λ|, in radians per unit of time; zero if nothing moves.
+    pub fn fastest(&self) -> f64 {
+        self.rates
+            .iter()
+            .map(|rate| rate.norm())
+            .fold(0.0, f64::max)
+    }
+
+    /// The smallest |λ| that is not zero; zero if all are.
+    pub fn slowest(&self) -> f64 {
+        let least = Self::FREE * self.fastest();
+        let sizes = self.rates.iter().map(|rate| rate.norm());
+        let moving = sizes.filter(|size| *size > least);
+        moving.reduce(f64::min).unwrap_or(0.0)
+    }
+
+    /// fastest/slowest; one if nothing moves.
+    pub fn stiffness(&self) -> f64 {
+        if self.slowest() == 0.0 {
+            1.0
+        } else {
+            self.fastest() / self.slowest()
+        }
+    }
+
+    /// The step from which on Newton's method has to solve the elements: longer ones do not contract as a fixed point, 2/|λ|.
+    pub fn newton_from(&self) -> f64 {
+        2.0 / self.fastest()
+    }
+}
+
+/// What it means for steps, in one sentence.
+impl fmt::Display for TimeScales {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (fastest, slowest) = (self.fastest(), self.slowest());
+        if fastest == 0.0 {
+            return f.write_str("nothing swings, grows or decays");
+        }
+        write!(
+            f,
+            "times from {:.3e} to {:.3e} (2π/|λ|), ratio {:.3e}: ",
+            TAU / fastest,
+            TAU / slowest,
+            self.stiffness()
+        )?;
+        if self.stiffness() > Self::STIFF {
+            write!(
+                f,
+                "stiff; steps beyond {:.3e} need Newton's method, and serve where the fast motion need not be seen",
+                self.newton_from()
+            )
+        } else {
+            write!(
+                f,
+                "not stiff; steps up to {:.3e} contract",
+                self.newton_from()
+            )
+        }
+    }
+}
+
 /// The logarithms of the moduli of all eigenvalues, the largest first.
 fn logarithms(matrix: &DMatrix<f64>) -> Option<Vec<f64>> {
     let values = eigenvalues_of_finite(matrix)?;
@@ -193,7 +343,7 @@ fn sum<R: Real, const N: usize>(a: [R; N], b: [R; N]) -> [R; N] {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
-impl<const N: usize> Model<N> for Frozen<N> {
+impl<const N: usize> Model<N> for LinearModel<N> {
     const FORM: Form = Form::Hamiltonian;
     const FACTS: Facts = Facts {
         time_dependent: false,
@@ -267,8 +417,8 @@ mod tests {
     use crate::stability::{spectral_radius, transition_matrix};
 
     /// H = ½ p² + ½ ω² q² with the force −2ξω p.
-    fn oscillator(omega: f64, xi: f64) -> Frozen<1> {
-        Frozen {
+    fn oscillator(omega: f64, xi: f64) -> LinearModel<1> {
+        LinearModel {
             second: Second {
                 zz: [[1.0]],
                 zq: [[0.0]],
@@ -280,7 +430,7 @@ mod tests {
     }
 
     /// H = ½ p² − ½ q².
-    fn saddle() -> Frozen<1> {
+    fn saddle() -> LinearModel<1> {
         let mut frozen = oscillator(1.0, 0.0);
         frozen.second.qq = [[-1.0]];
         frozen
@@ -336,7 +486,7 @@ mod tests {
 
     #[test]
     fn the_frozen_model_is_its_own_derivative() {
-        let frozen = Frozen {
+        let frozen = LinearModel {
             second: Second {
                 zz: [[2.0, 0.3], [0.3, 1.0]],
                 zq: [[0.1, -0.4], [0.7, 0.2]],
@@ -360,8 +510,8 @@ mod tests {
             let by_q = 0.5 * (at(moved(q, 1.0), p) - at(moved(q, -1.0), p));
             assert!((by_p - first.z[a]).abs() < 1e-14 && (by_q - first.q[a]).abs() < 1e-14);
         }
-        // Frozen again, it is itself; and a short step is 1 + hS, with an error of (‖S‖h)² < 10⁻⁹.
-        let again = Frozen::at(&frozen, 0.0, &State { q, p }).expect("regular");
+        // LinearModel again, it is itself; and a short step is 1 + hS, with an error of (‖S‖h)² < 10⁻⁹.
+        let again = LinearModel::about(&frozen, 0.0, &State { q, p }).expect("regular");
         assert_eq!(again.second, frozen.second);
         let h = 1e-6;
         let a = frozen
@@ -369,6 +519,26 @@ mod tests {
             .expect("a linear step");
         let expected = DMatrix::identity(4, 4) + frozen.generator() * h;
         assert!((a - expected).amax() < 1e-10);
+    }
+
+    #[test]
+    fn free_coordinates_have_no_time_scale() {
+        let mut model = LinearModel::<2> {
+            second: Second::ZERO,
+        };
+        model.second.zz = [[1.0, 0.0], [0.0, 1.0]];
+        let scales = model.time_scales().expect("eigenvalues");
+        assert_eq!((scales.fastest(), scales.stiffness()), (0.0, 1.0));
+        assert_eq!(scales.to_string(), "nothing swings, grows or decays");
+        model.second.qq = [[0.0, 0.0], [0.0, 4.0]];
+        let scales = model.time_scales().expect("eigenvalues");
+        // A frequency of two beside a coordinate that drifts.
+        assert!((scales.fastest() - 2.0).abs() < 1e-14 && (scales.slowest() - 2.0).abs() < 1e-14);
+        assert!((scales.newton_from() - 1.0).abs() < 1e-14);
+        model.second.qq = [[1e-6, 0.0], [0.0, 4.0]];
+        let scales = model.time_scales().expect("eigenvalues");
+        assert!((scales.stiffness() / 2e3 - 1.0).abs() < 1e-9);
+        assert!(scales.to_string().contains("ratio 2.000e3: stiff"));
     }
 
     #[test]
@@ -404,7 +574,7 @@ mod tests {
     #[test]
     fn an_unstable_model_does_not_hide_a_bubble() {
         // A saddle that grows by e^{0.33} beside an oscillator in its bubble, where the radius is 1.13 < e^{0.33}.
-        let mut both = Frozen::<2> {
+        let mut both = LinearModel::<2> {
             second: Second::ZERO,
         };
         both.second.zz = [[1.0, 0.0], [0.0, 1.0]];
@@ -420,7 +590,7 @@ mod tests {
     #[test]
     fn free_coordinates_are_no_growth() {
         // Four eigenvalues in one Jordan block, H = ½ p₁² + q₁ p₂: round-off spreads them by its fourth root.
-        let mut chain = Frozen::<2> {
+        let mut chain = LinearModel::<2> {
             second: Second::ZERO,
         };
         chain.second.zz = [[1.0, 0.0], [0.0, 1e-3]];
