@@ -11,6 +11,7 @@
 
 mod chaos;
 mod estimates;
+mod findings;
 mod ladders;
 mod picks;
 #[path = "../speed_accuracy/scenes/mod.rs"]
@@ -127,11 +128,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let estimates = estimates::section(&scenes)?;
     let picks = picks::section(&scenes)?;
     let chaos = chaos::section()?;
+    let findings = findings::section()?;
     let path = folder.join("enough.html");
     let page = Page::new("Enough and no more")
         .section(estimates)
         .section(picks)
-        .section(chaos);
+        .section(chaos)
+        .section(findings);
     let page = ladders::sections()?.into_iter().fold(page, Page::section);
     page.save(&path)?;
     println!("\n{}", path.display());
