@@ -80,7 +80,7 @@ pub(crate) struct Found {
 /// from a pendulum to eighteen coordinates of planets (`docs/theory.md` §14.3).
 const FEW_POINTS: f64 = 1e-5;
 /// What errors of the iteration may be of what is asked, all steps together: what they leave has the same sign in step after step.
-const ITERATION: f64 = 0.03;
+const ITERATION: f64 = 0.1;
 /// Iterations do not end earlier with less.
 const TIGHTEST: f64 = 1e-17;
 /// Above it roundings do not show, and what they take needs not be carried along.
@@ -101,8 +101,14 @@ const LEAST_FACTOR: f64 = 0.4;
 const MOST_FACTOR: f64 = 0.87;
 /// Equal steps up to this number cost less than to look where they may be longer.
 const MANY: f64 = 200.0;
+/// The first step that is tried is this part of the span.
+const FIRST: f64 = 8.0;
+/// Where steps will be more than this, another probe is cheap.
+const MANY_TO_PROBE: f64 = 24.0;
+/// An order is high above it.
+const HIGH: f64 = 10.0;
 /// However much shorter the second step, errors are not believed to fall by more.
-const MOST_GAIN: f64 = 700.0;
+const MOST_GAIN: f64 = 150.0;
 /// The same where iterations of both runs end nearly alike: what they leave may have grown, and does not fall at all.
 const MOST_GAIN_MEASURED: f64 = 30.0;
 /// Errors do not fall smoothly where steps meet a pericentre now here, now there: by the estimate, steps longer by this factor have to be enough too.
@@ -220,9 +226,9 @@ fn graded_way<'a>(asked: &'a Asked, graded: &'a Graded) -> (Way<'a>, f64) {
         grading: Some(&graded.grading),
         keeps: false,
     };
-    way.step = graded.factor.min(way.lengths(asked).1);
-    let factor = way.step;
-    (way, factor)
+    let longest = way.lengths(asked).1;
+    way.step = longest;
+    (way, graded.factor.min(longest))
 }
 
 /// The way with equal steps, and a step by a probe at the start.
@@ -239,7 +245,8 @@ fn even_way<'a>(asked: &'a Asked, run: &mut Runner<'_>) -> Result<(Way<'a>, f64)
         grading: None,
         keeps: false,
     };
-    let mut step = probe(asked, &mut way, run);
+    way.step = longest.min(length / FIRST);
+    let mut step = probe(asked, &mut way, longest, run);
     if asked.may_iterate && step.as_ref().map_or(true, |(_, factor)| *factor > STIFF) {
         // Steps that contract are far shorter than they need be: it is not accuracy that limits them.
         let mut implicit = Way {
@@ -247,7 +254,7 @@ fn even_way<'a>(asked: &'a Asked, run: &mut Runner<'_>) -> Result<(Way<'a>, f64)
             step: longest,
             ..way.clone()
         };
-        let by_newton = probe(asked, &mut implicit, run);
+        let by_newton = probe(asked, &mut implicit, longest, run);
         let longer = match (&step, &by_newton) {
             (Ok((iterated, _)), Ok((solved, _))) => *solved > STIFF * iterated,
             (Err(_), Ok(_)) => true,
@@ -258,6 +265,12 @@ fn even_way<'a>(asked: &'a Asked, run: &mut Runner<'_>) -> Result<(Way<'a>, f64)
         }
     }
     let (step, _) = step?;
+    // Longer steps than that need not contract.
+    way.step = if way.by_iteration {
+        (way.step * LONGER).max(step)
+    } else {
+        longest
+    };
     Ok((way, step))
 }
 
@@ -276,7 +289,7 @@ fn climb(
     if asked.accuracy > ROUGH {
         way.tolerance = way.tolerance.max(1.1e-3 * ROUGH);
     }
-    way.step = (COARSER * step).min(longest);
+    way.step = (COARSER * step).min(longest).min(way.step);
     let mut ladder = Ladder::new(element, asked.accuracy, way.grading.is_some());
     let mut failure = None;
     while ladder.attempts.len() < MOST_RUNS {
@@ -295,10 +308,10 @@ fn climb(
             Ok(ran) => match ladder.climb(taken, ran) {
                 Verdict::Enough => break,
                 Verdict::Shorter(wanted) => {
-                    way.step = wanted.min(step);
+                    way.step = wanted;
                     if way.keeps {
                         // For the same reason.
-                        way.tolerance = (0.1 * way.tolerance).max(TIGHTEST);
+                        way.tolerance = (0.2 * way.tolerance).max(TIGHTEST);
                     }
                 }
                 Verdict::Floor if way.tolerance > TIGHTEST => {
@@ -401,8 +414,10 @@ impl Ladder {
             error_estimate: None,
         };
         let Some((longer, before)) = self.last.replace((step, ran)) else {
+            // Where longer steps fail it is not accuracy that limits them.
+            let has_failed = !self.attempts.is_empty() && self.order > HIGH;
             self.attempts.push(attempt);
-            return Verdict::Shorter(step / COARSER);
+            return Verdict::Shorter(step / if has_failed { LONGER } else { COARSER });
         };
         let Some((_, ran)) = &self.last else {
             return Verdict::Enough;
@@ -449,8 +464,8 @@ impl Ladder {
         attempt.error_estimate = Some(error + left);
         self.attempts.push(attempt);
         self.apart = Some(apart);
-        let is_met =
-            known && apart <= RESOLVED && error * longer.powf(power) <= self.accuracy - left;
+        let margin = longer.powf(power);
+        let is_met = known && apart <= RESOLVED && error * margin <= self.accuracy - left;
         self.errors = Some((errors, is_met));
         self.unresolved = if apart <= RESOLVED {
             0
@@ -472,21 +487,32 @@ impl Ladder {
     }
 }
 
-/// A step that is near, and by what factor it should be longer than the longest one that could be made: one step at the start against two of half its length.
+/// A step that is near, and by what factor it should be longer than the longest one that could be made, which stays in `way`: one step at the start against two of half its length.
 fn probe(
     asked: &Asked,
     way: &mut Way<'_>,
+    longest: f64,
     run: &mut Runner<'_>,
 ) -> Result<(f64, f64), RunErrorKind> {
     /// Halvings of the span: 2⁻⁶⁰ of it is nothing.
     const MOST: u32 = 60;
     /// A difference that tells the order.
     const CLEAR: f64 = 1e-3;
+    /// Errors are not known to go on falling over a larger factor.
+    const FAR: f64 = 0.6;
+    /// Shorter steps that are tried only to know better.
+    const MOST_HALVED: u32 = 1;
+    /// A step that is to be longer by more is tried.
+    const SHORT: f64 = 1.8;
     let Asked { accuracy, span, .. } = asked;
     let length = (span.end - span.start).abs();
     let direction = (span.end - span.start).signum();
     let order = way.element.order() as f64;
     let mut failure = None;
+    // What is known, and that longer steps are no good.
+    let mut known: Option<(f64, f64)> = None;
+    let mut is_longest = false;
+    let mut halved = 0;
     for _ in 0..MOST {
         let h = way.step;
         let cuts = [span.start, span.start + direction * h];
@@ -498,25 +524,54 @@ fn probe(
             })
         };
         let pair = over(h).and_then(|whole| Ok((whole, over(h / 2.0)?)));
-        match pair {
-            Ok((whole, halves)) => {
-                let apart = largest(&difference(&whole.trace, &halves.trace)).max(f64::EPSILON);
-                if apart <= CLEAR {
-                    // Steps whose local errors add up to what is asked, and drift as errors of a frequency do.
-                    let steps = length / h;
-                    let sum = apart * steps * (steps / 4.0).max(1.0);
-                    let wanted = (accuracy / sum).powf(1.0 / order) / LONGER;
-                    return Ok((h * wanted.clamp(1e-3, 1.5), wanted));
+        let apart = pair.map(|(whole, halves)| {
+            largest(&difference(&whole.trace, &halves.trace)).max(f64::EPSILON)
+        });
+        let shorter = match apart {
+            Ok(apart) if apart <= CLEAR => {
+                // Steps whose local errors add up to what is asked, and drift as errors of a frequency do.
+                let steps = length / h;
+                let sum = apart * steps * (steps / 4.0).max(1.0);
+                let wanted = (accuracy / sum).powf(1.0 / order) / guess(order);
+                known = Some((h, wanted));
+                let is_short = wanted > SHORT && h < longest;
+                if is_short && !is_longest {
+                    way.step = (2.0 * h).min(longest);
+                    continue;
                 }
-                way.step /= if apart > 1.0 { 4.0 } else { 2.0 };
+                let is_near = wanted >= FAR || steps < MANY_TO_PROBE * wanted || order < HIGH;
+                if is_near || halved == MOST_HALVED {
+                    break;
+                }
+                halved += 1;
+                is_longest = true;
+                way.step = h / 2.0;
+                continue;
             }
+            Ok(apart) if apart > 1.0 => 4.0,
+            Ok(_) => 2.0,
             Err(kind) => {
-                way.step /= 3.0;
                 failure = Some(kind);
+                3.0
             }
+        };
+        if known.is_some() {
+            break;
         }
+        is_longest = true;
+        way.step /= shorter;
+    }
+    if let Some((h, wanted)) = known {
+        way.step = h;
+        return Ok((h * wanted.clamp(1e-3, 2.0), wanted));
     }
     Err(failure.unwrap_or(RunErrorKind::Step { step: way.step }))
+}
+
+/// How much shorter than a probe says the second step is, so that it is mostly the last one: errors of high order fall with less than their power where steps are long, and
+/// a motion meets what its start does not show. The sum that low orders go by is more than errors add up to.
+fn guess(order: f64) -> f64 {
+    if order > HIGH { 1.3 * LONGER } else { 0.9 }
 }
 
 impl Way<'_> {
