@@ -4,6 +4,7 @@
 //! ```sh
 //! cargo run --release -p tfe-peers             # pictures, tables and a page in target/speed_accuracy
 //! cargo run --release -p tfe-peers -- folder
+//! cargo run --release -p tfe-peers -- folder stiff     # the stiff scenes alone
 //! ```
 
 mod contest;
@@ -30,7 +31,7 @@ use scenes::planets::{kepler, solar_system, solar_system_start};
 use scenes::stiff::{ELASTIC, ELASTIC_START, elastic_pendulum};
 use std::error::Error;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tfe::State;
 use tfe::charts::{Page, Section};
@@ -119,6 +120,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1);
     let folder = folder.map_or_else(|| PathBuf::from("target/speed_accuracy"), PathBuf::from);
     fs::create_dir_all(&folder)?;
+    if std::env::args_os()
+        .nth(2)
+        .is_some_and(|part| part == "stiff")
+    {
+        stiff_section(&folder)?;
+        return Ok(());
+    }
     let clock = Instant::now();
     let (mut rows, mut sections, mut scenes) = (Vec::new(), Vec::new(), Vec::new());
     println!("{}", table::line(&table::HEADER));
@@ -131,15 +139,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         sections.extend(scene.save(&folder, name)?);
         scenes.push(scene);
     }
-    println!("\nstiff\n{}", table::line(&table::HEADER));
-    let stiff = stiff::table()?;
-    for row in &stiff {
-        println!("{}", table::line(row));
-    }
-    fs::write(folder.join("stiff.csv"), table::csv(table::HEADER, &stiff))?;
-    let stiff = Section::new("Stiff scenes")
-        .paragraph(stiff::EXPLANATION)
-        .table(table::HEADER, stiff);
+    let stiff = stiff_section(&folder)?;
     println!("\n{}", long::line(&long::HEADER));
     let lattices = long::table()?;
     for row in &lattices {
@@ -178,4 +178,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let seconds = clock.elapsed().as_secs_f64();
     println!("\n{seconds:.1} s   {}", path.display());
     Ok(())
+}
+
+fn stiff_section(folder: &Path) -> Result<Section, Box<dyn Error>> {
+    println!("\nstiff\n{}", table::line(&table::HEADER));
+    let stiff = stiff::table()?;
+    for row in &stiff {
+        println!("{}", table::line(row));
+    }
+    fs::write(folder.join("stiff.csv"), table::csv(table::HEADER, &stiff))?;
+    Ok(Section::new("Stiff scenes")
+        .paragraph(stiff::EXPLANATION)
+        .table(table::HEADER, stiff))
 }
