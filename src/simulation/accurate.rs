@@ -267,19 +267,18 @@ fn find<R: Repeatable<N>, const N: usize>(
             Some(grading) => run.through(&way.nodes(grading))?,
             None => run.even(way.cuts, way.step)?,
         };
-        let (_, stepper) = match last.take() {
-            Some((by_iteration, stepper)) if by_iteration == way.by_iteration => {
-                last.insert((by_iteration, stepper))
+        let is_known =
+            matches!(&last, Some((by_iteration, _)) if *by_iteration == way.by_iteration);
+        if !is_known {
+            let mut control = run.control();
+            if way.by_iteration {
+                control.solve = Solve::FixedPoint;
+                control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
             }
-            _ => {
-                let mut control = run.control();
-                if way.by_iteration {
-                    control.solve = Solve::FixedPoint;
-                    control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
-                }
-                let stepper = run.stepper(way.element, control, true)?;
-                last.insert((way.by_iteration, stepper))
-            }
+            last = Some((way.by_iteration, run.stepper(way.element, control, true)?));
+        }
+        let Some((_, stepper)) = &mut last else {
+            return Err(RunErrorKind::Step { step: way.step });
         };
         R::set_tolerance(stepper, way.tolerance);
         let before = R::statistics(stepper);
