@@ -1,21 +1,19 @@
-//! Runs with an estimate of their error: what models of both kinds of length have in common, and those of fixed size.
+//! Runs with an estimate of their error: what models of both kinds of length have in common.
 
 mod beside;
 mod family;
+mod fixed;
 
 use super::mesh::Mesh;
 use super::progress::Bar;
-use super::{Simulation, check_constraints, check_start};
 use crate::accuracy::{
     Asked, Course, Estimated, Found, Graded, Grading, Pilot, Ran, Trace, Way, damping_element_for,
     difference, element_for, explore, factor_for, search,
 };
-use crate::error::{RunError, RunErrorKind};
-use crate::motion::Motion;
+use crate::error::RunErrorKind;
 use beside::Beside;
-use std::ops::Range;
-use tfe_runtime::step::{Control, Stepper};
-use tfe_runtime::{Element, Facts, Form, Model, Solve, State, Statistics, StepError, constrained};
+use tfe_runtime::step::Control;
+use tfe_runtime::{Element, Facts, Solve, Statistics, StepError};
 
 /// An iteration that takes more is no bargain.
 const MOST_ITERATIONS: u32 = 25;
@@ -402,7 +400,7 @@ fn check_accuracy(accuracy: f64) -> Result<(), RunErrorKind> {
     }
 }
 
-/// A run to be that picks its element and its step; made by [`Simulation::accuracy`] and
+/// A run to be that picks its element and its step; made by [`Simulation::accuracy`](crate::Simulation::accuracy) and
 /// [`FamilySimulation::accuracy`](crate::family::FamilySimulation::accuracy).
 #[derive(Clone, Debug)]
 pub struct Accurate<S> {
@@ -443,254 +441,5 @@ impl<S> Accurate<S> {
     pub fn equal_steps(mut self) -> Self {
         self.equal_steps = true;
         self
-    }
-}
-
-impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
-    /// Picks element and step so that the estimated error is at or below `accuracy` wherever it is estimated: of coordinates over the largest coordinate, of
-    /// momenta over the largest momentum, of each declared output over its largest value.
-    ///
-    /// An element chosen before stays, a step given before is the longest one allowed. The motion comes with its error and says what was picked and why. Three or
-    /// four runs over the span are made, all but the last with longer steps (`docs/theory.md` §14.3); the last two of them tell the error.
-    ///
-    /// Steps are equal, between breaks, for models that are conservative and do not depend on time. For others they are short where the motion is fast, if equal ones
-    /// would be many and steps differ by more than three (`docs/theory.md` §14.5); [`Accurate::equal_steps`] forbids that. [Nodes](Simulation::nodes) given before are refined as a whole.
-    ///
-    /// ```
-    /// use tfe::prelude::*;
-    ///
-    /// #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + k*cos(theta), output(height) = -cos(theta))]
-    /// struct Pendulum { k: f64 }
-    ///
-    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// let pendulum = Pendulum { k: 1.0 };
-    /// let motion = Simulation::new(&pendulum)
-    ///     .accuracy(1e-8)
-    ///     .run(pendulum.state([2.0], [0.0]), 0.0..10.0)?;
-    /// assert!(motion.error_estimate() <= 1e-8);
-    /// assert!((motion.last().q[0] - 0.713_148_180_601_379).abs() < 2e-8); // of a motion between −2 and 2
-    /// assert!(motion.error_estimate_of("height").is_some());
-    /// println!("{}", motion.picked().ok_or("picks always")?);
-    /// # Ok(())
-    /// # }
-    /// ```
-    #[must_use]
-    pub fn accuracy(self, accuracy: f64) -> Accurate<Self> {
-        Accurate::new(self, accuracy)
-    }
-
-    /// Runs over the span as [`run`](Self::run) does, and estimates the error at every node by a second run with an element of higher order:
-    ///
-    /// ```text
-    /// E(t) = |y_{h, n}(t) − y_{h, n+1}(t)|                                                    (T-98)
-    /// ```
-    ///
-    /// with the same steps and one node more; beside an element of twelve nodes, two steps for each of one of twelve. It costs a little more than another run. Where
-    /// steps are far too long for the motion both runs are wrong and so is the estimate: it is large then, never small by chance at all nodes.
-    ///
-    /// ```
-    /// use tfe::prelude::*;
-    ///
-    /// #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + k*cos(theta))]
-    /// struct Pendulum { k: f64 }
-    ///
-    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// let pendulum = Pendulum { k: 1.0 };
-    /// let motion = Simulation::new(&pendulum)
-    ///     .element(Primal::<3>)
-    ///     .step(0.1)
-    ///     .run_estimated(pendulum.state([2.0], [0.0]), 0.0..10.0)?;
-    /// let error = (motion.last().q[0] - 0.713_148_180_601_379).abs() / 2.0;
-    /// let (_, estimate) = motion.error_estimates().last().ok_or("one a node")?;
-    /// assert!(error / 2.0 < estimate && estimate < 2.0 * error.max(1e-6));
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`RunError`], as from [`run`](Self::run), of either run.
-    pub fn run_estimated(
-        &self,
-        start: State<N>,
-        span: Range<f64>,
-    ) -> Result<Estimated<Motion<N>>, RunError<N>> {
-        let beginning = || Motion::from_start(self.model, span.start, &start);
-        let mesh = self.prepare(&start, &span).map(|(mesh, _)| mesh);
-        let mesh = mesh.map_err(|kind| RunError::new(kind, beginning()))?;
-        estimated(self, (span.start, &start), &mesh)
-            .map_err(|broken| RunError::new(broken.0, broken.1))
-    }
-}
-
-impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
-    /// Runs over the span with the element and the step that meet the accuracy.
-    ///
-    /// # Errors
-    /// [`RunError`], as from [`Simulation::run`]; [`RunErrorKind::AccuracyMissed`] where no step was found that meets the accuracy, with the best motion in
-    /// [`partial`](RunError::partial): a chaotic motion over a span too long, or less than roundings make.
-    pub fn run(
-        &self,
-        start: State<N>,
-        span: Range<f64>,
-    ) -> Result<Estimated<Motion<N>>, RunError<N>> {
-        let run = &self.simulation;
-        if span.start == span.end {
-            let motion = run.run(start, span)?;
-            let outputs = run.outputs();
-            return Ok(Estimated::new(
-                motion,
-                Vec::new(),
-                Vec::new(),
-                outputs,
-                None,
-            ));
-        }
-        let refused = |kind| {
-            let motion = Motion::from_start(run.model, span.start, &start);
-            RunError::new(kind, motion)
-        };
-        self.check(&start, &span).map_err(refused)?;
-        let impulses = run.impulses.iter().map(|one| one.time);
-        let asked = Asked {
-            accuracy: self.accuracy,
-            span: span.clone(),
-            // An impulse inside an element costs it its order.
-            breaks: run.breaks.iter().copied().chain(impulses).collect(),
-            element: run.element,
-            longest: run.step,
-            may_iterate: run.control.solve == Solve::Auto
-                && const { !M::FACTS.linear && M::CONSTRAINTS.is_empty() },
-            graded: None,
-        };
-        let steps = Steps::of(&M::FACTS, self.equal_steps, !M::CONSTRAINTS.is_empty());
-        accurate(run, &start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
-    }
-
-    fn check(&self, start: &State<N>, span: &Range<f64>) -> Result<(), RunErrorKind> {
-        let run = &self.simulation;
-        check_accuracy(self.accuracy)?;
-        check_start(start)?;
-        // Of span, breaks and impulses.
-        let h = (span.end - span.start) / 1000.0;
-        if run.nodes.is_some() {
-            run.mesh(span)?;
-        }
-        Mesh::new(span, h, &run.breaks, &run.impulses)?;
-        check_constraints(run.model, span.start, h, start)
-    }
-}
-
-impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
-    type State = State<N>;
-    type Stepper = Stepper<'m, M, N>;
-    type Motion = Motion<N>;
-
-    fn element(&self) -> Element {
-        self.chosen_element()
-    }
-
-    fn control(&self) -> Control {
-        self.control
-    }
-
-    fn progress(&self) -> bool {
-        self.progress
-    }
-
-    fn coordinates(&self) -> usize {
-        N
-    }
-
-    fn columns(&self) -> usize {
-        self.model.columns()
-    }
-
-    fn outputs(&self) -> Vec<String> {
-        let columns = 0..self.model.columns();
-        let name = |at| self.model.column_name(at).to_string();
-        columns.map(name).collect()
-    }
-
-    fn stepper(
-        &self,
-        element: Element,
-        control: Control,
-        is_recorded: bool,
-    ) -> Result<Stepper<'m, M, N>, RunErrorKind> {
-        let stepper = Stepper::new(self.model, element, control).map_err(RunErrorKind::Element)?;
-        Ok(if is_recorded && self.record_every == 1 {
-            stepper
-        } else {
-            stepper.ends_only()
-        })
-    }
-
-    fn advance(
-        &self,
-        stepper: &mut Stepper<'m, M, N>,
-        (t, next, h): (f64, f64, f64),
-        mesh: &Mesh<N>,
-        state: &mut State<N>,
-    ) -> Result<(), StepError> {
-        let impulses = mesh.impulses_in(t, next, mesh.end() == Some(next));
-        stepper.advance(t, h, state, impulses)
-    }
-
-    fn set_tolerance(stepper: &mut Stepper<'m, M, N>, tolerance: f64) {
-        stepper.set_tolerance(tolerance);
-    }
-
-    fn statistics(stepper: &Stepper<'m, M, N>) -> Statistics {
-        *stepper.statistics()
-    }
-
-    fn row(&self, _: &mut Stepper<'m, M, N>, t: f64, state: &State<N>, row: &mut [f64]) {
-        row[..N].copy_from_slice(&state.q);
-        row[N..2 * N].copy_from_slice(&state.p);
-        if self.model.columns() == 0 {
-            return;
-        }
-        let z = match M::FORM {
-            Form::Hamiltonian => state.p,
-            Form::Lagrangian => {
-                constrained::velocity_of(self.model, t, &state.q, &state.p, &[0.0; N])
-                    .unwrap_or([f64::NAN; N])
-            }
-        };
-        self.model.observables(t, &state.q, &z, &mut row[2 * N..]);
-    }
-
-    fn record(
-        &self,
-        stepper: &mut Stepper<'m, M, N>,
-        mesh: &Mesh<N>,
-        (t, start): (f64, &State<N>),
-        passed: &mut Passing<'_, Stepper<'m, M, N>, State<N>>,
-    ) -> Result<Motion<N>, Broken<Motion<N>>> {
-        self.drive_over(*start, t, mesh, stepper, |stepper, element| {
-            passed(stepper, element.end, element.after);
-            Ok(())
-        })
-        .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))
-    }
-
-    fn part(&self, (t0, start): (f64, &State<N>), (t, end): (f64, &State<N>)) -> Motion<N> {
-        let mut motion = Motion::from_start(self.model, t0, start);
-        if t != t0 {
-            motion.record(self.model, t, end);
-        }
-        motion
-    }
-
-    fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind> {
-        Mesh::even(cuts, step, &self.impulses)
-    }
-
-    fn through(&self, nodes: &[f64]) -> Result<Mesh<N>, RunErrorKind> {
-        Mesh::of_nodes(nodes, &self.breaks, &self.impulses)
-    }
-
-    fn nodes(&self) -> Option<&[f64]> {
-        self.nodes.as_deref()
     }
 }
