@@ -231,7 +231,7 @@ impl<'m> Fidelity<'m> {
         let ends = searches.into_iter().zip(&self.rungs).enumerate();
         let rungs = ends.map(|(k, (search, (name, _)))| {
             let is_truth = k + 1 == self.rungs.len();
-            search.into_rung(name, is_truth)
+            search.into_rung(name, is_truth, smallest)
         });
         Ok(Ladder {
             title: self.title.clone(),

@@ -167,7 +167,7 @@ fn costs_rise_as_errors_fall_and_tables_say_so() {
     #[cfg(feature = "charts")]
     {
         let svg = ladder.chart().to_svg().unwrap();
-        assert!(svg.contains("model error of linear") && svg.contains("full"));
+        assert!(svg.contains("linear, model error 2.3e-2") && svg.contains("full"));
     }
 }
 

@@ -123,10 +123,11 @@ impl<'a> Search<'a> {
     }
 
     /// With errors that are no smaller than that of the model (where numerical errors happen to cancel it, that is luck), nor than what the truth is known to.
-    pub(super) fn into_rung(self, name: &str, is_truth: bool) -> Rung {
-        let model_error = self.model_error().filter(|_| !is_truth);
+    /// What is below the smallest accuracy is not told from roundings, and no error of the model.
+    pub(super) fn into_rung(self, name: &str, is_truth: bool, smallest: f64) -> Rung {
+        let floor = self.model_error().filter(|_| !is_truth);
         let least = self.truth.summary().uncertainty();
-        let least = model_error.map_or(least, |error| error.max(least));
+        let least = floor.map_or(least, |error| error.max(least));
         let point = |trial: Trial<'_>| {
             let (element, step) = (trial.way.element, trial.way.grid.step());
             let choice = |found: Found| Choice {
@@ -150,7 +151,7 @@ impl<'a> Search<'a> {
         Rung {
             name: name.to_owned(),
             points: self.trials.into_iter().map(point).collect(),
-            model_error,
+            model_error: floor.filter(|error| *error > smallest),
         }
     }
 }

@@ -8,8 +8,8 @@ use crate::fidelity::{Choice, Ladder, Rung};
 const LOST: f64 = 10.0;
 
 impl Ladder {
-    /// Cost against error, both logarithmic: the front of each rung, and a vertical line where the error of its model ends it. Runs that failed are
-    /// counted in the legend.
+    /// Cost against error, both logarithmic: the front of each rung, and a vertical line where the error of its model ends it. The legend tells errors of
+    /// models, and counts runs that failed.
     pub fn chart(&self) -> Chart {
         let logarithmic = |label: &str| Axis::new(label).scale(Scale::Logarithmic);
         let mut chart = Chart::new(&self.title)
@@ -29,12 +29,12 @@ impl Ladder {
         });
         if least < most {
             let ends = |error| [(error, least), (error, most)];
-            for rung in &self.rungs {
-                let drawn = rung.model_error.filter(|error| *error < LOST);
-                if let Some(error) = drawn {
-                    let name = format!("model error of {}", rung.name);
-                    chart = chart.series(name, Style::Reference, ends(error));
-                }
+            let errors = self.rungs.iter().filter_map(|rung| rung.model_error);
+            let drawn = errors.filter(|error| *error < LOST);
+            // One line of the legend for all, which look the same.
+            let names = std::iter::once("errors of models").chain(std::iter::repeat(""));
+            for (error, name) in drawn.zip(names) {
+                chart = chart.series(name, Style::Reference, ends(error));
             }
         }
         chart
@@ -82,8 +82,12 @@ impl Ladder {
 
 /// The name of a rung in the legend.
 fn name(rung: &Rung) -> String {
+    let mut name = rung.name.clone();
+    if let Some(error) = rung.model_error {
+        name += &format!(", model error {error:.1e}");
+    }
     match rung.failed() {
-        0 => rung.name.clone(),
-        failed => format!("{}, {failed} failed", rung.name),
+        0 => name,
+        failed => format!("{name}, {failed} failed"),
     }
 }
