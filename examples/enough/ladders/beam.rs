@@ -1,0 +1,69 @@
+//! A beam by its lowest modes.
+
+use super::{ladder, served, shown};
+use std::error::Error;
+use tfe::charts::Section;
+use tfe::prelude::*;
+
+/// A slender beam of unit length, mass and stiffness, clamped at one end, in n parts of length 1/n: w[i] at x = (i + 1)/n. Central differences for its
+/// curvature, of which half a part lies at the clamp, where the slope is zero, and none at the free end, which has half the mass of the others.
+///
+/// ```text
+/// V = k/2 (½ (2 w₁)² + Σ (w_{i+1} − 2 w_i + w_{i−1})²) ,     k = n³ ,     m = 1/n
+/// ```
+#[dynamics(
+    coordinates(w[n]),
+    lagrangian = sum(i in 0..n, m/2*dot(w[i])^2) - m/4*dot(w[n-1])^2
+        - k*w[0]^2 - k/2*(w[1] - 2*w[0])^2 - sum(i in 0..n-2, k/2*(w[i+2] - 2*w[i+1] + w[i])^2),
+    output(tip) = w[n-1], output(middle) = w[half-1],
+)]
+struct Beam {
+    n: usize,
+    half: usize,
+    m: f64,
+    k: f64,
+}
+
+impl Beam {
+    fn new(n: usize) -> Self {
+        let parts = n as f64;
+        Self {
+            n,
+            half: n / 2,
+            m: 1.0 / parts,
+            k: parts.powi(3),
+        }
+    }
+}
+
+/// Drawn aside at its tip, and let go.
+pub fn section() -> Result<Section, Box<dyn Error>> {
+    const PARTS: usize = 40;
+    let beam = Beam::new(PARTS);
+    let one: Modal<'_, Beam, 1> = Modal::of(&beam)?;
+    let two: Modal<'_, Beam, 2> = Modal::of(&beam)?;
+    let five: Modal<'_, Beam, 5> = Modal::of(&beam)?;
+    let twenty: Modal<'_, Beam, 20> = Modal::of(&beam)?;
+    // cos βL cosh βL = −1, in differences of second order.
+    let exact = 3.516_015_268_5;
+    let lowest = one.frequencies()[0];
+    println!(
+        "\nbeam of {PARTS} parts: lowest frequency {lowest:.6}, of the continuous beam {exact:.6}"
+    );
+    assert!((lowest / exact - 1.0).abs() < 1.0 / (PARTS * PARTS) as f64);
+    let x = (1..=PARTS).map(|i| i as f64 / PARTS as f64);
+    let drawn: Vec<f64> = x.map(|x| 0.005 * (3.0 * x * x - x.powi(3))).collect();
+    let start = beam.state(drawn, vec![0.0; PARTS]);
+    let ladder = ladder("A beam plucked at its tip, by modes", 4.0)
+        .rung("1 mode", &one, one.reduce(&start))
+        .rung("2 modes", &two, two.reduce(&start))
+        .rung("5 modes", &five, five.reduce(&start))
+        .rung("20 modes", &twenty, twenty.reduce(&start))
+        .rung("full", &beam, start)
+        .run()?;
+    let seen = format!(
+        "Seen: the fewer modes, the longer the steps that serve them; the cheapest is {}.",
+        served(&ladder)
+    );
+    shown(&ladder, &seen)
+}
