@@ -7,7 +7,7 @@
 //!
 //! The scenes are those of `speed_accuracy`. First, estimated errors beside true ones for elements of every family and many steps; then, for accuracies from 1e-4 to
 //! 1e-11, what `Simulation::accuracy` picks, the true error, and its time beside that of the best element, step and tolerance that trial finds, all searching
-//! included; then a chaotic motion and how far it can be had; last, ladders of models: which of several is just good enough.
+//! included; then a chaotic motion and how far it can be had; what each finding of `structure()` is worth; last, ladders of models: which of several is just good enough.
 
 mod chaos;
 mod estimates;
