@@ -2,11 +2,12 @@
 
 use super::{Guess, implementations};
 use crate::emit::identifier;
+use crate::input::plain;
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::BTreeSet;
-use syn::DeriveInput;
-use tfe_symbolic::ast::Pass;
+use syn::{Data, DeriveInput, Field, Type};
+use tfe_symbolic::ast::{Entry, Pass};
 
 /// What can be told of `model(Name, …)`.
 #[derive(Clone)]
@@ -16,8 +17,8 @@ pub(super) struct Variant {
     gone: usize,
     /// Whether only cyclic coordinates have gone.
     is_projected: bool,
-    /// How many fields it has more.
-    added: usize,
+    /// The fields that it has more.
+    added: BTreeSet<String>,
 }
 
 impl Variant {
@@ -26,20 +27,34 @@ impl Variant {
             let own = passes.iter().filter(move |pass| pass.word.node == word);
             own.flat_map(|pass| &pass.entries)
         };
+        let name_of = |entry: &Entry| entry.value.to_string().replace('[', "_").replace(']', "");
+        let momenta = entries("routh").map(|entry| format!("p_{}", name_of(entry)));
         // One stiffness may stand for several springs.
-        let added: BTreeSet<String> = entries("elastic")
-            .map(|entry| entry.value.to_string())
-            .collect();
+        let added = entries("elastic").map(name_of).chain(momenta).collect();
         Self {
             name: identifier(name),
             gone: entries("frozen").count() + entries("routh").count(),
             is_projected: passes.iter().all(|pass| pass.word.node == "routh"),
-            added: added.len() + entries("routh").count(),
+            added,
         }
     }
 }
 
-/// A struct without fields that can be used like the model.
+/// The fields of numbers that it may have: those of the original, and those added.
+fn fields(variant: &Variant, item: &DeriveInput) -> BTreeSet<Ident> {
+    let own = match &item.data {
+        Data::Struct(data) => data.fields.iter().collect(),
+        _ => Vec::new(),
+    };
+    let is_number =
+        |field: &&Field| matches!(&field.ty, Type::Path(path) if path.path.is_ident("f64"));
+    let own = own.into_iter().filter(is_number);
+    let own = own.filter_map(|field| field.ident.as_ref().map(plain));
+    let all: BTreeSet<String> = own.chain(variant.added.iter().cloned()).collect();
+    all.iter().map(|name| identifier(name)).collect()
+}
+
+/// A struct with the fields that are numbers, which can be used like the model.
 pub(super) fn stubs(variant: &Variant, item: &DeriveInput, guess: &Guess) -> TokenStream {
     let Variant { name, .. } = variant;
     let vis = &item.vis;
@@ -57,11 +72,13 @@ pub(super) fn stubs(variant: &Variant, item: &DeriveInput, guess: &Guess) -> Tok
     let implementations = implementations(&stub, &guess);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
     let generics = &item.generics;
-    let added = (0..variant.added).map(|at| format_ident!("__{at}"));
+    let fields = fields(variant, item);
+    let fields = fields.iter();
+    let added = (0..variant.added.len()).map(|at| format_ident!("__{at}"));
     quote! {
         #[derive(Clone, Copy, Debug, PartialEq, Default)]
         #[allow(dead_code, missing_docs)]
-        #vis struct #name #generics #where_clause {}
+        #vis struct #name #generics #where_clause { #(pub #fields: f64),* }
 
         #implementations
 
@@ -69,7 +86,7 @@ pub(super) fn stubs(variant: &Variant, item: &DeriveInput, guess: &Guess) -> Tok
         #[allow(dead_code, missing_docs, unused_variables, clippy::all)]
         impl #impl_generics #name #type_generics #where_clause {
             #vis fn of(_: &#original #type_generics #(, #added: f64)*) -> Self {
-                Self {}
+                ::core::default::Default::default()
             }
 
             #of_state
@@ -86,7 +103,7 @@ fn of_state(item: &DeriveInput, all: &TokenStream, guess: &Guess) -> TokenStream
             _: &#original #type_generics,
             _: &#path::__private::State<{ #all }>,
         ) -> (Self, #path::__private::State<{ #dof }>) {
-            (Self {}, #path::__private::State { q: [0.0; #dof], p: [0.0; #dof] })
+            (::core::default::Default::default(), #path::__private::State { q: [0.0; #dof], p: [0.0; #dof] })
         }
     }
 }
