@@ -151,52 +151,17 @@ impl Reduction {
 
     /// The Routhian in place of L; the velocities in terms of what stays, in the order of `all`.
     fn eliminate(&mut self, all: &mut [Cyclic]) -> Result<Vec<ExprId>, Kind> {
-        let mut order: Vec<usize> = Vec::new();
-        while order.len() < all.len() {
-            let graph = &mut self.model.graph;
-            // The simplest inertia first: others often cancel then.
-            let mut best: Option<(usize, usize, ExprId)> = None;
-            for (number, one) in all.iter().enumerate() {
-                if one.rate.is_none() {
-                    let inertia = inertia(graph, self.model.energy, one.at);
-                    let size = graph.reachable(&[inertia]).len();
-                    if best.is_none_or(|(least, ..)| size < least) {
-                        best = Some((size, number, inertia));
-                    }
-                }
-            }
-            let Some((_, number, inertia)) = best else {
-                break;
-            };
-            let one = &mut all[number];
-            let velocity = Input::Velocity(Affine::constant(one.at));
-            if graph.as_constant(inertia).is_some_and(Constant::is_zero)
-                || graph.inputs_of(inertia).contains(&velocity)
-            {
-                let name = one.name.clone();
-                return Err(Kind::CyclicNotQuadratic { name });
-            }
-            let slope = derivative(graph, self.model.energy, &velocity);
-            let at_rest = |graph: &mut Graph, id: ExprId| {
-                graph.with_leaves(id, &mut |graph, input| {
-                    (*input == velocity).then(|| graph.integer(0))
-                })
-            };
-            let (offset, rest) = (at_rest(graph, slope), at_rest(graph, self.model.energy));
-            let beta = graph.input(Input::Parameter(one.momentum.clone()));
-            let momentum = graph.subtract(beta, offset);
-            one.rate = Some(graph.product(Constant::ONE, &[(momentum, 1), (inertia, -1)]));
-            let half = Constant::integer(2).reciprocal().unwrap_or(Constant::ZERO);
-            let lost = graph.product(half, &[(momentum, 2), (inertia, -1)]);
-            self.model.energy = graph.subtract(rest, lost);
+        let mut order = Vec::new();
+        while let Some((number, inertia)) = self.simplest(all) {
+            self.eliminate_one(&mut all[number], inertia)?;
             order.push(number);
         }
+        let graph = &mut self.model.graph;
         // The velocity found last holds none of the others, that before only the last, and so on.
         for (found, number) in order.iter().enumerate().rev() {
             for later in &order[found + 1..] {
                 let (at, value) = (all[*later].at, all[*later].rate);
                 let own = all[*number].rate.zip(value);
-                let graph = &mut self.model.graph;
                 all[*number].rate = own.map(|(own, value)| with_rate(graph, own, at, value));
             }
         }
@@ -207,6 +172,43 @@ impl Reduction {
             Ok(pairs.fold(id, |id, (at, rate)| with_rate(graph, id, *at, *rate)))
         })?;
         Ok(rates)
+    }
+
+    /// The coordinate with the simplest inertia among those that are still there, and that inertia: with it gone, parts of others often cancel.
+    fn simplest(&mut self, all: &[Cyclic]) -> Option<(usize, ExprId)> {
+        let (graph, energy) = (&mut self.model.graph, self.model.energy);
+        let left = all.iter().enumerate().filter(|(_, one)| one.rate.is_none());
+        let sized = left.map(|(number, one)| {
+            let inertia = inertia(graph, energy, one.at);
+            (graph.reachable(&[inertia]).len(), number, inertia)
+        });
+        let least = sized.min_by_key(|(size, ..)| *size);
+        least.map(|(_, number, inertia)| (number, inertia))
+    }
+
+    /// R of one coordinate, and its velocity.
+    fn eliminate_one(&mut self, one: &mut Cyclic, inertia: ExprId) -> Result<(), Kind> {
+        let graph = &mut self.model.graph;
+        let velocity = Input::Velocity(Affine::constant(one.at));
+        if graph.as_constant(inertia).is_some_and(Constant::is_zero)
+            || graph.inputs_of(inertia).contains(&velocity)
+        {
+            let name = one.name.clone();
+            return Err(Kind::CyclicNotQuadratic { name });
+        }
+        let slope = derivative(graph, self.model.energy, &velocity);
+        let rest = graph.integer(0);
+        let (a, at_rest) = (
+            with_rate(graph, slope, one.at, rest),
+            with_rate(graph, self.model.energy, one.at, rest),
+        );
+        let beta = graph.input(Input::Parameter(one.momentum.clone()));
+        let momentum = graph.subtract(beta, a);
+        one.rate = Some(graph.product(Constant::ONE, &[(momentum, 1), (inertia, -1)]));
+        let half = Constant::integer(2).reciprocal().unwrap_or(Constant::ZERO);
+        let lost = graph.product(half, &[(momentum, 2), (inertia, -1)]);
+        self.model.energy = graph.subtract(at_rest, lost);
+        Ok(())
     }
 
     /// Parameters in place of momenta; the velocities ∂H/∂p.
