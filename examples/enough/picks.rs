@@ -6,6 +6,7 @@ use crate::truth::Truth;
 use std::error::Error;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
+use tfe::accuracy::Picked;
 use tfe::charts::{Axis, Chart, ChartError, Scale, Section, Style};
 use tfe::prelude::*;
 
@@ -23,6 +24,8 @@ struct Run {
     step: f64,
     runs: usize,
     seconds: f64,
+    /// Of the run that was picked, without the search for it, where its steps are equal.
+    alone: Option<f64>,
     /// Of the best way that trial finds, where there is any.
     best: Option<f64>,
 }
@@ -56,9 +59,15 @@ pub fn measure<M: Model<N>, const N: usize>(
             least_seconds(|| by_hand.run(truth.start, span.clone()).is_ok())
         });
         let outcome = accurate.run(truth.start, span.clone());
+        let alone = |picked: &Picked| {
+            let run = simulation.clone().element(picked.element);
+            let run = run.step(picked.step).tolerance(picked.tolerance);
+            least_seconds(|| run.run(truth.start, span.clone()).is_ok())
+        };
         let outcome = outcome
             .map_err(|error| error.to_string())
             .map(|motion| Run {
+                alone: motion.picked().filter(|picked| !picked.varies()).map(alone),
                 error: truth.error(motion.last()),
                 estimate: motion.error_estimate(),
                 element: motion
@@ -93,10 +102,14 @@ impl Run {
     fn ratio(&self) -> Option<f64> {
         Some(self.seconds / self.best?)
     }
+
+    fn ratio_alone(&self) -> Option<f64> {
+        Some(self.alone? / self.best?)
+    }
 }
 
 impl Pick {
-    fn row(&self, title: &str) -> [String; 8] {
+    fn row(&self, title: &str) -> [String; 9] {
         let asked = format!("{:.0e}", self.asked);
         let title = title.to_owned();
         let Ok(run) = &self.outcome else {
@@ -105,6 +118,7 @@ impl Pick {
                 title,
                 asked,
                 "refused".to_owned(),
+                none(),
                 none(),
                 none(),
                 none(),
@@ -125,18 +139,29 @@ impl Pick {
             format!("{}, h = {}", run.element, short(run.step)),
             run.runs.to_string(),
             format!("{:.1}", 1e6 * run.seconds),
-            run.ratio()
-                .map_or_else(|| "—".to_owned(), |ratio| format!("{ratio:.2}")),
+            told(run.ratio()),
+            told(run.ratio_alone()),
         ]
     }
 
     /// A line of the printed table.
     pub fn line(&self, title: &str) -> String {
-        let [title, asked, error, estimate, way, runs, time, ratio] = self.row(title);
+        let [title, asked, error, estimate, way, runs, time, ratio, alone] = self.row(title);
         format!(
-            "  {title:<26} {asked:>6}  true {error:>8}  estimated {estimate:>8}  {way:<26} {runs} runs {time:>8} µs  {ratio:>5} of the best"
+            "  {title:<26} {asked:>6}  true {error:>8}  estimated {estimate:>8}  {way:<26} {runs} runs {time:>8} µs  {ratio:>5} of the best, {alone:>5} without the search"
         )
     }
+}
+
+fn told(ratio: Option<f64>) -> String {
+    ratio.map_or_else(|| "—".to_owned(), |ratio| format!("{ratio:.2}"))
+}
+
+/// The middle one, and how many are at most two.
+fn middle(mut ratios: Vec<f64>) -> (f64, usize) {
+    ratios.sort_by(f64::total_cmp);
+    let median = ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN);
+    (median, ratios.iter().filter(|ratio| **ratio <= 2.0).count())
 }
 
 /// Table and charts.
@@ -147,7 +172,7 @@ pub fn section(scenes: &[Scene]) -> Result<Section, ChartError> {
     let mut times = Chart::new("Time beside the best element, step and tolerance by trial")
         .x(Axis::new("accuracy asked for").scale(Scale::Logarithmic))
         .y(Axis::new("times the best").scale(Scale::Logarithmic));
-    let mut ratios = Vec::new();
+    let (mut ratios, mut alone) = (Vec::new(), Vec::new());
     let (mut count, mut met) = (0, 0);
     for scene in scenes {
         let runs = || {
@@ -157,6 +182,7 @@ pub fn section(scenes: &[Scene]) -> Result<Section, ChartError> {
         count += scene.picks.len();
         met += runs().filter(|(asked, run)| run.error <= *asked).count();
         ratios.extend(runs().filter_map(|(_, run)| run.ratio()));
+        alone.extend(runs().filter_map(|(_, run)| run.ratio_alone()));
         let points = runs().map(|(asked, run)| (asked, run.error));
         errors = errors.series(scene.title, Style::LineWithMarkers, points);
         let points = runs().filter_map(|(asked, run)| Some((asked, run.ratio()?)));
@@ -165,12 +191,12 @@ pub fn section(scenes: &[Scene]) -> Result<Section, ChartError> {
     let ends = [(1e-11, 1e-11), (1e-4, 1e-4)];
     errors = errors.series("asked for", Style::Reference, ends);
     times = times.series("twice", Style::Reference, [(1e-11, 2.0), (1e-4, 2.0)]);
-    ratios.sort_by(f64::total_cmp);
-    let median = ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN);
-    let within = ratios.iter().filter(|ratio| **ratio <= 2.0).count();
+    let (all, all_alone) = (ratios.len(), alone.len());
+    let (median, within) = middle(ratios);
+    let (median_alone, within_alone) = middle(alone);
     let summary = format!(
-        "The accuracy is met in {met} of {count} cases. All runs of the search together take {median:.2} times (median) the time of the best way that trial finds, and at most twice in {within} of {}.",
-        ratios.len()
+        "The accuracy is met in {met} of {count} cases. All runs of the search together take {median:.2} times (median) the time of the best way that trial finds, and at most twice in {within} of \
+         {all}; the run that is picked takes {median_alone:.2} times that time, and at most twice in {within_alone} of {all_alone}."
     );
     println!("\n{summary}\n");
     let rows = scenes
@@ -190,6 +216,7 @@ pub fn section(scenes: &[Scene]) -> Result<Section, ChartError> {
                 "runs",
                 "µs",
                 "times the best",
+                "without the search",
             ],
             rows,
         ))
