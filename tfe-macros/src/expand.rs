@@ -8,7 +8,7 @@ use quote::quote;
 use syn::ItemStruct;
 use tfe_symbolic::compile;
 use tfe_symbolic::context::{FieldKind, Length};
-use tfe_symbolic::declared::{Declared, Form, Observable, Parameter};
+use tfe_symbolic::declared::{Declared, Form, Observable, Parameter, names};
 use tfe_symbolic::derivation::Derivation;
 use tfe_symbolic::input::Affine;
 use tfe_symbolic::program::{By, Program, Request};
@@ -117,7 +117,7 @@ impl<'a> Kernels<'a> {
             item,
             path,
             dof: emit::index(&declared.dof),
-            coordinates: coordinate_names(declared),
+            coordinates: names(&declared.coordinates),
         }
     }
 
@@ -443,19 +443,4 @@ impl<'a> Kernels<'a> {
             }
         }
     }
-}
-
-/// `theta1`, `q[0]`, `q[1]`, … where the number of coordinates is known; empty otherwise.
-pub(crate) fn coordinate_names(declared: &Declared) -> Vec<String> {
-    let mut names = Vec::new();
-    for array in &declared.coordinates {
-        match &array.length {
-            None => names.push(array.name.clone()),
-            Some(length) => match length.as_constant() {
-                Some(length) => names.extend((0..length).map(|k| format!("{}[{k}]", array.name))),
-                None => return Vec::new(),
-            },
-        }
-    }
-    names
 }

@@ -1,11 +1,10 @@
 //! What people read: the derived model in the struct's documentation, and the page of `Name::structure()`.
 
-use crate::expand::coordinate_names;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use std::fmt::Write as _;
 use tfe_symbolic::count::Counts;
-use tfe_symbolic::declared::{Declared, Form};
+use tfe_symbolic::declared::{Declared, Form, names};
 use tfe_symbolic::derivation::Derivation;
 use tfe_symbolic::program::Request;
 
@@ -176,10 +175,10 @@ pub(crate) fn structure(
         tokens(&kernels.first),
         tokens(&kernels.second),
     );
-    let names = coordinate_names(declared);
+    let all = names(&declared.coordinates);
     let found = derivation.structure();
-    let cyclic = found.cyclic.iter().filter_map(|index| names.get(*index));
-    let conserved = found.conserved.iter().filter_map(|index| names.get(*index));
+    let cyclic = found.cyclic.iter().filter_map(|index| all.get(*index));
+    let conserved = found.conserved.iter().filter_map(|index| all.get(*index));
     let diagonal_mass = found.diagonal_mass;
     let form = match declared.form {
         Form::Lagrangian => quote!(Lagrangian),

@@ -1,11 +1,10 @@
 //! The methods that make states: `state`, and `state_at` of models with a time transformation.
 
 use crate::emit::{Emitter, index};
-use crate::expand::coordinate_names;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::Visibility;
-use tfe_symbolic::declared::{Declared, TimeTransformation};
+use tfe_symbolic::declared::{Declared, TimeTransformation, names};
 use tfe_symbolic::derivation::Derivation;
 
 /// `state`; with a time transformation also `state_at`, and H as declared, which both need.
@@ -14,8 +13,8 @@ pub(crate) fn methods(declared: &Declared, vis: &Visibility, path: &TokenStream)
         .time_transformation
         .zip(Derivation::hamiltonian(declared));
     if let Some((TimeTransformation { clock, .. }, hamiltonian)) = transformed {
-        let names = coordinate_names(declared);
-        let body = Emitter::new(&names, TokenStream::new()).body(&hamiltonian);
+        let all = names(&declared.coordinates);
+        let body = Emitter::new(&all, TokenStream::new()).body(&hamiltonian);
         let hamiltonian = body.value.unwrap_or_else(|| quote!(t.like(0.0)));
         let statements = body.statements;
         let dof = index(&declared.dof);

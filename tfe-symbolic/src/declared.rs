@@ -44,6 +44,21 @@ pub struct CoordinateArray {
     pub length: Option<Affine>,
 }
 
+/// `x`, `q[0]`, `q[1]`, … by number; nothing where the length of an array is not known.
+pub fn names(arrays: &[CoordinateArray]) -> Vec<String> {
+    let mut names = Vec::new();
+    for array in arrays {
+        match array.length.as_ref().map(Affine::as_constant) {
+            None => names.push(array.name.clone()),
+            Some(Some(length)) => {
+                names.extend((0..length).map(|at| format!("{}[{at}]", array.name)));
+            }
+            Some(None) => return Vec::new(),
+        }
+    }
+    names
+}
+
 /// What must hold of a model of run-time length before it is evaluated; `text` and `ranges` are in the user's words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Requirement {

@@ -2,7 +2,7 @@
 
 use super::removal::holds_varying_index;
 use crate::constant::Constant;
-use crate::declared::{CoordinateArray, Declared, Form};
+use crate::declared::{Declared, Form, names};
 use crate::differentiate::derivative;
 use crate::input::{Affine, Input};
 
@@ -42,19 +42,4 @@ fn is_massless(model: &mut Declared, at: Affine) -> bool {
             graph.as_constant(velocity).is_some_and(Constant::is_zero)
         }
     }
-}
-
-/// `x`, `q[0]`, `q[1]`, … by number; of arrays of unknown length, nothing.
-pub(super) fn names(arrays: &[CoordinateArray]) -> Vec<String> {
-    let mut names = Vec::new();
-    for array in arrays {
-        match array.length.as_ref().map(Affine::as_constant) {
-            None => names.push(array.name.clone()),
-            Some(Some(length)) => {
-                names.extend((0..length).map(|at| format!("{}[{at}]", array.name)));
-            }
-            Some(None) => return Vec::new(),
-        }
-    }
-    names
 }

@@ -1,7 +1,6 @@
 //! The formulas of a model made from another one, for its documentation.
 
-use super::inertia::names;
-use crate::declared::Declared;
+use crate::declared::{Declared, names};
 use crate::diagnostic::Bag;
 use crate::graph::ExprId;
 use crate::input::Input;

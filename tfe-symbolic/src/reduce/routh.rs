@@ -10,7 +10,7 @@
 use super::target::Places;
 use super::{Ignored, Mistake, Reduction};
 use crate::constant::Constant;
-use crate::declared::{Form, Observable};
+use crate::declared::{Form, Observable, names};
 use crate::diagnostic::{Kind, Span};
 use crate::differentiate::derivative;
 use crate::graph::{ExprId, Graph};
@@ -77,7 +77,7 @@ impl Reduction {
             let Places::Numbers(places) = places else {
                 return Err(wrong(Kind::PassOfLength { pass: PASS }));
             };
-            let names = super::inertia::names(&self.model.coordinates);
+            let names = names(&self.model.coordinates);
             for at in places {
                 let name = usize::try_from(at).ok().and_then(|at| names.get(at));
                 let name = name.cloned().unwrap_or_default();
