@@ -3,6 +3,7 @@
 mod arnoldi;
 pub(crate) mod chebyshev;
 mod eigenvalues;
+pub(crate) mod growth;
 mod intervals;
 pub(crate) mod linear_model;
 mod map;
@@ -10,11 +11,12 @@ mod modes;
 mod schur_order;
 mod sign_functions;
 mod step;
+mod time_scales;
 
 pub use arnoldi::{Dominant, DominantError, Iteration, dominant_of};
 pub use eigenvalues::{EigenvalueError, eigenvalues};
 pub use intervals::{IntervalError, UnstableInterval, stability_changes_of, unstable_intervals_of};
-pub use linear_model::{LinearModel, LinearModelError, TimeScales};
+pub use linear_model::{LinearModel, LinearModelError};
 pub use map::{FloquetError, MapError, MapPlan, PointError, PointFailure, StabilityMap};
 pub use modes::{Mode, ModeError, ModeKind, modes};
 pub use step::Transitions;
@@ -23,6 +25,7 @@ pub use step::{dominant, transition};
 #[cfg(feature = "sparse")]
 pub use tfe_runtime::family::{FamilyTransition, FamilyTransitionError};
 pub use tfe_runtime::transition::TransitionError;
+pub use time_scales::TimeScales;
 
 use crate::constraints::tangent_basis;
 use nalgebra::{Complex, DMatrix};

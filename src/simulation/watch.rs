@@ -1,6 +1,7 @@
 //! What a run notices about itself: steps at which the method grows, not the model.
 
-use crate::stability::linear_model::{LinearModel, is_a_stable};
+use crate::stability::growth::is_a_stable;
+use crate::stability::linear_model::LinearModel;
 use std::fmt;
 use tfe_runtime::{Element, Model, State};
 

@@ -1,0 +1,108 @@
+//! How fast a linear model moves.
+
+use nalgebra::Complex;
+use std::f64::consts::TAU;
+use std::fmt;
+
+/// The rates λ of a linear model, whose motions are sums of e^{λt}: whether it is stiff, and what steps see of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimeScales {
+    pub(super) rates: Vec<Complex<f64>>,
+}
+
+impl TimeScales {
+    /// Rates that are smaller, relative to the largest, are those of free coordinates and rounding.
+    const FREE: f64 = 1e-6;
+    /// Beyond such a ratio of rates a model is called stiff.
+    const STIFF: f64 = 100.0;
+
+    /// All λ.
+    pub fn rates(&self) -> &[Complex<f64>] {
+        &self.rates
+    }
+
+    /// The largest |λ|, in radians per unit of time; zero if nothing moves.
+    pub fn fastest(&self) -> f64 {
+        self.rates
+            .iter()
+            .map(|rate| rate.norm())
+            .fold(0.0, f64::max)
+    }
+
+    /// The smallest |λ| that is not zero; zero if all are.
+    pub fn slowest(&self) -> f64 {
+        let least = Self::FREE * self.fastest();
+        let sizes = self.rates.iter().map(|rate| rate.norm());
+        let moving = sizes.filter(|size| *size > least);
+        moving.reduce(f64::min).unwrap_or(0.0)
+    }
+
+    /// fastest/slowest; one if nothing moves.
+    pub fn stiffness(&self) -> f64 {
+        if self.slowest() == 0.0 {
+            1.0
+        } else {
+            self.fastest() / self.slowest()
+        }
+    }
+
+    /// The step from which on Newton's method has to solve the elements: longer ones do not contract as a fixed point, 2/|λ|.
+    pub fn newton_from(&self) -> f64 {
+        2.0 / self.fastest()
+    }
+}
+
+/// What it means for steps, in one sentence.
+impl fmt::Display for TimeScales {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (fastest, slowest) = (self.fastest(), self.slowest());
+        if fastest == 0.0 {
+            return f.write_str("nothing swings, grows or decays");
+        }
+        write!(
+            f,
+            "times from {:.3e} to {:.3e} (2π/|λ|), ratio {:.3e}: ",
+            TAU / fastest,
+            TAU / slowest,
+            self.stiffness()
+        )?;
+        if self.stiffness() > Self::STIFF {
+            write!(
+                f,
+                "stiff; steps beyond {:.3e} need Newton's method, and serve where the fast motion need not be seen",
+                self.newton_from()
+            )
+        } else {
+            write!(
+                f,
+                "not stiff; steps up to {:.3e} contract",
+                self.newton_from()
+            )
+        }
+    }
+}
+#[cfg(test)]
+mod tests {
+    use crate::stability::linear_model::LinearModel;
+    use tfe_runtime::Second;
+
+    #[test]
+    fn free_coordinates_have_no_time_scale() {
+        let mut model = LinearModel::<2> {
+            second: Second::ZERO,
+        };
+        model.second.zz = [[1.0, 0.0], [0.0, 1.0]];
+        let scales = model.time_scales().expect("eigenvalues");
+        assert_eq!((scales.fastest(), scales.stiffness()), (0.0, 1.0));
+        assert_eq!(scales.to_string(), "nothing swings, grows or decays");
+        model.second.qq = [[0.0, 0.0], [0.0, 4.0]];
+        let scales = model.time_scales().expect("eigenvalues");
+        // A frequency of two beside a coordinate that drifts.
+        assert!((scales.fastest() - 2.0).abs() < 1e-14 && (scales.slowest() - 2.0).abs() < 1e-14);
+        assert!((scales.newton_from() - 1.0).abs() < 1e-14);
+        model.second.qq = [[1e-6, 0.0], [0.0, 4.0]];
+        let scales = model.time_scales().expect("eigenvalues");
+        assert!((scales.stiffness() / 2e3 - 1.0).abs() < 1e-9);
+        assert!(scales.to_string().contains("ratio 2.000e3: stiff"));
+    }
+}
