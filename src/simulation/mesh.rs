@@ -41,7 +41,6 @@ impl<const N: usize> Mesh<N> {
             return Err(RunErrorKind::Step { step });
         }
         let direction = if end < start { -1.0 } else { 1.0 };
-        let forward = |a: &f64, b: &f64| (direction * a).total_cmp(&(direction * b));
         let within = |time: f64| {
             direction * start <= direction * time && direction * time <= direction * end
         };
@@ -51,15 +50,18 @@ impl<const N: usize> Mesh<N> {
             .copied()
             .filter(|&time| within(time) && time != start && time != end)
             .collect();
-        cuts.sort_by(forward);
+        sort(&mut cuts, direction);
         cuts.dedup();
-        let mut impulses = impulses.to_vec();
-        for impulse in &impulses {
+        for impulse in impulses {
             if !(within(impulse.time) && impulse.value.iter().all(|value| value.is_finite())) {
                 return Err(RunErrorKind::Impulse { time: impulse.time });
             }
         }
-        impulses.sort_by(|a, b| forward(&a.time, &b.time));
+        let times: Vec<f64> = impulses.iter().map(|impulse| impulse.time).collect();
+        let impulses = order(&times, direction)
+            .into_iter()
+            .map(|place| impulses[place])
+            .collect();
 
         let mut segments = Vec::new();
         let mut from = start;
@@ -122,7 +124,7 @@ impl<const N: usize> Mesh<N> {
         let ahead =
             |time: &f64| direction * start < direction * time && direction * time < direction * end;
         nodes.extend(breaks.iter().copied().filter(ahead));
-        nodes.sort_by(|a, b| (direction * a).total_cmp(&(direction * b)));
+        sort(&mut nodes, direction);
         nodes.dedup();
         mesh.segments = single_steps(&nodes);
         for segment in &mut mesh.segments {
@@ -286,6 +288,18 @@ impl Segment {
             self.start + k as f64 * self.step
         }
     }
+}
+
+/// Puts times in the order in which a run meets them. Not generic, so that it is compiled once.
+fn sort(times: &mut [f64], direction: f64) {
+    times.sort_by(|a, b| (direction * a).total_cmp(&(direction * b)));
+}
+
+/// The places of times in the order in which a run meets them; of equal ones the first comes first.
+fn order(times: &[f64], direction: f64) -> Vec<usize> {
+    let mut places: Vec<usize> = (0..times.len()).collect();
+    places.sort_by(|&a, &b| (direction * times[a]).total_cmp(&(direction * times[b])));
+    places
 }
 
 #[cfg(test)]

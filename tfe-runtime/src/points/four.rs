@@ -1,5 +1,7 @@
 //! Four points side by side.
 
+use super::Row;
+use super::tables::Matrix;
 use crate::double_double::DoubleDouble;
 use crate::model::{First, Model};
 use crate::real::{Lanes, Real};
@@ -37,6 +39,9 @@ pub(crate) trait Four: Precise {
     fn sin_cos_of_two(self, other: Self) -> ((Self, Self), (Self, Self)) {
         (self.sin_cos(), other.sin_cos())
     }
+
+    /// The product of a table with a vector over the points, for every coordinate.
+    fn apply<const N: usize>(self, matrix: &Matrix, rows: &[Row<N>], products: &mut [Row<N>]);
 
     /// The kernel of first derivatives at four points.
     fn first<M, const N: usize>(
@@ -104,6 +109,12 @@ impl Four for Lanes<4> {
     #[inline(always)]
     fn lanes(self) -> [f64; 4] {
         self.0
+    }
+
+    /// Called and not inlined: what few processors run need not be compiled at every place of every model.
+    #[inline(never)]
+    fn apply<const N: usize>(self, matrix: &Matrix, rows: &[Row<N>], products: &mut [Row<N>]) {
+        matrix.apply_inline(self, rows, products);
     }
 
     #[inline(always)]
@@ -221,6 +232,11 @@ impl Four for crate::quad::Quad {
     #[inline(always)]
     fn lanes(self) -> [f64; 4] {
         self.lanes()
+    }
+
+    #[inline(always)]
+    fn apply<const N: usize>(self, matrix: &Matrix, rows: &[Row<N>], products: &mut [Row<N>]) {
+        matrix.apply_inline(self, rows, products);
     }
 
     #[inline(always)]

@@ -45,6 +45,16 @@ impl Matrix {
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
+        like.apply(self, rows, products);
+    }
+
+    #[inline(always)]
+    pub(super) fn apply_inline<V: Four, const N: usize>(
+        &self,
+        like: V,
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
         match rows.len() {
             1 => self.apply_to::<V, N, 1>(like, rows, products),
             2 => self.apply_to::<V, N, 2>(like, rows, products),
