@@ -24,8 +24,8 @@ use crate::element::Element;
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
 use crate::newton::Control;
-use crate::scheme::{SchemeRef, SchemeTable, Tables as _};
-use crate::step::{cold_phase, cold_velocity};
+use crate::scheme::{SchemeRef, SchemeTable};
+use crate::step::{cold_rate, cold_rates};
 use alloc::vec;
 use alloc::vec::Vec;
 use step::Job;
@@ -41,6 +41,7 @@ pub(crate) struct Points<const N: usize> {
     /// L_q + Q, or π: rates of the momenta.
     forces: Vec<Row<N>>,
     /// ν, or κ: rates of the coordinates.
+    /// In equations of second order only where somebody has asked for them.
     rates: Vec<Row<N>>,
     momenta: Vec<Row<N>>,
     velocities: Vec<Row<N>>,
@@ -63,8 +64,6 @@ pub(crate) struct Points<const N: usize> {
     /// The end of the last step, and what rounding took from it.
     pub(crate) end: State<N>,
     pub(crate) end_low: State<N>,
-    /// Scratch of cold starts.
-    cold: Vec<f64>,
     is_warm: bool,
     last_step: f64,
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -117,18 +116,20 @@ impl<const N: usize> Points<N> {
         let inertia = Inertia::of(model)?;
         let tables = Tables::of(scheme);
         let groups = tables.groups;
-        let rows = || vec![[[0.0; 4]; N]; groups];
+        // Short runs notice how much memory is asked for.
+        let rows = |if_needed: bool| vec![[[0.0; 4]; N]; if if_needed { groups } else { 0 }];
+        let is_second = is_second_order::<M, N>();
         let varied = if M::FACTS.constant_mass { 0 } else { groups };
         Some(Self {
-            forces: rows(),
-            rates: rows(),
-            momenta: rows(),
-            velocities: rows(),
-            products: rows(),
-            more_products: rows(),
-            drift: rows(),
-            low_position: rows(),
-            low_momentum: rows(),
+            forces: rows(true),
+            rates: rows(!is_second),
+            momenta: rows(!is_second),
+            velocities: rows(is_phase::<M, N>()),
+            products: rows(true),
+            more_products: rows(true),
+            drift: rows(is_second),
+            low_position: rows(!is_second),
+            low_momentum: rows(!is_second),
             masses: vec![[[[0.0; 4]; N]; N]; varied],
             tables,
             inertia,
@@ -138,7 +139,6 @@ impl<const N: usize> Points<N> {
             speed: 0.0,
             end: State::ZERO,
             end_low: State::ZERO,
-            cold: vec![0.0; 2 * scheme.points() * N],
             is_warm: false,
             last_step: 0.0,
             #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -175,7 +175,7 @@ impl<const N: usize> Points<N> {
         if self.is_warm {
             self.tables.set_ratio(table, leg.h / self.last_step);
         } else {
-            self.start_cold(model, &table.view(), &leg);
+            self.start_cold(model, &leg);
         }
         self.last_step = leg.h;
         let job = Job {
@@ -192,20 +192,15 @@ impl<const N: usize> Points<N> {
 
     /// Constant rates.
     #[cold]
-    fn start_cold<M>(&mut self, model: &M, scheme: &SchemeRef<'_>, leg: &Leg<'_, N>)
+    fn start_cold<M>(&mut self, model: &M, leg: &Leg<'_, N>)
     where
         M: Model<N>,
     {
-        let points = self.tables.points;
-        let unknowns = &mut self.cold;
-        let (mut force, mut rate) = ([0.0; N], [0.0; N]);
+        let (mut force, rate);
         if matches!(M::FORM, Form::Hamiltonian) {
-            cold_phase(model, scheme, leg.t, leg.start, unknowns);
-            force.copy_from_slice(&unknowns[..N]);
-            rate.copy_from_slice(&unknowns[points * N..][..N]);
+            (force, rate) = cold_rates(model, leg.t, leg.start);
         } else {
-            cold_velocity(model, leg.t, leg.start, unknowns);
-            rate.copy_from_slice(&unknowns[..N]);
+            (force, rate) = ([0.0; N], cold_rate(model, leg.t, leg.start));
             if is_second_order::<M, N>() {
                 let mut first = First::ZERO;
                 model.first(leg.t, &leg.start.q, &rate, &mut first);
@@ -214,10 +209,9 @@ impl<const N: usize> Points<N> {
                 }
             }
         }
-        for (forces, rates) in self.forces.iter_mut().zip(&mut self.rates) {
-            for a in 0..N {
-                (forces[a], rates[a]) = ([force[a]; 4], [rate[a]; 4]);
-            }
+        for a in 0..N {
+            (self.forces.iter_mut()).for_each(|forces| forces[a] = [force[a]; 4]);
+            (self.rates.iter_mut()).for_each(|rates| rates[a] = [rate[a]; 4]);
         }
     }
 
@@ -370,6 +364,7 @@ pub(crate) mod tests {
     use crate::bundle::Pendulums;
     use crate::model::{CoordinateName, Facts, Second};
     use crate::real::Real;
+    use crate::scheme::Tables as _;
     use crate::{Mixed, Radau};
 
     /// Two bodies, an angle, a force: products, quotients, roots, sines.

@@ -392,8 +392,16 @@ pub(crate) fn cold_velocity<M, const N: usize>(
 ) where
     M: Model<N>,
 {
-    let v = velocity(model, t, &state.q, &state.p, &[0.0; N]).unwrap_or([0.0; N]);
+    let v = cold_rate(model, t, state);
     unknowns.as_chunks_mut::<N>().0.fill(v);
+}
+
+/// The velocity at the start; zero if there is none, which the iteration then finds out.
+pub(crate) fn cold_rate<M, const N: usize>(model: &M, t: f64, state: &State<N>) -> [f64; N]
+where
+    M: Model<N>,
+{
+    velocity(model, t, &state.q, &state.p, &[0.0; N]).unwrap_or([0.0; N])
 }
 
 /// The rates at the start.
@@ -406,17 +414,30 @@ pub(crate) fn cold_phase<M, const N: usize>(
 ) where
     M: Model<N>,
 {
-    let mut first = First::ZERO;
-    model.first(t, &state.q, &state.p, &mut first);
+    let (force, rate) = cold_rates(model, t, state);
     let (pi, kappa) = unknowns
         .as_chunks_mut::<N>()
         .0
         .split_at_mut(scheme.points());
-    kappa.fill(first.z);
+    kappa.fill(rate);
+    pi.fill(force);
+}
+
+/// ṗ and q̇ of a Hamiltonian at the start.
+pub(crate) fn cold_rates<M, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+) -> ([f64; N], [f64; N])
+where
+    M: Model<N>,
+{
+    let mut first = First::ZERO;
+    model.first(t, &state.q, &state.p, &mut first);
     for a in 0..N {
         first.force[a] -= first.q[a];
     }
-    pi.fill(first.force);
+    (first.force, first.z)
 }
 
 /// The end of an element and what rounding took from it (T-68).

@@ -104,7 +104,7 @@ where
             return;
         }
         let mask = like.like(0.0).less(warm);
-        let table = &self.tables.continued;
+        let table = self.tables.continued();
         if const { is_second_order::<M, N>() || is_phase::<M, N>() } {
             apply(like, table, &group.forces, &mut work.products);
             for (old, new) in group.forces.iter_mut().zip(&work.products) {

@@ -322,7 +322,7 @@ impl<V: Four> Space<V> {
     fn begin<const G: usize>(&mut self, problem: &Problem, leg: Leg<'_>, is_warm: bool) {
         let (like, n) = (self.like, self.n);
         let h = like.like(leg.h);
-        let continued = rows::<V, G>(like, &problem.tables.continued);
+        let continued = rows::<V, G>(like, problem.tables.continued());
         let low_rows = rows::<V, G>(like, &problem.tables.twice_low);
         let rows = rows::<V, G>(like, &problem.tables.twice);
         let first = Placement::<V, G>::of(like, &problem.tables, leg.h, 0);

@@ -14,6 +14,7 @@ use crate::points::tables::MAX_GROUPS;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::Statistics;
 use alloc::boxed::Box;
+use alloc::vec::Vec;
 
 /// Steps a model of run-time length with one element, on memory of its own.
 ///

@@ -167,6 +167,7 @@ impl<const N: usize> Points<N> {
     pub(super) fn set_rates(&mut self, h: f64) {
         let like = crate::Lanes([0.0; 4]);
         (self.tables.once).apply(like, &self.forces, &mut self.products);
+        self.rates.resize(self.products.len(), [[0.0; 4]; N]);
         for (product, rate) in self.products.iter().zip(&mut self.rates) {
             for a in 0..N {
                 let change = self.inertia.row(like, product, a).0;

@@ -134,11 +134,11 @@ impl<const N: usize> Points<N> {
     {
         if self.is_warm {
             if const { is_second_order::<M, N>() || is_phase::<M, N>() } {
-                (self.tables.continued).apply(like, &self.forces, &mut self.products);
+                (self.tables.continued()).apply(like, &self.forces, &mut self.products);
                 core::mem::swap(&mut self.forces, &mut self.products);
             }
             if const { !is_second_order::<M, N>() } {
-                (self.tables.continued).apply(like, &self.rates, &mut self.products);
+                (self.tables.continued()).apply(like, &self.rates, &mut self.products);
                 core::mem::swap(&mut self.rates, &mut self.products);
             }
         }

@@ -2,11 +2,10 @@
 
 use super::Row;
 use super::four::Four;
-#[cfg(feature = "std")]
-use crate::Element;
 use crate::double_double::DoubleDouble;
 use crate::scheme::{SchemeRef, SchemeTable, Tables as _};
 use crate::step::set_extrapolation;
+use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -238,9 +237,19 @@ fn transposed<V: Four>(rows: [V; 4]) -> [V; 4] {
     ]
 }
 
-/// All tables; `low` is what rounding took.
+/// All tables of an element, and what continues the last one; clones share what no step changes.
 #[derive(Clone, Debug)]
 pub(crate) struct Tables {
+    fixed: Arc<Fixed>,
+    /// From the last element to this one, for steps of the ratio that follows; those of ratio one are among the others.
+    other: Option<Matrix>,
+    ratio: f64,
+    scratch: Vec<f64>,
+}
+
+/// What no step changes; `low` is what rounding took.
+#[derive(Clone, Debug)]
+pub(crate) struct Fixed {
     pub(crate) points: usize,
     pub(crate) groups: usize,
     /// c
@@ -258,36 +267,83 @@ pub(crate) struct Tables {
     pub(crate) weights: Weights,
     /// bᵀA
     pub(crate) lever: Weights,
-    /// From the last element to this one, for steps of the ratio that follows.
-    pub(crate) continued: Matrix,
-    ratio: f64,
-    scratch: Vec<f64>,
+    /// From one element to the next that is as long.
+    continued: Matrix,
+}
+
+impl core::ops::Deref for Tables {
+    type Target = Fixed;
+    #[inline(always)]
+    fn deref(&self) -> &Fixed {
+        &self.fixed
+    }
 }
 
 /// The tables computed so far.
 #[cfg(feature = "std")]
-static KNOWN: std::sync::Mutex<Vec<(Element, Tables)>> = std::sync::Mutex::new(Vec::new());
+static KNOWN: std::sync::Mutex<Vec<(crate::Element, Arc<Fixed>)>> =
+    std::sync::Mutex::new(Vec::new());
 
 impl Tables {
     /// Of an element that is a Runge–Kutta method. With the feature `std` they are computed once in a program.
     pub(crate) fn of(scheme: &SchemeRef<'_>) -> Self {
-        #[cfg(feature = "std")]
-        {
-            // A panic elsewhere leaves the list as good as it was.
-            let mut known = KNOWN
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner);
-            if let Some((_, tables)) = known.iter().find(|(of, _)| *of == scheme.element) {
-                return tables.clone();
-            }
-            let tables = Self::computed(scheme);
-            known.push((scheme.element, tables.clone()));
-            tables
+        Self {
+            fixed: Self::fixed(scheme),
+            other: None,
+            ratio: 1.0,
+            scratch: Vec::new(),
         }
-        #[cfg(not(feature = "std"))]
-        Self::computed(scheme)
     }
 
+    #[cfg(feature = "std")]
+    fn fixed(scheme: &SchemeRef<'_>) -> Arc<Fixed> {
+        // A panic elsewhere leaves the list as good as it was.
+        let mut known = KNOWN
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, fixed)) = known.iter().find(|(of, _)| *of == scheme.element) {
+            return fixed.clone();
+        }
+        let fixed = Arc::new(Fixed::computed(scheme));
+        known.push((scheme.element, fixed.clone()));
+        fixed
+    }
+
+    #[cfg(not(feature = "std"))]
+    fn fixed(scheme: &SchemeRef<'_>) -> Arc<Fixed> {
+        Arc::new(Fixed::computed(scheme))
+    }
+
+    /// From the last element to this one.
+    #[inline(always)]
+    pub(crate) fn continued(&self) -> &Matrix {
+        self.other.as_ref().unwrap_or(&self.fixed.continued)
+    }
+
+    /// Makes `continued` that of steps of this ratio.
+    pub(crate) fn set_ratio(&mut self, table: &SchemeTable, ratio: f64) {
+        // Far outside the last element its polynomial says nothing; backwards it may be reused.
+        let near = (-1.5..=3.0).contains(&ratio);
+        let ratio = if near { ratio } else { 0.0 };
+        if self.ratio != ratio {
+            self.continue_by(&table.view(), ratio);
+        }
+    }
+
+    #[cold]
+    fn continue_by(&mut self, scheme: &SchemeRef<'_>, ratio: f64) {
+        let points = self.fixed.points;
+        self.scratch.resize(points * points, 0.0);
+        set_extrapolation(scheme, ratio, &mut self.scratch);
+        match &mut self.other {
+            Some(matrix) => matrix.set(points, &self.scratch),
+            None => self.other = Some(Matrix::new(points, &self.scratch)),
+        }
+        self.ratio = ratio;
+    }
+}
+
+impl Fixed {
     fn computed(scheme: &SchemeRef<'_>) -> Self {
         let points = scheme.points();
         let coefficient = |i: usize, j: usize| DoubleDouble {
@@ -318,8 +374,10 @@ impl Tables {
             nodes[group][lane] = scheme.nodes[l];
             (reach[group][lane], reach_low[group][lane]) = (sum.high, sum.low);
         }
-        let scratch = vec![0.0; points * points];
-        let mut tables = Self {
+        // Most steps are as long as the one before.
+        let mut continued = vec![0.0; points * points];
+        set_extrapolation(scheme, 1.0, &mut continued);
+        Self {
             points,
             groups: nodes.len(),
             nodes,
@@ -331,30 +389,8 @@ impl Tables {
             twice_low: Matrix::new(points, &low(&twice)),
             weights: Weights::new(scheme.weights, scheme.weights_low),
             lever: Weights::new(&high(&lever), &low(&lever)),
-            continued: Matrix::new(points, &scratch),
-            ratio: 1.0,
-            scratch,
-        };
-        // Most steps are as long as the one before.
-        tables.continue_by(scheme, 1.0);
-        tables
-    }
-
-    /// Makes `continued` that of steps of this ratio.
-    pub(crate) fn set_ratio(&mut self, table: &SchemeTable, ratio: f64) {
-        // Far outside the last element its polynomial says nothing; backwards it may be reused.
-        let near = (-1.5..=3.0).contains(&ratio);
-        let ratio = if near { ratio } else { 0.0 };
-        if self.ratio != ratio {
-            self.continue_by(&table.view(), ratio);
+            continued: Matrix::new(points, &continued),
         }
-    }
-
-    #[cold]
-    fn continue_by(&mut self, scheme: &SchemeRef<'_>, ratio: f64) {
-        set_extrapolation(scheme, ratio, &mut self.scratch);
-        self.continued.set(self.points, &self.scratch);
-        self.ratio = ratio;
     }
 }
 
