@@ -213,6 +213,12 @@ impl Monitor {
         self.noise >= 2
     }
 
+    /// Whether the last increments are roundings of nearly dependent equations: small, and not halved any more by matrices made for them. They may go to and fro
+    /// between two values for ever.
+    fn is_rounding(&self, fresh: bool) -> bool {
+        fresh && self.idle >= IDLE && self.last <= ROUGH_ROUND_OFF
+    }
+
     /// Whether so many more iterations would not do, at the present rate.
     #[inline(always)]
     pub(crate) fn is_hopeless(&self, remaining: u32) -> bool {
@@ -328,7 +334,7 @@ where
         let verdict = monitor.judge(increment)?;
         // Equations that are linear are solved once; a second solution takes away the rounding.
         let refined = linear && iteration > 0 && increment.relative <= ROUND_OFF;
-        if refined || matches!(verdict, Verdict::Converged) {
+        if refined || matches!(verdict, Verdict::Converged) || monitor.is_rounding(fresh) {
             return equations.finish(unknowns, step);
         }
         // The first increment alone tells no rate: an old matrix may show a second one.
