@@ -52,14 +52,14 @@ const _: () = {
             for i in 0..N.saturating_sub(1) {
                 let t3 = q[i] - q[i + 1];
                 let t4 = t3 * t3;
-                let t5 = t4 * t2;
+                let t5 = t2 * t4;
                 let t6 = t1 + t5;
                 let t7 = t4 * t6;
                 t0 = t0 - t7;
             }
             for i in 0..N {
-                let t8 = z[i] * z[i];
-                let t9 = t.like(0.5) * t.like(self.m[i]);
+                let t8 = t.like(0.5) * t.like(self.m[i]);
+                let t9 = z[i] * z[i];
                 t0 += t8 * t9;
             }
             t0
@@ -99,7 +99,7 @@ const _: () = {
             let omega = t.like(self.omega);
             first.q.fill(t.like(0.0));
             first.force.fill(t.like(0.0));
-            let t0 = omega * t;
+            let t0 = t * omega;
             let t1 = t0.sin();
             first.force[N.saturating_sub(1)] += f * t1;
             for i in 0..N.saturating_sub(1) {
@@ -107,13 +107,13 @@ const _: () = {
                 let t3 = t2 * t2;
                 let t4 = a * t3;
                 let t5 = k + t4;
-                let t6 = t2 * t5;
+                let t6 = t5 * t2;
                 first.q[i] += -t6;
                 first.q[i + 1] += t6;
             }
             for i in 0..N {
-                first.z[i] = z[i] * t.like(self.m[i]);
-                let t7 = z[i] * c;
+                first.z[i] = t.like(self.m[i]) * z[i];
+                let t7 = c * z[i];
                 first.force[i] += -t7;
             }
         }
@@ -133,7 +133,7 @@ const _: () = {
             let omega = t.like(self.omega);
             first.q.fill(t.like(0.0));
             first.force.fill(t.like(0.0));
-            let t0 = omega * t;
+            let t0 = t * omega;
             let t1 = t0.sin();
             first.force[N.saturating_sub(1)] += f * t1;
             for i in 0..N.saturating_sub(1) {
@@ -141,13 +141,13 @@ const _: () = {
                 let t3 = t2 * t2;
                 let t4 = a * t3;
                 let t5 = k + t4;
-                let t6 = t2 * t5;
+                let t6 = t5 * t2;
                 first.q[i] += -t6;
                 first.q[i + 1] += t6;
             }
             for i in 0..N {
+                let t7 = c * z[i];
                 first.z[i] = t.like(self.m[i]) * z[i];
-                let t7 = z[i] * c;
                 first.force[i] += -t7;
                 zz[i][i] = t.like(self.m[i]);
             }
@@ -170,15 +170,15 @@ const _: () = {
             for row in &mut second.qq {
                 row.fill(t.like(0.0));
             }
-            let t0 = omega * t;
+            let t0 = t * omega;
             let t1 = t0.sin();
             first.force[N.saturating_sub(1)] += f * t1;
             for i in 0..N.saturating_sub(1) {
                 let t2 = q[i] - q[i + 1];
                 let t3 = t2 * t2;
-                let t4 = t3 * a;
+                let t4 = a * t3;
                 let t5 = k + t4;
-                let t6 = t2 * t5;
+                let t6 = t5 * t2;
                 first.q[i] += -t6;
                 first.q[i + 1] += t6;
                 let t7 = t.like(3.0) * t4;
@@ -191,8 +191,8 @@ const _: () = {
             }
             let t10 = -c;
             for i in 0..N {
-                first.z[i] = t.like(self.m[i]) * z[i];
                 let t11 = c * z[i];
+                first.z[i] = t.like(self.m[i]) * z[i];
                 first.force[i] += -t11;
                 second.zz[i][i] = t.like(self.m[i]);
                 second.force_z[i][i] = t10;

@@ -83,26 +83,26 @@ const _: () = {
             );
             let a = t.like(self.a);
             let k = t.like(self.k);
-            let t0 = z[0] * z[0];
-            let t1 = q[0] - q[1];
-            let t2 = t1 * t1;
+            let t0 = q[0] - q[1];
+            let t1 = z[0] * z[0];
+            let t2 = t0 * t0;
             let t3 = k * t2;
-            let t4 = t0 - t3;
+            let t4 = t1 - t3;
             let t5 = t.like(0.5) * t4;
             let mut t6 = t5;
             for i in 0..self.n {
-                let t7 = z[i + 1] * z[i + 1];
-                let t8 = t.like(0.5) * t.like(self.m[i]);
+                let t7 = t.like(0.5) * t.like(self.m[i]);
+                let t8 = z[i + 1] * z[i + 1];
                 t6 += t7 * t8;
             }
             let t9 = t.like(0.5) * k;
             for i in 0..self.w {
                 let t10 = q[i + 1] - q[i + 2];
-                let t11 = t10 * a;
-                let t12 = t11 / t.like(3.0);
-                let t13 = t9 - t12;
-                let t14 = t10 * t10;
-                let t15 = t13 * t14;
+                let t11 = a * t10;
+                let t12 = t10 * t10;
+                let t13 = t11 / t.like(3.0);
+                let t14 = t9 - t13;
+                let t15 = t12 * t14;
                 t6 = t6 - t15;
             }
             t6
@@ -137,9 +137,9 @@ const _: () = {
             }
             for i in 0..self.w {
                 let t3 = q[i + 1] - q[i + 2];
-                let t4 = t3 * a;
+                let t4 = a * t3;
                 let t5 = k - t4;
-                let t6 = t3 * t5;
+                let t6 = t5 * t3;
                 first.q[i + 1] += t2 - t6;
                 t2 = t6;
             }
@@ -171,9 +171,9 @@ const _: () = {
             first.force[self.n] = -z[self.n];
             for i in 0..self.w {
                 let t3 = q[i + 1] - q[i + 2];
-                let t4 = t3 * a;
+                let t4 = a * t3;
                 let t5 = k - t4;
-                let t6 = t3 * t5;
+                let t6 = t5 * t3;
                 first.q[i + 1] += t2 - t6;
                 t2 = t6;
             }
@@ -222,25 +222,25 @@ const _: () = {
             let mut t4 = t3;
             first.z[0] = z[0];
             first.q[0] += -t1;
-            first.force[self.n] = -z[self.n];
             entries.add(__tfe::Block::ZZ, 0, 0, t.like(1.0));
+            first.force[self.n] = -z[self.n];
             entries.add(__tfe::Block::QQ, 0, 0, t3);
             entries.add(__tfe::Block::QQ, 0, 1, k);
             entries.add(__tfe::Block::QQ, 1, 0, k);
             entries.add(__tfe::Block::ForceZ, self.n, self.n, t.like(-1.0));
             for i in 0..self.n {
-                first.z[i + 1] = t.like(self.m[i]) * z[i + 1];
                 entries.add(__tfe::Block::ZZ, i + 1, i + 1, t.like(self.m[i]));
+                first.z[i + 1] = t.like(self.m[i]) * z[i + 1];
             }
             for i in 0..self.w {
                 let t5 = q[i + 1] - q[i + 2];
-                let t6 = t5 * a;
+                let t6 = a * t5;
                 let t7 = k - t6;
                 let t8 = t6 - t7;
                 let t9 = -t8;
                 entries.add(__tfe::Block::QQ, i + 1, i + 2, t9);
                 entries.add(__tfe::Block::QQ, i + 2, i + 1, t9);
-                let t10 = t5 * t7;
+                let t10 = t7 * t5;
                 first.q[i + 1] += t2 - t10;
                 t2 = t10;
                 entries.add(__tfe::Block::QQ, i + 1, i + 1, t4 + t8);

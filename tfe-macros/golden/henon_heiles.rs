@@ -36,19 +36,19 @@ const _: () = {
         };
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let lambda = t.like(self.lambda);
-            let t0 = q[1] * q[1];
-            let t1 = q[0] * q[0];
-            let t2 = z[0] * z[0];
-            let t3 = z[1] * z[1];
-            let t4 = t2 + t3;
-            let t5 = t1 + t4;
-            let t6 = t0 + t5;
-            let t7 = t.like(0.5) * t6;
-            let t8 = t0 / t.like(3.0);
-            let t9 = t1 - t8;
-            let t10 = q[1] * lambda;
-            let t11 = t9 * t10;
-            t7 + t11
+            let t0 = q[0] * q[0];
+            let t1 = z[0] * z[0];
+            let t2 = z[1] * z[1];
+            let t3 = t1 + t2;
+            let t4 = lambda * q[1];
+            let t5 = q[1] * q[1];
+            let t6 = t5 + t0;
+            let t7 = t6 + t3;
+            let t8 = t.like(0.5) * t7;
+            let t9 = t5 / t.like(3.0);
+            let t10 = t0 - t9;
+            let t11 = t4 * t10;
+            t8 + t11
         }
         const LANES: bool = true;
         fn first<R: __tfe::Real>(
@@ -82,7 +82,7 @@ const _: () = {
             first.z[0] = z[0];
             first.z[1] = z[1];
             let t0 = t.like(2.0) * lambda;
-            let t1 = q[1] * q[0];
+            let t1 = q[0] * q[1];
             let t2 = t0 * t1;
             first.q[0] = q[0] + t2;
             let t3 = q[0] * q[0];
@@ -103,8 +103,10 @@ const _: () = {
             let lambda = t.like(self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
+            zz[0][0] = t.like(1.0);
+            zz[1][1] = t.like(1.0);
             let t0 = t.like(2.0) * lambda;
-            let t1 = q[1] * q[0];
+            let t1 = q[0] * q[1];
             let t2 = t0 * t1;
             first.q[0] = q[0] + t2;
             let t3 = q[0] * q[0];
@@ -112,8 +114,6 @@ const _: () = {
             let t5 = t3 - t4;
             let t6 = lambda * t5;
             first.q[1] = q[1] + t6;
-            zz[0][0] = t.like(1.0);
-            zz[1][1] = t.like(1.0);
         }
         fn second<R: __tfe::Real>(
             &self,
@@ -126,22 +126,22 @@ const _: () = {
             let lambda = t.like(self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
-            let t0 = t.like(2.0) * lambda;
-            let t1 = q[1] * t0;
-            let t2 = t.like(1.0) + t1;
-            first.q[0] = q[0] * t2;
-            let t3 = q[0] * q[0];
-            let t4 = q[1] * q[1];
-            let t5 = t3 - t4;
-            let t6 = lambda * t5;
-            first.q[1] = q[1] + t6;
             second.zz[0][0] = t.like(1.0);
             second.zz[1][1] = t.like(1.0);
-            second.qq[0][0] = t2;
-            let t7 = q[0] * t0;
-            second.qq[0][1] = t7;
-            second.qq[1][0] = t7;
+            let t0 = t.like(2.0) * lambda;
+            let t1 = q[1] * t0;
+            let t2 = q[0] * t0;
+            second.qq[0][1] = t2;
+            second.qq[1][0] = t2;
+            let t3 = t.like(1.0) + t1;
+            second.qq[0][0] = t3;
+            first.q[0] = q[0] * t3;
+            let t4 = q[0] * q[0];
             second.qq[1][1] = t.like(1.0) - t1;
+            let t5 = q[1] * q[1];
+            let t6 = t4 - t5;
+            let t7 = lambda * t6;
+            first.q[1] = q[1] + t7;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {
             match index {

@@ -46,18 +46,18 @@ const _: () = {
             let j = t.like(self.j);
             let m = t.like(self.m);
             let t0 = alpha.sin();
-            let t1 = z[0] * z[0];
-            let t2 = z[1] * z[1];
-            let t3 = t1 + t2;
-            let t4 = m * t3;
-            let t5 = z[2] * z[2];
-            let t6 = j * t5;
-            let t7 = t4 + t6;
-            let t8 = t.like(0.5) * t7;
-            let t9 = m * q[0];
-            let t10 = g * t9;
-            let t11 = t0 * t10;
-            t8 + t11
+            let t1 = z[2] * z[2];
+            let t2 = j * t1;
+            let t3 = z[0] * z[0];
+            let t4 = z[1] * z[1];
+            let t5 = t3 + t4;
+            let t6 = m * t5;
+            let t7 = t2 + t6;
+            let t8 = m * q[0];
+            let t9 = g * t8;
+            let t10 = t0 * t9;
+            let t11 = t.like(0.5) * t7;
+            t11 + t10
         }
         const LANES: bool = false;
         fn first<R: __tfe::Real>(
@@ -92,10 +92,10 @@ const _: () = {
             let j = t.like(self.j);
             let m = t.like(self.m);
             let t0 = alpha.sin();
+            first.z[2] = j * z[2];
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
-            first.z[2] = j * z[2];
-            let t1 = m * g;
+            let t1 = g * m;
             first.q[0] = t0 * t1;
         }
         #[inline(always)]
@@ -112,14 +112,14 @@ const _: () = {
             let j = t.like(self.j);
             let m = t.like(self.m);
             let t0 = alpha.sin();
-            first.z[0] = m * z[0];
-            first.z[1] = m * z[1];
-            first.z[2] = j * z[2];
-            let t1 = m * g;
-            first.q[0] = t0 * t1;
             zz[0][0] = m;
             zz[1][1] = m;
             zz[2][2] = j;
+            first.z[2] = j * z[2];
+            first.z[0] = m * z[0];
+            first.z[1] = m * z[1];
+            let t1 = g * m;
+            first.q[0] = t0 * t1;
         }
         fn second<R: __tfe::Real>(
             &self,
@@ -134,14 +134,14 @@ const _: () = {
             let j = t.like(self.j);
             let m = t.like(self.m);
             let t0 = alpha.sin();
-            first.z[0] = m * z[0];
-            first.z[1] = m * z[1];
-            first.z[2] = j * z[2];
-            let t1 = m * g;
-            first.q[0] = t0 * t1;
             second.zz[0][0] = m;
             second.zz[1][1] = m;
             second.zz[2][2] = j;
+            first.z[2] = j * z[2];
+            first.z[0] = m * z[0];
+            first.z[1] = m * z[1];
+            let t1 = g * m;
+            first.q[0] = t0 * t1;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {
             match index {
@@ -191,22 +191,22 @@ const _: () = {
                 return;
             };
             let (sin_phi, cos_phi) = q[2].sin_cos();
-            let t0 = sin_phi * v[1];
-            let t1 = cos_phi * v[0];
+            let t0 = v[0] * cos_phi;
+            let t1 = v[1] * sin_phi;
             psi_q[0][2] = t0 + t1;
             let t2 = v[2] * cos_phi;
             row_rates[0][0] = t2;
             let t3 = v[2] * sin_phi;
             row_rates[0][1] = t3;
-            let t4 = cos_phi * mu[0];
+            let t4 = mu[0] * cos_phi;
             second.bend[0][2] = t4;
-            let t5 = sin_phi * mu[0];
-            second.bend[1][2] = t5;
-            let t6 = t3 * mu[0];
-            second.rate_q[0][2] = -t6;
-            second.rate_q[1][2] = t2 * mu[0];
             second.rate_v[0][2] = t4;
+            let t5 = mu[0] * sin_phi;
+            second.bend[1][2] = t5;
             second.rate_v[1][2] = t5;
+            let t6 = mu[0] * t3;
+            second.rate_q[1][2] = mu[0] * t2;
+            second.rate_q[0][2] = -t6;
         }
     }
 };

@@ -47,11 +47,11 @@ const _: () = {
             let m = t.like(self.m);
             let cos_theta = q[0].cos();
             let t0 = l * z[0];
-            let t1 = t0 * t0;
-            let t2 = t.like(0.5) * t1;
-            let t3 = l * g;
-            let t4 = cos_theta * t3;
-            let t5 = t2 + t4;
+            let t1 = g * l;
+            let t2 = cos_theta * t1;
+            let t3 = t0 * t0;
+            let t4 = t.like(0.5) * t3;
+            let t5 = t4 + t2;
             m * t5
         }
         const LANES: bool = true;
@@ -86,11 +86,11 @@ const _: () = {
             let l = t.like(self.l);
             let m = t.like(self.m);
             let sin_theta = q[0].sin();
-            let t0 = m * l;
-            let t1 = l * z[0];
-            first.z[0] = t0 * t1;
-            let t2 = g * sin_theta;
-            let t3 = t0 * t2;
+            let t0 = g * sin_theta;
+            let t1 = l * m;
+            let t2 = l * z[0];
+            first.z[0] = t1 * t2;
+            let t3 = t1 * t0;
             first.q[0] = -t3;
         }
         #[inline(always)]
@@ -106,13 +106,13 @@ const _: () = {
             let l = t.like(self.l);
             let m = t.like(self.m);
             let sin_theta = q[0].sin();
-            let t0 = l * m;
-            let t1 = l * t0;
-            first.z[0] = t1 * z[0];
-            let t2 = g * sin_theta;
-            let t3 = t0 * t2;
+            let t0 = g * sin_theta;
+            let t1 = l * m;
+            let t2 = l * t1;
+            zz[0][0] = t2;
+            first.z[0] = z[0] * t2;
+            let t3 = t1 * t0;
             first.q[0] = -t3;
-            zz[0][0] = t1;
         }
         fn second<R: __tfe::Real>(
             &self,
@@ -128,12 +128,12 @@ const _: () = {
             let (sin_theta, cos_theta) = q[0].sin_cos();
             let t0 = l * m;
             let t1 = l * t0;
-            first.z[0] = t1 * z[0];
-            let t2 = t0 * g;
-            let t3 = t2 * sin_theta;
-            first.q[0] = -t3;
             second.zz[0][0] = t1;
+            first.z[0] = z[0] * t1;
+            let t2 = g * t0;
+            let t3 = sin_theta * t2;
             let t4 = cos_theta * t2;
+            first.q[0] = -t3;
             second.qq[0][0] = -t4;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {

@@ -41,12 +41,12 @@ const _: () = {
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let g = t.like(self.g);
             let m = t.like(self.m);
-            let t0 = z[0] * z[0];
-            let t1 = z[1] * z[1];
-            let t2 = t0 + t1;
-            let t3 = t.like(0.5) * t2;
-            let t4 = q[1] * g;
-            let t5 = t3 - t4;
+            let t0 = g * q[1];
+            let t1 = z[0] * z[0];
+            let t2 = z[1] * z[1];
+            let t3 = t1 + t2;
+            let t4 = t.like(0.5) * t3;
+            let t5 = t4 - t0;
             m * t5
         }
         const LANES: bool = false;
@@ -81,7 +81,7 @@ const _: () = {
             let m = t.like(self.m);
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
-            let t0 = m * g;
+            let t0 = g * m;
             first.q[1] = -t0;
         }
         #[inline(always)]
@@ -95,12 +95,12 @@ const _: () = {
         ) {
             let g = t.like(self.g);
             let m = t.like(self.m);
-            first.z[0] = m * z[0];
-            first.z[1] = m * z[1];
-            let t0 = m * g;
-            first.q[1] = -t0;
             zz[0][0] = m;
             zz[1][1] = m;
+            first.z[0] = m * z[0];
+            first.z[1] = m * z[1];
+            let t0 = g * m;
+            first.q[1] = -t0;
         }
         fn second<R: __tfe::Real>(
             &self,
@@ -112,12 +112,12 @@ const _: () = {
         ) {
             let g = t.like(self.g);
             let m = t.like(self.m);
-            first.z[0] = m * z[0];
-            first.z[1] = m * z[1];
-            let t0 = m * g;
-            first.q[1] = -t0;
             second.zz[0][0] = m;
             second.zz[1][1] = m;
+            first.z[0] = m * z[0];
+            first.z[1] = m * z[1];
+            let t0 = g * m;
+            first.q[1] = -t0;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {
             match index {
@@ -177,9 +177,9 @@ const _: () = {
             };
             let t0 = t.like(2.0) * v[0];
             psi_q[0][0] = t0;
+            row_rates[0][0] = t0;
             let t1 = t.like(2.0) * v[1];
             psi_q[0][1] = t1;
-            row_rates[0][0] = t0;
             row_rates[0][1] = t1;
             let t2 = t.like(2.0) * mu[0];
             second.bend[0][0] = t2;

@@ -50,8 +50,8 @@ const _: () = {
             let t3 = t.like(self.k[0]) * t2;
             let t4 = t1 - t3;
             let t5 = t.like(0.5) * t4;
-            let t6 = t2 * t2;
-            let t7 = t.like(0.25) * t.like(self.k[1]);
+            let t6 = t.like(0.25) * t.like(self.k[1]);
+            let t7 = t2 * t2;
             let t8 = t6 * t7;
             t5 - t8
         }
@@ -87,17 +87,17 @@ const _: () = {
             let c = t.like(self.c);
             let m = t.like(self.m);
             let omega = t.like(self.omega);
-            let t0 = omega * t;
+            let t0 = t * omega;
             let t1 = t0.cos();
+            let t2 = amplitude * t1;
             first.z[0] = m * z[0];
-            let t2 = q[0] * q[0];
-            let t3 = t.like(self.k[1]) * t2;
-            let t4 = t.like(self.k[0]) + t3;
-            let t5 = q[0] * t4;
-            first.q[0] = -t5;
-            let t6 = amplitude * t1;
-            let t7 = z[0] * c;
-            first.force[0] = t6 - t7;
+            let t3 = c * z[0];
+            first.force[0] = t2 - t3;
+            let t4 = q[0] * q[0];
+            let t5 = t.like(self.k[1]) * t4;
+            let t6 = t.like(self.k[0]) + t5;
+            let t7 = q[0] * t6;
+            first.q[0] = -t7;
         }
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
@@ -112,18 +112,18 @@ const _: () = {
             let c = t.like(self.c);
             let m = t.like(self.m);
             let omega = t.like(self.omega);
-            let t0 = omega * t;
+            let t0 = t * omega;
             let t1 = t0.cos();
-            first.z[0] = m * z[0];
-            let t2 = q[0] * q[0];
-            let t3 = t.like(self.k[1]) * t2;
-            let t4 = t.like(self.k[0]) + t3;
-            let t5 = q[0] * t4;
-            first.q[0] = -t5;
-            let t6 = amplitude * t1;
-            let t7 = z[0] * c;
-            first.force[0] = t6 - t7;
             zz[0][0] = m;
+            let t2 = amplitude * t1;
+            first.z[0] = m * z[0];
+            let t3 = c * z[0];
+            first.force[0] = t2 - t3;
+            let t4 = q[0] * q[0];
+            let t5 = t.like(self.k[1]) * t4;
+            let t6 = t.like(self.k[0]) + t5;
+            let t7 = q[0] * t6;
+            first.q[0] = -t7;
         }
         fn second<R: __tfe::Real>(
             &self,
@@ -137,22 +137,22 @@ const _: () = {
             let c = t.like(self.c);
             let m = t.like(self.m);
             let omega = t.like(self.omega);
-            let t0 = omega * t;
+            let t0 = t * omega;
             let t1 = t0.cos();
-            first.z[0] = m * z[0];
-            let t2 = q[0] * q[0];
-            let t3 = t.like(self.k[1]) * t2;
-            let t4 = t.like(self.k[0]) + t3;
-            let t5 = q[0] * t4;
-            first.q[0] = -t5;
-            let t6 = amplitude * t1;
-            let t7 = c * z[0];
-            first.force[0] = t6 - t7;
             second.zz[0][0] = m;
-            let t8 = t.like(3.0) * t3;
+            let t2 = amplitude * t1;
+            first.z[0] = m * z[0];
+            let t3 = c * z[0];
+            first.force[0] = t2 - t3;
+            second.force_z[0][0] = -c;
+            let t4 = q[0] * q[0];
+            let t5 = t.like(self.k[1]) * t4;
+            let t6 = t.like(self.k[0]) + t5;
+            let t7 = q[0] * t6;
+            first.q[0] = -t7;
+            let t8 = t.like(3.0) * t5;
             let t9 = t.like(self.k[0]) + t8;
             second.qq[0][0] = -t9;
-            second.force_z[0][0] = -c;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {
             match index {
@@ -181,19 +181,19 @@ const _: () = {
                 __tfe::By::Time => {
                     let amplitude = t.like(self.amplitude);
                     let omega = t.like(self.omega);
-                    let t0 = omega * t;
+                    let t0 = t * omega;
                     let t1 = t0.sin();
-                    let t2 = omega * amplitude;
+                    let t2 = amplitude * omega;
                     let t3 = t1 * t2;
                     first.force[0] = -t3;
                 }
                 __tfe::By::Parameter(0) => {
                     let amplitude = t.like(self.amplitude);
                     let omega = t.like(self.omega);
-                    let t0 = omega * t;
+                    let t0 = t * omega;
                     let t1 = t0.sin();
-                    let t2 = t * amplitude;
-                    let t3 = t1 * t2;
+                    let t2 = amplitude * t1;
+                    let t3 = t * t2;
                     first.force[0] = -t3;
                 }
                 __tfe::By::Parameter(1) => {

@@ -113,7 +113,7 @@ impl<'a> Emitter<'a> {
                 self.indices.insert(variable.to_string());
                 self.survey(body);
             }
-            for operand in operands(statement) {
+            for operand in statement.operands() {
                 if let Operand::Temporary(temporary) = operand {
                     *self.reads.entry(*temporary).or_default() += 1;
                 }
@@ -503,34 +503,6 @@ fn written(statement: &Statement) -> Option<&Operand> {
         | Statement::Accumulate { value, .. }
         | Statement::Assign { value, .. } => Some(value),
         _ => None,
-    }
-}
-
-/// What a statement reads; of a loop, nothing.
-pub(crate) fn operands(statement: &Statement) -> Vec<&Operand> {
-    match statement {
-        Statement::Let { operation, .. } => match operation {
-            Operation::Copy(a) | Operation::Negate(a) | Operation::IntegerPower(a, _) => vec![a],
-            Operation::Add(a, b)
-            | Operation::Subtract(a, b)
-            | Operation::Multiply(a, b)
-            | Operation::Divide(a, b)
-            | Operation::Power(a, b) => vec![a, b],
-            Operation::Call(_, arguments) => arguments.iter().collect(),
-            Operation::Select {
-                left,
-                right,
-                then,
-                otherwise,
-                ..
-            } => vec![left, right, then, otherwise],
-        },
-        Statement::SineCosine { argument, .. } => vec![argument],
-        Statement::Accumulator { start: value, .. }
-        | Statement::Accumulate { value, .. }
-        | Statement::Assign { value, .. }
-        | Statement::Store { value, .. } => vec![value],
-        Statement::Loop { .. } | Statement::Balance { .. } | Statement::Clear { .. } => Vec::new(),
     }
 }
 

@@ -179,9 +179,9 @@ impl Derivation {
     /// let hamiltonian = Derivation::hamiltonian(&declared).expect("a time transformation");
     /// assert_eq!(
     ///     hamiltonian.to_string(),
-    ///     "t0 = p[0] * p[0]\n\
-    ///      t1 = q[0] * q[1]\n\
-    ///      t2 = t0 - t1\n\
+    ///     "t0 = q[0] * q[1]\n\
+    ///      t1 = p[0] * p[0]\n\
+    ///      t2 = t1 - t0\n\
     ///      E = t2\n"
     /// );
     /// ```
@@ -226,11 +226,11 @@ impl Derivation {
     /// assert_eq!(
     ///     derivation.program_by(By::Parameter(0)).to_string(),
     ///     "t0 = cos(t)\n\
+    ///      Q[0] = t0\n\
     ///      t1 = 2 * q[0]\n\
     ///      t2 = k * t1\n\
     ///      t3 = -t2\n\
-    ///      E_q[0] = t3\n\
-    ///      Q[0] = t0\n"
+    ///      E_q[0] = t3\n"
     /// );
     /// ```
     pub fn program_by(&self, by: By) -> Program {

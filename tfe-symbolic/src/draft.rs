@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::alike::with_like_operations_alike;
 use crate::angles::expand_angles;
 use crate::arms::Arms;
 use crate::arrange::{Grouping, arrange};
@@ -92,7 +93,10 @@ impl Draft {
         arranged.sort_by_key(|arranged| arranged.plan.cost());
         let least = arranged.first().map_or(0, |arranged| arranged.plan.cost());
         arranged.retain(|arranged| 4 * arranged.plan.cost() <= CLOSE * least);
-        let key = |arranged: &Arranged| (arranged.plan.cost(), arranged.plan.len());
+        let key = |arranged: &Arranged| {
+            let plan = &arranged.plan;
+            (plan.cost(), plan.len(), plan.copies())
+        };
         arranged.dedup_by_key(|arranged| (arranged.draft.cost, key(arranged)));
         let mut left = FOLLOWED;
         let within = arranged.iter().take_while(|arranged| {
@@ -161,7 +165,8 @@ impl Arranged<'_> {
         let mut next = self.values.iter();
         let mut block = self.draft.block.clone();
         block.for_each_value(&mut |value| *value = *next.next().unwrap_or(value));
-        let plan = with_fewer_negations(self.plan, &block.stored());
+        let plan = with_like_operations_alike(self.plan);
+        let plan = with_fewer_negations(plan, &block.stored());
         schedule(plan, &self.draft.cleared, &block, &self.draft.balances)
     }
 }

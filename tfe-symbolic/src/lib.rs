@@ -7,6 +7,7 @@
 //! Each arrow is a function from one named type to the next; [`compile`] lists them. The crate knows
 //! neither Rust tokens nor floating-point linear algebra.
 
+mod alike;
 mod angles;
 mod arms;
 mod arrange;
@@ -37,6 +38,7 @@ pub mod interpret;
 mod listing;
 pub mod lower;
 pub mod notation;
+mod order;
 mod pairs;
 pub mod parse;
 mod plan;

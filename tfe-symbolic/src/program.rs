@@ -211,6 +211,89 @@ pub enum Statement {
     },
 }
 
+impl Operation {
+    fn operands(&self) -> Vec<&Operand> {
+        match self {
+            Self::Copy(a) | Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
+            Self::Add(a, b)
+            | Self::Subtract(a, b)
+            | Self::Multiply(a, b)
+            | Self::Divide(a, b)
+            | Self::Power(a, b) => vec![a, b],
+            Self::Call(_, arguments) => arguments.iter().collect(),
+            Self::Select {
+                left,
+                right,
+                then,
+                otherwise,
+                ..
+            } => vec![left, right, then, otherwise],
+        }
+    }
+
+    fn operands_mut(&mut self) -> Vec<&mut Operand> {
+        match self {
+            Self::Copy(a) | Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
+            Self::Add(a, b)
+            | Self::Subtract(a, b)
+            | Self::Multiply(a, b)
+            | Self::Divide(a, b)
+            | Self::Power(a, b) => vec![a, b],
+            Self::Call(_, arguments) => arguments.iter_mut().collect(),
+            Self::Select {
+                left,
+                right,
+                then,
+                otherwise,
+                ..
+            } => vec![left, right, then, otherwise],
+        }
+    }
+}
+
+impl Statement {
+    /// What it reads; of a loop, nothing.
+    pub fn operands(&self) -> Vec<&Operand> {
+        match self {
+            Self::Let { operation, .. } => operation.operands(),
+            Self::SineCosine {
+                argument: value, ..
+            }
+            | Self::Accumulator { start: value, .. }
+            | Self::Accumulate { value, .. }
+            | Self::Assign { value, .. }
+            | Self::Store { value, .. } => vec![value],
+            Self::Loop { .. } | Self::Balance { .. } | Self::Clear { .. } => Vec::new(),
+        }
+    }
+
+    /// Goes through the temporaries that it reads and then those that it sets; of a loop, none.
+    pub(crate) fn for_each_temporary(&mut self, change: &mut impl FnMut(&mut Temporary)) {
+        let (operands, targets) = match self {
+            Self::Let { target, operation } => (operation.operands_mut(), vec![target]),
+            Self::SineCosine {
+                sine,
+                cosine,
+                argument,
+            } => (vec![argument], vec![sine, cosine]),
+            Self::Accumulator {
+                target,
+                start: value,
+            }
+            | Self::Accumulate { target, value }
+            | Self::Assign { target, value } => (vec![value], vec![target]),
+            Self::Store { value, .. } => (vec![value], Vec::new()),
+            Self::Loop { .. } | Self::Balance { .. } | Self::Clear { .. } => return,
+        };
+        for operand in operands {
+            if let Operand::Temporary(temporary) = operand {
+                change(temporary);
+            }
+        }
+        targets.into_iter().for_each(change);
+    }
+}
+
 /// What one kernel computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub struct Request {

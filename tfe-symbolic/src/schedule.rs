@@ -1,13 +1,15 @@
-//! From arranged operations to a program: temporaries in the order of their use, each as far outside of the loops as it can be.
+//! From arranged operations to a program: temporaries as they are needed, each as far outside of the loops as it can be.
 
 use std::collections::BTreeSet;
 
+use crate::alike::ranks;
 use crate::balance::Balance;
 use crate::blocks::{Block, Local, Sink, Target};
 use crate::entry::{Array, Place};
 use crate::function::Function;
 use crate::graph::{SumRange, loop_bit};
 use crate::input::LoopVariable;
+use crate::order::in_order;
 use crate::plan::{Op, OpId, Plan, Value};
 use crate::program::{Operand, Operation, Program, Statement, Temporary};
 use crate::table::Map;
@@ -24,6 +26,7 @@ pub(crate) fn schedule(
             .ids()
             .filter(|id| matches!(plan.op(*id), Op::Loop { .. }))
             .collect(),
+        ranks: ranks(&plan),
         plan,
         scopes: vec![Scope::default()],
         temporaries: 0,
@@ -42,7 +45,7 @@ pub(crate) fn schedule(
             length: length.clone(),
         });
     }
-    let statements = scheduler.scopes.swap_remove(0).statements;
+    let statements = in_order(scheduler.scopes.swap_remove(0).statements);
     Program {
         statements,
         temporaries: scheduler.temporaries,
@@ -60,6 +63,8 @@ struct Scope {
 
 struct Scheduler {
     plan: Plan,
+    /// Which operand of sums and products stands first.
+    ranks: Vec<usize>,
     /// The sums over ranges that are values.
     reductions: Vec<OpId>,
     scopes: Vec<Scope>,
@@ -89,7 +94,15 @@ impl Scheduler {
             );
             call && self.plan.loops_of(*id) == 0 && !self.plan.reduces(*id)
         };
-        let angles: Vec<OpId> = self.plan.ids().filter(angle).collect();
+        let mut angles: Vec<OpId> = self.plan.ids().filter(angle).collect();
+        // In the order of the coordinates; what has to be computed comes after them.
+        angles.sort_by_key(|id| match self.plan.op(*id).operands()[..] {
+            [argument] => match self.plan.op(argument) {
+                Op::Input(input) => (false, Some(input.clone())),
+                _ => (true, None),
+            },
+            _ => (true, None),
+        });
         for id in angles {
             self.operand(id);
         }
@@ -223,7 +236,7 @@ impl Scheduler {
                 stack.pop();
                 continue;
             }
-            let op = self.plan.op(top).clone();
+            let op = self.operation(top);
             if let Op::Loop { range, .. } = &op {
                 self.reduce(top, range);
                 stack.pop();
@@ -243,6 +256,22 @@ impl Scheduler {
         }
         // Known by construction; a hole in the plan shows as NaN in tests, not as a panic in a compiler.
         self.known(id).unwrap_or(Operand::Constant(f64::NAN))
+    }
+
+    /// The operation, with the operands of sums and products in the order that like ones have in common.
+    fn operation(&self, id: OpId) -> Op {
+        let key = |id: OpId| {
+            let input = match self.plan.op(id) {
+                Op::Input(input) => Some(input),
+                _ => None,
+            };
+            (self.ranks.get(id.index()), input)
+        };
+        match self.plan.op(id) {
+            Op::Add(a, b) if key(*b) < key(*a) => Op::Add(*b, *a),
+            Op::Multiply(a, b) if key(*b) < key(*a) => Op::Multiply(*b, *a),
+            op => op.clone(),
+        }
     }
 
     /// Writes the operation, whose operands are known.

@@ -417,9 +417,9 @@ fn nothing_is_computed_that_vanishes() {
         derivation.program(second).to_string(),
         "t0 = 2 * v[0]\n\
          psi_q[1, 0] = t0\n\
+         A_rate[1, 0] = t0\n\
          t1 = 2 * v[2]\n\
          psi_q[1, 2] = t1\n\
-         A_rate[1, 0] = t0\n\
          A_rate[1, 2] = t1\n\
          t2 = 2 * mu[1]\n\
          bend[0, 0] = t2\n\

@@ -1,6 +1,6 @@
 //! Which kernels run through their sites in one loop, so that they can say how far they have come.
 
-use crate::emit::{Emitter, index, less, loop_name, operands};
+use crate::emit::{Emitter, index, less, loop_name};
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::input::{Affine, IndexSymbol, Input};
@@ -91,7 +91,8 @@ fn touched(statements: &[Statement]) -> impl Iterator<Item = &Affine> {
             } => Some(place),
             _ => None,
         };
-        operands(statement)
+        statement
+            .operands()
             .into_iter()
             .filter_map(read)
             .chain(written)
