@@ -253,34 +253,39 @@ where
             Models::One(model)
                 if Bundle::<M, N, WIDTH>::uses_lanes(&self.element, &self.control) =>
             {
-                // The tables of the element are made once, not for every batch.
+                // Made once, and one batch after the other runs in a copy.
                 let empty = Bundle::new(model, self.element, self.control);
                 let empty = empty.map_err(RunErrorKind::Element)?;
-                summed(count.div_ceil(WIDTH), |batch| {
-                    let from = batch * WIDTH;
+                let batch = |bundle: &mut Bundle<'_, M, N, WIDTH>, number: usize| {
+                    let from = number * WIDTH;
                     let starts = &starts[from..(from + WIDTH).min(count)];
-                    let statistics = plan.run_together(empty.clone(), starts, |lane, result| {
+                    let statistics = plan.run_together(bundle, starts, |lane, result| {
                         finished(from + lane, result);
                     });
                     progress.advance(starts.len());
                     statistics
-                })
+                };
+                summed(count.div_ceil(WIDTH), || empty.clone(), batch)
             }
-            models => summed(count, |index| {
-                let model = match models {
-                    Models::One(model) => model,
-                    Models::Many(models) => &models[index],
-                };
-                let start = if starts.len() == 1 {
-                    &starts[0]
-                } else {
-                    &starts[index]
-                };
-                let (result, statistics) = plan.run_alone(model, start);
-                finished(index, result);
-                progress.advance(1);
-                statistics
-            }),
+            models => summed(
+                count,
+                || (),
+                |_: &mut (), index| {
+                    let model = match models {
+                        Models::One(model) => model,
+                        Models::Many(models) => &models[index],
+                    };
+                    let start = if starts.len() == 1 {
+                        &starts[0]
+                    } else {
+                        &starts[index]
+                    };
+                    let (result, statistics) = plan.run_alone(model, start);
+                    finished(index, result);
+                    progress.advance(1);
+                    statistics
+                },
+            ),
         };
         Ok(statistics)
     }
@@ -300,19 +305,30 @@ where
     }
 }
 
-/// The sum of what all batches have cost.
+/// The sum of what all batches have cost. What `place` makes serves many of them, one after the other.
 #[cfg(feature = "parallel")]
-fn summed(batches: usize, batch: impl Fn(usize) -> Statistics + Send + Sync) -> Statistics {
+fn summed<P>(
+    batches: usize,
+    place: impl Fn() -> P + Send + Sync,
+    batch: impl Fn(&mut P, usize) -> Statistics + Send + Sync,
+) -> Statistics {
     use rayon::iter::{IntoParallelIterator, ParallelIterator};
     (0..batches)
         .into_par_iter()
-        .map(batch)
+        .map_init(place, batch)
         .reduce(Statistics::default, merged)
 }
 
 #[cfg(not(feature = "parallel"))]
-fn summed(batches: usize, batch: impl Fn(usize) -> Statistics + Send + Sync) -> Statistics {
-    (0..batches).map(batch).fold(Statistics::default(), merged)
+fn summed<P>(
+    batches: usize,
+    place: impl Fn() -> P,
+    batch: impl Fn(&mut P, usize) -> Statistics,
+) -> Statistics {
+    let mut place = place();
+    (0..batches)
+        .map(|number| batch(&mut place, number))
+        .fold(Statistics::default(), merged)
 }
 
 fn merged(mut sum: Statistics, other: Statistics) -> Statistics {
@@ -340,7 +356,7 @@ impl<const N: usize> Plan<N> {
     /// Up to [`WIDTH`] runs in lanes.
     fn run_together<M>(
         &self,
-        mut bundle: Bundle<'_, M, N, WIDTH>,
+        bundle: &mut Bundle<'_, M, N, WIDTH>,
         starts: &[State<N>],
         finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
     ) -> Statistics
@@ -384,7 +400,7 @@ impl<const N: usize> Plan<N> {
             };
             finished(lane, result);
         }
-        bundle.statistics()
+        bundle.take_statistics()
     }
 
     /// One run by itself.

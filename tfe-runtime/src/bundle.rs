@@ -192,6 +192,9 @@ where
                 }
             }
         }
+        if let Some(engine) = &mut self.engine {
+            engine.forget();
+        }
         // Lanes without a trajectory compute along with the first one; nobody looks at them.
         let first = starts.first().unwrap_or(&State::ZERO);
         for (k, group) in self.groups.iter_mut().enumerate() {
@@ -283,6 +286,18 @@ where
         for fate in &self.fates {
             if let Some(stepper) = &fate.stepper {
                 sum.merge(stepper.statistics());
+            }
+        }
+        sum
+    }
+
+    /// The same since the last call, or since the bundle was made.
+    pub fn take_statistics(&mut self) -> Statistics {
+        let mut sum = core::mem::take(&mut self.together);
+        sum.merge(&core::mem::take(&mut self.past));
+        for fate in &mut self.fates {
+            if let Some(stepper) = &mut fate.stepper {
+                sum.merge(&stepper.take_statistics());
             }
         }
         sum

@@ -478,6 +478,11 @@ where
     pub fn statistics(&self) -> &Statistics {
         &self.memory.statistics
     }
+
+    /// The same since the last call.
+    pub(crate) fn take_statistics(&mut self) -> Statistics {
+        core::mem::take(&mut self.memory.statistics)
+    }
 }
 
 /// How a step with all points at once has ended.

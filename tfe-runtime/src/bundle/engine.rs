@@ -67,6 +67,11 @@ impl<const N: usize> Engine<N> {
         })
     }
 
+    /// Says that no trajectory continues the last step.
+    pub(super) fn forget(&mut self) {
+        self.last_step = 0.0;
+    }
+
     /// Moves the wanted lanes from t to t + h and says which of them have arrived; the others are where they were.
     pub(super) fn advance<M>(
         &mut self,
@@ -78,7 +83,10 @@ impl<const N: usize> Engine<N> {
     ) where
         M: Model<N>,
     {
-        self.tables.set_ratio(table, h / self.last_step);
+        // Without a last step there is nothing to continue, and the table for equal steps stays as it is.
+        if self.last_step != 0.0 {
+            self.tables.set_ratio(table, h / self.last_step);
+        }
         self.last_step = h;
         // The slowest one of this step.
         statistics.contraction = Contraction::NONE;
