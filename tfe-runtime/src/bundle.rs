@@ -26,6 +26,7 @@ use crate::points::has_form;
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
 use crate::step::Stepper;
+use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 use engine::Engine;
@@ -106,7 +107,8 @@ struct Fate<'m, M, const N: usize> {
     is_used: bool,
     /// Whether it goes its own way, and for how many steps.
     preference: Preference,
-    stepper: Option<Stepper<'m, M, N>>,
+    /// Few have one, and it is large.
+    stepper: Option<Box<Stepper<'m, M, N>>>,
 }
 
 // Not derived: the model is borrowed, it need not be `Clone`.
@@ -252,7 +254,7 @@ where
         if fate.stepper.is_none() {
             let stepper = Stepper::new(self.model, self.table.view().element, self.control);
             // The element was good when the bundle was made.
-            fate.stepper = stepper.ok();
+            fate.stepper = stepper.ok().map(Box::new);
         }
         if let Some(stepper) = &mut fate.stepper {
             let group = &mut self.groups[lane / LANES];

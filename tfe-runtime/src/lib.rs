@@ -36,6 +36,8 @@ pub mod length;
 pub mod lu;
 pub mod model;
 mod newton;
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+mod octet;
 mod phase_form;
 #[cfg(feature = "alloc")]
 mod points;

@@ -1,64 +1,247 @@
-//! Four numbers in one register of a processor with AVX2, chosen at run time.
+//! Numbers in registers of the processor, chosen at run time: four with AVX2.
 //!
 //! The operations are those of IEEE 754, one rounding each and never fused, so that a kernel gives the same digits as with plain numbers; sine
 //! and cosine are those of [`trigonometry`](crate::trigonometry). Code that computes with these numbers has to be compiled for that
 //! instruction set, hence everything is written into the place of its call, and the outermost call goes through [`pulp`].
 
 use crate::bundle::Pair;
-use crate::real::{Real, integer_power};
+use crate::real::Real;
 use crate::trigonometry::{LIMIT, Turn, reduced};
-use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 use pulp::x86::V3;
 use pulp::{Simd, f64x4, m64x4, u64x4};
 
-/// Four numbers, and the proof that the processor has registers for them.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Quad {
-    isa: V3,
-    value: f64x4,
+/// Numbers that fill a register of an instruction set.
+macro_rules! register {
+    (
+        $(#[$doc:meta])*
+        $name:ident: $count:literal of $isa:ident,
+        $value:ident, $mask:ident, $bits:ident, $product_less:ident, $shift:ident
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        pub(crate) struct $name {
+            isa: $isa,
+            value: $value,
+        }
+
+        impl $name {
+            #[inline(always)]
+            pub(crate) fn of(isa: $isa, lanes: [f64; $count]) -> Self {
+                Self {
+                    isa,
+                    value: pulp::cast(lanes),
+                }
+            }
+
+            /// The same kind of numbers as `self` with these values.
+            #[inline(always)]
+            pub(crate) fn with(self, lanes: [f64; $count]) -> Self {
+                Self::of(self.isa, lanes)
+            }
+
+            #[inline(always)]
+            pub(crate) fn lanes(self) -> [f64; $count] {
+                pulp::cast(self.value)
+            }
+
+            /// The product and what rounding takes from it: the one place where a fused instruction serves, its result is exact.
+            #[inline(always)]
+            pub(crate) fn product(self, other: Self) -> (Self, Self) {
+                let high = self.isa.mul_f64s(self.value, other.value);
+                let low = self.isa.$product_less(self.value, other.value, high);
+                (
+                    Self {
+                        value: high,
+                        ..self
+                    },
+                    Self { value: low, ..self },
+                )
+            }
+
+            /// The larger one; of a NaN and a number, the second.
+            #[inline(always)]
+            pub(crate) fn larger(self, other: Self) -> Self {
+                let value = self.isa.max_f64s(self.value, other.value);
+                Self { value, ..self }
+            }
+
+            /// What has no instruction, one lane after the other.
+            #[inline(always)]
+            fn each(self, function: impl Fn(f64) -> f64) -> Self {
+                let mut lanes = self.lanes();
+                for lane in 0..$count {
+                    lanes[lane] = function(lanes[lane]);
+                }
+                self.with(lanes)
+            }
+
+            #[inline(always)]
+            fn both(self, other: Self, function: impl Fn(f64, f64) -> f64) -> Self {
+                let (mut lanes, other) = (self.lanes(), other.lanes());
+                for lane in 0..$count {
+                    lanes[lane] = function(lanes[lane], other[lane]);
+                }
+                self.with(lanes)
+            }
+        }
+
+        crate::quad::operators! {
+            $name: Add add add_f64s; Sub sub sub_f64s; Mul mul mul_f64s; Div div div_f64s;
+        }
+
+        impl core::ops::Neg for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                let value = self.isa.neg_f64s(self.value);
+                Self { value, ..self }
+            }
+        }
+
+        impl core::ops::AddAssign for $name {
+            #[inline(always)]
+            fn add_assign(&mut self, other: Self) {
+                *self = *self + other;
+            }
+        }
+
+        impl crate::real::Real for $name {
+            type Mask = $mask;
+
+            #[inline(always)]
+            fn from_f64(value: f64) -> Self {
+                // Slow, and only for kernels written by hand: `like` needs no question.
+                let isa = $isa::try_new().expect("these numbers exist on processors that have them only");
+                Self::of(isa, [value; $count])
+            }
+
+            #[inline(always)]
+            fn like(self, value: f64) -> Self {
+                let value = self.isa.splat_f64s(value);
+                Self { value, ..self }
+            }
+
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                let (sin, cos) = crate::trigonometry::reduced(self);
+                if self.is_small() {
+                    return (sin, cos);
+                }
+                let (x, mut sin, mut cos) = (self.lanes(), sin.lanes(), cos.lanes());
+                for lane in 0..$count {
+                    if !(x[lane].abs() <= crate::trigonometry::LIMIT) {
+                        (sin[lane], cos[lane]) = crate::real::Real::sin_cos(x[lane]);
+                    }
+                }
+                (self.with(sin), self.with(cos))
+            }
+
+            #[inline(always)]
+            fn sin(self) -> Self {
+                self.sin_cos().0
+            }
+
+            #[inline(always)]
+            fn cos(self) -> Self {
+                self.sin_cos().1
+            }
+
+            crate::quad::lane_by_lane! {
+                tan(); asin(); acos(); atan(); atan2(x); sinh(); cosh(); tanh(); asinh(); acosh(); atanh(); exp(); ln(); hypot(other);
+                powf(exponent); sign(); min(other); max(other);
+            }
+
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                let value = self.isa.sqrt_f64s(self.value);
+                Self { value, ..self }
+            }
+
+            #[inline(always)]
+            fn abs(self) -> Self {
+                let value = self.isa.abs_f64s(self.value);
+                Self { value, ..self }
+            }
+
+            #[inline(always)]
+            fn powi(self, exponent: i32) -> Self {
+                crate::real::integer_power(self, exponent)
+            }
+
+            #[inline(always)]
+            fn less(self, other: Self) -> $mask {
+                self.isa.less_than_f64s(self.value, other.value)
+            }
+
+            #[inline(always)]
+            fn less_or_equal(self, other: Self) -> $mask {
+                self.isa.less_than_or_equal_f64s(self.value, other.value)
+            }
+
+            #[inline(always)]
+            fn select(mask: $mask, then: Self, otherwise: Self) -> Self {
+                let value = then.isa.select_f64s(mask, then.value, otherwise.value);
+                Self { value, ..then }
+            }
+        }
+
+        impl crate::trigonometry::Turn for $name {
+            #[inline(always)]
+            fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self) {
+                let isa = sin.isa;
+                let (sin, cos, quadrant): ($bits, $bits, $bits) = (
+                    pulp::cast(sin.value),
+                    pulp::cast(cos.value),
+                    pulp::cast(quadrant.value),
+                );
+                let (one, two) = (isa.splat_u64s(1), isa.splat_u64s(2));
+                // The same as for a single number.
+                let exchange = isa.sub_u64s(isa.splat_u64s(0), isa.and_u64s(quadrant, one));
+                let difference = isa.and_u64s(isa.xor_u64s(sin, cos), exchange);
+                let next = isa.add_u64s(quadrant, one);
+                let sin_sign = isa.$shift::<62>(isa.and_u64s(quadrant, two));
+                let cos_sign = isa.$shift::<62>(isa.and_u64s(next, two));
+                let sin = isa.xor_u64s(isa.xor_u64s(sin, difference), sin_sign);
+                let cos = isa.xor_u64s(isa.xor_u64s(cos, difference), cos_sign);
+                let (sin, cos) = (pulp::cast(sin), pulp::cast(cos));
+                (Self { isa, value: sin }, Self { isa, value: cos })
+            }
+        }
+    };
+}
+
+macro_rules! operators {
+    ($name:ident: $($operator:ident $method:ident $instruction:ident;)*) => {$(
+        impl core::ops::$operator for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                let value = self.isa.$instruction(self.value, other.value);
+                Self { isa: self.isa, value }
+            }
+        }
+    )*};
+}
+
+macro_rules! lane_by_lane {
+    ($($name:ident($($argument:ident),*);)*) => {$(
+        #[inline(always)]
+        fn $name(self $(, $argument: Self)*) -> Self {
+            crate::quad::lane_by_lane!(@ self, $name $(, $argument)*)
+        }
+    )*};
+    (@ $self:ident, $name:ident) => { $self.each(<f64 as crate::real::Real>::$name) };
+    (@ $self:ident, $name:ident, $argument:ident) => { $self.both($argument, <f64 as crate::real::Real>::$name) };
+}
+pub(crate) use {lane_by_lane, operators, register};
+
+register! {
+    /// Four numbers, and the proof that the processor has registers for them.
+    Quad: 4 of V3,
+    f64x4, m64x4, u64x4, mul_sub_f64x4, shl_const_u64x4
 }
 
 impl Quad {
-    #[inline(always)]
-    pub(crate) fn of(isa: V3, lanes: [f64; 4]) -> Self {
-        Self {
-            isa,
-            value: pulp::cast(lanes),
-        }
-    }
-
-    /// The same four numbers as `lanes`, on the processor of `self`.
-    #[inline(always)]
-    pub(crate) fn with(self, lanes: [f64; 4]) -> Self {
-        Self::of(self.isa, lanes)
-    }
-
-    #[inline(always)]
-    pub(crate) fn lanes(self) -> [f64; 4] {
-        pulp::cast(self.value)
-    }
-
-    /// The product and what rounding takes from it: the one place where a fused instruction serves, its result is exact.
-    #[inline(always)]
-    pub(crate) fn product(self, other: Self) -> (Self, Self) {
-        let high = self.isa.mul_f64s(self.value, other.value);
-        let low = self.isa.mul_sub_f64x4(self.value, other.value, high);
-        (
-            Self {
-                value: high,
-                ..self
-            },
-            Self { value: low, ..self },
-        )
-    }
-
-    /// The larger one; of a NaN and a number, the second.
-    #[inline(always)]
-    pub(crate) fn larger(self, other: Self) -> Self {
-        let value = self.isa.max_f64s(self.value, other.value);
-        Self { value, ..self }
-    }
-
     /// Whether all arguments are reduced here.
     #[inline(always)]
     fn is_small(self) -> bool {
@@ -75,169 +258,6 @@ impl Quad {
         }
         let (sin, cos) = reduced(Pair(self, other));
         ((sin.0, cos.0), (sin.1, cos.1))
-    }
-
-    /// What has no instruction, one lane after the other.
-    #[inline(always)]
-    fn each(self, function: impl Fn(f64) -> f64) -> Self {
-        let mut lanes = self.lanes();
-        for lane in 0..4 {
-            lanes[lane] = function(lanes[lane]);
-        }
-        self.with(lanes)
-    }
-
-    #[inline(always)]
-    fn both(self, other: Self, function: impl Fn(f64, f64) -> f64) -> Self {
-        let (mut lanes, other) = (self.lanes(), other.lanes());
-        for lane in 0..4 {
-            lanes[lane] = function(lanes[lane], other[lane]);
-        }
-        self.with(lanes)
-    }
-}
-
-macro_rules! operators {
-    ($($operator:ident $method:ident $instruction:ident;)*) => {$(
-        impl $operator for Quad {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                let value = self.isa.$instruction(self.value, other.value);
-                Self { isa: self.isa, value }
-            }
-        }
-    )*};
-}
-operators! { Add add add_f64s; Sub sub sub_f64s; Mul mul mul_f64s; Div div div_f64s; }
-
-impl Neg for Quad {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        let value = self.isa.neg_f64s(self.value);
-        Self { value, ..self }
-    }
-}
-
-impl AddAssign for Quad {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-macro_rules! lane_by_lane {
-    ($($name:ident($($argument:ident),*);)*) => {$(
-        #[inline(always)]
-        fn $name(self $(, $argument: Self)*) -> Self {
-            lane_by_lane!(@ self, $name $(, $argument)*)
-        }
-    )*};
-    (@ $self:ident, $name:ident) => { $self.each(<f64 as Real>::$name) };
-    (@ $self:ident, $name:ident, $argument:ident) => { $self.both($argument, <f64 as Real>::$name) };
-}
-
-impl Real for Quad {
-    type Mask = m64x4;
-
-    #[inline(always)]
-    fn from_f64(value: f64) -> Self {
-        // Slow, and only for kernels written by hand: `like` needs no question.
-        let isa = V3::try_new().expect("these numbers exist on processors that have them only");
-        Self::of(isa, [value; 4])
-    }
-
-    #[inline(always)]
-    fn like(self, value: f64) -> Self {
-        let value = self.isa.splat_f64s(value);
-        Self { value, ..self }
-    }
-
-    #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
-        let (sin, cos) = reduced(self);
-        if self.is_small() {
-            return (sin, cos);
-        }
-        let (x, mut sin, mut cos) = (self.lanes(), sin.lanes(), cos.lanes());
-        for lane in 0..4 {
-            if !(x[lane].abs() <= LIMIT) {
-                (sin[lane], cos[lane]) = Real::sin_cos(x[lane]);
-            }
-        }
-        (self.with(sin), self.with(cos))
-    }
-
-    #[inline(always)]
-    fn sin(self) -> Self {
-        self.sin_cos().0
-    }
-
-    #[inline(always)]
-    fn cos(self) -> Self {
-        self.sin_cos().1
-    }
-
-    lane_by_lane! {
-        tan(); asin(); acos(); atan(); atan2(x); sinh(); cosh(); tanh(); asinh(); acosh(); atanh(); exp(); ln(); hypot(other);
-        powf(exponent); sign(); min(other); max(other);
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        let value = self.isa.sqrt_f64s(self.value);
-        Self { value, ..self }
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        let value = self.isa.abs_f64s(self.value);
-        Self { value, ..self }
-    }
-
-    #[inline(always)]
-    fn powi(self, exponent: i32) -> Self {
-        integer_power(self, exponent)
-    }
-
-    #[inline(always)]
-    fn less(self, other: Self) -> m64x4 {
-        self.isa.less_than_f64s(self.value, other.value)
-    }
-
-    #[inline(always)]
-    fn less_or_equal(self, other: Self) -> m64x4 {
-        self.isa.less_than_or_equal_f64s(self.value, other.value)
-    }
-
-    #[inline(always)]
-    fn select(mask: m64x4, then: Self, otherwise: Self) -> Self {
-        let value = then.isa.select_f64s(mask, then.value, otherwise.value);
-        Self { value, ..then }
-    }
-}
-
-impl Turn for Quad {
-    #[inline(always)]
-    fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self) {
-        let isa = sin.isa;
-        let (sin, cos, quadrant): (u64x4, u64x4, u64x4) = (
-            pulp::cast(sin.value),
-            pulp::cast(cos.value),
-            pulp::cast(quadrant.value),
-        );
-        let (one, two) = (isa.splat_u64s(1), isa.splat_u64s(2));
-        // The same as for a single number.
-        let exchange = isa.sub_u64s(isa.splat_u64s(0), isa.and_u64s(quadrant, one));
-        let difference = isa.and_u64s(isa.xor_u64s(sin, cos), exchange);
-        let next = isa.add_u64s(quadrant, one);
-        let sin_sign = isa.shl_const_u64x4::<62>(isa.and_u64s(quadrant, two));
-        let cos_sign = isa.shl_const_u64x4::<62>(isa.and_u64s(next, two));
-        let sin = isa.xor_u64s(isa.xor_u64s(sin, difference), sin_sign);
-        let cos = isa.xor_u64s(isa.xor_u64s(cos, difference), cos_sign);
-        let (sin, cos) = (pulp::cast(sin), pulp::cast(cos));
-        (Self { isa, value: sin }, Self { isa, value: cos })
     }
 }
 

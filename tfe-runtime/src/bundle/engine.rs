@@ -18,7 +18,30 @@ pub(super) struct Engine<const N: usize> {
     work: Work<N>,
     last_step: f64,
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-    pub(super) isa: Option<pulp::x86::V3>,
+    pub(super) registers: Registers,
+}
+
+/// What the processor has for eight numbers.
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Registers {
+    /// What the compiler makes of arrays.
+    Any,
+    /// Two of AVX2.
+    Two(pulp::x86::V3),
+    /// One of AVX-512.
+    One(pulp::x86::V4),
+}
+
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl Registers {
+    fn of_processor() -> Self {
+        match (pulp::x86::V4::try_new(), pulp::x86::V3::try_new()) {
+            (Some(isa), _) => Self::One(isa),
+            (None, Some(isa)) => Self::Two(isa),
+            (None, None) => Self::Any,
+        }
+    }
 }
 
 /// All steps of a bundle from one time to the next.
@@ -59,10 +82,10 @@ impl<const N: usize> Engine<N> {
             work,
             last_step: 0.0,
             #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            isa: if M::LANES {
-                pulp::x86::V3::try_new()
+            registers: if M::LANES {
+                Registers::of_processor()
             } else {
-                None
+                Registers::Any
             },
         })
     }
@@ -112,11 +135,12 @@ impl<const N: usize> Engine<N> {
             lanes,
             statistics,
         };
+        // Without kernels for lanes the constant is false, and the compiler drops the calls.
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-        // Without kernels for lanes the constant is false, and the compiler drops the call.
-        if let (Some(isa), true) = (self.isa, M::LANES) {
-            isa.vectorize(Wide { job, isa });
-            return;
+        match self.registers {
+            Registers::One(isa) if M::LANES => return isa.vectorize(OfEight { job, isa }),
+            Registers::Two(isa) if M::LANES => return isa.vectorize(OfFour { job, isa }),
+            _ => {}
         }
         let like = crate::Lanes([0.0; 4]);
         job.run(Pair(like, like));
@@ -125,13 +149,13 @@ impl<const N: usize> Engine<N> {
 
 /// The same in registers of four.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-struct Wide<'a, M, const N: usize> {
+struct OfFour<'a, M, const N: usize> {
     job: Job<'a, M, N>,
     isa: pulp::x86::V3,
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for Wide<'_, M, N> {
+impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for OfFour<'_, M, N> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
@@ -140,8 +164,26 @@ impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for Wide<'_, M, N> {
     }
 }
 
+/// The same in registers of eight.
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+struct OfEight<'a, M, const N: usize> {
+    job: Job<'a, M, N>,
+    isa: pulp::x86::V4,
+}
+
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for OfEight<'_, M, N> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        self.job
+            .run(crate::octet::Octet::of(self.isa, [0.0; LANES]));
+    }
+}
+
 #[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
 pub(crate) mod tests {
+    use super::Registers;
     use crate::bundle::Bundle;
     use crate::element::Element;
     use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
@@ -210,27 +252,32 @@ pub(crate) mod tests {
 
     /// Runs thirteen lanes with and without wide registers.
     fn agree<M: Model<N>, const N: usize>(model: &M, element: Element, start: State<N>, h: f64) {
-        let mut with = Bundle::<_, N, 13>::new(model, element, Control::default()).unwrap();
+        let mut empty = Bundle::<_, N, 13>::new(model, element, Control::default()).unwrap();
         let mut starts = [start; 13];
         for (lane, start) in starts.iter_mut().enumerate() {
             start.p[0] *= 1.0 + 0.01 * lane as f64;
         }
-        with.start(&starts);
-        let mut without = with.clone();
-        match &mut without.engine {
-            Some(engine) if engine.isa.is_some() => engine.isa = None,
-            _ => return, // Nothing to compare with on this processor.
+        empty.start(&starts);
+        let run = |registers| {
+            let mut bundle = empty.clone();
+            bundle.engine.as_mut().unwrap().registers = registers;
+            for step in 0..200 {
+                assert!(!bundle.advance(h * f64::from(step), h));
+            }
+            bundle
+        };
+        let without = run(Registers::Any);
+        // As far as this processor has them.
+        let two = pulp::x86::V3::try_new().map(Registers::Two);
+        let one = pulp::x86::V4::try_new().map(Registers::One);
+        for with in two.into_iter().chain(one).map(run) {
+            for lane in 0..13 {
+                let end = with.state(lane).unwrap();
+                assert_eq!(end, without.state(lane).unwrap());
+                assert!(end.q[0].is_finite() && end.q[0] != start.q[0]);
+            }
+            assert_eq!(with.statistics(), without.statistics());
         }
-        for step in 0..200 {
-            let t = h * f64::from(step);
-            assert!(!with.advance(t, h) && !without.advance(t, h));
-        }
-        for lane in 0..13 {
-            let end = with.state(lane).unwrap();
-            assert_eq!(end, without.state(lane).unwrap());
-            assert!(end.q[0].is_finite() && end.q[0] != start.q[0]);
-        }
-        assert_eq!(with.statistics(), without.statistics());
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Eight numbers: two registers of four. Written side by side their operations overlap, where one chain of them would wait for itself.
+//! Eight numbers: one register, or two of four. Written side by side the operations of two overlap, where one chain of them would wait for
+//! itself.
 
 use crate::points::four::{Four, Precise};
 use crate::real::Real;
@@ -43,6 +44,32 @@ impl<V: Four> Precise for Pair<V> {
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
         Self(self.0.larger(other.0), self.1.larger(other.1))
+    }
+}
+
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl Precise for crate::octet::Octet {
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        self.product(other)
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        self.larger(other)
+    }
+}
+
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl Eight for crate::octet::Octet {
+    #[inline(always)]
+    fn with(self, lanes: [f64; LANES]) -> Self {
+        self.with(lanes)
+    }
+
+    #[inline(always)]
+    fn lanes(self) -> [f64; LANES] {
+        self.lanes()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::group::Row;
 use super::pair::Eight;
+use crate::points::four::Apart;
 use crate::points::tables::{Matrix, Weights};
 
 /// The product of a K × K matrix with a vector over the points, for every coordinate.
@@ -12,61 +13,80 @@ pub(super) fn apply<V: Eight, const N: usize>(
     rows: &[Row<N>],
     products: &mut [Row<N>],
 ) {
-    let (blocks, rest) = products.as_chunks_mut::<2>();
-    let done = 2 * blocks.len();
-    for (block, products) in blocks.iter_mut().enumerate() {
-        apply_block(like, matrix, 2 * block, rows, products);
-    }
-    for (line, product) in rest.iter_mut().enumerate() {
-        let product = core::array::from_mut(product);
-        apply_block(like, matrix, done + line, rows, product);
+    like.apart(Product {
+        like,
+        matrix,
+        rows,
+        products,
+    });
+}
+
+/// A product to be computed. No model is part of its type, so that all places of its call share what the compiler makes of it.
+struct Product<'a, V, const N: usize> {
+    like: V,
+    matrix: &'a Matrix,
+    rows: &'a [Row<N>],
+    products: &'a mut [Row<N>],
+}
+
+impl<V: Eight, const N: usize> Apart for Product<'_, V, N> {
+    #[inline(always)]
+    fn run(self) {
+        // Small tables are written out; as many lines at once as their sums fit into registers.
+        match self.rows.len() {
+            1 => self.lines::<1, 1, 0, 1>(),
+            2 => self.lines::<2, 1, 0, 2>(),
+            3 => self.lines::<3, 1, 0, 3>(),
+            4 => self.lines::<4, 1, 0, 4>(),
+            5 => self.lines::<5, 2, 0, 5>(),
+            6 => self.lines::<6, 2, 0, 6>(),
+            7 => self.lines::<7, 2, 0, 4>().lines::<7, 2, 4, 3>(),
+            8 => self.lines::<8, 2, 0, 4>().lines::<8, 2, 4, 4>(),
+            _ => self.any(),
+        };
     }
 }
 
-/// Lines `from` and B − 1 that follow.
-#[inline(always)]
-fn apply_block<V: Eight, const N: usize, const B: usize>(
-    like: V,
-    matrix: &Matrix,
-    from: usize,
-    rows: &[Row<N>],
-    products: &mut [Row<N>; B],
-) {
-    for a in 0..N {
-        let mut sums = [like.like(0.0); B];
-        for (column, row) in matrix.columns().zip(rows) {
-            let value = like.with(row[a]);
-            let column = &column[from..from + B];
-            for line in 0..B {
-                sums[line] += like.like(column[line]) * value;
+impl<V: Eight, const N: usize> Product<'_, V, N> {
+    /// Lines `FROM` and B − 1 that follow of a table of K points in C groups.
+    #[inline(always)]
+    fn lines<const K: usize, const C: usize, const FROM: usize, const B: usize>(self) -> Self {
+        let Self { like, .. } = self;
+        let (columns, _) = self.matrix.groups().as_chunks::<C>();
+        if let (Some(columns), Some(rows), Some(products)) = (
+            columns.first_chunk::<K>(),
+            self.rows.first_chunk::<K>(),
+            self.products[FROM..].first_chunk_mut::<B>(),
+        ) {
+            for a in 0..N {
+                let first = like.with(rows[0][a]);
+                let mut sums = [first; B];
+                for line in 0..B {
+                    sums[line] = like.like(columns[0].as_flattened()[FROM + line]) * first;
+                }
+                for j in 1..K {
+                    let (column, value) = (columns[j].as_flattened(), like.with(rows[j][a]));
+                    for line in 0..B {
+                        sums[line] += like.like(column[FROM + line]) * value;
+                    }
+                }
+                for line in 0..B {
+                    products[line][a] = sums[line].lanes();
+                }
             }
         }
-        for line in 0..B {
-            products[line][a] = sums[line].lanes();
-        }
+        self
     }
-}
 
-/// Σ weight · value over the points of coordinate `a`, and what rounding takes from it, as in [`Weights::sums`].
-#[inline(always)]
-pub(super) fn sum<V: Eight, const N: usize, const EXACT: bool>(
-    like: V,
-    weights: &Weights,
-    rows: &[Row<N>],
-    a: usize,
-) -> (V, V) {
-    let (mut high, mut low) = (like.like(0.0), like.like(0.0));
-    for (l, row) in rows.iter().enumerate() {
-        let (weight, weight_low) = weights.of(l);
-        let value = like.with(row[a]);
-        if const { !EXACT } {
-            high += like.like(weight) * value;
-            continue;
+    /// Four lines at a time, the rest one by one.
+    #[inline(always)]
+    fn any(self) -> Self {
+        let lines = self.products.len();
+        for from in (0..lines / 4 * 4).step_by(4) {
+            self.block::<4>(from);
         }
-        let (product, rest) = like.like(weight).product(value);
-        let (sum, lost) = high.exact_sum(product);
-        high = sum;
-        low += (rest + like.like(weight_low) * value) + lost;
+        for from in lines / 4 * 4..lines {
+            self.block::<1>(from);
+        }
+        self
     }
-    (high, low)
-}

@@ -1,0 +1,23 @@
+//! Eight numbers in one register of a processor with AVX-512, for eight trajectories side by side. The rules are those of [`quad`](crate::quad).
+
+use crate::trigonometry::LIMIT;
+use pulp::x86::V4;
+use pulp::{Simd, b8, f64x8, u64x8};
+
+crate::quad::register! {
+    /// Eight numbers, and the proof that the processor has registers for them.
+    Octet: 8 of V4,
+    f64x8, b8, u64x8, mul_sub_f64x8, shl_const_u64x8
+}
+
+impl Octet {
+    /// Whether all arguments are reduced here.
+    #[inline(always)]
+    fn is_small(self) -> bool {
+        let isa = self.isa;
+        let limit = isa.splat_f64s(LIMIT);
+        isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), limit)
+            .0
+            == u8::MAX
+    }
+}
