@@ -35,7 +35,7 @@ pub(crate) use engine::tests::Pendulums;
 use group::Group;
 use pair::LANES;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-pub(crate) use pair::Pair;
+pub(crate) use pair::{Apart, Pair};
 
 /// Up to W trajectories that take the same steps.
 ///

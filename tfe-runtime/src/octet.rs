@@ -1,5 +1,6 @@
 //! Eight numbers in one register of a processor with AVX-512, for eight trajectories side by side. The rules are those of [`quad`](crate::quad).
 
+use crate::bundle::Apart;
 use crate::trigonometry::LIMIT;
 use pulp::x86::V4;
 use pulp::{Simd, b8, f64x8, u64x8};
@@ -19,5 +20,36 @@ impl Octet {
         isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), limit)
             .0
             == u8::MAX
+    }
+
+    /// Whether a number is positive.
+    #[inline(always)]
+    pub(crate) fn any_positive(self) -> bool {
+        self.isa
+            .less_than_f64s(self.isa.splat_f64s(0.0), self.value)
+            .0
+            != 0
+    }
+
+    /// Runs work in a function of its own.
+    #[inline(always)]
+    pub(crate) fn apart<W: Apart>(self, work: W) {
+        self.isa.vectorize(Call {
+            isa: self.isa,
+            work,
+        });
+    }
+}
+
+struct Call<W> {
+    isa: V4,
+    work: W,
+}
+
+impl<W: Apart> pulp::NullaryFnOnce for Call<W> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        self.work.run(Octet::of(self.isa, [0.0; 8]));
     }
 }

@@ -5,6 +5,7 @@
 //! instruction set, hence everything is written into the place of its call, and the outermost call goes through [`pulp`].
 
 use crate::bundle::Pair;
+use crate::points::four::Apart;
 use crate::real::Real;
 use crate::trigonometry::{LIMIT, Turn, reduced};
 use pulp::x86::V3;
@@ -250,6 +251,15 @@ impl Quad {
         isa.first_true_m64s(isa.not_m64x4(small)) == 4
     }
 
+    /// Runs work in a function of its own.
+    #[inline(always)]
+    pub(crate) fn apart<W: Apart>(self, work: W) {
+        self.isa.vectorize(Call {
+            isa: self.isa,
+            work,
+        });
+    }
+
     /// sin and cos of both: the chains of operations overlap.
     #[inline(always)]
     pub(crate) fn sin_cos_of_two(self, other: Self) -> ((Self, Self), (Self, Self)) {
@@ -258,6 +268,19 @@ impl Quad {
         }
         let (sin, cos) = reduced(Pair(self, other));
         ((sin.0, cos.0), (sin.1, cos.1))
+    }
+}
+
+struct Call<W> {
+    isa: V3,
+    work: W,
+}
+
+impl<W: Apart> pulp::NullaryFnOnce for Call<W> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        self.work.run(Quad::of(self.isa, [0.0; 4]));
     }
 }
 

@@ -3,6 +3,7 @@
 use super::group::{Group, Work};
 use super::pair::{Eight, LANES, Pair};
 use super::step::Step;
+use crate::double_double::DoubleDouble;
 use crate::model::Model;
 use crate::newton::Control;
 use crate::points::Inertia;
@@ -113,6 +114,16 @@ impl<const N: usize> Engine<N> {
         self.last_step = h;
         // The slowest one of this step.
         statistics.contraction = Contraction::NONE;
+        let (mut reach, mut reach_low) = ([0.0; N], [0.0; N]);
+        let square = DoubleDouble::product(h, h);
+        for a in 0..N {
+            let inverse = DoubleDouble {
+                high: self.inertia.inverse_diagonal[a],
+                low: self.inertia.inverse_low[a],
+            };
+            let product = square.times(inverse);
+            (reach[a], reach_low[a]) = (product.high, product.low);
+        }
         let step = Step {
             model,
             tables: &self.tables,
@@ -120,6 +131,8 @@ impl<const N: usize> Engine<N> {
             control,
             t,
             h,
+            reach,
+            reach_low,
         };
         for (group, lanes) in groups.iter_mut().zip(lanes.chunks(LANES)) {
             for (lane, wanted) in lanes.iter().enumerate() {

@@ -94,10 +94,7 @@ where
         // only, hence the factor.
         let velocity = changed / larger(size, like.like(f64::MIN_POSITIVE));
         let velocity = like.like(0.25) * velocity;
-        Increments {
-            relative: larger(velocity, position),
-            position,
-        }
+        Increments::new(larger(velocity, position), position)
     }
 
     /// A Hamiltonian: momenta, the velocities that belong to them, coordinates, and then both rates anew.
@@ -181,11 +178,9 @@ where
             force_size.by_lane(),
             force_changed.by_lane(),
         );
-        Increments {
-            // A NaN in one of them must not be lost.
-            relative: larger(position, momentum) + like.like(0.0) * (position + momentum),
-            position,
-        }
+        // A NaN in one of them must not be lost.
+        let relative = larger(position, momentum) + like.like(0.0) * (position + momentum);
+        Increments::new(relative, position)
     }
 
     /// Start plus h times the integrals of the rates, of coordinate `a`.

@@ -134,10 +134,3 @@ pub(super) fn flags(lanes: &[bool]) -> [f64; LANES] {
     }
     flags
 }
-
-/// Whether a lane is not zero; none is negative.
-#[inline(always)]
-pub(super) fn any<V: Eight>(flags: V) -> bool {
-    let [a, b, c, d, e, f, g, h] = flags.lanes();
-    ((a + e) + (b + f)) + ((c + g) + (d + h)) > 0.0
-}

@@ -14,11 +14,44 @@ pub(super) struct Judge<V> {
     idle: V,
 }
 
-/// Increments, relative to the state, and of the coordinates alone.
+/// Increments, relative to the state.
 #[derive(Clone, Copy)]
 pub(super) struct Increments<V> {
-    pub(super) relative: V,
-    pub(super) position: V,
+    relative: V,
+    /// Whether the coordinates move no more.
+    settled: V,
+}
+
+/// Coordinates move no more where an increment of them is smaller.
+const SETTLED: f64 = 4.0 * f64::EPSILON;
+
+impl<V: Real> Increments<V> {
+    /// From those relative to the state, and those of the coordinates alone.
+    #[inline(always)]
+    pub(super) fn new(relative: V, position: V) -> Self {
+        let (zero, one) = (relative.like(0.0), relative.like(1.0));
+        let settled = position.less_or_equal(relative.like(SETTLED));
+        Self {
+            relative,
+            settled: V::select(settled, one, zero),
+        }
+    }
+
+    /// The larger one of two quotients, of which the numerator of the second one is `factor` times that of the first one. Only that quotient is
+    /// computed. Zero over zero is zero, NaN stays NaN.
+    #[inline(always)]
+    pub(super) fn larger_quotient(velocity: (V, V), position: (V, V), factor: V) -> Self {
+        let (zero, one) = (factor.like(0.0), factor.like(1.0));
+        let is_position = position.1.less(factor * velocity.1);
+        let above = V::select(is_position, position.0, velocity.0);
+        let below = V::select(is_position, position.1, velocity.1);
+        let relative = V::select(above.less_or_equal(zero), zero, above / below);
+        let settled = (position.0).less_or_equal(factor.like(SETTLED) * position.1);
+        Self {
+            relative,
+            settled: V::select(settled, one, zero),
+        }
+    }
 }
 
 impl<V: Real> Judge<V> {
@@ -72,8 +105,7 @@ impl<V: Real> Judge<V> {
     fn stalled(&self, increments: Increments<V>) -> V {
         let size = increments.relative;
         let (zero, one) = (size.like(0.0), size.like(1.0));
-        let settled = (increments.position).less_or_equal(size.like(4.0 * f64::EPSILON));
-        let settled = V::select(settled, one, zero);
+        let settled = increments.settled;
         let fine = V::select(size.less_or_equal(size.like(ROUND_OFF)), one, zero);
         let rough = V::select(size.less_or_equal(size.like(ROUGH_ROUND_OFF)), one, settled);
         let risen = V::select(one.less_or_equal(self.risen), fine, zero);
@@ -138,10 +170,10 @@ mod tests {
             let mut monitors = [(); 4].map(|()| Monitor::new(1e-17));
             let mut active = [true; 4];
             for step in 0..24 {
-                let increments = Increments {
-                    relative: Lanes([0, 1, 2, 3].map(|lane| lanes[lane][step].0)),
-                    position: Lanes([0, 1, 2, 3].map(|lane| lanes[lane][step].1)),
-                };
+                let increments = Increments::new(
+                    Lanes([0, 1, 2, 3].map(|lane| lanes[lane][step].0)),
+                    Lanes([0, 1, 2, 3].map(|lane| lanes[lane][step].1)),
+                );
                 let flags = Lanes(active.map(|lane| f64::from(u8::from(lane))));
                 let (done, going) = judge.judge(increments, flags);
                 let hopeful = judge.hopeful(going, 24 - step as u32);

@@ -1,7 +1,7 @@
 //! Eight numbers: one register, or two of four. Written side by side the operations of two overlap, where one chain of them would wait for
 //! itself.
 
-use crate::points::four::{Four, Precise};
+use crate::points::four::{self, Four, Precise};
 use crate::real::Real;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
@@ -9,12 +9,40 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 pub(super) const LANES: usize = 8;
 
 /// Eight numbers, one for each of eight trajectories.
-pub(super) trait Eight: Precise {
+pub(crate) trait Eight: Precise {
     /// The same kind of numbers with these values.
     fn with(self, lanes: [f64; LANES]) -> Self;
 
     /// The values.
     fn lanes(self) -> [f64; LANES];
+
+    /// Whether a number is positive; of numbers that are no NaN.
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        let mut largest = 0.0;
+        for number in self.lanes() {
+            largest = if largest < number { number } else { largest };
+        }
+        largest > 0.0
+    }
+
+    /// Runs the work with numbers of this kind.
+    fn apart<W: Apart>(self, work: W);
+}
+
+/// Work that is compiled apart from the places where it is called, for the instruction set of the numbers with which it computes.
+pub(crate) trait Apart {
+    fn run<V: Eight>(self, like: V);
+}
+
+/// The same with pairs.
+struct Paired<W>(W);
+
+impl<W: Apart> four::Apart for Paired<W> {
+    #[inline(always)]
+    fn run<V: Four>(self, like: V) {
+        self.0.run(Pair(like, like));
+    }
 }
 
 /// The first four and the last four.
@@ -31,6 +59,11 @@ impl<V: Four> Eight for Pair<V> {
     fn lanes(self) -> [f64; LANES] {
         let ([a, b, c, d], [e, f, g, h]) = (self.0.lanes(), self.1.lanes());
         [a, b, c, d, e, f, g, h]
+    }
+
+    #[inline(always)]
+    fn apart<W: Apart>(self, work: W) {
+        self.0.apart(Paired(work));
     }
 }
 
@@ -70,6 +103,16 @@ impl Eight for crate::octet::Octet {
     #[inline(always)]
     fn lanes(self) -> [f64; LANES] {
         self.lanes()
+    }
+
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        self.any_positive()
+    }
+
+    #[inline(always)]
+    fn apart<W: Apart>(self, work: W) {
+        self.apart(work);
     }
 }
 

@@ -1,8 +1,7 @@
 //! Products of the tables with numbers of eight trajectories.
 
 use super::group::Row;
-use super::pair::Eight;
-use crate::points::four::Apart;
+use super::pair::{Apart, Eight};
 use crate::points::tables::{Matrix, Weights};
 
 /// The product of a K × K matrix with a vector over the points, for every coordinate.
@@ -14,7 +13,6 @@ pub(super) fn apply<V: Eight, const N: usize>(
     products: &mut [Row<N>],
 ) {
     like.apart(Product {
-        like,
         matrix,
         rows,
         products,
@@ -22,71 +20,116 @@ pub(super) fn apply<V: Eight, const N: usize>(
 }
 
 /// A product to be computed. No model is part of its type, so that all places of its call share what the compiler makes of it.
-struct Product<'a, V, const N: usize> {
-    like: V,
+struct Product<'a, const N: usize> {
     matrix: &'a Matrix,
     rows: &'a [Row<N>],
     products: &'a mut [Row<N>],
 }
 
-impl<V: Eight, const N: usize> Apart for Product<'_, V, N> {
+impl<const N: usize> Apart for Product<'_, N> {
     #[inline(always)]
-    fn run(self) {
-        // Small tables are written out; as many lines at once as their sums fit into registers.
+    fn run<V: Eight>(mut self, like: V) {
+        // Small tables are written out, with as many lines at once as their sums fit into registers.
         match self.rows.len() {
-            1 => self.lines::<1, 1, 0, 1>(),
-            2 => self.lines::<2, 1, 0, 2>(),
-            3 => self.lines::<3, 1, 0, 3>(),
-            4 => self.lines::<4, 1, 0, 4>(),
-            5 => self.lines::<5, 2, 0, 5>(),
-            6 => self.lines::<6, 2, 0, 6>(),
-            7 => self.lines::<7, 2, 0, 4>().lines::<7, 2, 4, 3>(),
-            8 => self.lines::<8, 2, 0, 4>().lines::<8, 2, 4, 4>(),
-            _ => self.any(),
-        };
-    }
-}
-
-impl<V: Eight, const N: usize> Product<'_, V, N> {
-    /// Lines `FROM` and B − 1 that follow of a table of K points in C groups.
-    #[inline(always)]
-    fn lines<const K: usize, const C: usize, const FROM: usize, const B: usize>(self) -> Self {
-        let Self { like, .. } = self;
-        let (columns, _) = self.matrix.groups().as_chunks::<C>();
-        if let (Some(columns), Some(rows), Some(products)) = (
-            columns.first_chunk::<K>(),
-            self.rows.first_chunk::<K>(),
-            self.products[FROM..].first_chunk_mut::<B>(),
-        ) {
-            for a in 0..N {
-                let first = like.with(rows[0][a]);
-                let mut sums = [first; B];
-                for line in 0..B {
-                    sums[line] = like.like(columns[0].as_flattened()[FROM + line]) * first;
+            1 => self.lines::<V, 1, 1, 0, 1>(like),
+            2 => self.lines::<V, 2, 1, 0, 2>(like),
+            3 => self.lines::<V, 3, 1, 0, 3>(like),
+            4 => self.lines::<V, 4, 1, 0, 4>(like),
+            5 => self.lines::<V, 5, 2, 0, 5>(like),
+            6 => self.lines::<V, 6, 2, 0, 6>(like),
+            7 => {
+                self.lines::<V, 7, 2, 0, 4>(like);
+                self.lines::<V, 7, 2, 4, 3>(like);
+            }
+            8 => {
+                self.lines::<V, 8, 2, 0, 4>(like);
+                self.lines::<V, 8, 2, 4, 4>(like);
+            }
+            count => {
+                let whole = count - count % 4;
+                for from in (0..whole).step_by(4) {
+                    self.block::<V, 4>(like, from);
                 }
-                for j in 1..K {
-                    let (column, value) = (columns[j].as_flattened(), like.with(rows[j][a]));
-                    for line in 0..B {
-                        sums[line] += like.like(column[FROM + line]) * value;
-                    }
-                }
-                for line in 0..B {
-                    products[line][a] = sums[line].lanes();
+                for line in whole..count {
+                    self.block::<V, 1>(like, line);
                 }
             }
         }
-        self
+    }
+}
+
+impl<const N: usize> Product<'_, N> {
+    /// Lines `FROM` and B − 1 that follow, of a table of K points in C groups.
+    #[inline(always)]
+    fn lines<V: Eight, const K: usize, const C: usize, const FROM: usize, const B: usize>(
+        &mut self,
+        like: V,
+    ) {
+        let columns = self.matrix.groups().as_chunks::<C>().0;
+        let (Some(columns), Some(rows), Some(products)) = (
+            columns.first_chunk::<K>(),
+            self.rows.first_chunk::<K>(),
+            self.products[FROM..].first_chunk_mut::<B>(),
+        ) else {
+            return;
+        };
+        for a in 0..N {
+            let mut sums = [like; B];
+            for j in 0..K {
+                let (column, value) = (columns[j].as_flattened(), like.with(rows[j][a]));
+                for line in 0..B {
+                    let product = like.like(column[FROM + line]) * value;
+                    sums[line] = if j == 0 {
+                        product
+                    } else {
+                        sums[line] + product
+                    };
+                }
+            }
+            for line in 0..B {
+                products[line][a] = sums[line].lanes();
+            }
+        }
     }
 
-    /// Four lines at a time, the rest one by one.
+    /// The same of any table.
     #[inline(always)]
-    fn any(self) -> Self {
-        let lines = self.products.len();
-        for from in (0..lines / 4 * 4).step_by(4) {
-            self.block::<4>(from);
+    fn block<V: Eight, const B: usize>(&mut self, like: V, from: usize) {
+        for a in 0..N {
+            let mut sums = [like.like(0.0); B];
+            for (column, row) in self.matrix.columns().zip(self.rows) {
+                let (column, value) = (&column[from..from + B], like.with(row[a]));
+                for line in 0..B {
+                    sums[line] += like.like(column[line]) * value;
+                }
+            }
+            for line in 0..B {
+                self.products[from + line][a] = sums[line].lanes();
+            }
         }
-        for from in lines / 4 * 4..lines {
-            self.block::<1>(from);
-        }
-        self
     }
+}
+
+/// Σ weight · value over the points of coordinate `a`, and what rounding takes from it, as in [`Weights::sums`].
+#[inline(always)]
+pub(super) fn sum<V: Eight, const N: usize, const EXACT: bool>(
+    like: V,
+    weights: &Weights,
+    rows: &[Row<N>],
+    a: usize,
+) -> (V, V) {
+    let (mut high, mut low) = (like.like(0.0), like.like(0.0));
+    for (l, row) in rows.iter().enumerate() {
+        let (weight, weight_low) = weights.of(l);
+        let value = like.with(row[a]);
+        if const { !EXACT } {
+            high += like.like(weight) * value;
+            continue;
+        }
+        let (product, rest) = like.like(weight).product(value);
+        let (sum, lost) = high.exact_sum(product);
+        high = sum;
+        low += (rest + like.like(weight_low) * value) + lost;
+    }
+    (high, low)
+}

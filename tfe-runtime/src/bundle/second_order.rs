@@ -1,14 +1,14 @@
 //! M q̈ = f(q, q̇): forces are the only unknowns.
 
 use super::group::{Group, Row, Work, load, replace};
-use super::judge::{Increments, larger};
+use super::judge::Increments;
 use super::pair::Eight;
 use super::products::{apply, sum};
 use super::step::Step;
 use crate::double_double::DoubleDouble;
 use crate::model::{Form, Model};
 use crate::points::end::moved;
-use crate::points::sweep::{Largest, no_derivatives};
+use crate::points::sweep::no_derivatives;
 
 impl<M, const N: usize> Step<'_, M, N>
 where
@@ -60,25 +60,35 @@ where
     fn set_exact_drift<V: Eight>(&self, like: V, group: &Group<N>, work: &mut Work<N>) {
         let table = &self.tables.twice_low;
         apply(like, table, &group.forces, &mut work.more_products);
-        let h = like.like(self.h);
+        let (h, square) = (like.like(self.h), like.like(self.h * self.h));
         // What the one rounding of h² takes, the same in every step.
         let square_low = like.like(DoubleDouble::product(self.h, self.h).low);
-        for l in 0..self.tables.points {
-            let reach = like.like(self.tables.reach.as_flattened()[l]);
-            let reach_low = like.like(self.tables.reach_low.as_flattened()[l]);
-            let mut rate = self.accelerations(like, &work.more_products[l]);
-            let whole = self.accelerations(like, &work.products[l]);
-            for a in 0..N {
-                if self.inertia.diagonal.is_some() {
-                    // What the one rounding of 1/m takes from all accelerations.
-                    let low = like.like(self.inertia.inverse_low[a]);
-                    rate[a] += low * like.with(work.products[l][a]);
+        let points = self.tables.points;
+        let drift = &mut work.drift[..points];
+        let products = &work.products[..points];
+        let more_products = &work.more_products[..points];
+        let reach = &self.tables.reach.as_flattened()[..points];
+        let reach_low = &self.tables.reach_low.as_flattened()[..points];
+        for l in 0..points {
+            let mut low = [like; N];
+            if self.inertia.diagonal.is_some() {
+                for a in 0..N {
+                    low[a] = like.like(self.reach[a]) * like.with(more_products[l][a])
+                        + like.like(self.reach_low[a]) * like.with(products[l][a]);
                 }
+            } else {
+                let rate_low = self.accelerations(like, &more_products[l]);
+                let rate = self.accelerations(like, &products[l]);
+                for a in 0..N {
+                    low[a] = square * rate_low[a] + square_low * rate[a];
+                }
+            }
+            let (reach, reach_low) = (like.like(reach[l]), like.like(reach_low[l]));
+            for a in 0..N {
                 let (v, v_low) = (like.with(work.velocity[a]), like.with(work.velocity_low[a]));
                 let v_low = reach * v_low + reach_low * v;
-                let low = like.with(group.low.q[a]) + h * (v_low + h * rate[a]);
-                let low = low + square_low * whole[a];
-                work.drift[l][a] = (h * (reach * v) + low).lanes();
+                let low = like.with(group.low.q[a]) + (h * v_low + low[a]);
+                drift[l][a] = (h * (reach * v) + low).lanes();
             }
         }
     }
@@ -119,18 +129,32 @@ where
             Form::Lagrangian => start_v,
             Form::Hamiltonian => load(like, &group.start.p),
         };
-        let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
         let zero = like.like(0.0);
-        for l in 0..self.tables.points {
-            let (mut q, mut z) = ([zero; N], [zero; N]);
-            let rate = self.accelerations(like, &work.products[l]);
+        let (mut changed, mut size, mut sum) = ([zero; N], [zero; N], zero);
+        let points = self.tables.points;
+        let forces = &mut group.forces[..points];
+        let drift = &work.drift[..points];
+        let products = &work.products[..points];
+        let more_products = &work.more_products[..points];
+        for l in 0..points {
+            let (mut q, mut z) = (load(like, &drift[l]), [zero; N]);
+            if self.inertia.diagonal.is_some() {
+                for a in 0..N {
+                    q[a] += like.like(self.reach[a]) * like.with(products[l][a]);
+                }
+            } else {
+                let rate = self.accelerations(like, &products[l]);
+                for a in 0..N {
+                    q[a] += square * rate[a];
+                }
+            }
             for a in 0..N {
-                q[a] = start_q[a] + (like.with(work.drift[l][a]) + square * rate[a]);
+                q[a] = start_q[a] + q[a];
             }
             if const { M::FACTS.forced } {
                 let rate = match M::FORM {
-                    Form::Lagrangian => self.accelerations(like, &work.more_products[l]),
-                    Form::Hamiltonian => load(like, &work.more_products[l]),
+                    Form::Lagrangian => self.accelerations(like, &more_products[l]),
+                    Form::Hamiltonian => load(like, &more_products[l]),
                 };
                 for a in 0..N {
                     z[a] = start_z[a] + h * rate[a];
@@ -140,33 +164,40 @@ where
             let t = self.time(like, l);
             self.model.first_inline(t, &q, &z, &mut first);
             for a in 0..N {
-                let force = match M::FORM {
-                    Form::Lagrangian => first.q[a] + first.force[a],
-                    Form::Hamiltonian => first.force[a] - first.q[a],
+                let given = match M::FORM {
+                    Form::Lagrangian => first.q[a],
+                    Form::Hamiltonian => -first.q[a],
                 };
-                let old = &mut group.forces[l][a];
-                // As accelerations: momenta of light and heavy bodies say nothing beside each other.
-                let inverse = like.like(self.inertia.inverse_diagonal[a]);
-                changed.raise(inverse * (force - like.with(*old)));
-                size.raise(inverse * force);
-                replace::<V>(mask, old, force);
+                let force = if const { M::FACTS.forced } {
+                    given + first.force[a]
+                } else {
+                    given
+                };
+                let change = force - like.with(forces[l][a]);
+                changed[a] = change.abs().larger(changed[a]);
+                size[a] = force.abs().larger(size[a]);
+                // A sum shows what is no number.
+                sum += change;
+                replace::<V>(mask, &mut forces[l][a], force);
             }
         }
-        let (changed, size) = (changed.by_lane(), size.by_lane());
-        let speed = largest(like, &start_v);
-        let length = like.like(self.h.abs());
-        let velocity = self.relative(speed, size, changed);
-        let moved = speed + length * size;
-        let position = self.relative(
-            largest(like, &start_q),
-            moved,
-            like.like(0.5) * length * changed,
-        );
-        Increments {
-            // Both are NaN, or none is.
-            relative: larger(velocity, position),
-            position,
+        // As accelerations: momenta of light and heavy bodies say nothing beside each other.
+        for a in 0..N {
+            let inverse = like.like(self.inertia.inverse_diagonal[a].abs());
+            (changed[a], size[a]) = (inverse * changed[a], inverse * size[a]);
         }
+        let changed = largest(like, &changed) + zero * sum;
+        let size = largest(like, &size);
+        let (speed, distance) = (largest(like, &start_v), largest(like, &start_q));
+        // Relative changes of velocity and position.
+        let length = like.like(self.h.abs());
+        let half = like.like(0.5) * length;
+        let velocity = (length * changed, speed.larger(length * size));
+        let position = (
+            length * (half * changed),
+            distance.larger(length * (speed + length * size)),
+        );
+        Increments::larger_quotient(velocity, position, half)
     }
 
     /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) of coordinate `a`; [`prepare_end`](Self::prepare_end) goes before.
@@ -220,7 +251,7 @@ where
 pub(super) fn largest<V: Eight, const N: usize>(like: V, vector: &[V; N]) -> V {
     let mut largest = like.like(0.0);
     for a in 0..N {
-        largest = larger(largest, vector[a].abs());
+        largest = vector[a].abs().larger(largest);
     }
     largest
 }

@@ -1,6 +1,6 @@
 //! A step of eight trajectories: start of the iteration, the iteration, the end.
 
-use super::group::{Group, Work, any, flags, replace};
+use super::group::{Group, Row, Work, flags, replace};
 use super::judge::{Increments, Judge, larger};
 use super::pair::{Eight, LANES};
 use super::products::apply;
@@ -11,6 +11,7 @@ use crate::points::{Inertia, is_phase, is_second_order};
 use crate::scheme::SchemeRef;
 use crate::statistics::{Contraction, Statistics};
 use crate::step::{cold_phase, cold_velocity};
+use alloc::vec::Vec;
 
 /// What is the same for all trajectories.
 pub(super) struct Step<'a, M, const N: usize> {
@@ -20,6 +21,9 @@ pub(super) struct Step<'a, M, const N: usize> {
     pub(super) control: &'a Control,
     pub(super) t: f64,
     pub(super) h: f64,
+    /// h²/m of coordinates with constant masses and nothing beside the diagonal, and what rounding took from it.
+    pub(super) reach: [f64; N],
+    pub(super) reach_low: [f64; N],
 }
 
 /// After these iterations mass matrices are evaluated anew. The start is good to a few digits, so that one evaluation mostly serves; that
@@ -99,26 +103,35 @@ where
     /// Sets the unknowns of lanes that continue a step to the polynomial of that, continued.
     #[inline(always)]
     fn continue_last<V: Eight>(&self, like: V, group: &mut Group<N>, work: &mut Work<N>) {
-        let warm = like.with(flags(&group.warm));
-        if !any(warm) {
+        if group.warm == [false; LANES] {
             return;
         }
-        let mask = like.like(0.0).less(warm);
-        let table = self.tables.continued();
         if const { is_second_order::<M, N>() || is_phase::<M, N>() } {
-            apply(like, table, &group.forces, &mut work.products);
-            for (old, new) in group.forces.iter_mut().zip(&work.products) {
-                for a in 0..N {
-                    replace::<V>(mask, &mut old[a], like.with(new[a]));
-                }
-            }
+            self.continue_one(like, &group.warm, &mut group.forces, &mut work.products);
         }
         if const { !is_second_order::<M, N>() } {
-            apply(like, table, &group.rates, &mut work.products);
-            for (old, new) in group.rates.iter_mut().zip(&work.products) {
-                for a in 0..N {
-                    replace::<V>(mask, &mut old[a], like.with(new[a]));
-                }
+            self.continue_one(like, &group.warm, &mut group.rates, &mut work.products);
+        }
+    }
+
+    /// The same of one kind of unknowns.
+    #[inline(always)]
+    fn continue_one<V: Eight>(
+        &self,
+        like: V,
+        warm: &[bool; LANES],
+        unknowns: &mut Vec<Row<N>>,
+        products: &mut Vec<Row<N>>,
+    ) {
+        apply(like, self.tables.continued(), unknowns, products);
+        if *warm == [true; LANES] {
+            core::mem::swap(unknowns, products);
+            return;
+        }
+        let mask = like.like(0.0).less(like.with(flags(warm)));
+        for (old, new) in unknowns.iter_mut().zip(products) {
+            for a in 0..N {
+                replace::<V>(mask, &mut old[a], like.with(new[a]));
             }
         }
     }
@@ -157,7 +170,7 @@ where
                 active = judge.hopeful(active, most - iteration);
             }
             iteration += 1;
-            if !any(active) {
+            if !active.any_positive() {
                 break;
             }
         }

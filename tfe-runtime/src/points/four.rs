@@ -26,6 +26,11 @@ pub(crate) trait Precise: Real {
     }
 }
 
+/// Work that is compiled apart from the places where it is called, for the instruction set of the numbers with which it computes.
+pub(crate) trait Apart {
+    fn run<V: Four>(self, like: V);
+}
+
 /// Four numbers, one for each of four points.
 pub(crate) trait Four: Precise {
     /// The same kind of numbers with these values.
@@ -33,6 +38,12 @@ pub(crate) trait Four: Precise {
 
     /// The values.
     fn lanes(self) -> [f64; 4];
+
+    /// Runs the work with numbers of this kind.
+    #[inline(always)]
+    fn apart<W: Apart>(self, work: W) {
+        work.run(self);
+    }
 
     /// sin and cos of `self`, and of `other`.
     #[inline(always)]
@@ -237,6 +248,11 @@ impl Four for crate::quad::Quad {
     #[inline(always)]
     fn apply<const N: usize>(self, matrix: &Matrix, rows: &[Row<N>], products: &mut [Row<N>]) {
         matrix.apply_inline(self, rows, products);
+    }
+
+    #[inline(always)]
+    fn apart<W: Apart>(self, work: W) {
+        self.apart(work);
     }
 
     #[inline(always)]

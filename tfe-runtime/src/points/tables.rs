@@ -109,6 +109,12 @@ impl Matrix {
         }
     }
 
+    /// The columns one after the other, in groups of four lines.
+    #[inline(always)]
+    pub(crate) fn groups(&self) -> &[[f64; 4]] {
+        &self.columns
+    }
+
     /// The columns, padded to groups of four.
     #[inline(always)]
     pub(crate) fn columns(&self) -> core::slice::ChunksExact<'_, f64> {
