@@ -94,6 +94,8 @@ pub struct Bundle<'m, M, const N: usize, const W: usize> {
     engine: Option<Engine<N>>,
     groups: Vec<Group<N>>,
     fates: [Fate<'m, M, N>; W],
+    /// The lanes with a trajectory, as long as all of them have gone side by side.
+    calm: Option<[bool; W]>,
     /// Statistics of steps in lanes.
     together: Statistics,
     /// Of steppers that are no more.
@@ -169,6 +171,7 @@ where
             engine,
             groups: vec![Group::new(points); W.div_ceil(LANES)],
             fates: [const { Fate::UNUSED }; W],
+            calm: None,
             together: Statistics::NONE,
             past: Statistics::NONE,
         })
@@ -182,6 +185,7 @@ where
 
     /// Begins anew with these states, one a lane; those beyond W are left out. Statistics go on.
     pub fn start(&mut self, starts: &[State<N>]) {
+        let (mut lanes, mut is_calm) = ([false; W], true);
         for (lane, fate) in self.fates.iter_mut().enumerate() {
             if let Some(stepper) = &fate.stepper {
                 self.past.merge(stepper.statistics());
@@ -189,11 +193,14 @@ where
             *fate = Fate::UNUSED;
             if let Some(start) = starts.get(lane) {
                 fate.is_used = true;
+                lanes[lane] = true;
                 if !(largest(&start.q).is_finite() && largest(&start.p).is_finite()) {
                     fate.failure = Some(StepError::NonFinite);
+                    is_calm = false;
                 }
             }
         }
+        self.calm = is_calm.then_some(lanes);
         if let Some(engine) = &mut self.engine {
             engine.forget();
         }
@@ -215,8 +222,12 @@ where
             && is_step
             && let Some(engine) = &mut self.engine
         {
-            for (lane, fate) in lanes.iter_mut().zip(&self.fates) {
-                *lane = fate.is_alive() && fate.preference.is_fixed_point();
+            if let Some(calm) = self.calm {
+                lanes = calm;
+            } else {
+                for (lane, fate) in lanes.iter_mut().zip(&self.fates) {
+                    *lane = fate.is_alive() && fate.preference.is_fixed_point();
+                }
             }
             engine.advance(
                 (self.model, &self.table, &self.control),
@@ -226,6 +237,10 @@ where
                 &mut self.together,
             );
         }
+        if self.calm == Some(lanes) {
+            return false;
+        }
+        self.calm = None;
         let mut has_failed = false;
         for (lane, arrived) in lanes.into_iter().enumerate() {
             let fate = &mut self.fates[lane];

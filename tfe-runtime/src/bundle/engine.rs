@@ -135,10 +135,8 @@ impl<const N: usize> Engine<N> {
             reach_low,
         };
         for (group, lanes) in groups.iter_mut().zip(lanes.chunks(LANES)) {
-            for (lane, wanted) in lanes.iter().enumerate() {
-                if *wanted && !group.warm[lane] {
-                    step.start_cold(&table.view(), group, &mut self.work, lane);
-                }
+            if group.warm != [true; LANES] {
+                step.start_cold(&table.view(), group, &mut self.work, lanes);
             }
         }
         let job = Job {

@@ -127,6 +127,7 @@ pub(super) fn replace<V: Eight>(mask: V::Mask, old: &mut [f64; LANES], new: V) {
 }
 
 /// One where a lane is chosen, else zero.
+#[inline(always)]
 pub(super) fn flags(lanes: &[bool]) -> [f64; LANES] {
     let mut flags = [0.0; LANES];
     for (flag, lane) in flags.iter_mut().zip(lanes) {

@@ -136,6 +136,7 @@ where
         let drift = &work.drift[..points];
         let products = &work.products[..points];
         let more_products = &work.more_products[..points];
+        let nodes = &self.tables.nodes.as_flattened()[..points];
         for l in 0..points {
             let (mut q, mut z) = (load(like, &drift[l]), [zero; N]);
             if self.inertia.diagonal.is_some() {
@@ -161,7 +162,7 @@ where
                 }
             }
             let mut first = no_derivatives(like);
-            let t = self.time(like, l);
+            let t = like.like(self.t + self.h * nodes[l]);
             self.model.first_inline(t, &q, &z, &mut first);
             for a in 0..N {
                 let given = match M::FORM {

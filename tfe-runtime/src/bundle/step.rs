@@ -231,37 +231,43 @@ where
         V::select(step.less_or_equal(zero), zero, quotient)
     }
 
-    /// Constant rates for one lane.
+    /// Constant rates for those of the wanted lanes that continue no step.
     #[cold]
     pub(super) fn start_cold(
         &self,
         scheme: &SchemeRef<'_>,
         group: &mut Group<N>,
         work: &mut Work<N>,
-        lane: usize,
+        lanes: &[bool],
     ) {
-        let (state, points) = (group.state(lane), self.tables.points);
+        let points = self.tables.points;
         let unknowns = &mut work.cold;
-        let (mut force, mut rate) = ([0.0; N], [0.0; N]);
-        if const { is_phase::<M, N>() } {
-            cold_phase(self.model, scheme, self.t, &state, unknowns);
-            force.copy_from_slice(&unknowns[..N]);
-            rate.copy_from_slice(&unknowns[points * N..][..N]);
-        } else {
-            cold_velocity(self.model, self.t, &state, unknowns);
-            rate.copy_from_slice(&unknowns[..N]);
-            if is_second_order::<M, N>() {
-                let mut first = First::ZERO;
-                self.model.first(self.t, &state.q, &rate, &mut first);
-                for a in 0..N {
-                    force[a] = first.q[a] + first.force[a];
+        for (lane, wanted) in lanes.iter().enumerate() {
+            if !wanted || group.warm[lane] {
+                continue;
+            }
+            let state = group.state(lane);
+            let (mut force, mut rate) = ([0.0; N], [0.0; N]);
+            if const { is_phase::<M, N>() } {
+                cold_phase(self.model, scheme, self.t, &state, unknowns);
+                force.copy_from_slice(&unknowns[..N]);
+                rate.copy_from_slice(&unknowns[points * N..][..N]);
+            } else {
+                cold_velocity(self.model, self.t, &state, unknowns);
+                rate.copy_from_slice(&unknowns[..N]);
+                if is_second_order::<M, N>() {
+                    let mut first = First::ZERO;
+                    self.model.first(self.t, &state.q, &rate, &mut first);
+                    for a in 0..N {
+                        force[a] = first.q[a] + first.force[a];
+                    }
                 }
             }
-        }
-        for l in 0..points {
-            for a in 0..N {
-                group.forces[l][a][lane] = force[a];
-                group.rates[l][a][lane] = rate[a];
+            for l in 0..points {
+                for a in 0..N {
+                    group.forces[l][a][lane] = force[a];
+                    group.rates[l][a][lane] = rate[a];
+                }
             }
         }
     }
