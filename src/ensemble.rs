@@ -195,10 +195,9 @@ where
             }
         })?;
         let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Ok(Ends::new(
-            results.into_iter().flatten().collect(),
-            statistics,
-        ))
+        // All are there, and are moved within the same memory.
+        let results = results.into_iter().map_while(|result| result).collect();
+        Ok(Ends::new(results, statistics))
     }
 
     /// Runs all trajectories and hands over each result, with the index of its run, as soon as it is known: in no particular order, and with

@@ -20,13 +20,17 @@ where
         let table = &self.tables.once_low;
         apply(like, table, &group.rates, &mut work.products);
         apply(like, table, &group.forces, &mut work.more_products);
-        let h = like.like(self.h);
-        for l in 0..self.tables.points {
+        let (h, points) = (like.like(self.h), self.tables.points);
+        let products = &work.products[..points];
+        let more_products = &work.more_products[..points];
+        let low_position = &mut work.low_position[..points];
+        let low_momentum = &mut work.low_momentum[..points];
+        for l in 0..points {
             for a in 0..N {
-                let moved = h * like.with(work.products[l][a]);
-                work.low_position[l][a] = (like.with(group.low.q[a]) + moved).lanes();
-                let moved = h * like.with(work.more_products[l][a]);
-                work.low_momentum[l][a] = (like.with(group.low.p[a]) + moved).lanes();
+                let moved = h * like.with(products[l][a]);
+                low_position[l][a] = (like.with(group.low.q[a]) + moved).lanes();
+                let moved = h * like.with(more_products[l][a]);
+                low_momentum[l][a] = (like.with(group.low.p[a]) + moved).lanes();
             }
         }
     }
@@ -43,16 +47,23 @@ where
     ) -> Increments<V> {
         let (h, zero) = (like.like(self.h), like.like(0.0));
         let (start_q, start_p) = (load(like, &group.start.q), load(like, &group.start.p));
-        apply(like, &self.tables.once, &group.rates, &mut work.products);
-        for l in 0..self.tables.points {
+        let points = self.tables.points;
+        let rates = &mut group.rates[..points];
+        let forces = &mut group.forces[..points];
+        let momenta = &mut work.momenta[..points];
+        let products = &mut work.products[..points];
+        let low_position = &work.low_position[..points];
+        let low_momentum = &work.low_momentum[..points];
+        let nodes = &self.tables.nodes.as_flattened()[..points];
+        apply(like, &self.tables.once, rates, products);
+        for l in 0..points {
             let mut q = start_q;
             for a in 0..N {
-                let low = like.with(work.low_position[l][a]);
-                q[a] += h * like.with(work.products[l][a]) + low;
+                q[a] += h * like.with(products[l][a]) + like.with(low_position[l][a]);
             }
-            let v = load(like, &group.rates[l]);
+            let v = load(like, &rates[l]);
             let mut first = no_derivatives(like);
-            let t = self.time(like, l);
+            let t = like.like(self.t + self.h * nodes[l]);
             if const { !M::FACTS.constant_mass } && refresh {
                 let mut mass = [[zero; N]; N];
                 (self.model).first_and_mass_inline(t, &q, &v, &mut first, &mut mass);
@@ -62,18 +73,17 @@ where
                 self.model.first_inline(t, &q, &v, &mut first);
             }
             for a in 0..N {
-                work.momenta[l][a] = first.z[a].lanes();
-                replace::<V>(mask, &mut group.forces[l][a], first.q[a] + first.force[a]);
+                momenta[l][a] = first.z[a].lanes();
+                replace::<V>(mask, &mut forces[l][a], first.q[a] + first.force[a]);
             }
         }
-        apply(like, &self.tables.once, &group.forces, &mut work.products);
+        apply(like, &self.tables.once, forces, products);
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
-        for l in 0..self.tables.points {
+        for l in 0..points {
             let mut step = [zero; N];
             for a in 0..N {
-                let low = like.with(work.low_momentum[l][a]);
-                let wanted = h * like.with(work.products[l][a]) + low;
-                step[a] = wanted - (like.with(work.momenta[l][a]) - start_p[a]);
+                let wanted = h * like.with(products[l][a]) + like.with(low_momentum[l][a]);
+                step[a] = wanted - (like.with(momenta[l][a]) - start_p[a]);
             }
             if const { M::FACTS.constant_mass } {
                 step = self.inertia.times(like, &step);
@@ -81,10 +91,11 @@ where
                 solve(like, &work.masses[l], &mut step);
             }
             for a in 0..N {
-                let old = &mut group.rates[l][a];
+                let old = &mut rates[l][a];
                 let rate = like.with(*old) + step[a];
                 changed.raise(step[a]);
-                size.raise(rate);
+                // What is not finite shows in the change.
+                size.raise_finite(rate);
                 replace::<V>(mask, old, rate);
             }
         }
@@ -109,47 +120,51 @@ where
     ) -> Increments<V> {
         let (h, zero) = (like.like(self.h), like.like(0.0));
         let (start_q, start_p) = (load(like, &group.start.q), load(like, &group.start.p));
-        apply(like, &self.tables.once, &group.forces, &mut work.products);
-        for l in 0..self.tables.points {
+        let points = self.tables.points;
+        let rates = &mut group.rates[..points];
+        let forces = &mut group.forces[..points];
+        let momenta = &mut work.momenta[..points];
+        let velocities = &mut work.velocities[..points];
+        let products = &mut work.products[..points];
+        let low_position = &work.low_position[..points];
+        let low_momentum = &work.low_momentum[..points];
+        let nodes = &self.tables.nodes.as_flattened()[..points];
+        apply(like, &self.tables.once, forces, products);
+        for l in 0..points {
             let mut change = [zero; N];
             for a in 0..N {
-                let low = like.with(work.low_momentum[l][a]);
-                let p = start_p[a] + (h * like.with(work.products[l][a]) + low);
-                change[a] = p - like.with(work.momenta[l][a]);
-                work.momenta[l][a] = p.lanes();
+                let moved = h * like.with(products[l][a]) + like.with(low_momentum[l][a]);
+                let p = start_p[a] + moved;
+                change[a] = p - like.with(momenta[l][a]);
+                momenta[l][a] = p.lanes();
             }
             let mut by_change = [zero; N];
             if !is_first && M::FACTS.constant_mass {
                 by_change = self.inertia.times(like, &change);
             } else if !is_first {
+                let mass = &work.masses[l];
                 for a in 0..N {
                     for b in 0..N {
-                        by_change[a] += like.with(work.masses[l][a][b]) * change[b];
+                        by_change[a] += like.with(mass[a][b]) * change[b];
                     }
                 }
             }
             for a in 0..N {
-                work.velocities[l][a] = (like.with(group.rates[l][a]) + by_change[a]).lanes();
+                velocities[l][a] = (like.with(rates[l][a]) + by_change[a]).lanes();
             }
         }
-        apply(
-            like,
-            &self.tables.once,
-            &work.velocities,
-            &mut work.products,
-        );
+        apply(like, &self.tables.once, velocities, products);
         let none = Largest::none(like);
         let (mut force_changed, mut force_size) = (none, none);
         let (mut rate_changed, mut rate_size) = (none, none);
-        for l in 0..self.tables.points {
+        for l in 0..points {
             let mut q = start_q;
             for a in 0..N {
-                let low = like.with(work.low_position[l][a]);
-                q[a] += h * like.with(work.products[l][a]) + low;
+                q[a] += h * like.with(products[l][a]) + like.with(low_position[l][a]);
             }
-            let p = load(like, &work.momenta[l]);
+            let p = load(like, &momenta[l]);
             let mut first = no_derivatives(like);
-            let t = self.time(like, l);
+            let t = like.like(self.t + self.h * nodes[l]);
             if const { !M::FACTS.constant_mass } && refresh {
                 let mut mass = [[zero; N]; N];
                 (self.model).first_and_mass_inline(t, &q, &p, &mut first, &mut mass);
@@ -158,12 +173,13 @@ where
                 self.model.first_inline(t, &q, &p, &mut first);
             }
             for a in 0..N {
-                let (old_force, old_rate) = (&mut group.forces[l][a], &mut group.rates[l][a]);
+                let (old_force, old_rate) = (&mut forces[l][a], &mut rates[l][a]);
                 let force = first.force[a] - first.q[a];
                 force_changed.raise(force - like.with(*old_force));
                 rate_changed.raise(first.z[a] - like.with(*old_rate));
-                force_size.raise(force);
-                rate_size.raise(first.z[a]);
+                // What is not finite shows in the changes.
+                force_size.raise_finite(force);
+                rate_size.raise_finite(first.z[a]);
                 replace::<V>(mask, old_force, force);
                 replace::<V>(mask, old_rate, first.z[a]);
             }

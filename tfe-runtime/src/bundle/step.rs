@@ -217,12 +217,6 @@ where
         }
     }
 
-    /// When point l is.
-    #[inline(always)]
-    pub(super) fn time<V: Eight>(&self, like: V, l: usize) -> V {
-        like.like(self.t + self.h * self.tables.nodes.as_flattened()[l])
-    }
-
     /// |h δ| over the larger one of start and |h x|; zero over zero is zero, NaN stays NaN.
     #[inline(always)]
     pub(super) fn relative<V: Eight>(&self, start: V, x: V, step: V) -> V {
