@@ -202,6 +202,7 @@ pub(crate) mod tests {
     use crate::real::Real;
     use crate::step::Control;
     use crate::{Mixed, Radau};
+    use alloc::vec::Vec;
 
     /// Two damped pendulums of masses 3 and 7: equations of second order.
     pub(crate) struct Pendulums;
@@ -288,6 +289,40 @@ pub(crate) mod tests {
                 assert!(end.q[0].is_finite() && end.q[0] != start.q[0]);
             }
             assert_eq!(with.statistics(), without.statistics());
+        }
+    }
+
+    #[test]
+    fn a_batch_leaves_nothing_to_the_next_one() {
+        let element = Element::from(Mixed::<5>);
+        let starts = |speed: f64, count: usize| {
+            let lane = |lane: usize| State {
+                q: [1.0, -0.5],
+                p: [speed + 0.1 * lane as f64, 0.2],
+            };
+            (0..count).map(lane).collect::<Vec<_>>()
+        };
+        let run = |bundle: &mut Bundle<'_, Pendulums, 2, 13>, starts: &[State<2>], h: f64| {
+            bundle.start(starts);
+            for step in 0..20 {
+                bundle.advance(h * f64::from(step), h);
+            }
+            let states: Vec<_> = (0..13).map(|lane| bundle.state(lane)).collect();
+            (states, bundle.take_statistics())
+        };
+        let empty = Bundle::new(&Pendulums, element, Control::default()).unwrap();
+        let mut used = empty.clone();
+        // Steps so long that the fixed point does not contract; a start that is none; other steps; fewer lanes.
+        let (_, statistics) = run(&mut used, &starts(1.0, 13), 6.0);
+        assert!(statistics.newton_iterations > 0);
+        let (states, _) = run(&mut used, &starts(f64::NAN, 2), 0.1);
+        assert!(states.iter().all(Result::is_err));
+        for (count, h) in [(9, 0.1), (13, 0.2), (3, 0.1)] {
+            let starts = starts(0.3, count);
+            assert_eq!(
+                run(&mut used, &starts, h),
+                run(&mut empty.clone(), &starts, h)
+            );
         }
     }
 

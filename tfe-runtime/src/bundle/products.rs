@@ -133,3 +133,49 @@ pub(super) fn sum<V: Eight, const N: usize, const EXACT: bool>(
     }
     (high, low)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Lanes;
+    use crate::bundle::pair::{LANES, Pair};
+    use crate::element::Element;
+    use crate::points::tables::Tables;
+    use crate::scheme::{SchemeTable, Tables as _};
+
+    /// Tables of all sizes, against sums written down.
+    #[test]
+    fn products_are_sums_over_the_points() {
+        let like = Lanes([0.0; 4]);
+        for nodes in 2..=12 {
+            let scheme = SchemeTable::new(Element::radau(nodes)).unwrap();
+            let tables = Tables::of(&scheme.view());
+            let points = tables.points;
+            let value = |l: usize, a: usize, lane: usize| (l * 31 + a * 7 + lane) as f64 % 10.0;
+            let mut rows = vec![[[0.0; LANES]; 3]; points];
+            for (l, row) in rows.iter_mut().enumerate() {
+                for (a, lanes) in row.iter_mut().enumerate() {
+                    for (lane, number) in lanes.iter_mut().enumerate() {
+                        *number = value(l, a, lane);
+                    }
+                }
+            }
+            let mut products = rows.clone();
+            apply(Pair(like, like), &tables.once, &rows, &mut products);
+            for l in 0..points {
+                for a in 0..3 {
+                    for lane in 0..LANES {
+                        let entries = scheme.view().position[l * points..].iter();
+                        let terms = entries.zip(0..points).map(|(x, j)| x * value(j, a, lane));
+                        let error = products[l][a][lane] - terms.sum::<f64>();
+                        // Roundings of sums below ten times the number of points.
+                        assert!(
+                            error.abs() <= 1e-14 * points as f64,
+                            "{nodes} nodes: {error:.1e}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

@@ -40,10 +40,7 @@ pub(crate) trait Four: Precise {
     fn lanes(self) -> [f64; 4];
 
     /// Runs the work with numbers of this kind.
-    #[inline(always)]
-    fn apart<W: Apart>(self, work: W) {
-        work.run(self);
-    }
+    fn apart<W: Apart>(self, work: W);
 
     /// sin and cos of `self`, and of `other`.
     #[inline(always)]
@@ -126,6 +123,11 @@ impl Four for Lanes<4> {
     #[inline(never)]
     fn apply<const N: usize>(self, matrix: &Matrix, rows: &[Row<N>], products: &mut [Row<N>]) {
         matrix.apply_inline(self, rows, products);
+    }
+
+    #[inline(never)]
+    fn apart<W: Apart>(self, work: W) {
+        work.run(self);
     }
 
     #[inline(always)]
