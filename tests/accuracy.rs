@@ -171,6 +171,37 @@ fn what_was_chosen_before_stays() {
     assert!((back.states().len() as u64) < back.statistics().steps);
 }
 
+/// A run of one's own with all that was picked.
+#[test]
+fn what_was_picked_makes_the_same_motion() {
+    let start = Pendulum.state([2.0], [0.0]);
+    let simulation = Simulation::new(&Pendulum);
+    let motion = simulation.clone().accuracy(1e-8).run(start, 0.0..10.0);
+    let motion = motion.expect("runs");
+    let picked = motion.picked().expect("picked");
+    assert_eq!(picked.solve, Solve::FixedPoint);
+    let again = simulation
+        .element(picked.element)
+        .step(picked.step)
+        .tolerance(picked.tolerance)
+        .solver(picked.solve)
+        .run(start, 0.0..10.0)
+        .expect("runs");
+    assert_eq!(again.states().len(), motion.states().len());
+    assert_eq!(again.statistics().newton_iterations, 0);
+    let (first, second) = (again.last(), motion.last());
+    let apart = (first.q[0] - second.q[0])
+        .abs()
+        .max((first.p[0] - second.p[0]).abs());
+    // What iterations leave is far below what is asked.
+    assert!(apart <= 1e-9, "{apart:e}");
+    // What does not iterate is solved as the simulation says.
+    let linear = Simulation::new(&Oscillator).accuracy(1e-8);
+    let linear = linear.run(Oscillator.state([1.0], [0.0]), 0.0..10.0);
+    let linear = linear.expect("runs");
+    assert_eq!(linear.picked().expect("picked").solve, Solve::Auto);
+}
+
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = select(t < 1, 1, -1))]
 struct Switched;
 

@@ -62,6 +62,7 @@ pub fn measure<M: Model<N>, const N: usize>(
         let alone = |picked: &Picked| {
             let run = simulation.clone().element(picked.element);
             let run = run.step(picked.step).tolerance(picked.tolerance);
+            let run = run.solver(picked.solve);
             least_seconds(|| run.run(truth.start, span.clone()).is_ok())
         };
         let outcome = outcome

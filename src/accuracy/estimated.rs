@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::ops::Deref;
-use tfe_runtime::Element;
+use tfe_runtime::{Element, Solve};
 
 /// A motion with an estimate of its error; everything that a motion can be asked, it can be asked too.
 ///
@@ -92,7 +92,7 @@ impl<T> Deref for Estimated<T> {
     }
 }
 
-/// Element, step and tolerance that [`Simulation::accuracy`](crate::Simulation::accuracy) picked. `Display` says them with the reason.
+/// Element, step, tolerance and solver that [`Simulation::accuracy`](crate::Simulation::accuracy) picked: a run of one's own with them is as accurate. `Display` says them with the reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picked {
     /// The element.
@@ -103,6 +103,8 @@ pub struct Picked {
     pub shortest: f64,
     /// The tolerance of the iteration inside elements.
     pub tolerance: f64,
+    /// How its equations were solved: by [`Solve::FixedPoint`] where that contracts in all steps, else as the simulation was told.
+    pub solve: Solve,
     /// What was asked for.
     pub accuracy: f64,
     /// The estimated error.

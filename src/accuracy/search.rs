@@ -12,7 +12,7 @@ use cuts::cuts;
 use ladder::{Ladder, Verdict};
 use probe::probe;
 use std::ops::Range;
-use tfe_runtime::Element;
+use tfe_runtime::{Element, Solve};
 
 /// What is asked of a run.
 #[derive(Clone, Debug)]
@@ -27,6 +27,8 @@ pub(crate) struct Asked {
     pub(crate) longest: Option<f64>,
     /// Whether there is a fixed-point iteration.
     pub(crate) may_iterate: bool,
+    /// How elements are solved where it is not.
+    pub(crate) solve: Solve,
     /// Where steps are to be long and where short; equal steps without it.
     pub(crate) graded: Option<Graded>,
 }
@@ -351,6 +353,11 @@ fn climb(
             step: extremes.1,
             shortest: extremes.0,
             tolerance: way.tolerance,
+            solve: if way.by_iteration {
+                Solve::FixedPoint
+            } else {
+                asked.solve
+            },
             accuracy: asked.accuracy,
             error_estimate: largest(&errors),
             attempts,
@@ -381,6 +388,7 @@ mod tests {
             element: None,
             longest: None,
             may_iterate: true,
+            solve: Solve::Auto,
             graded: None,
         };
         let mut last = 0.0;

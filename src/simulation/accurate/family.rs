@@ -92,6 +92,7 @@ impl<M: FamilyModel> Accurate<FamilySimulation<'_, M>> {
             // Without sparse factorisations there is nothing else.
             may_iterate: run.control.solve == Solve::Auto
                 && const { M::FACTS.separable && !M::CONSTRAINED },
+            solve: run.control.solve,
             graded: None,
         };
         let steps = Steps::of(&M::FACTS, self.equal_steps, M::CONSTRAINED);

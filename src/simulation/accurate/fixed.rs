@@ -124,6 +124,7 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
             longest: run.step,
             may_iterate: run.control.solve == Solve::Auto
                 && const { !M::FACTS.linear && M::CONSTRAINTS.is_empty() },
+            solve: run.control.solve,
             graded: None,
         };
         let steps = Steps::of(&M::FACTS, self.equal_steps, !M::CONSTRAINTS.is_empty());
