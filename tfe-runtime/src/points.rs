@@ -196,19 +196,7 @@ impl<const N: usize> Points<N> {
     where
         M: Model<N>,
     {
-        let (mut force, rate);
-        if matches!(M::FORM, Form::Hamiltonian) {
-            (force, rate) = cold_rates(model, leg.t, leg.start);
-        } else {
-            (force, rate) = ([0.0; N], cold_rate(model, leg.t, leg.start));
-            if is_second_order::<M, N>() {
-                let mut first = First::ZERO;
-                model.first(leg.t, &leg.start.q, &rate, &mut first);
-                for a in 0..N {
-                    force[a] = first.q[a] + first.force[a];
-                }
-            }
-        }
+        let (force, rate) = constant_rates(model, leg.t, leg.start);
         for a in 0..N {
             (self.forces.iter_mut()).for_each(|forces| forces[a] = [force[a]; 4]);
             (self.rates.iter_mut()).for_each(|rates| rates[a] = [rate[a]; 4]);
@@ -231,6 +219,29 @@ impl<const N: usize> Points<N> {
             }
         }
     }
+}
+
+/// Rates of momenta and coordinates at the start, for a first iteration that continues nothing; those of momenta are zero where they are no unknowns.
+pub(crate) fn constant_rates<M, const N: usize>(
+    model: &M,
+    t: f64,
+    start: &State<N>,
+) -> ([f64; N], [f64; N])
+where
+    M: Model<N>,
+{
+    if const { is_phase::<M, N>() } {
+        return cold_rates(model, t, start);
+    }
+    let (mut force, rate) = ([0.0; N], cold_rate(model, t, start));
+    if const { is_second_order::<M, N>() } {
+        let mut first = First::ZERO;
+        model.first(t, &start.q, &rate, &mut first);
+        for a in 0..N {
+            force[a] = first.q[a] + first.force[a];
+        }
+    }
+    (force, rate)
 }
 
 impl<const N: usize> Inertia<N> {

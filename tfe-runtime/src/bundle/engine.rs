@@ -136,7 +136,7 @@ impl<const N: usize> Engine<N> {
         };
         for (group, lanes) in groups.iter_mut().zip(lanes.chunks(LANES)) {
             if group.warm != [true; LANES] {
-                step.start_cold(&table.view(), group, &mut self.work, lanes);
+                step.start_cold(group, lanes);
             }
         }
         let job = Job {

@@ -49,8 +49,6 @@ pub(super) struct Work<const N: usize> {
     /// Velocities at the start.
     pub(super) velocity: Row<N>,
     pub(super) velocity_low: Row<N>,
-    /// One trajectory at a cold start.
-    pub(super) cold: Vec<f64>,
 }
 
 impl<const N: usize> Group<N> {
@@ -104,7 +102,6 @@ impl<const N: usize> Work<N> {
             masses: vec![[[[0.0; LANES]; N]; N]; if varied { points } else { 0 }],
             velocity: [[0.0; LANES]; N],
             velocity_low: [[0.0; LANES]; N],
-            cold: vec![0.0; 2 * points * N],
         }
     }
 }

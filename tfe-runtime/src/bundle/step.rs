@@ -4,13 +4,11 @@ use super::group::{Group, Row, Work, flags, replace};
 use super::judge::{Increments, Judge, larger};
 use super::pair::{Eight, LANES};
 use super::products::apply;
-use crate::model::{First, Model};
+use crate::model::Model;
 use crate::newton::{Control, PATIENCE, Solve};
 use crate::points::tables::Tables;
-use crate::points::{Inertia, is_phase, is_second_order};
-use crate::scheme::SchemeRef;
+use crate::points::{Inertia, constant_rates, is_phase, is_second_order};
 use crate::statistics::{Contraction, Statistics};
-use crate::step::{cold_phase, cold_velocity};
 use alloc::vec::Vec;
 
 /// What is the same for all trajectories.
@@ -227,37 +225,13 @@ where
 
     /// Constant rates for those of the wanted lanes that continue no step.
     #[cold]
-    pub(super) fn start_cold(
-        &self,
-        scheme: &SchemeRef<'_>,
-        group: &mut Group<N>,
-        work: &mut Work<N>,
-        lanes: &[bool],
-    ) {
-        let points = self.tables.points;
-        let unknowns = &mut work.cold;
+    pub(super) fn start_cold(&self, group: &mut Group<N>, lanes: &[bool]) {
         for (lane, wanted) in lanes.iter().enumerate() {
             if !wanted || group.warm[lane] {
                 continue;
             }
-            let state = group.state(lane);
-            let (mut force, mut rate) = ([0.0; N], [0.0; N]);
-            if const { is_phase::<M, N>() } {
-                cold_phase(self.model, scheme, self.t, &state, unknowns);
-                force.copy_from_slice(&unknowns[..N]);
-                rate.copy_from_slice(&unknowns[points * N..][..N]);
-            } else {
-                cold_velocity(self.model, self.t, &state, unknowns);
-                rate.copy_from_slice(&unknowns[..N]);
-                if is_second_order::<M, N>() {
-                    let mut first = First::ZERO;
-                    self.model.first(self.t, &state.q, &rate, &mut first);
-                    for a in 0..N {
-                        force[a] = first.q[a] + first.force[a];
-                    }
-                }
-            }
-            for l in 0..points {
+            let (force, rate) = constant_rates(self.model, self.t, &group.state(lane));
+            for l in 0..self.tables.points {
                 for a in 0..N {
                     group.forces[l][a][lane] = force[a];
                     group.rates[l][a][lane] = rate[a];
