@@ -45,27 +45,6 @@ macro_rules! register {
                 pulp::cast(self.value)
             }
 
-            /// The product and what rounding takes from it: the one place where a fused instruction serves, its result is exact.
-            #[inline(always)]
-            pub(crate) fn product(self, other: Self) -> (Self, Self) {
-                let high = self.isa.mul_f64s(self.value, other.value);
-                let low = self.isa.$product_less(self.value, other.value, high);
-                (
-                    Self {
-                        value: high,
-                        ..self
-                    },
-                    Self { value: low, ..self },
-                )
-            }
-
-            /// The larger one; of a NaN and a number, the second.
-            #[inline(always)]
-            pub(crate) fn larger(self, other: Self) -> Self {
-                let value = self.isa.max_f64s(self.value, other.value);
-                Self { value, ..self }
-            }
-
             /// What has no instruction, one lane after the other.
             #[inline(always)]
             fn each(self, function: impl Fn(f64) -> f64) -> Self {
@@ -83,6 +62,29 @@ macro_rules! register {
                     lanes[lane] = function(lanes[lane], other[lane]);
                 }
                 self.with(lanes)
+            }
+        }
+
+        impl crate::points::four::Precise for $name {
+            /// The one place where a fused instruction serves: its result is exact.
+            #[inline(always)]
+            fn product(self, other: Self) -> (Self, Self) {
+                let high = self.isa.mul_f64s(self.value, other.value);
+                let low = self.isa.$product_less(self.value, other.value, high);
+                (
+                    Self {
+                        value: high,
+                        ..self
+                    },
+                    Self { value: low, ..self },
+                )
+            }
+
+            /// Of a NaN and a number, the second.
+            #[inline(always)]
+            fn larger(self, other: Self) -> Self {
+                let value = self.isa.max_f64s(self.value, other.value);
+                Self { value, ..self }
             }
         }
 

@@ -81,19 +81,6 @@ impl<V: Four> Precise for Pair<V> {
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl Precise for crate::octet::Octet {
-    #[inline(always)]
-    fn product(self, other: Self) -> (Self, Self) {
-        self.product(other)
-    }
-
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        self.larger(other)
-    }
-}
-
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
 impl Eight for crate::octet::Octet {
     #[inline(always)]
     fn with(self, lanes: [f64; LANES]) -> Self {

@@ -221,19 +221,6 @@ fn each_point<R: One, M, const N: usize>(
     }
 }
 
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl Precise for crate::quad::Quad {
-    #[inline(always)]
-    fn product(self, other: Self) -> (Self, Self) {
-        self.product(other)
-    }
-
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        self.larger(other)
-    }
-}
-
 /// In registers of the processor, the kernel for all four points at once.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 impl Four for crate::quad::Quad {
