@@ -7,6 +7,7 @@ pub(crate) mod canonical_order;
 mod cse;
 pub(crate) mod distribute;
 pub(crate) mod factor;
+pub(crate) mod guard;
 pub(crate) mod identities;
 pub(crate) mod plan;
 mod rebuild;

@@ -10,6 +10,7 @@ use crate::optimise::binarize::{Grouping, arrange};
 use crate::optimise::canonical_order::with_like_operations_alike;
 use crate::optimise::distribute::distribute;
 use crate::optimise::factor::{BUDGET, take_out_factors};
+use crate::optimise::guard::Guard;
 use crate::optimise::identities::by_identities;
 use crate::optimise::plan::Plan;
 use crate::optimise::scaled_trig::ScaledTrig;
@@ -40,6 +41,9 @@ pub(crate) struct Draft {
     cleared: BTreeSet<Array>,
     block: Block,
     balances: Vec<Balance>,
+    /// The results as declared.
+    plain: Vec<ExprId>,
+    /// The results with sines of sums expanded.
     values: Vec<ExprId>,
     cost: usize,
 }
@@ -65,22 +69,30 @@ impl Draft {
         let mut block = Block::of(&mut graph, entries);
         let zero = graph.constant(Constant::ZERO);
         let cleared = settle(&mut block, zero);
-        let mut values = Vec::new();
-        block.for_each_value(&mut |value| values.push(*value));
-        let values = expand_angles(&mut graph, values);
+        let mut plain = Vec::new();
+        block.for_each_value(&mut |value| plain.push(*value));
+        let values = expand_angles(&mut graph, plain.clone());
         let cost = arrange(&graph, &values, Grouping::ByLoops).cost();
         Self {
             graph,
             cleared,
             block,
             balances,
+            plain,
             values,
             cost,
         }
     }
 
-    /// The program of the cheapest of them; of equal ones the first.
-    pub(crate) fn best(mut drafts: Vec<Self>) -> Program {
+    /// The program of the cheapest of these drafts of the same results that loses no digits; of equal ones the first.
+    ///
+    /// The first draft is the one as declared: the others are compared with it, and it is taken where no other is good enough.
+    pub(crate) fn best(drafts: Vec<Self>) -> Program {
+        let Some(declared) = drafts.first() else {
+            return Program::default();
+        };
+        let guard = Guard::of(&declared.graph, &declared.plain);
+        let mut drafts = Self::accepted(drafts, &guard);
         drafts.sort_by_key(|draft| draft.cost);
         let least = drafts.first().map_or(0, |draft| draft.cost);
         drafts.retain(|draft| 5 * draft.cost <= WITHIN * least);
@@ -88,7 +100,7 @@ impl Draft {
         let share = BUDGET / (4 * drafts.len().max(1));
         let mut arranged: Vec<Arranged> = drafts
             .iter_mut()
-            .flat_map(|draft| draft.arranged(share))
+            .flat_map(|draft| draft.arranged(share, &guard))
             .collect();
         arranged.sort_by_key(|arranged| arranged.plan.cost());
         let least = arranged.first().map_or(0, |arranged| arranged.plan.cost());
@@ -106,8 +118,9 @@ impl Draft {
         });
         let followed = within.count();
         arranged.truncate(followed.max(1));
-        for Arranged { plan, .. } in &mut arranged {
-            *plan = by_identities(std::mem::take(plan));
+        for Arranged { plan, values, .. } in &mut arranged {
+            let accepts = |plan: &Plan| guard.accepts(plan, values);
+            *plan = by_identities(std::mem::take(plan), &accepts);
         }
         let best = arranged
             .into_iter()
@@ -115,8 +128,36 @@ impl Draft {
         best.map_or_else(Program::default, Arranged::program)
     }
 
-    /// Takes out common factors and arranges the operations, in several ways.
-    fn arranged(&mut self, budget: usize) -> Vec<Arranged<'_>> {
+    /// The drafts that lose no digits when their operations are put in order, without expanded sines where these lose some. The first one is
+    /// always among them.
+    fn accepted(drafts: Vec<Self>, guard: &Guard) -> Vec<Self> {
+        let mut accepted: Vec<Self> = Vec::with_capacity(drafts.len());
+        for mut draft in drafts {
+            let is_good = |draft: &Self| {
+                let plan = arrange(&draft.graph, &draft.values, Grouping::ByLoops);
+                guard.accepts(&plan, &draft.values)
+            };
+            let results = |first: &Self| {
+                first.cleared == draft.cleared && first.block.has_the_results_of(&draft.block)
+            };
+            if !accepted.first().is_none_or(results) {
+                continue;
+            }
+            let mut good = is_good(&draft);
+            if !good && draft.values != draft.plain {
+                draft.values.clone_from(&draft.plain);
+                draft.cost = arrange(&draft.graph, &draft.values, Grouping::ByLoops).cost();
+                good = is_good(&draft);
+            }
+            if good || accepted.is_empty() {
+                accepted.push(draft);
+            }
+        }
+        accepted
+    }
+
+    /// Takes out common factors and arranges the operations, in several ways. Without a way that loses no digits, in the order as declared.
+    fn arranged(&mut self, budget: usize, guard: &Guard) -> Vec<Arranged<'_>> {
         let graph = &mut self.graph;
         let factored = take_out_factors(graph, self.values.clone(), budget);
         let mut ways = vec![
@@ -124,12 +165,11 @@ impl Draft {
             (self.values.clone(), Grouping::ParametersApart),
             (factored, Grouping::VelocitiesLast),
         ];
-        if self.cost <= MULTIPLIED && self.block.inner.is_empty() {
-            let values: Option<Vec<ExprId>> =
-                self.values.iter().map(|x| graph.expanded(*x)).collect();
-            if let Some(values) = values {
-                ways.push((take_out_factors(graph, values, budget), Grouping::ByLoops));
-            }
+        if self.cost <= MULTIPLIED
+            && self.block.inner.is_empty()
+            && let Some(values) = multiplied_out(graph, &self.values)
+        {
+            ways.push((take_out_factors(graph, values, budget), Grouping::ByLoops));
         }
         let by_arms = self.by_arms(budget);
         let draft: &Self = self;
@@ -147,7 +187,16 @@ impl Draft {
                 values,
             }
         });
-        plans.chain(by_arms).collect()
+        let mut all: Vec<Arranged> = plans.chain(by_arms).collect();
+        all.retain(|arranged| guard.accepts(&arranged.plan, &arranged.values));
+        if all.is_empty() {
+            all.push(Arranged {
+                draft,
+                plan: arrange(&draft.graph, &draft.values, Grouping::ByLoops),
+                values: draft.values.clone(),
+            });
+        }
+        all
     }
 
     /// The values by arms, with common factors taken out.
@@ -158,6 +207,19 @@ impl Draft {
         let (arms, values) = ScaledTrig::of(&mut self.graph, &self.values)?;
         Some((arms, take_out_factors(&mut self.graph, values, budget)))
     }
+}
+
+/// The values multiplied out, but for sums whose digits that would lose; nothing where that makes too many terms.
+fn multiplied_out(graph: &mut Graph, values: &[ExprId]) -> Option<Vec<ExprId>> {
+    let kept: BTreeSet<ExprId> = graph
+        .reachable(values)
+        .into_iter()
+        .filter(|id| graph.keeps_order(*id))
+        .collect();
+    values
+        .iter()
+        .map(|x| graph.expanded_around(*x, |id| kept.contains(&id)))
+        .collect()
 }
 
 impl Arranged<'_> {

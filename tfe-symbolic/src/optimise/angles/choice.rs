@@ -233,7 +233,8 @@ impl Choice {
         (!route.is_empty()).then_some(route)
     }
 
-    /// The angle as a sum or difference of two that are known.
+    /// The angle as a sum or difference of two that are known. An atom that is in both parts and not in the angle would bring the rounding of its
+    /// sine into that of the angle: sin a is not taken from those of a + b and b.
     fn two_parts(&self, angle: &Angle) -> Option<How> {
         if let Some(half) = half(angle).filter(|half| self.known.contains_key(half)) {
             return Some(How::Double(half));
@@ -246,8 +247,11 @@ impl Choice {
             .min_by_key(|found| found.len())?;
         for at in candidates.iter().take(MOST_PARTS) {
             let part = &self.steps[*at].angle;
+            let fits = |other: &Angle| {
+                size(part) + size(other) == size(angle) && self.known.contains_key(other)
+            };
             let (other, opposite) = canonical(plus(angle, -1, part));
-            if self.known.contains_key(&other) {
+            if fits(&other) {
                 return Some(How::Sum {
                     first: part.clone(),
                     second: other,
@@ -255,7 +259,7 @@ impl Choice {
                 });
             }
             let (other, opposite) = canonical(plus(angle, 1, part));
-            if !opposite && self.known.contains_key(&other) {
+            if !opposite && fits(&other) {
                 return Some(How::Sum {
                     first: other,
                     second: part.clone(),
