@@ -22,6 +22,7 @@ use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 use crate::model::declared::{Constraint, Declared, Force, Form, Observable, Parameter};
 use crate::optimise::angles::expand_angles;
 use crate::pipeline::select_plan::Draft;
+use crate::pipeline::{Pass, Passes};
 use crate::program::count::Counts;
 use crate::program::{By, Program, Request};
 
@@ -97,6 +98,7 @@ pub struct Derivation {
     written: Vec<Vec<Entry>>,
     structure: Structure,
     sensitivities: Vec<Parameter>,
+    passes: Passes,
 }
 
 impl Derivation {
@@ -105,8 +107,17 @@ impl Derivation {
         Self::of_model(Model::from(declared))
     }
 
+    /// The same, with programs made without one of the passes: to see what a pass is worth.
+    pub fn without(declared: &Declared, pass: Pass) -> Self {
+        Self::by_passes(Model::from(declared), Passes::without(pass))
+    }
+
     /// Differentiates a model.
     pub fn of_model(model: Model) -> Self {
+        Self::by_passes(model, Passes::ALL)
+    }
+
+    fn by_passes(model: Model, passes: Passes) -> Self {
         let Model {
             form,
             dof,
@@ -139,17 +150,25 @@ impl Derivation {
         };
         entries.extend(constrain(&mut graph, &constraints));
         let structure = Structure::of(&graph, form, &dof, &entries);
-        let by_matrix = [Writing::AsDerived, Writing::Expanded]
-            .into_iter()
-            .filter_map(|writing| quadratic::entries(&mut graph, energy, &entries, writing));
-        let mut written: Vec<Vec<Entry>> = by_matrix.collect();
-        written.extend(entries_by_squares(&mut graph, form, energy, &entries));
+        let mut written: Vec<Vec<Entry>> = Vec::new();
+        if passes.run(Pass::QuadraticForm) {
+            let writings = [Writing::AsDerived, Writing::Expanded].into_iter();
+            written.extend(
+                writings.filter_map(|writing| {
+                    quadratic::entries(&mut graph, energy, &entries, writing)
+                }),
+            );
+        }
+        if passes.run(Pass::Squares) {
+            written.extend(entries_by_squares(&mut graph, form, energy, &entries));
+        }
         Self {
             graph,
             entries,
             written,
             structure,
             sensitivities,
+            passes,
         }
     }
 
@@ -192,14 +211,14 @@ impl Derivation {
             place: Place::scalar(Array::Value),
             value: transformation.hamiltonian,
         };
-        let draft = Draft::of(declared.graph.clone(), vec![entry]);
+        let draft = Draft::of(declared.graph.clone(), vec![entry], Passes::ALL);
         Some(Draft::best(vec![draft]))
     }
 
     fn program_of(&self, is_wanted: impl Fn(Array) -> bool) -> Program {
         let draft = |entries: &Vec<Entry>| {
             let wanted = entries.iter().filter(|entry| is_wanted(entry.place.array));
-            Draft::of(self.graph.clone(), wanted.cloned().collect())
+            Draft::of(self.graph.clone(), wanted.cloned().collect(), self.passes)
         };
         let plain = std::iter::once(&self.entries);
         Draft::best(plain.chain(&self.written).map(draft).collect())
@@ -243,7 +262,7 @@ impl Derivation {
         };
         let mut graph = self.graph.clone();
         let entries = entries_by(&mut graph, &self.entries, leaf);
-        Draft::best(vec![Draft::of(graph, entries)])
+        Draft::best(vec![Draft::of(graph, entries, self.passes)])
     }
 
     /// Whether ∂/∂z of the energy function holds the time.

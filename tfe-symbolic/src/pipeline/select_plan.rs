@@ -15,9 +15,11 @@ use crate::optimise::identities::by_identities;
 use crate::optimise::plan::Plan;
 use crate::optimise::scaled_trig::ScaledTrig;
 use crate::optimise::signs::with_fewer_negations;
+use crate::pipeline::{Pass, Passes};
 use crate::program::Program;
 use crate::schedule::balance::{Balance, balances};
 use crate::schedule::loop_nest::Block;
+use crate::schedule::order::in_order;
 use crate::schedule::statements::schedule;
 use crate::schedule::store_or_add::settle;
 
@@ -25,10 +27,10 @@ use crate::schedule::store_or_add::settle;
 const WITHIN: usize = 6;
 
 /// Drafts up to this cost are also multiplied out before common factors are sought.
-const MULTIPLIED: usize = 110;
+const MULTIPLIED: usize = 55;
 
 /// Drafts up to this cost are also written by arms.
-const ARMED: usize = 600;
+const ARMED: usize = 300;
 
 /// Identities are sought in the cheapest plans, where they cost no more than so many quarters of the cheapest, up to so many operations
 /// altogether.
@@ -37,6 +39,7 @@ const FOLLOWED: usize = 240;
 
 /// Entries in their loops, before common factors are sought.
 pub(crate) struct Draft {
+    passes: Passes,
     graph: Graph,
     cleared: BTreeSet<Array>,
     block: Block,
@@ -57,10 +60,15 @@ struct Arranged<'a> {
 
 impl Draft {
     /// Puts entries into loops and expands sines of sums.
-    pub(crate) fn of(mut graph: Graph, mut entries: Vec<Entry>) -> Self {
-        let balances = balances(&mut graph, &mut entries);
-        let values: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
-        let values = graph.open_single_sums(&values);
+    pub(crate) fn of(mut graph: Graph, mut entries: Vec<Entry>, passes: Passes) -> Self {
+        let balances = match passes.run(Pass::Balance) {
+            true => balances(&mut graph, &mut entries),
+            false => Vec::new(),
+        };
+        let mut values: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
+        if passes.run(Pass::OpenSums) {
+            values = graph.open_single_sums(&values);
+        }
         let entries = entries
             .into_iter()
             .zip(values)
@@ -71,9 +79,13 @@ impl Draft {
         let cleared = settle(&mut block, zero);
         let mut plain = Vec::new();
         block.for_each_value(&mut |value| plain.push(*value));
-        let values = expand_angles(&mut graph, plain.clone());
+        let values = match passes.run(Pass::AngleSums) {
+            true => expand_angles(&mut graph, plain.clone()),
+            false => plain.clone(),
+        };
         let cost = arrange(&graph, &values, Grouping::ByLoops).cost();
         Self {
+            passes,
             graph,
             cleared,
             block,
@@ -118,7 +130,15 @@ impl Draft {
         });
         let followed = within.count();
         arranged.truncate(followed.max(1));
-        for Arranged { plan, values, .. } in &mut arranged {
+        for Arranged {
+            draft,
+            plan,
+            values,
+        } in &mut arranged
+        {
+            if !draft.passes.run(Pass::Identities) {
+                continue;
+            }
             let accepts = |plan: &Plan| guard.accepts(plan, values);
             *plan = by_identities(std::mem::take(plan), &accepts);
         }
@@ -158,29 +178,40 @@ impl Draft {
 
     /// Takes out common factors and arranges the operations, in several ways. Without a way that loses no digits, in the order as declared.
     fn arranged(&mut self, budget: usize, guard: &Guard) -> Vec<Arranged<'_>> {
+        let passes = self.passes;
         let graph = &mut self.graph;
-        let factored = take_out_factors(graph, self.values.clone(), budget);
-        let mut ways = vec![
-            (factored.clone(), Grouping::ByLoops),
-            (self.values.clone(), Grouping::ParametersApart),
-            (factored, Grouping::VelocitiesLast),
-        ];
-        if self.cost <= MULTIPLIED
+        let take_out_factors =
+            |graph: &mut Graph, values: Vec<ExprId>| match passes.run(Pass::CommonFactors) {
+                true => take_out_factors(graph, values, budget),
+                false => values,
+            };
+        let factored = take_out_factors(graph, self.values.clone());
+        let mut ways = vec![(factored.clone(), Grouping::ByLoops)];
+        if passes.run(Pass::Groupings) {
+            ways.push((self.values.clone(), Grouping::ParametersApart));
+            ways.push((factored, Grouping::VelocitiesLast));
+        }
+        if passes.run(Pass::MultiplyOut)
+            && self.cost <= MULTIPLIED
             && self.block.inner.is_empty()
             && let Some(values) = multiplied_out(graph, &self.values)
         {
-            ways.push((take_out_factors(graph, values, budget), Grouping::ByLoops));
+            ways.push((take_out_factors(graph, values), Grouping::ByLoops));
         }
         let by_arms = self.by_arms(budget);
         let draft: &Self = self;
+        let arrange = |roots: &[ExprId], grouping| match passes.run(Pass::Distribute) {
+            true => distribute(&draft.graph, roots, grouping),
+            false => arrange(&draft.graph, roots, grouping),
+        };
         let plans = ways.into_iter().map(|(values, grouping)| Arranged {
             draft,
-            plan: distribute(&draft.graph, &values, grouping),
+            plan: arrange(&values, grouping),
             values,
         });
         let by_arms = by_arms.map(|(arms, values)| {
             let roots: Vec<ExprId> = values.iter().copied().chain(arms.parts()).collect();
-            let plan = distribute(&draft.graph, &roots, Grouping::VelocitiesLast);
+            let plan = arrange(&roots, Grouping::VelocitiesLast);
             Arranged {
                 draft,
                 plan: arms.written_out(plan, &values),
@@ -192,7 +223,7 @@ impl Draft {
         if all.is_empty() {
             all.push(Arranged {
                 draft,
-                plan: arrange(&draft.graph, &draft.values, Grouping::ByLoops),
+                plan: arrange(&draft.values, Grouping::ByLoops),
                 values: draft.values.clone(),
             });
         }
@@ -201,11 +232,16 @@ impl Draft {
 
     /// The values by arms, with common factors taken out.
     fn by_arms(&mut self, budget: usize) -> Option<(ScaledTrig, Vec<ExprId>)> {
-        if self.cost > ARMED || !self.block.inner.is_empty() {
+        let small = self.cost <= ARMED && self.block.inner.is_empty();
+        if !small || !self.passes.run(Pass::ScaledTrig) {
             return None;
         }
         let (arms, values) = ScaledTrig::of(&mut self.graph, &self.values)?;
-        Some((arms, take_out_factors(&mut self.graph, values, budget)))
+        let values = match self.passes.run(Pass::CommonFactors) {
+            true => take_out_factors(&mut self.graph, values, budget),
+            false => values,
+        };
+        Some((arms, values))
     }
 }
 
@@ -227,8 +263,23 @@ impl Arranged<'_> {
         let mut next = self.values.iter();
         let mut block = self.draft.block.clone();
         block.for_each_value(&mut |value| *value = *next.next().unwrap_or(value));
-        let plan = with_like_operations_alike(self.plan);
-        let plan = with_fewer_negations(plan, &block.stored());
-        schedule(plan, &self.draft.cleared, &block, &self.draft.balances)
+        let Draft {
+            passes,
+            cleared,
+            balances,
+            ..
+        } = self.draft;
+        let mut plan = self.plan;
+        if passes.run(Pass::CanonicalOrder) {
+            plan = with_like_operations_alike(plan);
+        }
+        if passes.run(Pass::Signs) {
+            plan = with_fewer_negations(plan, &block.stored());
+        }
+        let mut program = schedule(plan, cleared, &block, balances);
+        if passes.run(Pass::StatementOrder) {
+            program.statements = in_order(program.statements);
+        }
+        program
     }
 }

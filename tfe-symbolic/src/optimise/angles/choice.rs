@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use super::{Angle, canonical};
 use crate::expr::graph::ExprId;
+use crate::program::cost;
 
 /// What is wanted of an angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,10 +49,6 @@ struct Step {
     /// Numbers cost nothing.
     free: bool,
 }
-
-/// A sine with its cosine, and one of them alone, in additions.
-const PAIR: usize = 25;
-const LONE: usize = 20;
 
 /// How many helpers are tried one by one.
 const MOST_TRIALS: usize = 24;
@@ -174,7 +171,7 @@ impl Choice {
             known.cosine |= need.cosine;
             return;
         }
-        let direct = if need == BOTH { PAIR } else { LONE };
+        let direct = How::Direct.cost(need);
         match self.route(angle) {
             Some(route) if self.price(&route, need) < direct => {
                 let last = route.len() - 1;
@@ -321,8 +318,8 @@ impl How {
 
     fn cost(&self, need: Need) -> usize {
         match self {
-            Self::Direct if need == BOTH => PAIR,
-            Self::Direct => LONE,
+            Self::Direct if need == BOTH => cost::SINE_WITH_COSINE,
+            Self::Direct => cost::LONE_SINE,
             Self::Sum { .. } => 3 * need.count(),
             Self::Double(_) => 2 * need.count(),
         }

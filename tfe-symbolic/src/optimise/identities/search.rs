@@ -8,12 +8,7 @@ use super::weight;
 use crate::expr::hash::Map;
 use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::Formula;
-
-/// Sums and products of two are tabulated up to so many operations.
-const TABLED: usize = 160;
-
-/// Sums of two products are sought up to so many operations.
-const SEARCHED: usize = 130;
+use crate::program::cost;
 
 /// How many formulas for one operation are kept.
 const KEPT: usize = 4;
@@ -125,14 +120,12 @@ impl<'a> Search<'a> {
             singles.entry(size).or_default().push(id);
         }
         let (mut products, mut sums) = (Vec::new(), Vec::new());
-        if plan.len() <= TABLED {
-            for a in plan.ids() {
-                for b in plan.ids().take(a.index() + 1) {
-                    let (x, y) = (values[a.index()], values[b.index()]);
-                    products.push((x.times(y).size(), a, b));
-                    sums.push((x.plus(y).size(), a, b));
-                    sums.push((x.minus(y).size(), a, b));
-                }
+        for a in plan.ids() {
+            for b in plan.ids().take(a.index() + 1) {
+                let (x, y) = (values[a.index()], values[b.index()]);
+                products.push((x.times(y).size(), a, b));
+                sums.push((x.plus(y).size(), a, b));
+                sums.push((x.minus(y).size(), a, b));
             }
         }
         Self {
@@ -200,7 +193,7 @@ impl<'a> Search<'a> {
     fn formulas(&self, target: OpId, uses: &[u32]) -> Vec<Candidate> {
         let alone = self.alone(target, uses);
         let total: usize = alone.values().sum();
-        let unit = 2 << (3 * self.plan.loops_of(target).count_ones());
+        let unit = cost::ADDITION << (3 * self.plan.loops_of(target).count_ones());
         let mut found = Found {
             search: self,
             target,
@@ -214,10 +207,10 @@ impl<'a> Search<'a> {
         if total > unit {
             found.two();
         }
-        if total > 2 * unit && self.plan.len() <= TABLED {
+        if total > 2 * unit {
             found.three();
         }
-        if total > 3 * unit && self.plan.len() <= SEARCHED {
+        if total > 3 * unit {
             found.four();
         }
         found.candidates
