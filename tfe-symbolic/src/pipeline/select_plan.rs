@@ -145,7 +145,7 @@ impl Draft {
         let best = arranged
             .into_iter()
             .min_by_key(|arranged| (arranged.plan.cost(), arranged.plan.copies()));
-        best.map_or_else(Program::default, Arranged::program)
+        best.map_or_else(Program::default, |best| best.program(&guard))
     }
 
     /// The drafts that lose no digits when their operations are put in order, without expanded sines where these lose some. The first one is
@@ -259,7 +259,7 @@ fn multiplied_out(graph: &mut Graph, values: &[ExprId]) -> Option<Vec<ExprId>> {
 }
 
 impl Arranged<'_> {
-    fn program(self) -> Program {
+    fn program(self, guard: &Guard) -> Program {
         let mut next = self.values.iter();
         let mut block = self.draft.block.clone();
         block.for_each_value(&mut |value| *value = *next.next().unwrap_or(value));
@@ -271,7 +271,10 @@ impl Arranged<'_> {
         } = self.draft;
         let mut plan = self.plan;
         if passes.run(Pass::CanonicalOrder) {
-            plan = with_like_operations_alike(plan);
+            let alike = with_like_operations_alike(plan.clone());
+            if guard.accepts(&alike, &self.values) {
+                plan = alike;
+            }
         }
         if passes.run(Pass::Signs) {
             plan = with_fewer_negations(plan, &block.stored());

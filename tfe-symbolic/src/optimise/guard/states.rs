@@ -1,145 +1,126 @@
 //! States at which digits are easily lost: what a rewritten formula is compared at with the formula as declared.
 //!
-//! A state is a number for each input. Cancellation is what hurts, so most states bring inputs close to each other: equal or nearly equal
-//! ones, beside large common offsets, or of opposite signs; others have inputs of very different sizes. The numbers depend on the position of
-//! an input among all inputs, not on its name.
+//! A state is a number for each input. Cancellation is what hurts, so most states bring inputs close to each other: coordinates, velocities,
+//! parameters, or some of each are equal or nearly equal, beside large common offsets, or of opposite signs; parameters are of very different
+//! sizes in half of the states. The numbers depend on the position of an input among all inputs, not on its name.
 
 use crate::expr::input::Input;
 
-/// How the inputs of a state are chosen.
-#[derive(Clone, Copy, Debug)]
-struct Regime {
-    /// What coordinates, velocities and momenta have in common; 0 for none.
-    offset: f64,
-    /// How far they are from it.
-    spread: f64,
-    /// Parameters are 10^±this times a number of ordinary size.
-    decades: f64,
-    /// Which inputs go with the offset, and how.
-    cluster: Cluster,
-}
+/// How many states there are. With half as many, one model in a thousand gets a formula that loses digits; twice as many found no more.
+pub(crate) const STATES: usize = 96;
+
+/// The inputs that are close to each other.
+const CLUSTERS: [Cluster; 7] = {
+    use Cluster::{All, Coordinates, Half, Moving, Nobody, Rates, WithParameters};
+    [
+        Coordinates,
+        All,
+        Half,
+        Moving,
+        WithParameters,
+        Rates,
+        Nobody,
+    ]
+};
+
+/// What they have in common.
+const OFFSETS: [f64; 5] = [1.0, 1e3, 1e8, 1e5, 1e-3];
+
+/// How far they are from it, as a part of it.
+const SPREADS: [f64; 4] = [1e-3, 1e-6, 0.0, 1e-9];
+
+/// Where nothing is close, half of what moves is so small; and parameters are by so many decades larger or smaller than one.
+const SMALL: f64 = 1e-3;
+const DECADES: f64 = 6.0;
 
 /// Which inputs have the common offset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cluster {
     /// None.
     Nobody,
-    /// All that move; velocities have another offset of the same size.
+    /// Coordinates and the time.
+    Coordinates,
+    /// Velocities and momenta.
+    Rates,
+    /// Coordinates and, about another offset of the same size, velocities and momenta.
     Moving,
-    /// The same, with random signs.
-    MovingOrOpposite,
-    /// All inputs, parameters too.
+    /// Coordinates and parameters.
+    WithParameters,
+    /// All inputs.
     All,
-    /// The same, with random signs of what moves.
-    AllOrOpposite,
-    /// Half of all inputs, parameters too.
+    /// Half of all inputs.
     Half,
-    /// The same, with random signs of what moves.
-    HalfOrOpposite,
+}
+
+/// How the inputs of a state are chosen.
+#[derive(Clone, Copy, Debug)]
+struct Regime {
+    cluster: Cluster,
+    offset: f64,
+    spread: f64,
+    /// Whether what moves has random signs.
+    opposite: bool,
+    /// How many decades apart parameters are that are in no cluster.
+    decades: f64,
 }
 
 impl Regime {
-    const fn new(cluster: Cluster, offset: f64, spread: f64) -> Self {
+    /// Each of the choices goes with each of the others somewhere: their numbers have no common factor.
+    fn of(number: usize) -> Self {
         Self {
-            offset,
-            spread,
-            decades: 0.0,
-            cluster,
+            cluster: CLUSTERS[number % CLUSTERS.len()],
+            offset: OFFSETS[number % OFFSETS.len()],
+            spread: SPREADS[number % SPREADS.len()],
+            opposite: number % 3 == 2,
+            decades: if number / 4 % 2 == 0 { 0.0 } else { DECADES },
         }
     }
 
-    const fn of_sizes(spread: f64, decades: f64) -> Self {
-        Self {
-            offset: 0.0,
-            spread,
-            decades,
-            cluster: Cluster::Nobody,
-        }
-    }
-}
-
-/// The states, those first at which a bad formula is most often found out.
-const REGIMES: [Regime; 28] = {
-    use Cluster::{All, AllOrOpposite, Half, HalfOrOpposite, Moving, MovingOrOpposite};
-    [
-        Regime::new(Moving, 1e6, 0.5),
-        Regime::new(All, 1.0, 1e-5),
-        Regime::new(MovingOrOpposite, 1.0, 1e-6),
-        Regime::new(Half, 1.0, 1e-5),
-        Regime::of_sizes(1.0, 0.0),
-        Regime::of_sizes(1e-3, 0.0),
-        Regime::new(HalfOrOpposite, 1.0, 0.0),
-        Regime::new(Moving, 1e3, 0.5),
-        Regime::new(All, 1e8, 0.5),
-        Regime::new(MovingOrOpposite, 1.0, 0.0),
-        Regime::of_sizes(1.0, 6.0),
-        Regime::new(AllOrOpposite, 1.0, 1e-3),
-        Regime::new(HalfOrOpposite, 1e3, 1e-3),
-        Regime::new(Moving, 1e8, 0.5),
-        Regime::new(Moving, 1.0, 0.0),
-        Regime::new(HalfOrOpposite, 1.0, 1e-3),
-        Regime::new(Half, 1.0, 1e-7),
-        Regime::of_sizes(1.0, 3.0),
-        Regime::new(All, 1.0, 0.0),
-        Regime::new(MovingOrOpposite, 1e5, 1e-2),
-        Regime::new(AllOrOpposite, 1e-3, 1e-6),
-        Regime::new(Half, 1e3, 0.5),
-        Regime::of_sizes(1e-6, 0.0),
-        Regime::new(Moving, 1e-3, 1e-7),
-        Regime::new(HalfOrOpposite, 1.0, 1e-5),
-        Regime::of_sizes(1e-3, 6.0),
-        Regime::new(AllOrOpposite, 1.0, 0.0),
-        Regime::new(Half, 1e8, 0.5),
-    ]
-};
-
-/// How many states of each regime there are.
-const DRAWS: usize = 2;
-
-/// How many states there are.
-pub(crate) const STATES: usize = DRAWS * REGIMES.len();
-
-/// The numbers of these inputs in the state of this number, below [`STATES`].
-pub(crate) fn state(inputs: &[Input], number: usize) -> Vec<f64> {
-    let regime = REGIMES[number % REGIMES.len()];
-    let sample = |(position, input)| regime.sample(input, Draw::of(number, position));
-    inputs.iter().enumerate().map(sample).collect()
-}
-
-impl Regime {
     fn sample(self, input: &Input, mut draw: Draw) -> f64 {
-        let (own, sign, joins, small) = (draw.size(), draw.sign(), draw.sign(), draw.sign());
+        let (own, sign, joins, side) = (draw.size(), draw.sign(), draw.sign(), draw.sign());
         let exponent = self.decades * draw.symmetric();
-        let (moves, offset) = match input {
+        let (kind, share) = match input {
             // An index or a length.
             Input::Integer(_) => return (8.0 * own).floor(),
-            Input::Parameter(_) | Input::ParameterElement(..) => (false, self.offset),
-            Input::Velocity(_) | Input::Momentum(_) => (true, 0.75 * self.offset),
-            Input::Time | Input::Coordinate(_) | Input::Multiplier(_) => (true, self.offset),
+            Input::Parameter(_) | Input::ParameterElement(..) => (Kind::Parameter, 1.0),
+            // At rest with each other, but not at the place of anything.
+            Input::Velocity(_) | Input::Momentum(_) => (Kind::Rate, 0.75),
+            Input::Time | Input::Coordinate(_) | Input::Multiplier(_) => (Kind::Coordinate, 1.0),
         };
         let together = match self.cluster {
             Cluster::Nobody => false,
-            Cluster::Moving | Cluster::MovingOrOpposite => moves,
-            Cluster::All | Cluster::AllOrOpposite => true,
-            Cluster::Half | Cluster::HalfOrOpposite => joins > 0.0,
+            Cluster::Coordinates => kind == Kind::Coordinate,
+            Cluster::Rates => kind == Kind::Rate,
+            Cluster::Moving => kind != Kind::Parameter,
+            Cluster::WithParameters => kind != Kind::Rate,
+            Cluster::All => true,
+            Cluster::Half => joins > 0.0,
         };
-        let opposite = matches!(
-            self.cluster,
-            Cluster::MovingOrOpposite | Cluster::AllOrOpposite | Cluster::HalfOrOpposite
-        );
-        match (moves, together) {
-            (true, true) => {
-                (if opposite { sign } else { 1.0 }) * (offset + self.spread * small * own)
-            }
-            (false, true) => (offset + self.spread * small * own).abs(),
-            (false, false) => own * 10.0_f64.powf(exponent),
-            // Of states without offset, half of the inputs are small.
-            (true, false) if self.cluster == Cluster::Nobody && small > 0.0 => {
-                sign * own * self.spread
-            }
-            (true, false) => sign * own,
+        let near = share * self.offset * (1.0 + self.spread * side * own);
+        match (kind, together) {
+            (Kind::Parameter, true) => near,
+            (Kind::Parameter, false) => own * 10.0_f64.powf(exponent),
+            (_, true) if self.opposite => sign * near,
+            (_, true) => near,
+            (_, false) if self.cluster == Cluster::Nobody && side > 0.0 => sign * own * SMALL,
+            (_, false) => sign * own,
         }
     }
+}
+
+/// The kinds of inputs that are chosen in different ways.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Coordinate,
+    Rate,
+    Parameter,
+}
+
+/// The numbers of these inputs in the state of this number, below [`STATES`].
+pub(crate) fn state(inputs: &[Input], number: usize) -> Vec<f64> {
+    let regime = Regime::of(number);
+    let sample = |(position, input)| regime.sample(input, Draw::of(number, position));
+    inputs.iter().enumerate().map(sample).collect()
 }
 
 /// Numbers that look random, the same on every run.
