@@ -1,10 +1,11 @@
 //! Generated kernels beside hand-written ones: operations, instructions and nanoseconds a call.
 //!
-//! `cargo bench --bench kernels` prints the table; `cargo bench --bench kernels -- pendulum heavy-top` only these models, and with
-//! `--instructions` no times, for machines that are busy with other things. On the first ten models the optimiser was developed; the six
-//! after them were declared and written by hand without looking at what is emitted. Instructions are
-//! counted where valgrind is installed; it counts a filling instruction (`rep stos`) once for each byte or word, so what clears memory looks
-//! dearer there than in nanoseconds. Before anything is measured, both kernels are compared at several states.
+//! `cargo bench --bench kernels` prints the table; `cargo bench --bench kernels -- pendulum heavy-top` only these models; and
+//! `cargo bench --bench kernels -- --instructions` no times, for a machine that is busy with other things. The optimiser was developed
+//! on the first ten models; the six after them were declared and written by hand without looking at what is emitted.
+//!
+//! Instructions are counted where valgrind is installed; it counts a filling instruction (`rep stos`) once for each byte or word, so what
+//! clears memory looks dearer there than in nanoseconds. Before anything is measured, both kernels are compared at several states.
 
 mod by_hand;
 mod case;

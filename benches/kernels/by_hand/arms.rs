@@ -7,7 +7,7 @@ use tfe::runtime::{First, Real, Second};
 /// ```text
 /// d = b + c,  elbow (x, y) = l₂ (cos b, sin b),  hand (u, w) = s₃ (cos d, sin d),  (ρ, z) = (x + u, y + w)
 /// Θ = j₁ + i₂ sin²b + e₂ cos²b + i₃ sin²d + j₃ cos²d + m₃ ρ²,  e₂ = j₂ + m₂ s₂²
-/// ½ Θ_b = (i₂ − e₂) sin b cos b + ½ Θ_c|ρ − m₃ ρ z,  ½ Θ_c = (i₃ − j₃) sin d cos d − m₃ ρ w
+/// ½ Θ_b = (i₂ − e₂) sin b cos b + (i₃ − j₃) sin d cos d − m₃ ρ z,  ½ Θ_c = (i₃ − j₃) sin d cos d − m₃ ρ w
 /// ```
 impl ByHand<3> for SpatialArm {
     fn first<R: Real>(&self, _t: R, q: &[R; 3], v: &[R; 3], first: &mut First<R, 3>) {

@@ -137,8 +137,8 @@ impl ByHand<4> for Satellite {
                 };
             }
         }
-        // qq = 4 G(ė)ᵀ J G(ė) − k Σ Jᵢ (∂cᵢ/∂e ∂cᵢ/∂eᵀ + cᵢ ∂²cᵢ/∂e²): both products have the pattern of G, so that each moment multiplies a
-        // product of rates less one of slopes.
+        // qq = 4 G(ė)ᵀ J G(ė) − k Σ Jᵢ (∂cᵢ/∂e ∂cᵢ/∂eᵀ + cᵢ ∂²cᵢ/∂e²). Both products have the pattern of G: each moment
+        // multiplies a product of rates less one of slopes.
         let [r0, r1, r2, r3] = *v;
         let [al, be, ga, de] = slopes;
         let [k_al, k_be, k_ga, k_de] = slopes.map(|slope| k * slope);
