@@ -144,7 +144,8 @@ pub struct Fput {
     pub a: f64,
 }
 
-/// A spherical pendulum that hangs from a cart on a straight track: its angle from the vertical and its azimuth from the track.
+/// A spherical pendulum that hangs from a cart on a straight track: its angle from the vertical and its azimuth from
+/// the track.
 #[dynamics(
     coordinates(x, theta, phi),
     let r = [x + l*sin(theta)*cos(phi), l*sin(theta)*sin(phi), -l*cos(theta)],
@@ -157,7 +158,8 @@ pub struct SphericalPendulumOnCart {
     pub g: f64,
 }
 
-/// Foucault's pendulum of any amplitude, by its place over the ground: x north, y west, z up, on a planet that turns at `omega`.
+/// Foucault's pendulum of any amplitude, by its place over the ground: x north, y west, z up, on a planet that turns at
+/// `omega`.
 #[dynamics(
     coordinates(x, y),
     let z = -sqrt(l^2 - x^2 - y^2),
@@ -173,8 +175,9 @@ pub struct Foucault {
     pub latitude: f64,
 }
 
-/// A satellite on a circular orbit of the angular velocity `n`, turned by the gradient of gravity: a quaternion from body to space, scalar
-/// first, and three moments of inertia. `up` is the local vertical in the body; the condition |e| = 1 is no part of the kernels.
+/// A satellite on a circular orbit of the angular velocity `n`, turned by the gradient of gravity: a quaternion from
+/// body to space, scalar first, and three moments of inertia. `up` is the local vertical in the body; the condition |e|
+/// = 1 is no part of the kernels.
 #[dynamics(
     coordinates(e[4]),
     let w = body_rate(e),
@@ -188,8 +191,9 @@ pub struct Satellite {
     pub n: f64,
 }
 
-/// An arm in space: a column that turns about z, an upper arm and a forearm about axes y of their own, by the angles of the joints. Each
-/// link has its mass at the distance `s` from the joint, a moment `i` about its length and `j` across it.
+/// An arm in space: a column that turns about z, an upper arm and a forearm about axes y of their own, by the angles of
+/// the joints. Each link has its mass at the distance `s` from the joint, a moment `i` about its length and `j` across
+/// it.
 #[dynamics(
     coordinates(a, b, c),
     let d = b + c,
@@ -218,8 +222,9 @@ pub struct SpatialArm {
     pub g: f64,
 }
 
-/// An arm of two links in a vertical plane with elastic joints: angles of the links, the second from the first, and of the motors behind
-/// the gears. Each link has its mass at the distance `s` from the joint and a moment `i` about it, each motor a moment `j`.
+/// An arm of two links in a vertical plane with elastic joints: angles of the links, the second from the first, and of
+/// the motors behind the gears. Each link has its mass at the distance `s` from the joint and a moment `i` about it,
+/// each motor a moment `j`.
 #[dynamics(
     coordinates(a, b, c, d),
     let x1 = s1*cos(a),
