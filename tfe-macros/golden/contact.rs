@@ -5,8 +5,8 @@
 /// D = ½ c θ̇²
 /// coordinates: x, θ      parameters: m, r, g, k, c
 /// operations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other
-/// operations, gradient: 2 +−, 11 ×, 0 ÷, 1 sin/cos, 1 other
-/// operations, gradient and second derivatives: 3 +−, 14 ×, 0 ÷, 1 sin/cos, 1 other
+/// operations, gradient: 2 +−, 10 ×, 0 ÷, 1 sin/cos, 2 other
+/// operations, gradient and second derivatives: 3 +−, 13 ×, 0 ÷, 1 sin/cos, 5 other
 /// declared by             Lagrangian, 2 coordinates
 /// depends on time         no
 /// forces                  yes
@@ -99,21 +99,22 @@ const _: () = {
             let r = t.like(self.r);
             let (sin_theta, cos_theta) = q[1].sin_cos();
             first.z[0] = m * z[0];
-            let t0 = r * cos_theta;
-            let t1 = t0 - q[0];
-            let t2 = k * t1;
-            let t3 = -t1;
-            let t4 = R::select(t3.less(t.like(0.0)), t.like(1.0), t.like(0.0));
-            let t5 = t2 * t4;
-            let t6 = g * m;
-            first.q[0] = t5 - t6;
-            let t7 = r * sin_theta;
-            first.q[1] = t7 * t5;
-            let t8 = r * r;
-            let t9 = m * t8;
-            first.z[1] = z[1] * t9;
-            let t10 = c * z[1];
-            first.force[1] = -t10;
+            let t0 = g * m;
+            let t1 = r * cos_theta;
+            let t2 = q[0] - t1;
+            let t3 = k * t2;
+            let t4 = r * sin_theta;
+            let t5 = r * r;
+            let t6 = m * t5;
+            first.z[1] = z[1] * t6;
+            let t7 = c * z[1];
+            let t8 = t4 * t3;
+            let t9 = R::select(t2.less(t.like(0.0)), t3, t.like(0.0));
+            let t10 = t0 + t9;
+            let t11 = R::select(t2.less(t.like(0.0)), t8, t.like(0.0));
+            first.q[0] = -t10;
+            first.q[1] = -t11;
+            first.force[1] = -t7;
         }
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
@@ -132,22 +133,23 @@ const _: () = {
             let (sin_theta, cos_theta) = q[1].sin_cos();
             zz[0][0] = m;
             first.z[0] = m * z[0];
-            let t0 = r * cos_theta;
-            let t1 = t0 - q[0];
-            let t2 = k * t1;
-            let t3 = -t1;
-            let t4 = R::select(t3.less(t.like(0.0)), t.like(1.0), t.like(0.0));
-            let t5 = t2 * t4;
-            let t6 = g * m;
-            let t7 = m * r;
-            let t8 = r * t7;
-            zz[1][1] = t8;
-            let t9 = r * sin_theta;
-            first.z[1] = z[1] * t8;
-            let t10 = c * z[1];
-            first.q[0] = t5 - t6;
-            first.q[1] = t9 * t5;
-            first.force[1] = -t10;
+            let t0 = g * m;
+            let t1 = m * r;
+            let t2 = r * t1;
+            zz[1][1] = t2;
+            first.z[1] = z[1] * t2;
+            let t3 = c * z[1];
+            let t4 = r * cos_theta;
+            let t5 = q[0] - t4;
+            let t6 = r * sin_theta;
+            let t7 = k * t5;
+            let t8 = t6 * t7;
+            let t9 = R::select(t5.less(t.like(0.0)), t7, t.like(0.0));
+            let t10 = t0 + t9;
+            let t11 = R::select(t5.less(t.like(0.0)), t8, t.like(0.0));
+            first.q[0] = -t10;
+            first.q[1] = -t11;
+            first.force[1] = -t3;
         }
         fn second<R: __tfe::Real>(
             &self,
@@ -165,31 +167,36 @@ const _: () = {
             let (sin_theta, cos_theta) = q[1].sin_cos();
             second.zz[0][0] = m;
             first.z[0] = m * z[0];
-            let t0 = r * cos_theta;
-            let t1 = t0 - q[0];
-            let t2 = g * m;
-            let t3 = m * r;
-            let t4 = r * t3;
-            second.zz[1][1] = t4;
-            let t5 = r * sin_theta;
-            first.z[1] = z[1] * t4;
+            let t0 = g * m;
+            let t1 = m * r;
+            let t2 = r * t1;
+            second.zz[1][1] = t2;
+            first.z[1] = z[1] * t2;
+            let t3 = r * cos_theta;
+            let t4 = r * sin_theta;
+            let t5 = q[0] - t3;
             let t6 = c * z[1];
             first.force[1] = -t6;
             second.force_z[1][1] = -c;
-            let t7 = -t1;
-            let t8 = R::select(t7.less(t.like(0.0)), t.like(1.0), t.like(0.0));
-            let t9 = k * t8;
-            let t10 = t9 * t1;
-            first.q[0] = t10 - t2;
-            let t11 = t0 * t10;
-            first.q[1] = t5 * t10;
-            second.qq[0][0] = -t9;
-            let t12 = t5 * t9;
-            let t13 = t5 * t12;
-            second.qq[1][1] = t11 - t13;
-            let t14 = -t12;
-            second.qq[0][1] = t14;
-            second.qq[1][0] = t14;
+            let t7 = k * t5;
+            let t8 = t3 * t7;
+            let t9 = R::select(t5.less(t.like(0.0)), t7, t.like(0.0));
+            let t10 = t0 + t9;
+            first.q[0] = -t10;
+            let t11 = t4 * t7;
+            let t12 = R::select(t5.less(t.like(0.0)), t11, t.like(0.0));
+            first.q[1] = -t12;
+            let t13 = R::select(t5.less(t.like(0.0)), k, t.like(0.0));
+            second.qq[0][0] = -t13;
+            let t14 = k * t4;
+            let t15 = t4 * t14;
+            let t16 = t8 + t15;
+            let t17 = R::select(t5.less(t.like(0.0)), t14, t.like(0.0));
+            let t18 = R::select(t5.less(t.like(0.0)), t16, t.like(0.0));
+            let t19 = -t17;
+            second.qq[0][1] = t19;
+            second.qq[1][0] = t19;
+            second.qq[1][1] = -t18;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {
             match index {
@@ -252,19 +259,19 @@ impl Contact {
             },
             first: ::tfe::__private::Operations {
                 additions: 2,
-                multiplications: 11,
+                multiplications: 10,
                 divisions: 0,
                 sines: 1,
-                functions: 1,
+                functions: 2,
             },
             second: ::tfe::__private::Operations {
                 additions: 3,
-                multiplications: 14,
+                multiplications: 13,
                 divisions: 0,
                 sines: 1,
-                functions: 1,
+                functions: 5,
             },
-            page: "gap = x − r cos θ\nL = ½ m (x\u{307}² + r² θ\u{307}²) − m g x − (½ k gap² if gap < 0 else 0)\nD = ½ c θ\u{307}²\ncoordinates: x, θ      parameters: m, r, g, k, c\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient: 2 +−, 11 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient and second derivatives: 3 +−, 14 ×, 0 ÷, 1 sin/cos, 1 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_v             (1,1)\npattern Q_q             zero",
+            page: "gap = x − r cos θ\nL = ½ m (x\u{307}² + r² θ\u{307}²) − m g x − (½ k gap² if gap < 0 else 0)\nD = ½ c θ\u{307}²\ncoordinates: x, θ      parameters: m, r, g, k, c\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient: 2 +−, 10 ×, 0 ÷, 1 sin/cos, 2 other\noperations, gradient and second derivatives: 3 +−, 13 ×, 0 ÷, 1 sin/cos, 5 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_v             (1,1)\npattern Q_q             zero",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.

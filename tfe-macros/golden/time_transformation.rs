@@ -7,7 +7,7 @@
 /// coordinates: q, t      momenta: p, p_t      parameters: a, ω, c
 /// operations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other
 /// operations, gradient: 6 +−, 16 ×, 1 ÷, 2 sin/cos, 0 other
-/// operations, gradient and second derivatives: 11 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other
+/// operations, gradient and second derivatives: 9 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other
 /// declared by             Hamiltonian, 2 coordinates
 /// depends on time         no
 /// forces                  yes
@@ -47,13 +47,13 @@ const _: () = {
             let cos_q = q[0].cos();
             let t0 = omega * q[1];
             let t1 = t0.cos();
-            let t2 = a * t1;
-            let t3 = z[0] * z[0];
-            let t4 = t.like(0.5) * t3;
-            let t5 = t4 - cos_q;
-            let t6 = z[1] + t5;
-            let t7 = q[0] * t2;
-            let t8 = t6 - t7;
+            let t2 = z[0] * z[0];
+            let t3 = t.like(0.5) * t2;
+            let t4 = t3 - cos_q;
+            let t5 = a * q[0];
+            let t6 = t1 * t5;
+            let t7 = t4 - t6;
+            let t8 = z[1] + t7;
             let t9 = q[0] * q[0];
             let t10 = t.like(1.0) + t9;
             t8 / t10
@@ -93,8 +93,8 @@ const _: () = {
             let t0 = omega * q[1];
             let (t1, t2) = t0.sin_cos();
             let t3 = a * t2;
-            let t4 = a * t1;
-            let t5 = omega * t4;
+            let t4 = a * omega;
+            let t5 = t1 * t4;
             let t6 = sin_q - t3;
             let t7 = q[0] * t3;
             let t8 = q[0] * q[0];
@@ -102,21 +102,21 @@ const _: () = {
             let t10 = t.like(1.0) / t9;
             first.z[1] = t10;
             let t11 = q[0] * t10;
-            first.q[1] = t5 * t11;
-            let t12 = t.like(2.0) * t11;
-            let t13 = z[0] * t10;
-            first.z[0] = t13;
-            let t14 = c * t13;
-            let t15 = z[0] * z[0];
-            let t16 = t.like(0.5) * t15;
-            let t17 = t16 - cos_q;
-            let t18 = z[1] + t17;
-            let t19 = t18 - t7;
-            let t20 = t12 * t19;
-            let t21 = t6 - t20;
+            first.q[1] = t11 * t5;
+            let t12 = z[0] * t10;
+            first.z[0] = t12;
+            let t13 = c * t12;
+            let t14 = z[0] * z[0];
+            let t15 = t.like(0.5) * t14;
+            let t16 = cos_q - t15;
+            let t17 = t7 + t16;
+            let t18 = t17 - z[1];
+            let t19 = t.like(2.0) * t18;
+            let t20 = t19 * t11;
+            let t21 = t20 + t6;
             first.q[0] = t21 * t10;
-            first.force[1] = z[0] * t14;
-            first.force[0] = -t14;
+            first.force[1] = z[0] * t13;
+            first.force[0] = -t13;
         }
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
@@ -134,8 +134,8 @@ const _: () = {
             let t0 = omega * q[1];
             let (t1, t2) = t0.sin_cos();
             let t3 = a * t2;
-            let t4 = a * t1;
-            let t5 = omega * t4;
+            let t4 = a * omega;
+            let t5 = t1 * t4;
             let t6 = sin_q - t3;
             let t7 = q[0] * t3;
             let t8 = q[0] * q[0];
@@ -144,21 +144,21 @@ const _: () = {
             first.z[1] = t10;
             zz[0][0] = t10;
             let t11 = q[0] * t10;
-            first.q[1] = t5 * t11;
-            let t12 = t.like(2.0) * t11;
-            let t13 = z[0] * t10;
-            first.z[0] = t13;
-            let t14 = c * t13;
-            let t15 = z[0] * z[0];
-            let t16 = t.like(0.5) * t15;
-            let t17 = t16 - cos_q;
-            let t18 = z[1] + t17;
-            let t19 = t18 - t7;
-            let t20 = t12 * t19;
-            let t21 = t6 - t20;
+            first.q[1] = t11 * t5;
+            let t12 = z[0] * t10;
+            first.z[0] = t12;
+            let t13 = c * t12;
+            let t14 = z[0] * z[0];
+            let t15 = t.like(0.5) * t14;
+            let t16 = cos_q - t15;
+            let t17 = t7 + t16;
+            let t18 = t17 - z[1];
+            let t19 = t.like(2.0) * t18;
+            let t20 = t19 * t11;
+            let t21 = t20 + t6;
             first.q[0] = t21 * t10;
-            first.force[1] = z[0] * t14;
-            first.force[0] = -t14;
+            first.force[1] = z[0] * t13;
+            first.force[0] = -t13;
         }
         fn second<R: __tfe::Real>(
             &self,
@@ -174,60 +174,59 @@ const _: () = {
             let (sin_q, cos_q) = q[0].sin_cos();
             let t0 = omega * q[1];
             let (t1, t2) = t0.sin_cos();
-            let t3 = a * t2;
-            let t4 = a * t1;
-            let t5 = sin_q - t3;
-            let t6 = q[0] * q[0];
-            let t7 = t.like(1.0) + t6;
-            let t8 = t.like(1.0) / t7;
-            first.z[1] = t8;
-            second.zz[0][0] = t8;
-            let t9 = z[0] * t8;
-            first.z[0] = t9;
-            let t10 = q[0] * t8;
-            let t11 = t.like(2.0) * t10;
-            let t12 = omega * t10;
-            let t13 = q[0] * t3;
-            let t14 = omega * t3;
-            let t15 = omega * t8;
-            second.qq[1][1] = t14 * t12;
-            let t16 = z[0] * z[0];
-            let t17 = t.like(0.5) * t16;
-            let t18 = t17 - cos_q;
-            let t19 = t13 - t18;
-            let t20 = t19 - z[1];
-            let t21 = t11 * t20;
-            let t22 = t21 + t5;
-            let t23 = t11 * t5;
-            let t24 = cos_q - t23;
-            let t25 = t21 + t22;
-            let t26 = q[0] * t25;
-            let t27 = t26 - t20;
-            first.q[0] = t22 * t8;
-            first.q[1] = t4 * t12;
-            let t28 = t11 * t12;
-            let t29 = t15 - t28;
-            let t30 = t4 * t29;
-            second.qq[0][1] = t30;
-            second.qq[1][0] = t30;
-            let t31 = c * t9;
-            let t32 = z[0] * t31;
-            first.force[1] = t32;
-            let t33 = t11 * t9;
-            second.zq[0][0] = -t33;
-            let t34 = c * t8;
-            second.force_z[0][0] = -t34;
-            let t35 = t11 * t32;
-            second.force_q[1][0] = -t35;
-            first.force[0] = -t31;
-            let t36 = t11 * t8;
-            second.zq[1][0] = -t36;
-            second.force_q[0][0] = t11 * t31;
-            second.force_z[1][0] = t.like(2.0) * t31;
-            let t37 = t.like(2.0) * t8;
-            let t38 = t37 * t27;
-            let t39 = t24 - t38;
-            second.qq[0][0] = t39 * t8;
+            let t3 = q[0] * q[0];
+            let t4 = t.like(1.0) + t3;
+            let t5 = t.like(1.0) / t4;
+            first.z[1] = t5;
+            second.zz[0][0] = t5;
+            let t6 = z[0] * t5;
+            first.z[0] = t6;
+            let t7 = q[0] * t5;
+            let t8 = t.like(2.0) * t7;
+            let t9 = a * t2;
+            let t10 = q[0] * t9;
+            let t11 = sin_q - t9;
+            let t12 = a * omega;
+            let t13 = omega * t2;
+            let t14 = t1 * t12;
+            let t15 = t13 * t7;
+            second.qq[1][1] = t12 * t15;
+            let t16 = t7 * t14;
+            first.q[1] = t16;
+            let t17 = t14 * t5;
+            let t18 = t8 * t16;
+            let t19 = t17 - t18;
+            second.qq[0][1] = t19;
+            second.qq[1][0] = t19;
+            let t20 = z[0] * z[0];
+            let t21 = t.like(0.5) * t20;
+            let t22 = t21 - cos_q;
+            let t23 = t10 - t22;
+            let t24 = t23 - z[1];
+            let t25 = cos_q * t5;
+            let t26 = t8 * t24;
+            let t27 = t26 + t11;
+            first.q[0] = t27 * t5;
+            let t28 = c * t6;
+            let t29 = z[0] * t28;
+            first.force[1] = t29;
+            let t30 = t8 * t6;
+            second.zq[0][0] = -t30;
+            let t31 = c * t5;
+            second.force_z[0][0] = -t31;
+            let t32 = t8 * t29;
+            second.force_q[1][0] = -t32;
+            first.force[0] = -t28;
+            let t33 = t8 * t5;
+            let t34 = t5 * t5;
+            let t35 = t34 * t24;
+            let t36 = t33 * t27;
+            let t37 = t35 - t36;
+            second.zq[1][0] = -t33;
+            let t38 = t.like(2.0) * t37;
+            second.qq[0][0] = t38 + t25;
+            second.force_q[0][0] = t8 * t28;
+            second.force_z[1][0] = t.like(2.0) * t28;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {
             match index {
@@ -281,8 +280,8 @@ impl Forced {
         let cos_q = q[0].cos();
         let t0 = omega * q[1];
         let t1 = t0.cos();
-        let t2 = a * t1;
-        let t3 = q[0] * t2;
+        let t2 = a * q[0];
+        let t3 = t1 * t2;
         let t4 = z[0] * z[0];
         let t5 = t.like(0.5) * t4;
         let t6 = t5 - cos_q;
@@ -319,13 +318,13 @@ impl Forced {
                 functions: 0,
             },
             second: ::tfe::__private::Operations {
-                additions: 11,
+                additions: 9,
                 multiplications: 32,
                 divisions: 1,
                 sines: 2,
                 functions: 0,
             },
-            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 16 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 11 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no, diagonal\nseparable (H_pq = 0)    no\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
+            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 16 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 9 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no, diagonal\nseparable (H_pq = 0)    no\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
         }
     }
     /// The observable `energy` at time `tau`, coordinates `q` and momenta `p`.

@@ -6,5 +6,4 @@ pub mod derivation;
 pub(crate) mod entry;
 pub(crate) mod quadratic;
 pub(crate) mod sensitivity;
-pub(crate) mod squares;
 pub mod structure;

@@ -1,15 +1,15 @@
 //! From the entries of a kernel to its program: the list of all passes, in the order in which they run.
 //!
 //! ```text
-//! entries ──QuadraticForm, Squares──▶ entries, written in several ways                    `derive`
+//! entries ──QuadraticForm──▶ entries, written in several ways                              `derive`
 //!         ──Balance, OpenSums, loops, AngleSums──▶ drafts: expressions in loops           `schedule`, `optimise`
-//!         ──CommonFactors, MultiplyOut, ScaledTrig, Groupings, Distribute──▶ plans        `optimise`
-//!         ──guard──▶ plans that lose no digits ──Identities──▶ the cheapest               `optimise`
-//!         ──CanonicalOrder, Signs──▶ plan ──statements, StatementOrder──▶ program         `schedule`
+//!         ──CommonFactors, binarize, guard──▶ plans that lose no digits                   `optimise`
+//!         ──Identities──▶ the cheapest ──CanonicalOrder, Signs──▶ plan                    `optimise`
+//!         ──statements, StatementOrder──▶ program                                         `schedule`
 //! ```
 //!
 //! A pass makes results cheaper and changes none of their values but by rounding. What rounding may do is checked for every plan by one guard
-//! (`optimise/guard`), against the formula as declared. What is cheaper is said by one measure (`optimise/cost`). Limits, which keep the time of
+//! (`optimise/guard`), against the formula as declared. What is cheaper is said by one measure (`program/cost`). Limits, which keep the time of
 //! expansion near-linear in the size of a model, are constants beside each pass. This folder may import every other one but `compile`.
 
 pub(crate) mod select_plan;
@@ -19,8 +19,6 @@ pub(crate) mod select_plan;
 pub enum Pass {
     /// Derivatives of an energy quadratic in z by its matrix.
     QuadraticForm,
-    /// Kinetic energies declared by angles as squares of velocities of point masses.
-    Squares,
     /// Second derivatives on the diagonals of blocks from those off them, where forces are between pairs.
     Balance,
     /// Sums used once become part of the sum that uses them.
@@ -29,14 +27,6 @@ pub enum Pass {
     AngleSums,
     /// a b + a c as a (b + c).
     CommonFactors,
-    /// Products of sums multiplied out before common factors are sought.
-    MultiplyOut,
-    /// Lengths beside sines as one variable with them.
-    ScaledTrig,
-    /// Products by parameters first, or by all but velocities first.
-    Groupings,
-    /// c (x + y) as c x + c y, where c x is computed anyway.
-    Distribute,
     /// Results from sums and products of other results.
     Identities,
     /// Like operations made alike, so that compilers compute two by one instruction.
@@ -49,17 +39,12 @@ pub enum Pass {
 
 impl Pass {
     /// All of them, in the order in which they run.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 9] = [
         Self::QuadraticForm,
-        Self::Squares,
         Self::Balance,
         Self::OpenSums,
         Self::AngleSums,
         Self::CommonFactors,
-        Self::MultiplyOut,
-        Self::ScaledTrig,
-        Self::Groupings,
-        Self::Distribute,
         Self::Identities,
         Self::CanonicalOrder,
         Self::Signs,
@@ -69,14 +54,9 @@ impl Pass {
     /// What it reads and what it makes.
     pub const fn contract(self) -> &'static str {
         match self {
-            Self::QuadraticForm | Self::Squares => "derivatives to derivatives",
+            Self::QuadraticForm => "derivatives to derivatives",
             Self::Balance => "derivatives to fewer derivatives and a rule for the others",
-            Self::OpenSums
-            | Self::AngleSums
-            | Self::CommonFactors
-            | Self::MultiplyOut
-            | Self::ScaledTrig => "expressions to expressions",
-            Self::Groupings | Self::Distribute => "expressions to a plan of operations",
+            Self::OpenSums | Self::AngleSums | Self::CommonFactors => "expressions to expressions",
             Self::Identities | Self::CanonicalOrder | Self::Signs => "plan to plan",
             Self::StatementOrder => "statements to statements",
         }
@@ -86,14 +66,9 @@ impl Pass {
     pub const fn limit(self) -> &'static str {
         match self {
             Self::QuadraticForm => "linear in the derivatives",
-            Self::Squares => "energies up to 300 expressions, forms up to 24 products",
             Self::Balance | Self::OpenSums | Self::Signs => "linear",
             Self::AngleSums => "angles of up to 8 parts; 64 known angles tried for each",
             Self::CommonFactors => "50 000 operations arranged over all trials",
-            Self::MultiplyOut => "drafts up to a cost of 55",
-            Self::ScaledTrig => "drafts up to a cost of 300",
-            Self::Groupings => "three arrangements",
-            Self::Distribute => "25 000 operations arranged over all trials",
             Self::Identities => "plans up to 130 operations, 240 altogether; 4 rounds of 32 trials",
             Self::CanonicalOrder | Self::StatementOrder => "near-linear",
         }
@@ -102,14 +77,11 @@ impl Pass {
     /// What it leaves as it is.
     pub const fn keeps(self) -> &'static str {
         match self {
-            Self::QuadraticForm | Self::Squares => "entries that are no derivatives of the energy",
+            Self::QuadraticForm => "entries that are no derivatives of the energy",
             Self::Balance => "all entries off the diagonal",
-            Self::OpenSums | Self::Distribute => "sums whose exact terms may cancel",
+            Self::OpenSums => "sums whose exact terms may cancel",
             Self::AngleSums => "arguments that are no sums of angles with small whole coefficients",
             Self::CommonFactors => "terms that something else uses",
-            Self::MultiplyOut => "sums whose exact terms may cancel, functions, quotients by sums",
-            Self::ScaledTrig => "sines without a length beside them",
-            Self::Groupings => "sums",
             Self::Identities => "operations that something else needs",
             Self::CanonicalOrder | Self::Signs | Self::StatementOrder => "the number of operations",
         }

@@ -60,6 +60,17 @@ impl Graph {
                 .any(|sign| *sign == Sign::Any || *sign != signs[0])
     }
 
+    /// The group of a term in a sum that keeps its order: terms of one group are added first. Coordinates are near coordinates, and parameters near
+    /// parameters: their sums cancel before a digit is rounded away.
+    pub(crate) fn group_of_term(&self, id: ExprId) -> usize {
+        match self.node(id) {
+            Node::Input(Input::Parameter(_) | Input::ParameterElement(..)) => 2,
+            Node::Input(Input::Velocity(_) | Input::Momentum(_)) => 1,
+            Node::Input(_) => 0,
+            _ => 3,
+        }
+    }
+
     /// The sign of an expression without a rounding error; nothing where it has one.
     fn sign_if_exact(&self, id: ExprId, depth: usize) -> Option<Sign> {
         let depth = depth.checked_sub(1)?;

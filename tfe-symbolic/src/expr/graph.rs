@@ -7,7 +7,7 @@ use std::fmt;
 
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
-use crate::expr::hash::{Map, Set};
+use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input, LoopVariable};
 use crate::syntax::ast::Comparison;
 
@@ -250,34 +250,6 @@ impl Graph {
             }
         }
         found.sort_unstable();
-        found
-    }
-
-    /// The nodes of the roots that are made of more than parameters and numbers.
-    pub(crate) fn moving(&self, roots: &[ExprId]) -> Set<ExprId> {
-        let is_parameter =
-            |input: &Input| matches!(input, Input::Parameter(_) | Input::ParameterElement(..));
-        self.containing(roots, |input| !is_parameter(input))
-    }
-
-    /// The nodes of the roots in which velocities or momenta stand.
-    pub(crate) fn containing_z(&self, roots: &[ExprId]) -> Set<ExprId> {
-        self.containing(roots, |input| {
-            matches!(input, Input::Velocity(_) | Input::Momentum(_))
-        })
-    }
-
-    fn containing(&self, roots: &[ExprId], wanted: impl Fn(&Input) -> bool) -> Set<ExprId> {
-        let mut found = Set::default();
-        for id in self.reachable(roots) {
-            let contains = match self.node(id) {
-                Node::Input(input) => wanted(input),
-                node => node.children().iter().any(|child| found.contains(child)),
-            };
-            if contains {
-                found.insert(id);
-            }
-        }
         found
     }
 

@@ -18,22 +18,9 @@ impl Graph {
     ///
     /// Functions and their arguments, quotients by sums and sums over ranges are atoms.
     pub(crate) fn expanded(&mut self, root: ExprId) -> Option<ExprId> {
-        self.expanded_around(root, |_| false)
-    }
-
-    /// The same with some sums as atoms.
-    pub(crate) fn expanded_around(
-        &mut self,
-        root: ExprId,
-        is_atom: impl Fn(ExprId) -> bool,
-    ) -> Option<ExprId> {
         let mut done: BTreeMap<ExprId, Polynomial> = BTreeMap::new();
         for id in self.reachable_outside_sums(&[root]) {
             let polynomial = match self.node(id).clone() {
-                // A multiple is taken apart everywhere.
-                Node::Sum { .. } if is_atom(id) && self.as_multiple(id).1 == id => {
-                    Polynomial::from([(id, Constant::ONE)])
-                }
                 Node::Constant(value) => {
                     let one = self.constant(Constant::ONE);
                     let mut number = Polynomial::new();

@@ -31,7 +31,7 @@ use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::Input;
 use crate::expr::rewrite::Mapping;
-use crate::optimise::binarize::{Grouping, arrange};
+use crate::optimise::binarize::arrange;
 use choice::{Choice, How, Need, choose};
 
 /// An angle, `Σ n x`: atoms in order, n ≠ 0, the first n positive. A number is an atom like the others.
@@ -101,7 +101,7 @@ pub(crate) fn expand_angles(graph: &mut Graph, roots: Vec<ExprId>) -> Vec<ExprId
         mapping.set(old, new);
     }
     let expanded: Vec<ExprId> = roots.iter().map(|root| mapping.of(*root)).collect();
-    let cost = |roots: &[ExprId]| arrange(graph, roots, Grouping::ByLoops).cost();
+    let cost = |roots: &[ExprId]| arrange(graph, roots).cost();
     if cost(&expanded) < cost(&roots) {
         expanded
     } else {

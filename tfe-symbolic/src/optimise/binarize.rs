@@ -11,50 +11,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::expr::constant::{Constant, is_decimal};
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
-use crate::expr::hash::{Map, Set};
+use crate::expr::hash::Map;
 use crate::optimise::cse::{self, Item, Kind, Operands, Pair};
 use crate::optimise::plan::{Op, Plan, Value};
 use demand::{Multiple, ONE, PositiveConstant, Terms, demanded, gather, multiple};
-pub(crate) use demand::{Opened, scaled_sums};
 use fractions::{Factors, Fractions};
 
 /// Larger powers are left to the method that computes integer powers.
 const LARGEST_PRODUCT_POWER: u32 = 64;
 
-/// Which factors of a product are multiplied with each other first.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Grouping {
-    /// Those that vary in fewer loops.
-    #[default]
-    ByLoops,
-    /// The parameters too: they are one coefficient wherever they stand together.
-    ParametersApart,
-    /// All but velocities and momenta: the entries of the mass matrix and their derivatives, which are wanted by themselves.
-    VelocitiesLast,
-}
-
 /// Arranges what the roots need.
-pub(crate) fn arrange(graph: &Graph, roots: &[ExprId], grouping: Grouping) -> Plan {
-    arrange_with(graph, roots, &Opened::new(), grouping)
+pub(crate) fn arrange(graph: &Graph, roots: &[ExprId]) -> Plan {
+    Arranger::new(graph).run(roots)
 }
-
-/// Arranges what the roots need, with the number before these sums taken to their terms.
-pub(crate) fn arrange_with(
-    graph: &Graph,
-    roots: &[ExprId],
-    opened: &Opened,
-    grouping: Grouping,
-) -> Plan {
-    let moving = match grouping {
-        Grouping::ByLoops => Set::default(),
-        Grouping::ParametersApart => graph.moving(roots),
-        Grouping::VelocitiesLast => graph.containing_z(roots),
-    };
-    Arranger::new(graph, opened, moving).run(roots)
-}
-
-/// The mark of a factor that is kept apart, among the bits of loops: none nest so deep.
-const MOVES: u64 = 1 << 62;
 
 /// What an operand stands for.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -184,9 +153,6 @@ struct Quotient {
 
 struct Arranger<'a> {
     graph: &'a Graph,
-    opened: &'a Opened,
-    /// What is to be kept apart from other factors.
-    moving: Set<ExprId>,
     plan: Plan,
     sums: Family,
     products: Family,
@@ -206,11 +172,9 @@ type Places = Vec<(Multiple, i32)>;
 type SharedDivisors = BTreeMap<ExprId, Vec<ExprId>>;
 
 impl<'a> Arranger<'a> {
-    fn new(graph: &'a Graph, opened: &'a Opened, moving: Set<ExprId>) -> Self {
+    fn new(graph: &'a Graph) -> Self {
         Self {
             graph,
-            opened,
-            moving,
             plan: Plan::default(),
             sums: Family::new(Kind::Sum),
             products: Family::new(Kind::Product),
@@ -224,12 +188,8 @@ impl<'a> Arranger<'a> {
     }
 
     fn run(mut self, roots: &[ExprId]) -> Plan {
-        let uses = demanded(self.graph, roots, self.opened);
-        let (mut sums, merged) = gather(self.graph, self.opened, &uses);
-        let demanded: BTreeSet<Multiple> = uses
-            .into_keys()
-            .filter(|multiple| !merged.contains(multiple))
-            .collect();
+        let demanded = demanded(self.graph, roots);
+        let mut sums = gather(self.graph, &demanded);
         self.fractions = Fractions::of(self.graph, &demanded);
         self.collect_fractions();
         let shared = self.shared_divisors(&demanded);
@@ -258,12 +218,6 @@ impl<'a> Arranger<'a> {
             self.plan.set_value(*root, value);
         }
         self.plan
-    }
-
-    /// The bits by which factors are grouped.
-    fn class_of(&self, x: ExprId) -> u64 {
-        let moves = if self.moving.contains(&x) { MOVES } else { 0 };
-        self.graph.loops_of(x) | moves
     }
 
     fn value(&self, x: ExprId) -> Value {
@@ -364,7 +318,7 @@ impl<'a> Arranger<'a> {
             let mut set = |factors: &Factors| {
                 let mut operands = Operands::new();
                 for (x, n) in factors {
-                    let loops = self.class_of(*x);
+                    let loops = self.graph.loops_of(*x);
                     let item = self.products.item(Meaning::Multiple((*x, ONE)), loops);
                     operands.insert(item, *n);
                 }
@@ -401,7 +355,7 @@ impl<'a> Arranger<'a> {
         let (fractions, factors) = self.fractions.rest(self.graph, &multiple);
         for fraction in fractions {
             let meaning = Meaning::Fraction(fraction);
-            let class = self.class_of(x);
+            let class = self.graph.loops_of(x);
             above.insert(self.products.item(meaning, class), 1);
         }
         let merged = self.roots_below(&factors);
@@ -414,7 +368,7 @@ impl<'a> Arranger<'a> {
             factors
         };
         for (x, n) in factors {
-            let (loops, size) = (self.class_of(x), n.unsigned_abs());
+            let (loops, size) = (self.graph.loops_of(x), n.unsigned_abs());
             let together = shared
                 .get(&x)
                 .filter(|_| n < 0 && size <= LARGEST_PRODUCT_POWER);
@@ -531,23 +485,30 @@ impl<'a> Arranger<'a> {
         }
     }
 
+    /// A sum that keeps its order, group by group.
     fn build_in_order(&mut self, Terms { number, terms }: &Terms) -> Value {
-        let signed = |value: Value, negative: bool| Value {
-            negative: value.negative != negative,
-            op: value.op,
-        };
-        let mut values: Vec<Value> = terms
-            .iter()
-            .map(|(multiple, negative)| signed(self.built[multiple], *negative))
+        let mut groups: BTreeMap<usize, Vec<Value>> = BTreeMap::new();
+        for (multiple, negative) in terms {
+            let value = self.built[multiple];
+            let value = Value {
+                negative: value.negative != *negative,
+                op: value.op,
+            };
+            let group = self.graph.group_of_term(multiple.0);
+            groups.entry(group).or_default().push(value);
+        }
+        let mut sums: Vec<Value> = groups
+            .into_values()
+            .map(|values| self.fold(Kind::Sum, &values))
             .collect();
         if !number.is_zero() {
             let op = self.plan.push(Op::Constant(number.abs()));
-            values.push(Value {
+            sums.push(Value {
                 negative: number.is_negative(),
                 op,
             });
         }
-        self.fold(Kind::Sum, &values)
+        self.fold(Kind::Sum, &sums)
     }
 
     fn family(&mut self, kind: Kind) -> &mut Family {

@@ -257,7 +257,7 @@ mod tests {
     use super::*;
     use crate::expr::graph::{ExprId, Graph};
     use crate::expr::input::Affine;
-    use crate::optimise::binarize::{Grouping, arrange};
+    use crate::optimise::binarize::arrange;
 
     fn parameter(graph: &mut Graph, name: &str) -> ExprId {
         graph.input(Input::Parameter(name.to_owned()))
@@ -286,7 +286,7 @@ mod tests {
         let (first, other, last) = (g.multiply(a, v0), g.multiply(v1, v2), g.multiply(b, v1));
         let sum = g.add(first, other);
         let sum = g.add(sum, last);
-        let plan = arrange(&g, &[sum], Grouping::ByLoops);
+        let plan = arrange(&g, &[sum]);
         let (cost, plan) = (plan.cost(), with_like_operations_alike(plan));
         assert_eq!(plan.cost(), cost);
         // One of both terms is the product of velocities alone.
@@ -305,7 +305,7 @@ mod tests {
         let inner = g.add(b, c);
         let (known, other) = (g.multiply(gravity, inner), g.multiply(gravity, d));
         let sum = g.add(known, other);
-        let plan = arrange(&g, &[known, sum], Grouping::ByLoops);
+        let plan = arrange(&g, &[known, sum]);
         let (cost, plan) = (plan.cost(), with_like_operations_alike(plan));
         assert_eq!(plan.cost(), cost);
         let value = plan.value(sum).expect("a root");
@@ -318,7 +318,7 @@ mod tests {
         let [a, b] = ["a", "b"].map(|name| parameter(&mut g, name));
         let [v0, v1] = [0, 1].map(|k| velocity(&mut g, k));
         let (first, last) = (g.multiply(a, v0), g.multiply(b, v1));
-        let plan = arrange(&g, &[first, last], Grouping::ByLoops);
+        let plan = arrange(&g, &[first, last]);
         let ranks = ranks(&plan);
         let [first, last] = [first, last].map(|root| plan.value(root).expect("a root").op);
         assert_eq!(ranks[first.index()], ranks[last.index()]);

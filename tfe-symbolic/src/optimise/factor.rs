@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::rewrite::{Mapping, Uses};
-use crate::optimise::binarize::{Grouping, arrange};
+use crate::optimise::binarize::arrange;
 
 /// Operations arranged over all trials of one kernel, in whichever ways it is written.
 pub(crate) const BUDGET: usize = 50_000;
@@ -73,7 +73,7 @@ struct Trial {
 
 impl Trial {
     fn of(graph: &Graph, roots: Vec<ExprId>) -> Self {
-        let plan = arrange(graph, &roots, Grouping::ByLoops);
+        let plan = arrange(graph, &roots);
         Self {
             roots,
             cost: plan.cost(),

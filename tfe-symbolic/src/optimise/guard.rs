@@ -13,6 +13,8 @@
 mod bounded;
 mod states;
 
+use std::collections::BTreeMap;
+
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
@@ -171,7 +173,13 @@ fn baseline(
                 let number = positions.get(input).map(|at| numbers[*at]);
                 Bounded::exact(number.unwrap_or(f64::NAN))
             }
-            Node::Sum { constant, terms } => sum(*constant, terms, &of),
+            Node::Sum { constant, terms } => {
+                let group = |x: ExprId| match graph.keeps_order(*id) {
+                    true => graph.group_of_term(x),
+                    false => 0,
+                };
+                sum(*constant, terms, &of, &group)
+            }
             Node::Product(factors) => product(factors, &of),
             Node::Power { base, exponent } => of(*base).power(of(*exponent)),
             Node::Call {
@@ -205,16 +213,22 @@ fn baseline(
     known
 }
 
+/// A sum in the order in which it stands, groups of terms first.
 fn sum(
     constant: Constant,
     terms: &[(Constant, ExprId)],
     of: &dyn Fn(ExprId) -> Bounded,
+    group: &dyn Fn(ExprId) -> usize,
 ) -> Bounded {
-    let mut values = terms
-        .iter()
-        .map(|(c, x)| of(*x).scaled(c.to_f64(), c.is_power_of_two()));
-    let first = values.next().unwrap_or(Bounded::exact(0.0));
-    let total = values.fold(first, Bounded::plus);
+    let mut sums: BTreeMap<usize, Bounded> = BTreeMap::new();
+    for (c, x) in terms {
+        let term = of(*x).scaled(c.to_f64(), c.is_power_of_two());
+        sums.entry(group(*x))
+            .and_modify(|sum| *sum = sum.plus(term))
+            .or_insert(term);
+    }
+    let total = sums.into_values().reduce(Bounded::plus);
+    let total = total.unwrap_or(Bounded::exact(0.0));
     match constant.is_zero() {
         true => total,
         false => total.plus(Bounded::exact(constant.to_f64())),

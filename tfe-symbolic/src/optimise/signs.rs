@@ -176,13 +176,13 @@ mod tests {
     use super::*;
     use crate::expr::graph::Graph;
     use crate::expr::input::Input;
-    use crate::optimise::binarize::{Grouping, arrange};
+    use crate::optimise::binarize::arrange;
 
     /// Negations of the roots, before and after.
     fn negations(graph: &Graph, roots: &[ExprId]) -> (usize, usize) {
         let plain: BTreeSet<ExprId> = roots.iter().copied().collect();
         let count = |plan: &Plan| Signs::of(plan, &plain).count() / plan.len();
-        let plan = arrange(graph, roots, Grouping::ByLoops);
+        let plan = arrange(graph, roots);
         let before = count(&plan);
         (before, count(&with_fewer_negations(plan, &plain)))
     }

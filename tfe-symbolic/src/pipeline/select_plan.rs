@@ -1,4 +1,4 @@
-//! From entries to a program: several ways to write the same results, of which the cheapest is scheduled.
+//! From entries to a program: the same results written in several ways, of which the cheapest that loses no digits is scheduled.
 
 use std::collections::BTreeSet;
 
@@ -6,14 +6,12 @@ use crate::derive::entry::{Array, Entry};
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph};
 use crate::optimise::angles::expand_angles;
-use crate::optimise::binarize::{Grouping, arrange};
+use crate::optimise::binarize::arrange;
 use crate::optimise::canonical_order::with_like_operations_alike;
-use crate::optimise::distribute::distribute;
 use crate::optimise::factor::{BUDGET, take_out_factors};
 use crate::optimise::guard::Guard;
 use crate::optimise::identities::by_identities;
 use crate::optimise::plan::Plan;
-use crate::optimise::scaled_trig::ScaledTrig;
 use crate::optimise::signs::with_fewer_negations;
 use crate::pipeline::{Pass, Passes};
 use crate::program::Program;
@@ -23,21 +21,14 @@ use crate::schedule::order::in_order;
 use crate::schedule::statements::schedule;
 use crate::schedule::store_or_add::settle;
 
-/// Of the drafts, those that cost no more than so many fifths of the cheapest are followed: identities may change their order.
-const WITHIN: usize = 6;
+/// Of the drafts, those that cost at most so many fifths of the cheapest are followed: identities may change their order. Tuned on the models of
+/// `benches/kernels`; with twice the margin nothing gets cheaper and expansion takes a third longer.
+const MAX_FIFTHS_OF_CHEAPEST: usize = 6;
 
-/// Drafts up to this cost are also multiplied out before common factors are sought.
-const MULTIPLIED: usize = 55;
+/// Identities are sought in the cheapest plans of so many operations altogether. Twice as many change no kernel of `benches/kernels`.
+const MAX_OPERATIONS_FOR_IDENTITIES: usize = 240;
 
-/// Drafts up to this cost are also written by arms.
-const ARMED: usize = 300;
-
-/// Identities are sought in the cheapest plans, where they cost no more than so many quarters of the cheapest, up to so many operations
-/// altogether.
-const CLOSE: usize = 6;
-const FOLLOWED: usize = 240;
-
-/// Entries in their loops, before common factors are sought.
+/// Results in their loops, before common factors are sought.
 pub(crate) struct Draft {
     passes: Passes,
     graph: Graph,
@@ -48,11 +39,12 @@ pub(crate) struct Draft {
     plain: Vec<ExprId>,
     /// The results with sines of sums expanded.
     values: Vec<ExprId>,
-    cost: usize,
+    /// The values, their operations put in order.
+    plan: Plan,
 }
 
-/// A draft with its operations arranged.
-struct Arranged<'a> {
+/// A draft with common factors taken out.
+struct Candidate<'a> {
     draft: &'a Draft,
     values: Vec<ExprId>,
     plan: Plan,
@@ -83,7 +75,7 @@ impl Draft {
             true => expand_angles(&mut graph, plain.clone()),
             false => plain.clone(),
         };
-        let cost = arrange(&graph, &values, Grouping::ByLoops).cost();
+        let plan = arrange(&graph, &values);
         Self {
             passes,
             graph,
@@ -92,7 +84,7 @@ impl Draft {
             balances,
             plain,
             values,
-            cost,
+            plan,
         }
     }
 
@@ -105,46 +97,26 @@ impl Draft {
         };
         let guard = Guard::of(&declared.graph, &declared.plain);
         let mut drafts = Self::accepted(drafts, &guard);
-        drafts.sort_by_key(|draft| draft.cost);
-        let least = drafts.first().map_or(0, |draft| draft.cost);
-        drafts.retain(|draft| 5 * draft.cost <= WITHIN * least);
-        drafts.dedup_by_key(|draft| draft.cost);
-        let share = BUDGET / (4 * drafts.len().max(1));
-        let mut arranged: Vec<Arranged> = drafts
+        drafts.sort_by_key(|draft| draft.plan.cost());
+        let least = drafts.first().map_or(0, |draft| draft.plan.cost());
+        drafts.retain(|draft| 5 * draft.plan.cost() <= MAX_FIFTHS_OF_CHEAPEST * least);
+        drafts.dedup_by_key(|draft| draft.plan.cost());
+        let share = BUDGET / drafts.len().max(1);
+        let mut candidates: Vec<Candidate> = drafts
             .iter_mut()
-            .flat_map(|draft| draft.arranged(share, &guard))
+            .map(|draft| draft.candidate(share, &guard))
             .collect();
-        arranged.sort_by_key(|arranged| arranged.plan.cost());
-        let least = arranged.first().map_or(0, |arranged| arranged.plan.cost());
-        arranged.retain(|arranged| 4 * arranged.plan.cost() <= CLOSE * least);
-        let key = |arranged: &Arranged| {
-            let plan = &arranged.plan;
-            (plan.cost(), plan.len(), plan.copies())
-        };
-        arranged.dedup_by_key(|arranged| (arranged.draft.cost, key(arranged)));
-        let mut left = FOLLOWED;
-        let within = arranged.iter().take_while(|arranged| {
-            let enough = arranged.plan.len() <= left;
-            left = left.saturating_sub(arranged.plan.len());
-            enough
-        });
-        let followed = within.count();
-        arranged.truncate(followed.max(1));
-        for Arranged {
-            draft,
-            plan,
-            values,
-        } in &mut arranged
-        {
-            if !draft.passes.run(Pass::Identities) {
-                continue;
+        candidates.sort_by_key(|candidate| candidate.plan.cost());
+        let mut left = MAX_OPERATIONS_FOR_IDENTITIES;
+        for candidate in &mut candidates {
+            if left >= candidate.plan.len() {
+                left -= candidate.plan.len();
+                candidate.take_identities(&guard);
             }
-            let accepts = |plan: &Plan| guard.accepts(plan, values);
-            *plan = by_identities(std::mem::take(plan), &accepts);
         }
-        let best = arranged
+        let best = candidates
             .into_iter()
-            .min_by_key(|arranged| (arranged.plan.cost(), arranged.plan.copies()));
+            .min_by_key(|candidate| (candidate.plan.cost(), candidate.plan.copies()));
         best.map_or_else(Program::default, |best| best.program(&guard))
     }
 
@@ -153,21 +125,17 @@ impl Draft {
     fn accepted(drafts: Vec<Self>, guard: &Guard) -> Vec<Self> {
         let mut accepted: Vec<Self> = Vec::with_capacity(drafts.len());
         for mut draft in drafts {
-            let is_good = |draft: &Self| {
-                let plan = arrange(&draft.graph, &draft.values, Grouping::ByLoops);
-                guard.accepts(&plan, &draft.values)
-            };
-            let results = |first: &Self| {
+            let same_results = |first: &Self| {
                 first.cleared == draft.cleared && first.block.has_the_results_of(&draft.block)
             };
-            if !accepted.first().is_none_or(results) {
+            if !accepted.first().is_none_or(same_results) {
                 continue;
             }
-            let mut good = is_good(&draft);
+            let mut good = guard.accepts(&draft.plan, &draft.values);
             if !good && draft.values != draft.plain {
                 draft.values.clone_from(&draft.plain);
-                draft.cost = arrange(&draft.graph, &draft.values, Grouping::ByLoops).cost();
-                good = is_good(&draft);
+                draft.plan = arrange(&draft.graph, &draft.values);
+                good = guard.accepts(&draft.plan, &draft.values);
             }
             if good || accepted.is_empty() {
                 accepted.push(draft);
@@ -176,99 +144,42 @@ impl Draft {
         accepted
     }
 
-    /// Takes out common factors and arranges the operations, in several ways. Without a way that loses no digits, in the order as declared.
-    fn arranged(&mut self, budget: usize, guard: &Guard) -> Vec<Arranged<'_>> {
-        let passes = self.passes;
-        let graph = &mut self.graph;
-        let take_out_factors =
-            |graph: &mut Graph, values: Vec<ExprId>| match passes.run(Pass::CommonFactors) {
-                true => take_out_factors(graph, values, budget),
-                false => values,
-            };
-        let factored = take_out_factors(graph, self.values.clone());
-        let mut ways = vec![(factored.clone(), Grouping::ByLoops)];
-        if passes.run(Pass::Groupings) {
-            ways.push((self.values.clone(), Grouping::ParametersApart));
-            ways.push((factored, Grouping::VelocitiesLast));
-        }
-        if passes.run(Pass::MultiplyOut)
-            && self.cost <= MULTIPLIED
-            && self.block.inner.is_empty()
-            && let Some(values) = multiplied_out(graph, &self.values)
-        {
-            ways.push((take_out_factors(graph, values), Grouping::ByLoops));
-        }
-        let by_arms = self.by_arms(budget);
-        let draft: &Self = self;
-        let arrange = |roots: &[ExprId], grouping| match passes.run(Pass::Distribute) {
-            true => distribute(&draft.graph, roots, grouping),
-            false => arrange(&draft.graph, roots, grouping),
-        };
-        let plans = ways.into_iter().map(|(values, grouping)| Arranged {
-            draft,
-            plan: arrange(&values, grouping),
-            values,
-        });
-        let by_arms = by_arms.map(|(arms, values)| {
-            let roots: Vec<ExprId> = values.iter().copied().chain(arms.parts()).collect();
-            let plan = arrange(&roots, Grouping::VelocitiesLast);
-            Arranged {
-                draft,
-                plan: arms.written_out(plan, &values),
-                values,
+    /// The draft with common factors taken out, if that loses no digits.
+    fn candidate(&mut self, budget: usize, guard: &Guard) -> Candidate<'_> {
+        let (mut values, mut plan) = (self.values.clone(), self.plan.clone());
+        if self.passes.run(Pass::CommonFactors) {
+            let factored = take_out_factors(&mut self.graph, values.clone(), budget);
+            let trial = arrange(&self.graph, &factored);
+            if guard.accepts(&trial, &factored) {
+                (values, plan) = (factored, trial);
             }
-        });
-        let mut all: Vec<Arranged> = plans.chain(by_arms).collect();
-        all.retain(|arranged| guard.accepts(&arranged.plan, &arranged.values));
-        if all.is_empty() {
-            all.push(Arranged {
-                draft,
-                plan: arrange(&draft.values, Grouping::ByLoops),
-                values: draft.values.clone(),
-            });
         }
-        all
-    }
-
-    /// The values by arms, with common factors taken out.
-    fn by_arms(&mut self, budget: usize) -> Option<(ScaledTrig, Vec<ExprId>)> {
-        let small = self.cost <= ARMED && self.block.inner.is_empty();
-        if !small || !self.passes.run(Pass::ScaledTrig) {
-            return None;
+        Candidate {
+            draft: self,
+            values,
+            plan,
         }
-        let (arms, values) = ScaledTrig::of(&mut self.graph, &self.values)?;
-        let values = match self.passes.run(Pass::CommonFactors) {
-            true => take_out_factors(&mut self.graph, values, budget),
-            false => values,
-        };
-        Some((arms, values))
     }
 }
 
-/// The values multiplied out, but for sums whose digits that would lose; nothing where that makes too many terms.
-fn multiplied_out(graph: &mut Graph, values: &[ExprId]) -> Option<Vec<ExprId>> {
-    let kept: BTreeSet<ExprId> = graph
-        .reachable(values)
-        .into_iter()
-        .filter(|id| graph.keeps_order(*id))
-        .collect();
-    values
-        .iter()
-        .map(|x| graph.expanded_around(*x, |id| kept.contains(&id)))
-        .collect()
-}
+impl Candidate<'_> {
+    fn take_identities(&mut self, guard: &Guard) {
+        if self.draft.passes.run(Pass::Identities) {
+            let accepts = |plan: &Plan| guard.accepts(plan, &self.values);
+            self.plan = by_identities(std::mem::take(&mut self.plan), &accepts);
+        }
+    }
 
-impl Arranged<'_> {
     fn program(self, guard: &Guard) -> Program {
-        let mut next = self.values.iter();
-        let mut block = self.draft.block.clone();
-        block.for_each_value(&mut |value| *value = *next.next().unwrap_or(value));
         let Draft {
             passes,
             cleared,
             balances,
             ..
         } = self.draft;
+        let mut next = self.values.iter();
+        let mut block = self.draft.block.clone();
+        block.for_each_value(&mut |value| *value = *next.next().unwrap_or(value));
         let mut plan = self.plan;
         if passes.run(Pass::CanonicalOrder) {
             let alike = with_like_operations_alike(plan.clone());

@@ -1,7 +1,7 @@
 use super::*;
 use crate::expr::graph::{ExprId, Graph};
 use crate::expr::input::{Affine, Input};
-use crate::optimise::binarize::{Grouping, arrange};
+use crate::optimise::binarize::arrange;
 use crate::optimise::guard::Guard;
 
 fn parameters<const N: usize>(graph: &mut Graph) -> [ExprId; N] {
@@ -16,7 +16,7 @@ fn guarded(graph: &Graph, roots: &[ExprId], plan: Plan) -> Plan {
 
 /// Additions and products before and after.
 fn operations(graph: &Graph, roots: &[ExprId]) -> (usize, usize) {
-    let plan = arrange(graph, roots, Grouping::ByLoops);
+    let plan = arrange(graph, roots);
     let before = plan.cost();
     (before, guarded(graph, roots, plan).cost())
 }
@@ -101,7 +101,7 @@ fn what_would_cancel_is_left() {
     let twice = g.multiply(two, a);
     let inner = g.add(b, twice);
     let roots = [square, own, g.multiply(b, inner)];
-    let after = guarded(&g, &roots, arrange(&g, &roots, Grouping::ByLoops));
+    let after = guarded(&g, &roots, arrange(&g, &roots));
     let differences = |id: &OpId| matches!(after.op(*id), Op::Subtract(..));
     assert!(!after.ids().any(|id| differences(&id)));
 }
@@ -117,7 +117,7 @@ fn no_pole_is_brought_in() {
     let long = g.product(Constant::ONE, &[(x, 3), (sine, 1)]);
     let long = g.add(long, y);
     let roots = [square, quotient, long];
-    let plan = arrange(&g, &roots, Grouping::ByLoops);
+    let plan = arrange(&g, &roots);
     let after = guarded(&g, &roots, plan);
     let root = after.value(long).expect("it was a root");
     let mut stack = vec![root.op];
