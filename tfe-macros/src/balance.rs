@@ -1,13 +1,17 @@
 //! The diagonals of blocks from what stands beside them, as Rust statements.
 
-use crate::emit::index;
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::program::Output;
 
-/// The sums of all columns at once where their number is known, else one by one.
-pub(crate) fn balance(second: &TokenStream, output: &Output, length: &Affine) -> TokenStream {
+/// The sums of all columns at once where their number is known, else one by one; `index` writes an index as Rust.
+pub(crate) fn balance(
+    second: &TokenStream,
+    output: &Output,
+    length: &Affine,
+    index: fn(&Affine) -> TokenStream,
+) -> TokenStream {
     let entry = |output: &Output, row: &TokenStream, column: &TokenStream| {
         let (array, first_row, first_column) = match output {
             Output::ZZ(a, b) => (quote!(#second zz), a, b),

@@ -1,9 +1,11 @@
 //! Expressions: the arena with its constructors, their inputs, functions and constants, and operations on expressions such as derivatives
 //! and substitutions. Everything else builds on this folder; it imports nothing from outside.
 
+pub mod comparison;
 pub mod constant;
 pub mod differentiate;
 pub mod function;
+mod function_derivatives;
 pub mod graph;
 pub(crate) mod hash;
 pub mod input;

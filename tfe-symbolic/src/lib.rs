@@ -20,3 +20,4 @@ pub mod program;
 mod schedule;
 pub mod syntax;
 mod variants;
+pub mod vocabulary;

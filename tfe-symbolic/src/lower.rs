@@ -8,7 +8,10 @@
 
 mod affine;
 mod constraints;
+mod extended;
 mod forces;
+mod formulas;
+mod lets_with_rates;
 mod names;
 mod passes;
 mod rates;
@@ -28,7 +31,6 @@ use crate::diagnostic::{Bag, Kind, Span};
 use crate::expr::graph::{ExprId, Graph};
 use crate::expr::input::{Affine, LoopVariable};
 use crate::model::declared::{CoordinateArray, Declared, Form, Requirement};
-use crate::model::notation::Notation;
 use crate::syntax::ast::{Expr, ExprKind};
 use crate::syntax::context::Context;
 use crate::variants;
@@ -106,7 +108,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         crate_path: model.crate_path.clone(),
         used_fields,
         requirements,
-        notation: Notation::of(model),
+        notation: formulas::formulas(model),
     };
     // What is made from a wrong model would repeat its mistakes.
     if bag.is_empty() {
@@ -120,7 +122,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     let Some((rate, (_, span))) = rate.zip(model.time_transformation.as_ref()) else {
         return Some(declared);
     };
-    match transformation::extended(declared, rate) {
+    match extended::extended(declared, rate) {
         Ok(declared) => Some(declared),
         Err(kind) => {
             bag.push(*span, kind);
@@ -222,7 +224,7 @@ impl<'a> Lowerer<'a> {
             usual_dot: DotRule::Velocity,
             hamiltonian: None,
             lets: vec![None; model.lets.len()],
-            rates: rates::lets_with_rates(model),
+            rates: lets_with_rates::lets_with_rates(model),
             visible_lets: model.lets.len(),
             indices: Vec::new(),
             place: None,

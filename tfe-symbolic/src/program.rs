@@ -7,9 +7,9 @@ pub mod count;
 mod display;
 pub mod interpret;
 
+use crate::expr::comparison::Comparison;
 use crate::expr::function::Function;
 use crate::expr::input::{Affine, Input, LoopVariable};
-use crate::syntax::ast::Comparison;
 
 /// A value computed by a program. Each is assigned once (accumulators: declared once, then added to or assigned).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

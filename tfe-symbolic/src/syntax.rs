@@ -2,5 +2,6 @@
 
 pub mod ast;
 pub mod context;
+mod grammar;
 pub mod parse;
 mod print;

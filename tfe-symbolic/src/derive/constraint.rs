@@ -8,7 +8,7 @@
 //! The velocity v is a leaf of its own in models of both forms. The rate Ȧ = ∂A/∂q v + ∂A/∂t is taken with v as the rate of q, so that
 //! ∂Ȧ/∂v = ∂A/∂q and ∂Ȧ/∂q is the rate of ∂A/∂q: three of the five arrays of second derivatives come from one.
 
-mod sites;
+pub(crate) mod sites;
 
 use crate::derive::entry::{Array, Entry, Place};
 use crate::expr::constant::Constant;
@@ -18,7 +18,6 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
 use crate::expr::rewrite::Mapping;
 use crate::model::declared::{Constraint, ConstraintKind};
-pub(crate) use sites::entries as entries_by_site;
 
 /// A and a of one constraint.
 pub(crate) struct Row {

@@ -5,11 +5,11 @@
 
 use std::fmt;
 
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::hash::{Map, Set};
 use crate::expr::input::{Affine, Input, LoopVariable};
-use crate::syntax::ast::Comparison;
 
 /// An expression of a [`Graph`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -288,6 +288,16 @@ impl Graph {
             _ => None,
         };
         self.reachable(&[id]).into_iter().filter_map(leaf).collect()
+    }
+
+    /// Whether an index of a coordinate, velocity or momentum in an expression depends on a loop.
+    pub(crate) fn holds_varying_index(&self, id: ExprId) -> bool {
+        self.inputs_of(id).iter().any(|input| match input {
+            Input::Coordinate(at) | Input::Velocity(at) | Input::Momentum(at) => {
+                at.as_constant().is_none()
+            }
+            _ => false,
+        })
     }
 
     /// `c` and `x` with `id` = c x, where x is no multiple.

@@ -1,13 +1,12 @@
 //! `dot()`: the total time derivative, by the chain rule.
 
 use super::{DotRule, Lowerer, Value};
-use crate::check::{Model, Symbol};
 use crate::diagnostic::{Kind, Span};
 use crate::expr::differentiate::{derivative, directional};
 use crate::expr::graph::{ExprId, Node};
 use crate::expr::input::{Affine, Input};
 use crate::expr::rewrite::Mapping;
-use crate::syntax::ast::{Expr, ExprKind};
+use crate::syntax::ast::Expr;
 
 /// What goes wrong in a total derivative.
 #[derive(Default)]
@@ -106,37 +105,4 @@ impl Lowerer<'_> {
         }
         mapping.of(force)
     }
-}
-
-/// Which `let`s hold a `dot()`, themselves or by those before them.
-pub(super) fn lets_with_rates(model: &Model) -> Vec<bool> {
-    let mut rates = Vec::with_capacity(model.lets.len());
-    for (_, value) in &model.lets {
-        let found = holds_rate(value, model, &rates);
-        rates.push(found);
-    }
-    rates
-}
-
-fn holds_rate(expr: &Expr, model: &Model, rates: &[bool]) -> bool {
-    let mut stack = vec![expr];
-    while let Some(expr) = stack.pop() {
-        match &expr.node {
-            ExprKind::Call { function, .. }
-                if matches!(function.node.as_str(), "dot" | "body_rate") =>
-            {
-                return true;
-            }
-            ExprKind::Name(name) => {
-                if let Some(Symbol::Let(at)) = model.symbols.get(name)
-                    && rates.get(*at).copied().unwrap_or(false)
-                {
-                    return true;
-                }
-            }
-            _ => {}
-        }
-        stack.extend(expr.children());
-    }
-    false
 }

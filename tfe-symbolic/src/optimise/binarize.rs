@@ -16,10 +16,7 @@ use crate::optimise::cse::{self, Item, Kind, Operands, Pair};
 use crate::optimise::plan::{Op, Plan, Value};
 use demand::{Multiple, ONE, PositiveConstant, Terms, demanded, gather, multiple};
 pub(crate) use demand::{Opened, scaled_sums};
-use fractions::{Factors, Fractions};
-
-/// Larger powers are left to the method that computes integer powers.
-const LARGEST_PRODUCT_POWER: u32 = 64;
+use fractions::{Factors, Fractions, LARGEST_PRODUCT_POWER};
 
 /// Which factors of a product are multiplied with each other first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,11 +1,11 @@
 //! Operations of two operands, hash-consed: what is left to do is to put them in order.
 
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, SumRange, loop_bit, loops_in};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input};
-use crate::syntax::ast::Comparison;
 
 /// An operation of a [`Plan`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

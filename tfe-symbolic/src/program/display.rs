@@ -10,7 +10,6 @@
 use std::fmt;
 
 use crate::program::{Operand, Operation, Output, Program, Statement, Temporary};
-use crate::syntax::ast::Comparison;
 
 impl fmt::Display for Program {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -159,12 +158,7 @@ impl fmt::Display for Operation {
                 then,
                 otherwise,
             } => {
-                let sign = match comparison {
-                    Comparison::Less => "<",
-                    Comparison::LessOrEqual => "<=",
-                    Comparison::Greater => ">",
-                    Comparison::GreaterOrEqual => ">=",
-                };
+                let sign = comparison.symbol();
                 write!(f, "select({left} {sign} {right}, {then}, {otherwise})")
             }
         }

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
-use crate::expr::simplify::holds;
 use crate::program::{Operand, Operation, Output, Program, Statement, Temporary};
 
 /// What a kernel is given.
@@ -246,7 +245,7 @@ impl Machine<'_> {
                 then,
                 otherwise,
             } => {
-                let chosen = holds(*comparison, self.operand(left)?, self.operand(right)?);
+                let chosen = comparison.holds(self.operand(left)?, self.operand(right)?);
                 let (then, otherwise) = (self.operand(then)?, self.operand(otherwise)?);
                 if chosen { then } else { otherwise }
             }

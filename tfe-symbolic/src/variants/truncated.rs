@@ -9,7 +9,7 @@
 
 use std::collections::BTreeMap;
 
-use super::removal::{holds_varying_index, written_out_forces};
+use super::removal::written_out_forces;
 use super::target::Places;
 use super::{Assignment, Mistake, Reduction};
 use crate::diagnostic::Kind;
@@ -136,9 +136,9 @@ impl Reduction {
     fn polynomial(&mut self, of: ExprId, degree: u32, point: &Point) -> Result<ExprId, Kind> {
         let graph = &mut self.model.graph;
         let mut of = of;
-        if point.is_by_place() && holds_varying_index(graph, of) {
+        if point.is_by_place() && graph.holds_varying_index(of) {
             of = graph.unroll(of).unwrap_or(of);
-            if holds_varying_index(graph, of) {
+            if graph.holds_varying_index(of) {
                 return Err(Kind::PassOfLength { pass: PASS });
             }
         }

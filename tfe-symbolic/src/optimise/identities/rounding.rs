@@ -1,10 +1,9 @@
 //! What rounding may do to the roots of a plan, at a few states: a running error analysis, to first order.
 
+use crate::expr::comparison::Comparison;
 use crate::expr::graph::ExprId;
 use crate::expr::input::Input;
-use crate::expr::simplify::holds;
 use crate::optimise::plan::{Op, Plan};
-use crate::syntax::ast::Comparison;
 
 use super::residue::{mixed, scattered};
 
@@ -86,7 +85,7 @@ fn errors(plan: &Plan, words: &[u64], state: u64) -> Vec<(f64, f64)> {
 fn chosen(comparison: Comparison, operands: &[(f64, f64)]) -> (f64, f64) {
     match operands {
         [left, right, then, otherwise] => {
-            if holds(comparison, left.0, right.0) {
+            if comparison.holds(left.0, right.0) {
                 *then
             } else {
                 *otherwise
