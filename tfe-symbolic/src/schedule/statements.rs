@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::derive::entry::{Array, Place};
+use crate::derive::entry::Array;
 use crate::expr::function::Function;
 use crate::expr::graph::{SumRange, loop_bit};
 use crate::expr::hash::Map;
@@ -33,15 +33,13 @@ pub(crate) fn schedule(
         locals: Map::default(),
     };
     for array in cleared {
-        scheduler.append(Statement::Clear {
-            output: Place::scalar(*array).output(),
-        });
+        scheduler.append(Statement::Clear { array: *array });
     }
     scheduler.angles();
     scheduler.block(root);
     for Balance { first, length } in balances {
         scheduler.append(Statement::Balance {
-            output: first.output(),
+            output: first.clone(),
             length: length.clone(),
         });
     }
@@ -145,7 +143,7 @@ impl Scheduler {
         };
         match &sink.target {
             Target::Store { place, accumulate } => self.append(Statement::Store {
-                output: place.output(),
+                output: place.clone(),
                 value,
                 accumulate: *accumulate,
             }),
