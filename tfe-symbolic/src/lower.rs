@@ -24,11 +24,10 @@ mod transformation;
 mod usage;
 mod vector;
 
-use std::collections::HashMap;
-
 use crate::check::Model;
 use crate::diagnostic::{Bag, Kind, Span};
 use crate::expr::graph::{ExprId, Graph};
+use crate::expr::hash::Map;
 use crate::expr::input::{Affine, LoopVariable};
 use crate::model::declared::{CoordinateArray, Declared, Form, Requirement};
 use crate::syntax::ast::{Expr, ExprKind};
@@ -201,9 +200,9 @@ struct Lowerer<'a> {
     /// The largest number of terms of the sums met since it was last cleared; `None`: generic.
     terms: Option<u64>,
     /// The number of terms of each loop that was made.
-    loops: HashMap<ExprId, Option<u64>>,
+    loops: Map<ExprId, Option<u64>>,
     /// The smallest and largest value of indices that vary, as far as they are numbers.
-    extents: HashMap<Affine, Option<(i64, i64)>>,
+    extents: Map<Affine, Option<(i64, i64)>>,
     /// Which fields formulas use.
     fields: Vec<bool>,
     /// What must hold of lengths that are known at run time only.
@@ -230,8 +229,8 @@ impl<'a> Lowerer<'a> {
             place: None,
             hidden_loops: 0,
             terms: Some(1),
-            loops: HashMap::new(),
-            extents: HashMap::new(),
+            loops: Map::default(),
+            extents: Map::default(),
             fields: vec![false; context.fields.len()],
             requirements: Vec::new(),
         };

@@ -1,5 +1,7 @@
 //! Operations of two operands, hash-consed: what is left to do is to put them in order.
 
+use std::collections::BTreeMap;
+
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
@@ -58,7 +60,7 @@ pub(crate) struct Plan {
     /// Whether there is a sum over a range in it.
     reduces: Vec<bool>,
     known: Map<Op, OpId>,
-    values: Map<ExprId, Value>,
+    values: BTreeMap<ExprId, Value>,
 }
 
 impl Plan {

@@ -78,7 +78,7 @@ impl Scope {
         }
         // What comes from outside is read again on the next turn.
         left.retain(
-            |value, _| !matches!(value, Value::Temporary(temporary) if !own.contains(temporary)),
+            |value| !matches!(value, Value::Temporary(temporary) if !own.contains(temporary)),
         );
         Self { left }
     }
