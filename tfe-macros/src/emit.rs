@@ -303,7 +303,6 @@ impl<'a> Emitter<'a> {
 
     fn operation(&mut self, operation: &Operation) -> TokenStream {
         match operation {
-            Operation::Copy(a) => self.operand(a),
             Operation::Add(a, b) => self.binary(a, &quote!(+), b),
             Operation::Subtract(a, b) => self.binary(a, &quote!(-), b),
             Operation::Multiply(a, b) => self.binary(a, &quote!(*), b),

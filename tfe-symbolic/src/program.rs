@@ -34,8 +34,6 @@ pub enum Operand {
 /// One operation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Operation {
-    /// `a` itself
-    Copy(Operand),
     /// `a + b`
     Add(Operand, Operand),
     /// `a − b`
@@ -145,7 +143,7 @@ pub enum Statement {
 impl Operation {
     fn operands(&self) -> Vec<&Operand> {
         match self {
-            Self::Copy(a) | Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
+            Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
             Self::Add(a, b)
             | Self::Subtract(a, b)
             | Self::Multiply(a, b)
@@ -164,7 +162,7 @@ impl Operation {
 
     fn operands_mut(&mut self) -> Vec<&mut Operand> {
         match self {
-            Self::Copy(a) | Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
+            Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
             Self::Add(a, b)
             | Self::Subtract(a, b)
             | Self::Multiply(a, b)

@@ -16,7 +16,6 @@ use crate::expr::differentiate::{Forward, derivative, gradient};
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
-use crate::expr::rewrite::Mapping;
 use crate::model::declared::{Constraint, ConstraintKind};
 
 /// A and a of one constraint.
@@ -232,17 +231,9 @@ fn slopes(graph: &mut Graph, of: ExprId, pick: Pick) -> Vec<(Affine, ExprId)> {
 
 /// The expression with all velocities zero.
 fn at_rest(graph: &mut Graph, of: ExprId) -> ExprId {
-    let zero = graph.constant(Constant::ZERO);
-    let mut mapping = Mapping::default();
-    for id in graph.reachable(&[of]) {
-        let node = graph.node(id).clone();
-        let new = match &node {
-            Node::Input(Input::Velocity(_)) => zero,
-            node => graph.remake(node, &mapping),
-        };
-        mapping.set(id, new);
-    }
-    mapping.of(of)
+    graph.with_leaves(of, &mut |graph, input| {
+        matches!(input, Input::Velocity(_)).then(|| graph.constant(Constant::ZERO))
+    })
 }
 
 fn is_zero(graph: &Graph, id: ExprId) -> bool {

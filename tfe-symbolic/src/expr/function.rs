@@ -183,7 +183,7 @@ impl Function {
     }
 
     /// Whether it is defined and smooth for all numbers.
-    pub(crate) fn is_entire(self) -> bool {
+    pub(crate) fn is_smooth_everywhere(self) -> bool {
         matches!(
             self,
             Self::Sin

@@ -468,16 +468,11 @@ fn pieces(node: &Node, parenthesised: bool) -> Vec<Piece> {
             then,
             otherwise,
         } => {
-            let sign = match comparison {
-                Comparison::Less => " < ",
-                Comparison::LessOrEqual => " <= ",
-                Comparison::Greater => " > ",
-                Comparison::GreaterOrEqual => " >= ",
-            };
+            let sign = format!(" {} ", comparison.symbol());
             pieces.extend([
                 text("select("),
                 whole(left),
-                text(sign),
+                text(&sign),
                 whole(right),
                 text(", "),
             ]);

@@ -3,9 +3,9 @@
 use crate::diagnostic::Kind;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::derivative;
-use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::graph::{ExprId, Graph};
 use crate::expr::input::{Affine, Input};
-use crate::expr::rewrite::{Mapping, UNROLL_LIMIT};
+use crate::expr::rewrite::UNROLL_LIMIT;
 use crate::model::declared::{
     CLOCK, CLOCK_MOMENTUM, CoordinateArray, Declared, Force, TimeTransformation,
 };
@@ -70,15 +70,9 @@ fn single(name: &str, index: &Affine) -> CoordinateArray {
 
 /// The expression with a coordinate in place of the time.
 fn with_clock(graph: &mut Graph, id: ExprId, clock: &Affine) -> ExprId {
-    let mut mapping = Mapping::default();
-    for old in graph.reachable(&[id]) {
-        let new = match graph.node(old).clone() {
-            Node::Input(Input::Time) => graph.input(Input::Coordinate(clock.clone())),
-            node => graph.remake(&node, &mapping),
-        };
-        mapping.set(old, new);
-    }
-    mapping.of(id)
+    graph.with_leaves(id, &mut |graph, input| {
+        (*input == Input::Time).then(|| graph.input(Input::Coordinate(clock.clone())))
+    })
 }
 
 /// Σ Q_a ∂H/∂p_a

@@ -3,9 +3,8 @@
 use super::{DotRule, Lowerer, Value};
 use crate::diagnostic::{Kind, Span};
 use crate::expr::differentiate::{derivative, directional};
-use crate::expr::graph::{ExprId, Node};
+use crate::expr::graph::ExprId;
 use crate::expr::input::{Affine, Input};
-use crate::expr::rewrite::Mapping;
 use crate::syntax::ast::Expr;
 
 /// What goes wrong in a total derivative.
@@ -92,17 +91,12 @@ impl Lowerer<'_> {
         let velocity = Input::Velocity(Affine::constant(at));
         let slope = derivative(&mut self.graph, dissipation, &velocity);
         let force = self.graph.negate(slope);
-        let mut mapping = Mapping::default();
-        for id in self.graph.reachable(&[force]) {
-            let node = self.graph.node(id).clone();
-            let new = match &node {
-                Node::Input(Input::Velocity(at)) => {
-                    derivative(&mut self.graph, energy, &Input::Momentum(at.clone()))
+        self.graph
+            .with_leaves(force, &mut |graph, input| match input {
+                Input::Velocity(at) => {
+                    Some(derivative(graph, energy, &Input::Momentum(at.clone())))
                 }
-                node => self.graph.remake(node, &mapping),
-            };
-            mapping.set(id, new);
-        }
-        mapping.of(force)
+                _ => None,
+            })
     }
 }

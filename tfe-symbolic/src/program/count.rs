@@ -53,7 +53,6 @@ impl Counts {
 
     fn note(&mut self, operation: &Operation) {
         let counter = match operation {
-            Operation::Copy(_) => return,
             Operation::Add(..) | Operation::Subtract(..) => &mut self.additions,
             Operation::Multiply(..) => &mut self.multiplications,
             Operation::Divide(..) => &mut self.divisions,

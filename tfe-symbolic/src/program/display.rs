@@ -126,7 +126,6 @@ impl fmt::Display for Operand {
 impl fmt::Display for Operation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Copy(a) => a.fmt(f),
             Self::Add(a, b) => write!(f, "{a} + {b}"),
             Self::Subtract(a, b) => write!(f, "{a} - {b}"),
             Self::Multiply(a, b) => write!(f, "{a} * {b}"),

@@ -224,7 +224,6 @@ impl Machine<'_> {
 
     fn operation(&self, operation: &Operation) -> Result<f64, InterpretError> {
         Ok(match operation {
-            Operation::Copy(a) => self.operand(a)?,
             Operation::Add(a, b) => self.operand(a)? + self.operand(b)?,
             Operation::Subtract(a, b) => self.operand(a)? - self.operand(b)?,
             Operation::Multiply(a, b) => self.operand(a)? * self.operand(b)?,

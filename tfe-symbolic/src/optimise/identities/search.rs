@@ -217,7 +217,7 @@ fn partial(plan: &Plan) -> Vec<u64> {
         let whole = match op {
             Op::Divide(..) | Op::Power(..) | Op::Select { .. } | Op::Loop { .. } => false,
             Op::IntegerPower(_, n) => *n >= 0,
-            Op::Call(function, _) => function.is_entire(),
+            Op::Call(function, _) => function.is_smooth_everywhere(),
             _ => true,
         };
         if !whole {
