@@ -397,6 +397,8 @@ impl<'a> Emitter<'a> {
                 let value = signed(a);
                 quote!(t.like((#value) as f64))
             }
+            // Programs have none.
+            Input::Placeholder(..) => TokenStream::new(),
         }
     }
 

@@ -7,6 +7,7 @@
 //! A pass works on lowered expressions, so what it makes is differentiated like anything else. Coordinates are found by their names in the
 //! model at hand, which passes before may have changed; values of entries hold nothing of the state and mean the same in all of them.
 
+mod as_syntax;
 mod elastic;
 mod fields;
 mod frozen;

@@ -75,6 +75,7 @@ impl Dependence {
                     Input::Coordinate(_) => found.q = true,
                     Input::Velocity(_) | Input::Momentum(_) => found.z = true,
                     Input::Multiplier(_)
+                    | Input::Placeholder(..)
                     | Input::Parameter(_)
                     | Input::ParameterElement(..)
                     | Input::Integer(_) => {}

@@ -255,8 +255,12 @@ impl Graph {
 
     /// The nodes of the roots that are made of more than parameters and numbers.
     pub(crate) fn moving(&self, roots: &[ExprId]) -> Set<ExprId> {
-        let is_parameter =
-            |input: &Input| matches!(input, Input::Parameter(_) | Input::ParameterElement(..));
+        let is_parameter = |input: &Input| {
+            matches!(
+                input,
+                Input::Placeholder(..) | Input::Parameter(_) | Input::ParameterElement(..)
+            )
+        };
         self.containing(roots, |input| !is_parameter(input))
     }
 
@@ -333,6 +337,7 @@ impl Input {
             | Self::Velocity(index)
             | Self::Momentum(index)
             | Self::Multiplier(index)
+            | Self::Placeholder(_, index)
             | Self::ParameterElement(_, index)
             | Self::Integer(index) => Some(index),
         }
@@ -346,6 +351,7 @@ impl Input {
             Self::Velocity(_) => Self::Velocity(index),
             Self::Momentum(_) => Self::Momentum(index),
             Self::Multiplier(_) => Self::Multiplier(index),
+            Self::Placeholder(number, _) => Self::Placeholder(*number, index),
             Self::ParameterElement(name, _) => Self::ParameterElement(name.clone(), index),
             Self::Integer(_) => Self::Integer(index),
         }

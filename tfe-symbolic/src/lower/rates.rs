@@ -67,6 +67,7 @@ impl Lowerer<'_> {
                 None
             }
             Input::Multiplier(_)
+            | Input::Placeholder(..)
             | Input::Parameter(_)
             | Input::ParameterElement(..)
             | Input::Integer(_) => None,

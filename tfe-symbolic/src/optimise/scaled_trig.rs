@@ -11,7 +11,7 @@ use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::{Map, Set};
-use crate::expr::input::Input;
+use crate::expr::input::{Affine, Input};
 use crate::expr::rewrite::Mapping;
 use crate::optimise::plan::{Op, Plan};
 use crate::optimise::rebuild::{Changes, Formula, rebuild};
@@ -55,8 +55,8 @@ impl ScaledTrig {
                 let Some(call) = graph.find(&call) else {
                     continue;
                 };
-                // No field has such a name.
-                let input = Input::Parameter(format!("{call:?}"));
+                let number = u32::try_from(arms.len()).ok()?;
+                let input = Input::Placeholder(number, Affine::default());
                 let whole = graph.input(input.clone());
                 let powers = factors.iter().map(|(x, n)| (*x, -n)).collect();
                 search.written.insert(call, (powers, whole));
@@ -262,7 +262,6 @@ fn least(a: &Powers, b: &Powers) -> Powers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::expr::input::Affine;
     use crate::optimise::binarize::{Grouping, arrange};
 
     /// The parameters a, b, m and sine and cosine of two angles.

@@ -280,6 +280,7 @@ impl Machine<'_> {
                 self.element(name, array, index)
             }
             Input::Integer(index) => Ok(self.index(index)? as f64),
+            Input::Placeholder(..) => Err(InterpretError::Unassigned),
         }
     }
 

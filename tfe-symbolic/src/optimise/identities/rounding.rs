@@ -110,7 +110,10 @@ fn sample(input: &Input, word: u64, state: u64) -> f64 {
     let size = 0.25 * 8.0_f64.powf(part);
     let small = state >= 2 && (bits >> 12) & 1 == 0;
     let size = if small { 1e-3 * size } else { size };
-    let parameter = matches!(input, Input::Parameter(_) | Input::ParameterElement(..));
+    let parameter = matches!(
+        input,
+        Input::Placeholder(..) | Input::Parameter(_) | Input::ParameterElement(..)
+    );
     if parameter || (bits >> 16) & 1 == 0 {
         size
     } else {
