@@ -1,7 +1,7 @@
 //! Declarations: which names stand for what, which arguments are missing, doubled or at odds.
 //!
-//! One small function a rule. Nothing here looks inside formulas; that is the business of
-//! [`lower`](crate::lower).
+//! One small function a rule. Nothing here looks inside formulas; that is the business of [`lower`](crate::lower). May import `expr`,
+//! `vocabulary`, `diagnostic`, `syntax` and `model`.
 
 mod solver;
 mod transformation;

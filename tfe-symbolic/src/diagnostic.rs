@@ -1,5 +1,5 @@
-//! Mistakes in a declaration: where, what, and the remedy. All wording lives in
-//! `diagnostic/wording.rs`.
+//! Mistakes in a declaration: where, what, and the remedy. All wording lives in `diagnostic/wording.rs`. May import `expr` and
+//! `vocabulary`.
 
 pub mod kind;
 pub mod span;

@@ -5,6 +5,8 @@
 //! sums and products with other factors only, because its derivatives must be loops over local
 //! terms again; under anything else it is written out, or reported where it is too long for that.
 //! Forces and observables may use loops anywhere.
+//!
+//! May import `check`, `variants`, `derive` for kinds of constraints, and what these may import.
 
 mod affine;
 mod constraints;
