@@ -1,9 +1,13 @@
 //! The same kernels as an expert writes them: common factors and trigonometry worked out on paper, every symmetric entry once.
 
+mod arms;
 mod bodies;
+mod cart;
 mod chain;
 mod links;
 mod oscillators;
+mod rotating;
+mod satellite;
 mod tops;
 
 use tfe::runtime::{First, Real, Second};

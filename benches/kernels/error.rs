@@ -45,7 +45,7 @@ impl fmt::Display for Error {
             ),
             Self::Usage(argument) => write!(
                 f,
-                "cannot understand `{argument}`; either no arguments, or names of models, or --count <model> <first|second> <generated|hand|nothing> <repetitions>"
+                "cannot understand `{argument}`; either no arguments, or names of models and --instructions, or --count <model> <first|second> <generated|hand|nothing> <repetitions>"
             ),
             Self::Count(error) => write!(f, "cannot run valgrind: {error}"),
             Self::NoTotal(text) => write!(f, "valgrind gave no total:\n{text}"),

@@ -143,3 +143,124 @@ pub struct Planets {
 pub struct Fput {
     pub a: f64,
 }
+
+/// A spherical pendulum that hangs from a cart on a straight track: its angle from the vertical and its azimuth from
+/// the track.
+#[dynamics(
+    coordinates(x, theta, phi),
+    let r = [x + l*sin(theta)*cos(phi), l*sin(theta)*sin(phi), -l*cos(theta)],
+    lagrangian = mc/2*dot(x)^2 + m/2*inner(dot(r), dot(r)) - m*g*r[2],
+)]
+pub struct SphericalPendulumOnCart {
+    pub mc: f64,
+    pub m: f64,
+    pub l: f64,
+    pub g: f64,
+}
+
+/// Foucault's pendulum of any amplitude, by its place over the ground: x north, y west, z up, on a planet that turns at
+/// `omega`.
+#[dynamics(
+    coordinates(x, y),
+    let z = -sqrt(l^2 - x^2 - y^2),
+    let spin = [omega*cos(latitude), 0, omega*sin(latitude)],
+    let v = [dot(x), dot(y), dot(z)] + cross(spin, [x, y, z]),
+    lagrangian = m/2*inner(v, v) - m*g*z,
+)]
+pub struct Foucault {
+    pub m: f64,
+    pub l: f64,
+    pub g: f64,
+    pub omega: f64,
+    pub latitude: f64,
+}
+
+/// A satellite on a circular orbit of the angular velocity `n`, turned by the gradient of gravity: a quaternion from
+/// body to space, scalar first, and three moments of inertia. `up` is the local vertical in the body; the condition |e|
+/// = 1 is no part of the kernels.
+#[dynamics(
+    coordinates(e[4]),
+    let w = body_rate(e),
+    let up = rotate([e[0], -e[1], -e[2], -e[3]], [cos(n*t), sin(n*t), 0]),
+    lagrangian = (a*w[0]^2 + b*w[1]^2 + c*w[2]^2)/2 - 3*n^2/2*(a*up[0]^2 + b*up[1]^2 + c*up[2]^2),
+)]
+pub struct Satellite {
+    pub a: f64,
+    pub b: f64,
+    pub c: f64,
+    pub n: f64,
+}
+
+/// An arm in space: a column that turns about z, an upper arm and a forearm about axes y of their own, by the angles of
+/// the joints. Each link has its mass at the distance `s` from the joint, a moment `i` about its length and `j` across
+/// it.
+#[dynamics(
+    coordinates(a, b, c),
+    let d = b + c,
+    let upper = [cos(b)*cos(a), cos(b)*sin(a), sin(b)],
+    let fore = [cos(d)*cos(a), cos(d)*sin(a), sin(d)],
+    let r2 = s2*upper,
+    let r3 = l2*upper + s3*fore,
+    let w2 = [dot(a)*sin(b), dot(b), dot(a)*cos(b)],
+    let w3 = [dot(a)*sin(d), dot(d), dot(a)*cos(d)],
+    lagrangian = j1/2*dot(a)^2
+        + m2/2*inner(dot(r2), dot(r2)) + (i2*w2[0]^2 + j2*(w2[1]^2 + w2[2]^2))/2
+        + m3/2*inner(dot(r3), dot(r3)) + (i3*w3[0]^2 + j3*(w3[1]^2 + w3[2]^2))/2
+        - g*(m2*r2[2] + m3*r3[2]),
+)]
+pub struct SpatialArm {
+    pub j1: f64,
+    pub m2: f64,
+    pub l2: f64,
+    pub s2: f64,
+    pub i2: f64,
+    pub j2: f64,
+    pub m3: f64,
+    pub s3: f64,
+    pub i3: f64,
+    pub j3: f64,
+    pub g: f64,
+}
+
+/// An arm of two links in a vertical plane with elastic joints: angles of the links, the second from the first, and of
+/// the motors behind the gears. Each link has its mass at the distance `s` from the joint and a moment `i` about it,
+/// each motor a moment `j`.
+#[dynamics(
+    coordinates(a, b, c, d),
+    let x1 = s1*cos(a),
+    let y1 = s1*sin(a),
+    let x2 = l1*cos(a) + s2*cos(a + b),
+    let y2 = l1*sin(a) + s2*sin(a + b),
+    lagrangian = m1/2*(dot(x1)^2 + dot(y1)^2) + i1/2*dot(a)^2
+        + m2/2*(dot(x2)^2 + dot(y2)^2) + i2/2*(dot(a) + dot(b))^2
+        + j1/2*dot(c)^2 + j2/2*dot(d)^2 - k1/2*(a - c)^2 - k2/2*(b - d)^2 - g*(m1*y1 + m2*y2),
+)]
+pub struct ElasticArm {
+    pub m1: f64,
+    pub l1: f64,
+    pub s1: f64,
+    pub i1: f64,
+    pub m2: f64,
+    pub s2: f64,
+    pub i2: f64,
+    pub j1: f64,
+    pub j2: f64,
+    pub k1: f64,
+    pub k2: f64,
+    pub g: f64,
+}
+
+/// A bead on a wire bent to an ellipse that turns about its vertical axis at `omega`.
+#[dynamics(
+    coordinates(s),
+    let r = a*sin(s),
+    let z = -b*cos(s),
+    lagrangian = m/2*(dot(r)^2 + dot(z)^2 + (omega*r)^2) - m*g*z,
+)]
+pub struct SpinningEllipse {
+    pub m: f64,
+    pub a: f64,
+    pub b: f64,
+    pub omega: f64,
+    pub g: f64,
+}

@@ -3,6 +3,15 @@
 use crate::case::{Case, Kernel, Pair};
 use crate::count::Instructions;
 
+/// Whether nanoseconds are measured.
+#[derive(Clone, Copy, Debug)]
+pub enum Times {
+    /// Measured and printed.
+    Measured,
+    /// Dashes in their columns.
+    Omitted,
+}
+
 /// The lines above the numbers.
 pub fn head() {
     println!(
@@ -27,7 +36,7 @@ pub fn head() {
 }
 
 /// The line of a kernel.
-pub fn line(case: &dyn Case, kernel: Kernel, instructions: Option<Instructions>) {
+pub fn line(case: &dyn Case, kernel: Kernel, instructions: Option<Instructions>, times: Times) {
     let operations = case.operations(kernel);
     print!("{:<24} {kernel:<6}", case.name());
     print!(
@@ -45,8 +54,13 @@ pub fn line(case: &dyn Case, kernel: Kernel, instructions: Option<Instructions>)
         }
         None => print!("  {:>6} {:>6} {:>5}", "—", "—", "—"),
     }
-    for Pair { generated, hand } in [case.nanoseconds(kernel), case.lanes(kernel)] {
-        print!("  {generated:>7.1} {hand:>6.1} {:>5.2}", generated / hand);
+    match times {
+        Times::Measured => {
+            for Pair { generated, hand } in [case.nanoseconds(kernel), case.lanes(kernel)] {
+                print!("  {generated:>7.1} {hand:>6.1} {:>5.2}", generated / hand);
+            }
+        }
+        Times::Omitted => print!("  {0:>7} {0:>6} {0:>5}  {0:>7} {0:>6} {0:>5}", "—"),
     }
     println!();
 }

@@ -1,6 +1,7 @@
 //! Expressions: the arena with its constructors, their inputs, functions and constants, and operations on expressions such as derivatives
 //! and substitutions. Everything else builds on this folder; it imports nothing from outside.
 
+mod cancellation;
 pub mod comparison;
 pub mod constant;
 pub mod differentiate;

@@ -21,7 +21,7 @@ pub mod expr;
 pub mod lower;
 pub mod model;
 mod optimise;
-mod pipeline;
+pub mod pipeline;
 pub mod program;
 mod schedule;
 pub mod syntax;

@@ -3,6 +3,7 @@
 //! CONTRACT between the engine (which schedules programs) and the emitter. The files of the folder count, run and print programs. May import
 //! `expr` only.
 
+pub(crate) mod cost;
 pub mod count;
 mod display;
 pub mod interpret;

@@ -3,6 +3,6 @@
 
 pub(crate) mod balance;
 pub(crate) mod loop_nest;
-mod order;
+pub(crate) mod order;
 pub(crate) mod statements;
 pub(crate) mod store_or_add;

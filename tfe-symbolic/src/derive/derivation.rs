@@ -20,6 +20,7 @@ use crate::expr::graph::{ExprId, Graph, Node, SumRange};
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 use crate::model::declared::{Constraint, Declared, Force, Form, Observable, Parameter};
 use crate::optimise::angles::expand_angles;
+use crate::optimise::passes::{Pass, Passes};
 
 /// Larger energies, in expressions, are not written by squares.
 const SQUARED: usize = 300;
@@ -93,6 +94,7 @@ pub struct Derivation {
     pub(crate) written: Vec<Vec<Entry>>,
     structure: Structure,
     pub(crate) sensitivities: Vec<Parameter>,
+    pub(crate) passes: Passes,
 }
 
 impl Derivation {
@@ -101,8 +103,17 @@ impl Derivation {
         Self::of_model(Model::from(declared))
     }
 
+    /// The same, with programs made without one of the passes: to see what a pass is worth.
+    pub fn without(declared: &Declared, pass: Pass) -> Self {
+        Self::by_passes(Model::from(declared), Passes::without(pass))
+    }
+
     /// Differentiates a model.
     pub fn of_model(model: Model) -> Self {
+        Self::by_passes(model, Passes::ALL)
+    }
+
+    fn by_passes(model: Model, passes: Passes) -> Self {
         let Model {
             form,
             dof,
@@ -135,17 +146,25 @@ impl Derivation {
         };
         entries.extend(constrain(&mut graph, &constraints));
         let structure = Structure::of(&graph, form, &dof, &entries);
-        let by_matrix = [Writing::AsDerived, Writing::Expanded]
-            .into_iter()
-            .filter_map(|writing| quadratic::entries(&mut graph, energy, &entries, writing));
-        let mut written: Vec<Vec<Entry>> = by_matrix.collect();
-        written.extend(entries_by_squares(&mut graph, form, energy, &entries));
+        let mut written: Vec<Vec<Entry>> = Vec::new();
+        if passes.run(Pass::QuadraticForm) {
+            let writings = [Writing::AsDerived, Writing::Expanded].into_iter();
+            written.extend(
+                writings.filter_map(|writing| {
+                    quadratic::entries(&mut graph, energy, &entries, writing)
+                }),
+            );
+        }
+        if passes.run(Pass::Squares) {
+            written.extend(entries_by_squares(&mut graph, form, energy, &entries));
+        }
         Self {
             graph,
             entries,
             written,
             structure,
             sensitivities,
+            passes,
         }
     }
 

@@ -129,6 +129,20 @@ impl Constant {
         self == Self::ONE
     }
 
+    /// Whether it is a power of two or the negative of one, so that products with it are exact.
+    pub(crate) fn is_power_of_two(self) -> bool {
+        const FRACTION: u64 = (1 << 52) - 1;
+        match self.as_ratio() {
+            Some((top, bottom)) => {
+                top.unsigned_abs().is_power_of_two() && bottom.unsigned_abs().is_power_of_two()
+            }
+            None => {
+                let value = self.to_f64();
+                value.is_normal() && value.to_bits() & FRACTION == 0
+            }
+        }
+    }
+
     /// Whether it is below 0.
     pub fn is_negative(self) -> bool {
         match self.0 {

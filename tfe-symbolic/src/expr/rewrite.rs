@@ -203,7 +203,7 @@ impl Graph {
     /// Merges each sum that is used once into the sum that uses it, so that like terms meet.
     ///
     /// A sum used twice stays as it is: opening it would repeat its additions. With a factor c, the merge must not cost multiplications:
-    /// c(2x + y) opens, c(x + y) does not.
+    /// c(2x + y) opens, c(x + y) does not. A sum whose exact terms may cancel stays as it is, too: another order would lose digits.
     pub(crate) fn open_single_sums(&mut self, roots: &[ExprId]) -> Vec<ExprId> {
         let order = self.reachable(roots);
         let uses = self.uses(&order, roots);
@@ -218,7 +218,10 @@ impl Graph {
                         let (multiple, inner) = self.as_multiple(mapping.of(*x));
                         let factor = *outer * multiple;
                         match self.as_sum(inner).filter(|_| uses.of(*x) == 1) {
-                            Some((own, inner)) if opening_is_free(factor, own, inner) => {
+                            Some((own, inner))
+                                if opening_is_free(factor, own, inner)
+                                    && !self.may_cancel_exactly(own, inner) =>
+                            {
                                 constant = constant + factor * own;
                                 opened.extend(inner.iter().map(|(c, y)| (factor * *c, *y)));
                             }
@@ -290,6 +293,7 @@ pub(crate) fn substitute(affine: &Affine, variable: LoopVariable, value: &Affine
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::expr::function::Function;
 
     fn index(depth: u32) -> Affine {
         Affine::symbol(IndexSymbol::Loop(LoopVariable(depth)))
@@ -361,12 +365,25 @@ mod tests {
     #[test]
     fn shared_sums_stay_closed() {
         let mut g = Graph::default();
-        let [x, y, z] = [0, 1, 2].map(|k| q(&mut g, Affine::constant(k)));
+        let [x, y, z] = [0, 1, 2].map(|k| {
+            let angle = q(&mut g, Affine::constant(k));
+            g.call(Function::Sin, &[angle])
+        });
         let inner = g.add(x, y);
         let (a, b) = (g.add(inner, z), g.multiply(inner, z));
         assert_eq!(g.open_single_sums(&[a, b]), vec![a, b]);
         let opened = g.open_single_sums(&[a])[0];
         assert_eq!(g.as_sum(opened).map(|(_, terms)| terms.len()), Some(3));
+    }
+
+    #[test]
+    fn differences_stay_closed() {
+        // (x − y) + (z − w): with x ≈ y and z ≈ w another order would lose all digits.
+        let mut g = Graph::default();
+        let [x, y, z, w] = [0, 1, 2, 3].map(|k| q(&mut g, Affine::constant(k)));
+        let (first, second) = (g.subtract(x, y), g.subtract(z, w));
+        let sum = g.add(first, second);
+        assert_eq!(g.open_single_sums(&[sum]), vec![sum]);
     }
 
     #[test]

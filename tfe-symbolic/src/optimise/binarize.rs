@@ -188,6 +188,8 @@ struct Arranger<'a> {
     sums: Family,
     products: Family,
     sum_sets: Map<Multiple, usize>,
+    /// Sums that are evaluated in the order in which they stand.
+    in_order: Map<Multiple, Terms>,
     quotients: Map<Multiple, Quotient>,
     fractions: Fractions,
     fraction_sets: Vec<Quotient>,
@@ -210,6 +212,7 @@ impl<'a> Arranger<'a> {
             sums: Family::new(Kind::Sum),
             products: Family::new(Kind::Product),
             sum_sets: Map::default(),
+            in_order: Map::default(),
             quotients: Map::default(),
             fractions: Fractions::default(),
             fraction_sets: Vec::new(),
@@ -219,7 +222,7 @@ impl<'a> Arranger<'a> {
 
     fn run(mut self, roots: &[ExprId]) -> Plan {
         let uses = demanded(self.graph, roots, self.opened);
-        let (sums, merged) = gather(self.graph, self.opened, &uses);
+        let (mut sums, merged) = gather(self.graph, self.opened, &uses);
         let demanded: BTreeSet<Multiple> = uses
             .into_keys()
             .filter(|multiple| !merged.contains(multiple))
@@ -229,8 +232,12 @@ impl<'a> Arranger<'a> {
         let shared = self.shared_divisors(&demanded);
         for multiple in &demanded {
             let (x, factor) = *multiple;
-            match (self.graph.node(x), sums.get(multiple)) {
-                (_, Some(sum)) => self.collect_sum(*multiple, sum),
+            match (self.graph.node(x), sums.remove(multiple)) {
+                // Of two terms there is one order.
+                (_, Some(sum)) if sum.count() > 2 && self.graph.keeps_order(x) => {
+                    self.in_order.insert(*multiple, sum);
+                }
+                (_, Some(sum)) => self.collect_sum(*multiple, &sum),
                 (Node::Product(_), _) => self.collect_product(*multiple, &shared),
                 _ if factor != ONE => self.collect_product(*multiple, &shared),
                 _ => {}
@@ -446,6 +453,9 @@ impl<'a> Arranger<'a> {
         if let Some(set) = self.sum_sets.get(&multiple).copied() {
             return self.build_set(Kind::Sum, set);
         }
+        if let Some(sum) = self.in_order.remove(&multiple) {
+            return self.build_in_order(&sum);
+        }
         let operand = |arranger: &mut Self, x: ExprId| {
             let value = arranger.value(x);
             arranger.plan.plain(value)
@@ -516,6 +526,25 @@ impl<'a> Arranger<'a> {
             negative: top.negative != bottom.negative,
             op: self.plan.push(Op::Divide(top.op, bottom.op)),
         }
+    }
+
+    fn build_in_order(&mut self, Terms { number, terms }: &Terms) -> Value {
+        let signed = |value: Value, negative: bool| Value {
+            negative: value.negative != negative,
+            op: value.op,
+        };
+        let mut values: Vec<Value> = terms
+            .iter()
+            .map(|(multiple, negative)| signed(self.built[multiple], *negative))
+            .collect();
+        if !number.is_zero() {
+            let op = self.plan.push(Op::Constant(number.abs()));
+            values.push(Value {
+                negative: number.is_negative(),
+                op,
+            });
+        }
+        self.fold(Kind::Sum, &values)
     }
 
     fn family(&mut self, kind: Kind) -> &mut Family {

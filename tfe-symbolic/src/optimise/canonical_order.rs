@@ -18,6 +18,9 @@ use crate::optimise::rebuild::{Changes, Formula, rebuild};
 /// How many levels of operands are compared of terms that are to be added first.
 const LEVELS_OF_TERMS: usize = 2;
 
+/// Functions and choices are looked through to this depth for exact terms.
+const MAX_DEPTH: usize = 8;
+
 /// How many levels of operands are compared to see which operand stands first.
 const LEVELS_OF_OPERANDS: usize = 6;
 
@@ -66,13 +69,42 @@ fn is_sum(op: &Op) -> bool {
     matches!(op, Op::Add(..) | Op::Subtract(..))
 }
 
-/// The terms of all sums, with their signs. A sum that one other sum needs and nothing else is no sum by itself.
+/// Whether it is read without a rounding error: an input, a number, or a size, choice or multiple of one. What nests deeper counts as rounded.
+fn is_exact(plan: &Plan, id: OpId, depth: usize) -> bool {
+    let Some(depth) = depth.checked_sub(1) else {
+        return false;
+    };
+    let is_exact = |id: OpId| is_exact(plan, id, depth);
+    match plan.op(id) {
+        Op::Constant(_) | Op::Input(_) => true,
+        Op::Negate(a) => is_exact(*a),
+        Op::Call(Function::Abs | Function::Min | Function::Max, arguments) => {
+            arguments.iter().all(|x| is_exact(*x))
+        }
+        Op::Multiply(a, b) => match plan.op(*a) {
+            Op::Constant(value) => value.is_power_of_two() && is_exact(*b),
+            _ => false,
+        },
+        Op::Select {
+            then, otherwise, ..
+        } => is_exact(*then) && is_exact(*otherwise),
+        _ => false,
+    }
+}
+
+/// The terms of all sums, with their signs. A sum used only once, by another sum, is merged into it, unless it is one of two exact terms: these
+/// may cancel, and in another order digits would be lost.
 fn sums(plan: &Plan, uses: &[usize]) -> Vec<(OpId, Vec<Value>)> {
     let inside = |sum: OpId, part: OpId| {
         is_sum(plan.op(part))
             && uses[part.index()] == 1
             && plan.loops_of(part) == plan.loops_of(sum)
             && plan.reduces(part) == plan.reduces(sum)
+            && !plan
+                .op(part)
+                .operands()
+                .iter()
+                .all(|x| is_exact(plan, *x, MAX_DEPTH))
     };
     let parts = |id: OpId| match plan.op(id) {
         Op::Add(a, b) => vec![(*a, false), (*b, false)],

@@ -62,7 +62,7 @@ mod tests {
     /// Saved additions and products, in total.
     fn saved(graph: &Graph, roots: &[ExprId]) -> usize {
         let grouping = Grouping::ByLoops;
-        (arrange(graph, roots, grouping).cost() - distribute(graph, roots, grouping).cost()) / 2
+        arrange(graph, roots, grouping).cost() - distribute(graph, roots, grouping).cost()
     }
 
     #[test]

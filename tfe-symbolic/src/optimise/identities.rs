@@ -7,12 +7,11 @@
 //! Derivatives of one function are full of such identities, and rules would find few of them. Here all operations are evaluated in a finite
 //! field (`residue.rs` beside this file), and for each one that costs more than a few operations by itself, a table of values shows which
 //! others it is made of. Two independent evaluations agree by accident once in 10³⁰. A change is kept if the plan costs less and rounding
-//! does not do much more harm (`rounding.rs`); no operation becomes undefined where it was defined, for whatever is divided by, or is the
+//! does not do much more harm (`guard.rs`); no operation becomes undefined where it was defined, for whatever is divided by, or is the
 //! argument of a function, was needed before as well.
 
 mod formulas;
 mod residue;
-mod rounding;
 mod search;
 #[cfg(test)]
 mod tests;
@@ -20,7 +19,6 @@ mod tests;
 use crate::expr::constant::Constant;
 use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::{Changes, Formula, rebuild};
-use rounding::Bounds;
 use search::{Candidate, Search, weight};
 
 /// Larger plans are left as they are.
@@ -32,19 +30,18 @@ const ROUNDS: usize = 4;
 /// How many changes are tried in a round.
 const TRIALS: usize = 32;
 
-/// The plan with operations replaced by cheaper formulas.
-pub(crate) fn by_identities(plan: Plan) -> Plan {
+/// The plan with operations replaced by cheaper formulas, as long as the plan is accepted.
+pub(crate) fn by_identities(plan: Plan, accepts: &dyn Fn(&Plan) -> bool) -> Plan {
     let mut best = rebuild(&plan, &Changes::default()).0;
     if best.len() > LARGEST {
         return plan;
     }
-    let bounds = Bounds::of(&best);
     for _ in 0..ROUNDS {
         // Doubles are found as products.
         best.push(Op::Constant(Constant::integer(2)));
         let search = Search::of(&best);
         let candidates = search.candidates();
-        match improved(&best, candidates, &bounds) {
+        match improved(&best, candidates, accepts) {
             Some(better) => best = better,
             None => break,
         }
@@ -53,7 +50,11 @@ pub(crate) fn by_identities(plan: Plan) -> Plan {
 }
 
 /// The plan with as many of the replacements as help together.
-fn improved(plan: &Plan, candidates: Vec<Candidate>, bounds: &Bounds) -> Option<Plan> {
+fn improved(
+    plan: &Plan,
+    candidates: Vec<Candidate>,
+    accepts: &dyn Fn(&Plan) -> bool,
+) -> Option<Plan> {
     let mut changes = Changes::default();
     let (mut best, mut least) = (None, cost(plan));
     for candidate in candidates.into_iter().take(TRIALS) {
@@ -66,7 +67,7 @@ fn improved(plan: &Plan, candidates: Vec<Candidate>, bounds: &Bounds) -> Option<
         trial.formulas.insert(candidate.target, candidate.formula);
         let (other, _) = rebuild(plan, &trial);
         let now = cost(&other);
-        if now < least && bounds.hold_for(&other) {
+        if now < least && accepts(&other) {
             (best, least, changes) = (Some(other), now, trial);
         }
     }

@@ -8,6 +8,7 @@ use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, SumRange, loop_bit, loops_in};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input};
+use crate::program::cost;
 
 /// An operation of a [`Plan`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -89,7 +90,7 @@ impl Plan {
         self.known.get(op).copied()
     }
 
-    /// Twice the cost in the measure of [`crate::program::count::Counts::weighted`].
+    /// The cost in the measure of [`crate::program::count::Counts::weighted`].
     pub(crate) fn cost(&self) -> usize {
         self.ids().map(|id| self.cost_of(id)).sum()
     }
@@ -101,17 +102,17 @@ impl Plan {
         };
         match self.op(id) {
             Op::Constant(_) | Op::Input(_) | Op::Negate(_) => 0,
-            Op::Add(..)
-            | Op::Subtract(..)
-            | Op::Multiply(..)
-            | Op::Select { .. }
-            | Op::Loop { .. } => 2,
-            Op::Divide(..) => 12,
+            Op::Add(..) | Op::Subtract(..) | Op::Loop { .. } => cost::ADDITION,
+            Op::Multiply(..) => cost::PRODUCT,
+            Op::Select { .. } => cost::CHOICE,
+            Op::Divide(..) => cost::QUOTIENT,
             // One of both counts for the pair.
-            Op::Call(Function::Sin, arguments) if has(Function::Cos, arguments) => 50,
+            Op::Call(Function::Sin, arguments) if has(Function::Cos, arguments) => {
+                cost::SINE_WITH_COSINE
+            }
             Op::Call(Function::Cos, arguments) if has(Function::Sin, arguments) => 0,
-            Op::Call(Function::Sin | Function::Cos, _) => 40,
-            Op::IntegerPower(..) | Op::Power(..) | Op::Call(..) => 40,
+            Op::Call(Function::Sin | Function::Cos, _) => cost::LONE_SINE,
+            Op::IntegerPower(..) | Op::Power(..) | Op::Call(..) => cost::FUNCTION,
         }
     }
 

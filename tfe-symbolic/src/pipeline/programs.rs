@@ -4,6 +4,7 @@ use crate::derive::derivation::Derivation;
 use crate::derive::entry::{Array, Entry, Place};
 use crate::derive::sensitivity::{Leaf, entries_by};
 use crate::model::declared::Declared;
+use crate::optimise::passes::Passes;
 use crate::pipeline::select_plan::Draft;
 use crate::program::count::Counts;
 use crate::program::{By, Program, Request};
@@ -48,14 +49,14 @@ impl Derivation {
             place: Place::scalar(Array::Value),
             value: transformation.hamiltonian,
         };
-        let draft = Draft::of(declared.graph.clone(), vec![entry]);
+        let draft = Draft::of(declared.graph.clone(), vec![entry], Passes::ALL);
         Some(Draft::best(vec![draft]))
     }
 
     fn program_of(&self, is_wanted: impl Fn(Array) -> bool) -> Program {
         let draft = |entries: &Vec<Entry>| {
             let wanted = entries.iter().filter(|entry| is_wanted(entry.place.array));
-            Draft::of(self.graph.clone(), wanted.cloned().collect())
+            Draft::of(self.graph.clone(), wanted.cloned().collect(), self.passes)
         };
         let plain = std::iter::once(&self.entries);
         Draft::best(plain.chain(&self.written).map(draft).collect())
@@ -99,7 +100,7 @@ impl Derivation {
         };
         let mut graph = self.graph.clone();
         let entries = entries_by(&mut graph, &self.entries, leaf);
-        Draft::best(vec![Draft::of(graph, entries)])
+        Draft::best(vec![Draft::of(graph, entries, self.passes)])
     }
 
     /// The operations of [`Derivation::program`].

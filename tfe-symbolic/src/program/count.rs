@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Add;
 
 use crate::expr::function::Function;
+use crate::program::cost;
 use crate::program::{Operation, Program, Statement};
 
 /// Operations by kind. What stands in a loop counts once, as it is written; stores and negations are free.
@@ -75,13 +76,13 @@ impl Counts {
     ///
     /// Rounded from timings of scalar code and of lanes, where a sine alone costs as much as a pair; a program with the smaller cost is preferred.
     pub fn weighted(&self) -> usize {
-        self.additions
-            + self.multiplications
-            + self.selections
-            + 6 * self.divisions
-            + 25 * self.sine_cosine_pairs
-            + 20 * self.lone_sines
-            + 20 * self.functions
+        cost::ADDITION * self.additions
+            + cost::PRODUCT * self.multiplications
+            + cost::CHOICE * self.selections
+            + cost::QUOTIENT * self.divisions
+            + cost::SINE_WITH_COSINE * self.sine_cosine_pairs
+            + cost::LONE_SINE * self.lone_sines
+            + cost::FUNCTION * self.functions
     }
 }
 

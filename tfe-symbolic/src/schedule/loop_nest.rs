@@ -43,7 +43,7 @@ pub(crate) struct Sink {
 }
 
 /// Where a result goes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Target {
     /// Into the results.
     Store {
@@ -118,6 +118,31 @@ impl Block {
             inner.for_each_value(visit);
         }
         values(&mut self.after, visit);
+    }
+
+    /// Whether the other one has the same results in the same loops, computed from whatever expressions.
+    pub(crate) fn has_the_results_of(&self, other: &Self) -> bool {
+        let local = |(local, start): &(Local, Option<ExprId>)| (*local, start.is_some());
+        let sinks = |one: &[Sink], other: &[Sink]| {
+            let same = |(one, other): (&Sink, &Sink)| {
+                one.target == other.target
+                    && one.local == other.local
+                    && one.value.is_some() == other.value.is_some()
+            };
+            one.len() == other.len() && one.iter().zip(other).all(same)
+        };
+        let inner =
+            |((range, block), (other_range, other)): (&(SumRange, Self), &(SumRange, Self))| {
+                range == other_range && block.has_the_results_of(other)
+            };
+        self.locals
+            .iter()
+            .map(local)
+            .eq(other.locals.iter().map(local))
+            && sinks(&self.sinks, &other.sinks)
+            && sinks(&self.after, &other.after)
+            && self.inner.len() == other.inner.len()
+            && self.inner.iter().zip(&other.inner).all(inner)
     }
 
     /// The values that are wanted as they are: what is added to a variable may as well be subtracted.

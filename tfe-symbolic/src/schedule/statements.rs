@@ -12,7 +12,6 @@ use crate::optimise::plan::{Op, OpId, Plan, Value};
 use crate::program::{Operand, Operation, Program, Statement, Temporary};
 use crate::schedule::balance::Balance;
 use crate::schedule::loop_nest::{Block, Local, Sink, Target};
-use crate::schedule::order::in_order;
 
 /// Schedules a plan that holds the values of all results; these arrays are cleared first.
 pub(crate) fn schedule(
@@ -43,7 +42,7 @@ pub(crate) fn schedule(
             length: length.clone(),
         });
     }
-    let statements = in_order(scheduler.scopes.swap_remove(0).statements);
+    let statements = scheduler.scopes.swap_remove(0).statements;
     Program {
         statements,
         temporaries: scheduler.temporaries,

@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use crate::expr::graph::ExprId;
+use crate::program::cost;
 
 /// An angle, `Σ n x`: atoms in order, n ≠ 0, the first n positive. A number is an atom like the others.
 pub(crate) type Angle = Vec<(ExprId, i64)>;
@@ -50,10 +51,6 @@ struct Step {
     /// Numbers cost nothing.
     free: bool,
 }
-
-/// A sine with its cosine, and one of them alone, in additions.
-const PAIR: usize = 25;
-const LONE: usize = 20;
 
 /// How many helpers are tried one by one.
 const MOST_TRIALS: usize = 24;
@@ -185,7 +182,7 @@ impl Choice {
             known.cosine |= need.cosine;
             return;
         }
-        let direct = if need == BOTH { PAIR } else { LONE };
+        let direct = How::Direct.cost(need);
         match self.route(angle) {
             Some(route) if self.price(&route, need) < direct => {
                 let last = route.len() - 1;
@@ -244,7 +241,8 @@ impl Choice {
         (!route.is_empty()).then_some(route)
     }
 
-    /// The angle as a sum or difference of two that are known.
+    /// The angle as a sum or difference of two that are known. An atom that is in both parts and not in the angle would bring the rounding of its
+    /// sine into that of the angle: sin a is not taken from those of a + b and b.
     fn two_parts(&self, angle: &Angle) -> Option<How> {
         if let Some(half) = half(angle).filter(|half| self.known.contains_key(half)) {
             return Some(How::Double(half));
@@ -257,8 +255,11 @@ impl Choice {
             .min_by_key(|found| found.len())?;
         for at in candidates.iter().take(MOST_PARTS) {
             let part = &self.steps[*at].angle;
+            let fits = |other: &Angle| {
+                size(part) + size(other) == size(angle) && self.known.contains_key(other)
+            };
             let (other, opposite) = canonical(plus(angle, -1, part));
-            if self.known.contains_key(&other) {
+            if fits(&other) {
                 return Some(How::Sum {
                     first: part.clone(),
                     second: other,
@@ -266,7 +267,7 @@ impl Choice {
                 });
             }
             let (other, opposite) = canonical(plus(angle, 1, part));
-            if !opposite && self.known.contains_key(&other) {
+            if !opposite && fits(&other) {
                 return Some(How::Sum {
                     first: other,
                     second: part.clone(),
@@ -328,8 +329,8 @@ impl How {
 
     fn cost(&self, need: Need) -> usize {
         match self {
-            Self::Direct if need == BOTH => PAIR,
-            Self::Direct => LONE,
+            Self::Direct if need == BOTH => cost::SINE_WITH_COSINE,
+            Self::Direct => cost::LONE_SINE,
             Self::Sum { .. } => 3 * need.count(),
             Self::Double(_) => 2 * need.count(),
         }

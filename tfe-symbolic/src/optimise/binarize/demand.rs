@@ -37,6 +37,8 @@ pub(crate) fn scaled_sums(graph: &Graph, roots: &[ExprId], opened: &Opened) -> V
             demanded.contains_key(&multiple(graph, factor.0 * *c, *y).0)
         };
         *factor != ONE
+            // c (x − y) is exact to a rounding, c x − c y is not.
+            && !graph.keeps_order(*x)
             // What one loop computes is not there in another.
             && graph.loops_of(*x) == 0
             && !opened.contains(&(*x, *factor)) && terms.iter().any(known)
@@ -64,6 +66,13 @@ impl Uses {
 pub(super) struct Terms {
     pub(super) number: Constant,
     pub(super) terms: BTreeMap<Multiple, bool>,
+}
+
+impl Terms {
+    /// How many there are, with the number.
+    pub(super) fn count(&self) -> usize {
+        self.terms.len() + usize::from(!self.number.is_zero())
+    }
 }
 
 /// c x as a positive multiple of something that is no multiple, and whether the sign was lost.

@@ -3,12 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::residue::Residue;
-use super::search::{Candidate, Search, TABLED};
+use super::search::{Candidate, Search};
 use crate::optimise::plan::{OpId, Value};
 use crate::optimise::rebuild::Formula;
-
-/// Sums of two products are sought up to so many operations.
-const SEARCHED: usize = 130;
+use crate::program::cost;
 
 /// How many formulas for one operation are kept.
 const KEPT: usize = 4;
@@ -35,7 +33,7 @@ impl Search<'_> {
     fn formulas(&self, target: OpId, uses: &[u32]) -> Vec<Candidate> {
         let alone = self.alone(target, uses);
         let total: usize = alone.values().sum();
-        let unit = 2 << (3 * self.plan.loops_of(target).count_ones());
+        let unit = cost::ADDITION << (3 * self.plan.loops_of(target).count_ones());
         let mut found = Found {
             search: self,
             target,
@@ -49,10 +47,10 @@ impl Search<'_> {
         if total > unit {
             found.two();
         }
-        if total > 2 * unit && self.plan.len() <= TABLED {
+        if total > 2 * unit {
             found.three();
         }
-        if total > 3 * unit && self.plan.len() <= SEARCHED {
+        if total > 3 * unit {
             found.four();
         }
         found.candidates

@@ -7,9 +7,6 @@ use crate::expr::hash::Map;
 use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::Formula;
 
-/// Sums and products of two are tabulated up to so many operations.
-pub(super) const TABLED: usize = 160;
-
 /// The cost of an operation; in loops, by the turns that short ones have.
 pub(super) fn weight(plan: &Plan, id: OpId) -> usize {
     plan.cost_of(id) << (3 * plan.loops_of(id).count_ones())
@@ -122,14 +119,12 @@ impl<'a> Search<'a> {
             singles.entry(size).or_default().push(id);
         }
         let (mut products, mut sums) = (Vec::new(), Vec::new());
-        if plan.len() <= TABLED {
-            for a in plan.ids() {
-                for b in plan.ids().take(a.index() + 1) {
-                    let (x, y) = (values[a.index()], values[b.index()]);
-                    products.push((x.times(y).size(), a, b));
-                    sums.push((x.plus(y).size(), a, b));
-                    sums.push((x.minus(y).size(), a, b));
-                }
+        for a in plan.ids() {
+            for b in plan.ids().take(a.index() + 1) {
+                let (x, y) = (values[a.index()], values[b.index()]);
+                products.push((x.times(y).size(), a, b));
+                sums.push((x.plus(y).size(), a, b));
+                sums.push((x.minus(y).size(), a, b));
             }
         }
         Self {
