@@ -10,13 +10,14 @@
 
 pub(crate) mod sites;
 
-use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::{Forward, derivative, gradient};
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
 use crate::model::declared::{Constraint, ConstraintKind};
+use crate::program::{Array, Place};
 
 /// A and a of one constraint.
 pub(crate) struct Row {

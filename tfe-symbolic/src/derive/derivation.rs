@@ -10,7 +10,7 @@
 use std::collections::BTreeMap;
 
 use crate::derive::constraint;
-use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::entry::Entry;
 use crate::derive::quadratic::{self, Writing};
 use crate::derive::squares::by_squares;
 use crate::derive::structure::Structure;
@@ -21,6 +21,7 @@ use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 use crate::model::declared::{Constraint, Declared, Force, Form, Observable, Parameter};
 use crate::optimise::angles::expand_angles;
 use crate::optimise::passes::{Pass, Passes};
+use crate::program::{Array, Place};
 
 /// Larger energies, in expressions, are not written by squares.
 const SQUARED: usize = 300;

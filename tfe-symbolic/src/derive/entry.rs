@@ -1,7 +1,7 @@
 //! Entries of results: what is added where, on every turn of which loops.
 
 use crate::expr::graph::{ExprId, SumRange};
-pub(crate) use crate::program::place::{Array, Place};
+use crate::program::Place;
 
 /// What is added to one place, on every turn of a nest of loops.
 #[derive(Clone, Debug)]

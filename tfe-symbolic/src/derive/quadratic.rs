@@ -10,12 +10,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::gradient;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input};
+use crate::program::{Array, Place};
 
 /// M, b, U and the variables.
 struct Parts {

@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use crate::derive::entry::{Array, Entry};
+use crate::derive::entry::Entry;
 use crate::expr::graph::{ExprId, Graph};
 use crate::expr::input::{Affine, Input};
 use crate::model::declared::Form;
+use crate::program::Array;
 
 /// Where a block of second derivatives can be non-zero.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,13 +1,13 @@
 //! The programs of a derivation.
 
 use crate::derive::derivation::Derivation;
-use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::entry::Entry;
 use crate::derive::sensitivity::{Leaf, entries_by};
 use crate::model::declared::Declared;
 use crate::optimise::passes::Passes;
 use crate::pipeline::select_plan::Draft;
 use crate::program::count::Counts;
-use crate::program::{By, Program, Request};
+use crate::program::{Array, By, Place, Program, Request};
 
 impl Derivation {
     /// The program of a kernel.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::derive::entry::{Array, Entry};
+use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph};
 use crate::optimise::angles::expand_angles;
@@ -16,7 +16,7 @@ use crate::optimise::passes::{Pass, Passes};
 use crate::optimise::plan::Plan;
 use crate::optimise::scaled_trig::ScaledTrig;
 use crate::optimise::signs::with_fewer_negations;
-use crate::program::Program;
+use crate::program::{Array, Program};
 use crate::schedule::balance::{Balance, balances};
 use crate::schedule::loop_nest::Block;
 use crate::schedule::order::in_order;

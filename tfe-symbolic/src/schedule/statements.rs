@@ -2,14 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use crate::derive::entry::Array;
 use crate::expr::function::Function;
 use crate::expr::graph::{SumRange, loop_bit};
 use crate::expr::hash::Map;
 use crate::expr::input::LoopVariable;
 use crate::optimise::canonical_order::ranks;
 use crate::optimise::plan::{Op, OpId, Plan, Value};
-use crate::program::{Operand, Operation, Program, Statement, Temporary};
+use crate::program::{Array, Operand, Operation, Program, Statement, Temporary};
 use crate::schedule::balance::Balance;
 use crate::schedule::loop_nest::{Block, Local, Sink, Target};
 

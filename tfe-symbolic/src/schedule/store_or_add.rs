@@ -7,10 +7,10 @@ mod apart;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::derive::entry::{Array, Place};
 use crate::expr::graph::{ExprId, SumRange};
 use crate::expr::hash::Set;
 use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
+use crate::program::{Array, Place};
 use crate::schedule::loop_nest::{Block, Sink, Target};
 use apart::all_apart;
 
