@@ -1,17 +1,21 @@
 //! The diagonals of blocks from what stands beside them, as Rust statements.
 
-use crate::emit::index;
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::expr::input::Affine;
-use tfe_symbolic::program::Output;
+use tfe_symbolic::program::{Array, Place};
 
-/// The sums of all columns at once where their number is known, else one by one.
-pub(crate) fn balance(second: &TokenStream, output: &Output, length: &Affine) -> TokenStream {
-    let entry = |output: &Output, row: &TokenStream, column: &TokenStream| {
-        let (array, first_row, first_column) = match output {
-            Output::ZZ(a, b) => (quote!(#second zz), a, b),
-            Output::QQ(a, b) => (quote!(#second qq), a, b),
+/// The sums of all columns at once where their number is known, else one by one; `index` writes an index as Rust.
+pub(crate) fn balance(
+    second: &TokenStream,
+    output: &Place,
+    length: &Affine,
+    index: fn(&Affine) -> TokenStream,
+) -> TokenStream {
+    let entry = |output: &Place, row: &TokenStream, column: &TokenStream| {
+        let array = match output.array {
+            Array::ZZ => quote!(#second zz),
+            Array::QQ => quote!(#second qq),
             _ => return TokenStream::new(),
         };
         let from = |first: &Affine, steps: &TokenStream| match first.as_constant() {
@@ -21,7 +25,7 @@ pub(crate) fn balance(second: &TokenStream, output: &Output, length: &Affine) ->
                 quote!(#first + #steps)
             }
         };
-        let (row, column) = (from(first_row, row), from(first_column, column));
+        let (row, column) = (from(&output.row, row), from(&output.column, column));
         quote!(#array[#row][#column])
     };
     let (k, l) = (quote!(column), quote!(row));

@@ -5,7 +5,7 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::model::declared::{Constraint, ConstraintKind, Declared};
-use tfe_symbolic::program::{Output, Program, Request, Statement};
+use tfe_symbolic::program::{Array, Program, Request, Statement};
 
 /// What an implementation of `Model` holds of constraints: nothing where there are none.
 pub(crate) fn members(
@@ -95,9 +95,9 @@ impl Kernels<'_> {
         let dof = &self.dof;
         let body = self.emitted(&program);
         let (rows, drift) = (quote!(rows), quote!(drift));
-        let rows = writes(&program, |output| matches!(output, Output::Row(..)))
+        let rows = writes(&program, |array| matches!(array, Array::Row(_)))
             .then(|| self.chunk(&rows, &rows));
-        let drift = writes(&program, |output| matches!(output, Output::Drift(_)))
+        let drift = writes(&program, |array| matches!(array, Array::Drift(_)))
             .then(|| self.chunk(&drift, &drift));
         quote! {
             fn constraint_rows<R: __tfe::Real>(
@@ -125,11 +125,8 @@ impl Kernels<'_> {
         }
         let (dof, count) = (&self.dof, &self.count);
         let body = self.emitted(&program);
-        let bends = writes(&program, |output| {
-            matches!(
-                output,
-                Output::Bend(..) | Output::RateQ(..) | Output::RateV(..)
-            )
+        let bends = writes(&program, |array| {
+            matches!(array, Array::Bend | Array::RateQ | Array::RateV)
         });
         let mu = bends.then(|| {
             quote! {
@@ -138,9 +135,9 @@ impl Kernels<'_> {
                 };
             }
         });
-        let psi_q = writes(&program, |output| matches!(output, Output::PsiQ(..)))
+        let psi_q = writes(&program, |array| matches!(array, Array::PsiQ(_)))
             .then(|| self.chunk(&quote!(psi_q), &quote!(second.psi_q)));
-        let row_rates = writes(&program, |output| matches!(output, Output::RowRate(..)))
+        let row_rates = writes(&program, |array| matches!(array, Array::RowRate(_)))
             .then(|| self.chunk(&quote!(row_rates), &quote!(second.row_rates)));
         quote! {
             fn constraint_second<R: __tfe::Real>(
@@ -161,11 +158,10 @@ impl Kernels<'_> {
 }
 
 /// Whether a program writes a result of this kind. Constraints hold no loops.
-fn writes(program: &Program, kind: fn(&Output) -> bool) -> bool {
+fn writes(program: &Program, kind: fn(Array) -> bool) -> bool {
     program.statements.iter().any(|statement| match statement {
-        Statement::Store { output, .. }
-        | Statement::Balance { output, .. }
-        | Statement::Clear { output } => kind(output),
+        Statement::Store { output, .. } | Statement::Balance { output, .. } => kind(output.array),
+        Statement::Clear { array } => kind(*array),
         _ => false,
     })
 }

@@ -4,10 +4,10 @@ use crate::balance::balance;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::{BTreeMap, BTreeSet};
+use tfe_symbolic::expr::comparison::Comparison;
 use tfe_symbolic::expr::function::Function;
 use tfe_symbolic::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
-use tfe_symbolic::program::{Operand, Operation, Output, Program, Statement, Temporary};
-use tfe_symbolic::syntax::ast::Comparison;
+use tfe_symbolic::program::{Array, Operand, Operation, Place, Program, Statement, Temporary};
 
 /// Writes programs of one model.
 pub(crate) struct Emitter<'a> {
@@ -184,22 +184,19 @@ impl<'a> Emitter<'a> {
                 let body = self.statements(body);
                 quote!(for #variable in #start..#end { #body })
             }
-            Statement::Balance { output, length } => balance(&self.second, output, length),
-            Statement::Clear { output } => self.clear(output),
+            Statement::Balance { output, length } => balance(&self.second, output, length, index),
+            Statement::Clear { array } => self.clear(*array),
         }
     }
 
     /// A store, an accumulation or an assignment of `value`.
     fn write(&mut self, statement: &Statement, value: TokenStream) -> TokenStream {
         match statement {
-            Statement::Store {
-                output: Output::Value,
-                ..
-            } => {
+            Statement::Store { output, .. } if output.array == Array::Value => {
                 self.value = Some(value);
                 TokenStream::new()
             }
-            Statement::Store { output, .. } if self.by_entries && block(output).is_some() => {
+            Statement::Store { output, .. } if self.by_entries && block(output.array).is_some() => {
                 self.entry(output, &value)
             }
             Statement::Store {
@@ -212,7 +209,7 @@ impl<'a> Emitter<'a> {
             }
             Statement::Store { output, .. } => {
                 let place = self.place(output);
-                if self.assigns && matches!(output, Output::ByQ(_)) {
+                if self.assigns && output.array == Array::ByQ {
                     return quote!(#place = #value;);
                 }
                 quote!(#place += #value;)
@@ -229,75 +226,76 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    fn entry(&self, output: &Output, value: &TokenStream) -> TokenStream {
-        let Some((block, row, column)) = block(output) else {
+    fn entry(&self, output: &Place, value: &TokenStream) -> TokenStream {
+        let Some(block) = block(output.array) else {
             return TokenStream::new();
         };
-        let (block, row, column) = (format_ident!("{block}"), index(row), index(column));
+        let block = format_ident!("{block}");
+        let (row, column) = (index(&output.row), index(&output.column));
         quote!(entries.add(__tfe::Block::#block, #row, #column, #value);)
     }
 
-    fn place(&self, output: &Output) -> TokenStream {
+    fn place(&self, output: &Place) -> TokenStream {
         let second = &self.second;
-        match output {
-            Output::Value => quote!(value),
-            Output::ByZ(a) => at(&quote!(first.z), &[a]),
-            Output::ByQ(a) => at(&quote!(first.q), &[a]),
-            Output::Force(a) => at(&quote!(first.force), &[a]),
-            Output::ZZ(a, b) => at(&quote!(#second zz), &[a, b]),
-            Output::ZQ(a, b) => at(&quote!(#second zq), &[a, b]),
-            Output::QQ(a, b) => at(&quote!(#second qq), &[a, b]),
-            Output::ForceZ(a, b) => at(&quote!(#second force_z), &[a, b]),
-            Output::ForceQ(a, b) => at(&quote!(#second force_q), &[a, b]),
-            Output::Observable(k) => {
-                let k = Literal::usize_unsuffixed(*k);
+        let vector = |array: &TokenStream| at(array, &[&output.row]);
+        let matrix = |array: &TokenStream| at(array, &[&output.row, &output.column]);
+        match output.array {
+            Array::Value => quote!(value),
+            Array::ByZ => vector(&quote!(first.z)),
+            Array::ByQ => vector(&quote!(first.q)),
+            Array::Force => vector(&quote!(first.force)),
+            Array::ZZ => matrix(&quote!(#second zz)),
+            Array::ZQ => matrix(&quote!(#second zq)),
+            Array::QQ => matrix(&quote!(#second qq)),
+            Array::ForceZ => matrix(&quote!(#second force_z)),
+            Array::ForceQ => matrix(&quote!(#second force_q)),
+            Array::Observable(k) => {
+                let k = Literal::usize_unsuffixed(k);
                 quote!(values[#k])
             }
-            Output::Phi(k) => one(&quote!(values), *k),
-            Output::Drift(k) => one(&quote!(drift), *k),
-            Output::Row(_, a) | Output::PsiQ(_, a) | Output::RowRate(_, a) => {
-                at(&row(output), &[a])
-            }
-            Output::Bend(a, b) => at(&quote!(#second bend), &[a, b]),
-            Output::RateQ(a, b) => at(&quote!(#second rate_q), &[a, b]),
-            Output::RateV(a, b) => at(&quote!(#second rate_v), &[a, b]),
-            Output::SitePhi(a) | Output::SiteObservable(a) => at(&quote!(values), &[a]),
-            Output::SiteDrift(a) => at(&quote!(drift), &[a]),
+            Array::Phi(k) => one(&quote!(values), k),
+            Array::Drift(k) => one(&quote!(drift), k),
+            Array::Row(_) | Array::PsiQ(_) | Array::RowRate(_) => vector(&row(output.array)),
+            Array::Bend => matrix(&quote!(#second bend)),
+            Array::RateQ => matrix(&quote!(#second rate_q)),
+            Array::RateV => matrix(&quote!(#second rate_v)),
+            Array::SitePhi | Array::SiteObservable => vector(&quote!(values)),
+            Array::SiteDrift => vector(&quote!(drift)),
             // Told entry by entry.
-            Output::SiteRow(..) => TokenStream::new(),
+            Array::SiteRow => TokenStream::new(),
         }
     }
 
-    fn clear(&self, output: &Output) -> TokenStream {
+    fn clear(&self, cleared: Array) -> TokenStream {
         let second = &self.second;
         let vector = |array: TokenStream| quote!(#array.fill(t.like(0.0)););
         let matrix = |array: TokenStream| quote!(for row in &mut #array { row.fill(t.like(0.0)); });
-        match output {
+        match cleared {
             _ if self.onto_zeros => TokenStream::new(),
             // They are sums of what is added from the start.
-            _ if self.by_entries && block(output).is_some() => TokenStream::new(),
-            Output::ByZ(_) => vector(quote!(first.z)),
-            Output::ByQ(_) => vector(quote!(first.q)),
-            Output::Force(_) => vector(quote!(first.force)),
+            _ if self.by_entries && block(cleared).is_some() => TokenStream::new(),
+            Array::ByZ => vector(quote!(first.z)),
+            Array::ByQ => vector(quote!(first.q)),
+            Array::Force => vector(quote!(first.force)),
             // The mass matrix alone is passed by reference, the blocks of all second derivatives are fields.
-            Output::ZZ(..) if second.is_empty() => {
+            Array::ZZ if second.is_empty() => {
                 quote!(for row in zz.iter_mut() {
                     row.fill(t.like(0.0));
                 })
             }
-            Output::ZZ(..) => matrix(quote!(#second zz)),
-            Output::ZQ(..) => matrix(quote!(#second zq)),
-            Output::QQ(..) => matrix(quote!(#second qq)),
-            Output::ForceZ(..) => matrix(quote!(#second force_z)),
-            Output::ForceQ(..) => matrix(quote!(#second force_q)),
-            Output::Row(..) | Output::PsiQ(..) | Output::RowRate(..) => vector(row(output)),
-            Output::Bend(..) => matrix(quote!(#second bend)),
-            Output::RateQ(..) => matrix(quote!(#second rate_q)),
-            Output::RateV(..) => matrix(quote!(#second rate_v)),
-            Output::SitePhi(_) | Output::SiteObservable(_) => vector(quote!(values)),
-            Output::SiteDrift(_) => vector(quote!(drift)),
-            Output::SiteRow(..) => TokenStream::new(),
-            Output::Value | Output::Observable(_) | Output::Phi(_) | Output::Drift(_) => {
+            Array::ZZ => matrix(quote!(#second zz)),
+            Array::ZQ => matrix(quote!(#second zq)),
+            Array::QQ => matrix(quote!(#second qq)),
+            Array::ForceZ => matrix(quote!(#second force_z)),
+            Array::ForceQ => matrix(quote!(#second force_q)),
+            Array::Row(_) | Array::PsiQ(_) | Array::RowRate(_) => vector(row(cleared)),
+            Array::Bend => matrix(quote!(#second bend)),
+            Array::RateQ => matrix(quote!(#second rate_q)),
+            Array::RateV => matrix(quote!(#second rate_v)),
+            Array::SitePhi | Array::SiteObservable => vector(quote!(values)),
+            Array::SiteDrift => vector(quote!(drift)),
+            Array::SiteRow => TokenStream::new(),
+            Array::Value | Array::Observable(_) | Array::Phi(_) | Array::Drift(_) => {
                 TokenStream::new()
             }
         }
@@ -305,7 +303,6 @@ impl<'a> Emitter<'a> {
 
     fn operation(&mut self, operation: &Operation) -> TokenStream {
         match operation {
-            Operation::Copy(a) => self.operand(a),
             Operation::Add(a, b) => self.binary(a, &quote!(+), b),
             Operation::Subtract(a, b) => self.binary(a, &quote!(-), b),
             Operation::Multiply(a, b) => self.binary(a, &quote!(*), b),
@@ -400,6 +397,8 @@ impl<'a> Emitter<'a> {
                 let value = signed(a);
                 quote!(t.like((#value) as f64))
             }
+            // Programs have none.
+            Input::Placeholder(..) => TokenStream::new(),
         }
     }
 
@@ -482,16 +481,16 @@ impl<'a> Emitter<'a> {
     }
 }
 
-/// The block and the place of a second derivative.
-fn block(output: &Output) -> Option<(&'static str, &Affine, &Affine)> {
-    match output {
-        Output::ZZ(a, b) => Some(("ZZ", a, b)),
-        Output::ZQ(a, b) => Some(("ZQ", a, b)),
-        Output::QQ(a, b) => Some(("QQ", a, b)),
-        Output::ForceZ(a, b) => Some(("ForceZ", a, b)),
-        Output::ForceQ(a, b) => Some(("ForceQ", a, b)),
-        Output::SiteRow(a, b) => Some(("Row", a, b)),
-        Output::Bend(a, b) => Some(("Bend", a, b)),
+/// The block of a second derivative.
+fn block(array: Array) -> Option<&'static str> {
+    match array {
+        Array::ZZ => Some("ZZ"),
+        Array::ZQ => Some("ZQ"),
+        Array::QQ => Some("QQ"),
+        Array::ForceZ => Some("ForceZ"),
+        Array::ForceQ => Some("ForceQ"),
+        Array::SiteRow => Some("Row"),
+        Array::Bend => Some("Bend"),
         _ => None,
     }
 }
@@ -516,11 +515,11 @@ pub(crate) fn loop_name(variable: LoopVariable) -> Ident {
 }
 
 /// The row of a constraint.
-fn row(output: &Output) -> TokenStream {
-    match output {
-        Output::PsiQ(k, _) => one(&quote!(psi_q), *k),
-        Output::RowRate(k, _) => one(&quote!(row_rates), *k),
-        Output::Row(k, _) => one(&quote!(rows), *k),
+fn row(array: Array) -> TokenStream {
+    match array {
+        Array::PsiQ(k) => one(&quote!(psi_q), k),
+        Array::RowRate(k) => one(&quote!(row_rates), k),
+        Array::Row(k) => one(&quote!(rows), k),
         _ => TokenStream::new(),
     }
 }

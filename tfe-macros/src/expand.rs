@@ -51,7 +51,11 @@ pub(crate) fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
     let variants: Vec<_> = declared
         .variants
         .iter()
-        .map(|one| variant::expand(one, &item))
+        .map(|one| {
+            let (made, methods) = variant::expand(one, &item, &path);
+            let model = model(&one.model, made);
+            quote!(#model #methods)
+        })
         .collect();
     let documented = item
         .attrs

@@ -55,8 +55,23 @@ pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
     let variants = guess
         .variants
         .iter()
-        .map(|variant| variant::stubs(variant, item, &guess));
+        .map(|variant| variant_stubs(variant, item, &guess));
     quote!(#own #(#solvers)* #(#variants)*)
+}
+
+/// The stubs of a model made from the one with the mistake.
+fn variant_stubs(variant: &Variant, item: &DeriveInput, original: &Guess) -> TokenStream {
+    let stub = DeriveInput {
+        ident: variant.name.clone(),
+        ..item.clone()
+    };
+    let guess = Guess {
+        dof: variant.left(&original.dof),
+        ..original.clone()
+    };
+    let implementations = implementations(&stub, &guess);
+    let dofs = (&original.dof, &guess.dof);
+    variant::stubs(variant, item, &implementations, &guess.path, dofs)
 }
 
 /// The kernels and the methods.

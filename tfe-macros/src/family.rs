@@ -136,6 +136,20 @@ impl Kernels<'_> {
         self.derivation.program(request)
     }
 
+    /// The members for observables; nothing where there are none.
+    fn observables(&self) -> Option<TokenStream> {
+        let observables = &self.declared.observables;
+        let request = Request {
+            observables: true,
+            ..Request::default()
+        };
+        (!observables.is_empty()).then(|| {
+            let program = self.program(request);
+            let body = self.body(&program, Given::Nothing).statements;
+            observable::members(observables, &body)
+        })
+    }
+
     fn implementation(&self, item: &ItemStruct, path: &TokenStream) -> TokenStream {
         let name = &item.ident;
         let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
@@ -179,7 +193,7 @@ impl Kernels<'_> {
         let momenta_move = self.derivation.momenta_move();
         let (dof, check) = (&self.dof, self.check());
         let coordinate_name = self.coordinate_name();
-        let observables = observable::members(self);
+        let observables = self.observables();
         let constraints = constraint::members(self.declared, self.derivation, &self.dof);
         quote! {
             const _: () = {

@@ -1,7 +1,6 @@
 //! Models made from the declared one: `model(Name, truncated(2), frozen(r = l))`.
 
 use crate::emit::identifier;
-use crate::expand;
 use crate::input::plain;
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
@@ -12,8 +11,12 @@ use tfe_symbolic::model::declared::{Projection, Variant};
 /// The derives that hold of the model made as they hold of the original.
 const DERIVES: [&str; 5] = ["Clone", "Copy", "Debug", "PartialEq", "Default"];
 
-/// The struct, its kernels and methods as of any model, and `of`, which copies the parameters.
-pub(crate) fn expand(variant: &Variant, original: &ItemStruct) -> TokenStream {
+/// The struct, and its methods beside those of any model: `of`, which copies the parameters, and `of_state`.
+pub(crate) fn expand(
+    variant: &Variant,
+    original: &ItemStruct,
+    path: &TokenStream,
+) -> (ItemStruct, TokenStream) {
     let title = format!(
         " `{}` from [`{}`]: {}.",
         variant.model.name, original.ident, variant.made
@@ -21,9 +24,8 @@ pub(crate) fn expand(variant: &Variant, original: &ItemStruct) -> TokenStream {
     let fields = fields(variant, original);
     let item = renamed(&variant.model.name, &title, fields, original);
     let of = of(variant, &item, original);
-    let of_state = of_state(variant, &item, original);
-    let model = expand::model(&variant.model, item);
-    quote!(#model #of #of_state)
+    let of_state = of_state(variant, &item, original, path);
+    (item, quote!(#of #of_state))
 }
 
 /// A struct like the original with another name and other fields.
@@ -133,14 +135,18 @@ fn of(variant: &Variant, item: &ItemStruct, original: &ItemStruct) -> TokenStrea
 }
 
 /// `Name::of_state(&original, &state)`: the conserved momenta are those of a state.
-fn of_state(variant: &Variant, item: &ItemStruct, original: &ItemStruct) -> Option<TokenStream> {
+fn of_state(
+    variant: &Variant,
+    item: &ItemStruct,
+    original: &ItemStruct,
+    path: &TokenStream,
+) -> Option<TokenStream> {
     let Projection {
         original: all,
         kept,
         held,
     } = variant.projection.as_ref()?;
     let (name, from, vis) = (&item.ident, &original.ident, &item.vis);
-    let path = expand::runtime_path(&variant.model);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
     let left = Literal::usize_unsuffixed(kept.len());
     let all = Literal::usize_unsuffixed(*all);

@@ -1,7 +1,7 @@
 //! Declarations: which names stand for what, which arguments are missing, doubled or at odds.
 //!
-//! One small function a rule. Nothing here looks inside formulas; that is the business of
-//! [`lower`](crate::lower).
+//! One small function a rule. Nothing here looks inside formulas; that is the business of [`lower`](crate::lower). May import `expr`,
+//! `vocabulary`, `diagnostic`, `syntax` and `model`.
 
 mod solver;
 mod transformation;
@@ -10,13 +10,11 @@ mod variants;
 use std::collections::BTreeMap;
 
 use crate::diagnostic::{Bag, Kind, Role, Span, nearest};
-use crate::expr::function::Function;
 use crate::expr::input::{Affine, IndexSymbol};
 use crate::model::declared::{Form, Solver};
 use crate::syntax::ast::{Array, Expr, ExprKind, Item, Name, Pass, Range, Spanned};
 use crate::syntax::context::{Context, FieldKind, Length};
-pub use solver::{ELEMENTS, MAX_POINTS, RULES};
-pub use variants::PASSES;
+use crate::vocabulary::{Argument, is_function};
 
 /// The most coordinates of literal arrays: beyond it, tables of the engine get out of hand.
 pub const MAX_COORDINATES: usize = 10_000;
@@ -27,29 +25,6 @@ const METHODS: &[&str] = &["state", "structure"];
 const VARIANT_METHODS: &[&str] = &["of", "of_state"];
 /// One more of models with a time transformation.
 const CLOCK_METHOD: &str = "state_at";
-
-/// Functions that are no elementary functions, with their numbers of arguments.
-pub const SPECIAL_FUNCTIONS: &[(&str, usize)] = &[
-    ("dot", 1),
-    ("sum", 2),
-    ("select", 3),
-    ("inner", 2),
-    ("cross", 2),
-    ("norm", 1),
-    ("rotate", 2),
-    ("body_rate", 1),
-];
-
-/// Whether formulas can call `name`.
-pub fn is_function(name: &str) -> bool {
-    function_names().any(|function| function == name)
-}
-
-/// The names of all functions.
-pub fn function_names() -> impl Iterator<Item = &'static str> {
-    let special = SPECIAL_FUNCTIONS.iter().map(|(name, _)| *name);
-    special.chain(Function::ALL.into_iter().map(Function::name))
-}
 
 /// What a name in a formula stands for.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,15 +144,16 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
         ..Model::default()
     };
     model.fields(context, bag);
-    let mut seen = Seen::default();
+    let mut seen = Vec::new();
     let mut momenta = Vec::new();
     for Spanned { node: item, span } in items {
-        if let Some(argument) = once(&item)
-            && seen.again(argument)
-        {
+        let argument = item.argument();
+        if argument.stands_once() && seen.contains(&argument) {
+            let argument = argument.word();
             bag.push(span, Kind::RepeatedArgument { argument });
             continue;
         }
+        seen.push(argument);
         match item {
             Item::Coordinates(arrays) => {
                 if arrays.is_empty() {
@@ -220,7 +196,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
         // What seems to be missing may be what could not be read.
         return model;
     }
-    if !seen.0.contains(&"coordinates") {
+    if !seen.contains(&Argument::Coordinates) {
         bag.push(whole, Kind::NoCoordinates);
     }
     match (&model.energy, momenta.first()) {
@@ -233,32 +209,6 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
         (Some((Form::Lagrangian, _)), None) => {}
     }
     model
-}
-
-/// The arguments that may stand once.
-fn once(item: &Item) -> Option<&'static str> {
-    match item {
-        Item::Coordinates(_) => Some("coordinates"),
-        Item::Momenta(_) => Some("momenta"),
-        Item::Lagrangian(_) => Some("lagrangian"),
-        Item::Hamiltonian(_) => Some("hamiltonian"),
-        Item::Dissipation(_) => Some("dissipation"),
-        Item::TimeTransformation(_) => Some("time_transformation"),
-        Item::Sensitivity(_) => Some("sensitivity"),
-        Item::Crate(_) => Some("crate"),
-        _ => None,
-    }
-}
-
-#[derive(Default)]
-struct Seen(Vec<&'static str>);
-
-impl Seen {
-    fn again(&mut self, argument: &'static str) -> bool {
-        let again = self.0.contains(&argument);
-        self.0.push(argument);
-        again
-    }
 }
 
 /// Gives each array its place in the flat vector.

@@ -7,6 +7,7 @@ use crate::model::declared::Declared;
 use crate::syntax::ast::{ExprKind, Item, Spanned};
 use crate::syntax::context::{Context, FieldKind};
 use crate::syntax::parse::{first_word, parse_item, split_arguments};
+use crate::vocabulary::Argument;
 
 /// Reads a whole attribute: splits, parses, checks, lowers.
 ///
@@ -67,7 +68,8 @@ fn parse(text: &str, bag: &mut Bag) -> Arguments {
                 match broken_let(argument, range.start) {
                     Some(item) => arguments.items.push(item),
                     None => {
-                        arguments.names_missing |= !NAMELESS.contains(&first_word(argument));
+                        let argument = Argument::of_word(first_word(argument));
+                        arguments.names_missing |= argument.is_none_or(Argument::declares_names);
                     }
                 }
             }
@@ -89,18 +91,3 @@ fn broken_let(argument: &str, offset: usize) -> Option<Spanned<Item>> {
     let value = Spanned::new(ExprKind::Error, span);
     Some(Spanned::new(Item::Let { name, value }, span))
 }
-
-/// The arguments that formulas cannot refer to.
-const NAMELESS: [&str; 11] = [
-    "lagrangian",
-    "hamiltonian",
-    "time_transformation",
-    "force",
-    "dissipation",
-    "constraint",
-    "output",
-    "sensitivity",
-    "solver",
-    "model",
-    "crate",
-];

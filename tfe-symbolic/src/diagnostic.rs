@@ -1,36 +1,14 @@
-//! Mistakes in a declaration: where, what, and the remedy. All wording lives in
-//! `diagnostic/wording.rs`.
+//! Mistakes in a declaration: where, what, and the remedy. All wording lives in `diagnostic/wording.rs`. May import `expr` and
+//! `vocabulary`.
 
 pub mod kind;
+pub mod span;
 mod wording;
 
 use std::fmt::Write as _;
 
 pub use kind::{Kind, Role};
-
-/// A range of bytes in the attribute's text, `start..end`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Span {
-    /// The first byte.
-    pub start: usize,
-    /// One past the last byte.
-    pub end: usize,
-}
-
-impl Span {
-    /// The bytes `start..end`.
-    pub fn new(start: usize, end: usize) -> Self {
-        Self { start, end }
-    }
-
-    /// The smallest range that holds both.
-    pub fn join(self, other: Self) -> Self {
-        Self {
-            start: self.start.min(other.start),
-            end: self.end.max(other.end),
-        }
-    }
-}
+pub use span::Span;
 
 /// One mistake.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,9 +2,11 @@
 //! and substitutions. Everything else builds on this folder; it imports nothing from outside.
 
 mod cancellation;
+pub mod comparison;
 pub mod constant;
 pub mod differentiate;
 pub mod function;
+mod function_derivatives;
 pub mod graph;
 pub(crate) mod hash;
 pub mod input;

@@ -5,10 +5,15 @@
 //! sums and products with other factors only, because its derivatives must be loops over local
 //! terms again; under anything else it is written out, or reported where it is too long for that.
 //! Forces and observables may use loops anywhere.
+//!
+//! May import `check`, `variants`, `derive` for kinds of constraints, and what these may import.
 
 mod affine;
 mod constraints;
+mod extended;
 mod forces;
+mod formulas;
+mod lets_with_rates;
 mod names;
 mod passes;
 mod rates;
@@ -21,14 +26,12 @@ mod transformation;
 mod usage;
 mod vector;
 
-use std::collections::HashMap;
-
 use crate::check::Model;
 use crate::diagnostic::{Bag, Kind, Span};
 use crate::expr::graph::{ExprId, Graph};
+use crate::expr::hash::Map;
 use crate::expr::input::{Affine, LoopVariable};
 use crate::model::declared::{CoordinateArray, Declared, Form, Requirement};
-use crate::model::notation::Notation;
 use crate::syntax::ast::{Expr, ExprKind};
 use crate::syntax::context::Context;
 use crate::variants;
@@ -106,7 +109,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         crate_path: model.crate_path.clone(),
         used_fields,
         requirements,
-        notation: Notation::of(model),
+        notation: formulas::formulas(model),
     };
     // What is made from a wrong model would repeat its mistakes.
     if bag.is_empty() {
@@ -120,7 +123,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     let Some((rate, (_, span))) = rate.zip(model.time_transformation.as_ref()) else {
         return Some(declared);
     };
-    match transformation::extended(declared, rate) {
+    match extended::extended(declared, rate) {
         Ok(declared) => Some(declared),
         Err(kind) => {
             bag.push(*span, kind);
@@ -199,9 +202,9 @@ struct Lowerer<'a> {
     /// The largest number of terms of the sums met since it was last cleared; `None`: generic.
     terms: Option<u64>,
     /// The number of terms of each loop that was made.
-    loops: HashMap<ExprId, Option<u64>>,
+    loops: Map<ExprId, Option<u64>>,
     /// The smallest and largest value of indices that vary, as far as they are numbers.
-    extents: HashMap<Affine, Option<(i64, i64)>>,
+    extents: Map<Affine, Option<(i64, i64)>>,
     /// Which fields formulas use.
     fields: Vec<bool>,
     /// What must hold of lengths that are known at run time only.
@@ -222,14 +225,14 @@ impl<'a> Lowerer<'a> {
             usual_dot: DotRule::Velocity,
             hamiltonian: None,
             lets: vec![None; model.lets.len()],
-            rates: rates::lets_with_rates(model),
+            rates: lets_with_rates::lets_with_rates(model),
             visible_lets: model.lets.len(),
             indices: Vec::new(),
             place: None,
             hidden_loops: 0,
             terms: Some(1),
-            loops: HashMap::new(),
-            extents: HashMap::new(),
+            loops: Map::default(),
+            extents: Map::default(),
             fields: vec![false; context.fields.len()],
             requirements: Vec::new(),
         };

@@ -8,6 +8,7 @@ mod cse;
 pub(crate) mod factor;
 pub(crate) mod guard;
 pub(crate) mod identities;
+pub mod passes;
 pub(crate) mod plan;
 mod rebuild;
 pub(crate) mod signs;

@@ -10,99 +10,10 @@
 //!
 //! A pass makes results cheaper and changes none of their values but by rounding. What rounding may do is checked for every plan by one guard
 //! (`optimise/guard`), against the formula as declared. What is cheaper is said by one measure (`program/cost`). Limits, which keep the time of
-//! expansion near-linear in the size of a model, are constants beside each pass. This folder may import every other one but `compile`.
+//! expansion near-linear in the size of a model, are constants beside each pass. The passes with
+//! their contracts and limits are listed in `optimise/passes.rs`. This folder may import `derive`, `optimise`, `schedule`, and what these may import.
 
-pub(crate) mod select_plan;
+mod programs;
+mod select_plan;
 
-/// A pass of the optimiser. What a program is without it is told by [`crate::derive::derivation::Derivation::without`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Pass {
-    /// Derivatives of an energy quadratic in z by its matrix.
-    QuadraticForm,
-    /// Second derivatives on the diagonals of blocks from those off them, where forces are between pairs.
-    Balance,
-    /// Sums used once become part of the sum that uses them.
-    OpenSums,
-    /// Sines and cosines of sums from those of their parts.
-    AngleSums,
-    /// a b + a c as a (b + c).
-    CommonFactors,
-    /// Results from sums and products of other results.
-    Identities,
-    /// Like operations made alike, so that compilers compute two by one instruction.
-    CanonicalOrder,
-    /// Differences turned round so that few results are negated.
-    Signs,
-    /// Statements ordered so that few values are kept at a time.
-    StatementOrder,
-}
-
-impl Pass {
-    /// All of them, in the order in which they run.
-    pub const ALL: [Self; 9] = [
-        Self::QuadraticForm,
-        Self::Balance,
-        Self::OpenSums,
-        Self::AngleSums,
-        Self::CommonFactors,
-        Self::Identities,
-        Self::CanonicalOrder,
-        Self::Signs,
-        Self::StatementOrder,
-    ];
-
-    /// What it reads and what it makes.
-    pub const fn contract(self) -> &'static str {
-        match self {
-            Self::QuadraticForm => "derivatives to derivatives",
-            Self::Balance => "derivatives to fewer derivatives and a rule for the others",
-            Self::OpenSums | Self::AngleSums | Self::CommonFactors => "expressions to expressions",
-            Self::Identities | Self::CanonicalOrder | Self::Signs => "plan to plan",
-            Self::StatementOrder => "statements to statements",
-        }
-    }
-
-    /// What its time depends on, and where it stops.
-    pub const fn limit(self) -> &'static str {
-        match self {
-            Self::QuadraticForm => "linear in the derivatives",
-            Self::Balance | Self::OpenSums | Self::Signs => "linear",
-            Self::AngleSums => "angles of up to 8 parts; 64 known angles tried for each",
-            Self::CommonFactors => "50 000 operations arranged over all trials",
-            Self::Identities => "plans up to 130 operations, 240 altogether; 4 rounds of 32 trials",
-            Self::CanonicalOrder | Self::StatementOrder => "near-linear",
-        }
-    }
-
-    /// What it leaves as it is.
-    pub const fn keeps(self) -> &'static str {
-        match self {
-            Self::QuadraticForm => "entries that are no derivatives of the energy",
-            Self::Balance => "all entries off the diagonal",
-            Self::OpenSums => "sums whose exact terms may cancel",
-            Self::AngleSums => "arguments that are no sums of angles with small whole coefficients",
-            Self::CommonFactors => "terms that something else uses",
-            Self::Identities => "operations that something else needs",
-            Self::CanonicalOrder | Self::Signs | Self::StatementOrder => "the number of operations",
-        }
-    }
-}
-
-/// The passes that run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Passes(u32);
-
-impl Passes {
-    /// All of them.
-    pub(crate) const ALL: Self = Self(u32::MAX);
-
-    /// All but one.
-    pub(crate) const fn without(pass: Pass) -> Self {
-        Self(u32::MAX & !(1 << pass as u32))
-    }
-
-    /// Whether this one runs.
-    pub(crate) const fn run(self, pass: Pass) -> bool {
-        self.0 & (1 << pass as u32) != 0
-    }
-}
+pub use crate::optimise::passes::Pass;

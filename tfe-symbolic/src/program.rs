@@ -7,10 +7,15 @@ pub(crate) mod cost;
 pub mod count;
 mod display;
 pub mod interpret;
+pub mod place;
+pub mod request;
 
+use crate::expr::comparison::Comparison;
 use crate::expr::function::Function;
 use crate::expr::input::{Affine, Input, LoopVariable};
-use crate::syntax::ast::Comparison;
+
+pub use place::{Array, Place};
+pub use request::{By, Request};
 
 /// A value computed by a program. Each is assigned once (accumulators: declared once, then added to or assigned).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -30,8 +35,6 @@ pub enum Operand {
 /// One operation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Operation {
-    /// `a` itself
-    Copy(Operand),
     /// `a + b`
     Add(Operand, Operand),
     /// `a − b`
@@ -61,85 +64,6 @@ pub enum Operation {
         /// The value elsewhere
         otherwise: Operand,
     },
-}
-
-/// Where a result goes. `z` is the velocity of a Lagrangian, the momentum of a Hamiltonian.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Output {
-    /// The energy function itself, L or H
-    Value,
-    /// ∂/∂z, one entry
-    ByZ(Affine),
-    /// ∂/∂q, one entry
-    ByQ(Affine),
-    /// Generalized force on one coordinate
-    Force(Affine),
-    /// ∂²/∂z∂z
-    ZZ(Affine, Affine),
-    /// ∂²/∂z∂q (row z, column q)
-    ZQ(Affine, Affine),
-    /// ∂²/∂q∂q
-    QQ(Affine, Affine),
-    /// ∂Q/∂z (row: coordinate of the force)
-    ForceZ(Affine, Affine),
-    /// ∂Q/∂q
-    ForceQ(Affine, Affine),
-    /// The observable of this number
-    Observable(usize),
-    /// φ of the constraint of this number
-    Phi(usize),
-    /// A, one entry of the row of a constraint
-    Row(usize, Affine),
-    /// a of a constraint
-    Drift(usize),
-    /// ∂ψ/∂q with ψ = A v + a, one entry of the row of a constraint
-    PsiQ(usize, Affine),
-    /// Ȧ, one entry of the row of a constraint
-    RowRate(usize, Affine),
-    /// ∂(Aᵀμ)/∂q
-    Bend(Affine, Affine),
-    /// ∂(Ȧᵀμ)/∂q
-    RateQ(Affine, Affine),
-    /// ∂(Ȧᵀμ)/∂v
-    RateV(Affine, Affine),
-    /// φ of one constraint of a model of run-time length
-    SitePhi(Affine),
-    /// A of a model of run-time length (row: constraint, column: coordinate)
-    SiteRow(Affine, Affine),
-    /// a of one constraint of a model of run-time length
-    SiteDrift(Affine),
-    /// An observable of a model of run-time length that has some by site
-    SiteObservable(Affine),
-}
-
-impl Output {
-    /// The entry so many rows and columns further; of all but the matrices of an energy, the entry itself.
-    pub fn further(&self, rows: i64, columns: i64) -> Self {
-        let sum = |index: &Affine, steps: i64| Affine {
-            constant: index.constant.saturating_add(steps),
-            ..index.clone()
-        };
-        self.mapped(|row, column| (sum(row, rows), sum(column, columns)))
-    }
-
-    /// The entry on the other side of the diagonal; of all but the matrices of an energy, the entry itself.
-    pub fn transposed(&self) -> Self {
-        self.mapped(|row, column| (column.clone(), row.clone()))
-    }
-
-    fn mapped(&self, change: impl Fn(&Affine, &Affine) -> (Affine, Affine)) -> Self {
-        match self {
-            Self::ZZ(row, column) => {
-                let (row, column) = change(row, column);
-                Self::ZZ(row, column)
-            }
-            Self::QQ(row, column) => {
-                let (row, column) = change(row, column);
-                Self::QQ(row, column)
-            }
-            other => other.clone(),
-        }
-    }
 }
 
 /// One step of a program.
@@ -196,7 +120,7 @@ pub enum Statement {
     /// `output = value`, or `output += value`
     Store {
         /// Where to
-        output: Output,
+        output: Place,
         /// What
         value: Operand,
         /// Add to what is there (the program has stored it before, or cleared the array: see [`Statement::Clear`])
@@ -206,21 +130,21 @@ pub enum Statement {
     /// so does the one on the other side of the diagonal of the array
     Balance {
         /// The first of the entries
-        output: Output,
+        output: Place,
         /// How many
         length: Affine,
     },
-    /// Sets a whole array of results (all its entries) to zero, before loops scatter into it; the indices are ignored
+    /// Sets a whole array of results (all its entries) to zero, before loops scatter into it
     Clear {
-        /// The array, named by any of its entries
-        output: Output,
+        /// The array
+        array: Array,
     },
 }
 
 impl Operation {
     fn operands(&self) -> Vec<&Operand> {
         match self {
-            Self::Copy(a) | Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
+            Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
             Self::Add(a, b)
             | Self::Subtract(a, b)
             | Self::Multiply(a, b)
@@ -239,7 +163,7 @@ impl Operation {
 
     fn operands_mut(&mut self) -> Vec<&mut Operand> {
         match self {
-            Self::Copy(a) | Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
+            Self::Negate(a) | Self::IntegerPower(a, _) => vec![a],
             Self::Add(a, b)
             | Self::Subtract(a, b)
             | Self::Multiply(a, b)
@@ -298,36 +222,6 @@ impl Statement {
         }
         targets.into_iter().for_each(change);
     }
-}
-
-/// What one kernel computes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub struct Request {
-    /// L or H
-    pub value: bool,
-    /// First derivatives and forces
-    pub first: bool,
-    /// ∂²/∂z∂z (the mass matrix of a Lagrangian)
-    pub mass: bool,
-    /// All second derivatives and the derivatives of the forces
-    pub second: bool,
-    /// The observables
-    pub observables: bool,
-    /// φ of the holonomic constraints
-    pub constraint_values: bool,
-    /// A and a of the constraints
-    pub constraint_rows: bool,
-    /// The derivatives of the constraints, with velocities and multipliers
-    pub constraint_second: bool,
-}
-
-/// By what the first derivatives and forces are differentiated once more, at fixed (q, z).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum By {
-    /// The time
-    Time,
-    /// The parameter of this number in `sensitivity(…)`
-    Parameter(usize),
 }
 
 /// A program ready to be interpreted, printed or emitted.

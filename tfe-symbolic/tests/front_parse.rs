@@ -3,8 +3,9 @@
 use proptest::prelude::*;
 use tfe_symbolic::compile::declare;
 use tfe_symbolic::diagnostic::{Bag, Span};
+use tfe_symbolic::expr::comparison::Comparison;
 use tfe_symbolic::syntax::ast::{
-    BinaryOperator, Comparison, ElementSyntax, Entry, Expr, ExprKind, Item, Pass, Range, Spanned,
+    BinaryOperator, ElementSyntax, Entry, Expr, ExprKind, Item, Pass, Range, Spanned,
 };
 use tfe_symbolic::syntax::context::Context;
 use tfe_symbolic::syntax::parse::{

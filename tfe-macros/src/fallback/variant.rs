@@ -1,6 +1,5 @@
 //! Stubs of models made from one whose declaration is wrong.
 
-use super::{Guess, implementations};
 use crate::emit::identifier;
 use crate::input::plain;
 use proc_macro2::{Ident, Literal, TokenStream};
@@ -38,6 +37,17 @@ impl Variant {
             added,
         }
     }
+
+    /// The number of coordinates that are left of those of the original, one at least.
+    pub(super) fn left(&self, dof: &TokenStream) -> TokenStream {
+        match dof.to_string().parse::<usize>() {
+            Ok(all) => {
+                let left = Literal::usize_unsuffixed(all.saturating_sub(self.gone).max(1));
+                quote!(#left)
+            }
+            Err(_) => dof.clone(),
+        }
+    }
 }
 
 /// The fields of numbers that it may have: those of the original, and those added.
@@ -54,22 +64,21 @@ fn fields(variant: &Variant, item: &DeriveInput) -> BTreeSet<Ident> {
     all.iter().map(|name| identifier(name)).collect()
 }
 
-/// A struct with the fields that are numbers, which can be used like the model.
-pub(super) fn stubs(variant: &Variant, item: &DeriveInput, guess: &Guess) -> TokenStream {
+/// A struct with the fields that are numbers, which can be used like the model with these implementations; of `all` coordinates of the
+/// original it has `left`.
+pub(super) fn stubs(
+    variant: &Variant,
+    item: &DeriveInput,
+    implementations: &TokenStream,
+    path: &TokenStream,
+    (all, left): (&TokenStream, &TokenStream),
+) -> TokenStream {
     let Variant { name, .. } = variant;
     let vis = &item.vis;
     let original = &item.ident;
-    let stub = DeriveInput {
-        ident: name.clone(),
-        ..item.clone()
-    };
-    let all = guess.dof.clone();
-    let guess = Guess {
-        dof: left(&guess.dof, variant.gone),
-        ..guess.clone()
-    };
-    let of_state = variant.is_projected.then(|| of_state(item, &all, &guess));
-    let implementations = implementations(&stub, &guess);
+    let of_state = variant
+        .is_projected
+        .then(|| of_state(item, path, (all, left)));
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
     let generics = &item.generics;
     let fields = fields(variant, item);
@@ -94,27 +103,19 @@ pub(super) fn stubs(variant: &Variant, item: &DeriveInput, guess: &Guess) -> Tok
     }
 }
 
-fn of_state(item: &DeriveInput, all: &TokenStream, guess: &Guess) -> TokenStream {
+fn of_state(
+    item: &DeriveInput,
+    path: &TokenStream,
+    (all, left): (&TokenStream, &TokenStream),
+) -> TokenStream {
     let (original, vis) = (&item.ident, &item.vis);
     let (_, type_generics, _) = item.generics.split_for_impl();
-    let Guess { path, dof, .. } = guess;
     quote! {
         #vis fn of_state(
             _: &#original #type_generics,
             _: &#path::__private::State<{ #all }>,
-        ) -> (Self, #path::__private::State<{ #dof }>) {
-            (::core::default::Default::default(), #path::__private::State { q: [0.0; #dof], p: [0.0; #dof] })
+        ) -> (Self, #path::__private::State<{ #left }>) {
+            (::core::default::Default::default(), #path::__private::State { q: [0.0; #left], p: [0.0; #left] })
         }
-    }
-}
-
-/// The number of coordinates that are left, one at least.
-fn left(dof: &TokenStream, frozen: usize) -> TokenStream {
-    match dof.to_string().parse::<usize>() {
-        Ok(all) => {
-            let left = Literal::usize_unsuffixed(all.saturating_sub(frozen).max(1));
-            quote!(#left)
-        }
-        Err(_) => dof.clone(),
     }
 }

@@ -1,27 +1,15 @@
 //! The observables of a model of run-time length: their kernel, their names, and one method for each.
 
 use super::sites::{self, Sites};
-use super::{Given, Kernels};
 use crate::emit;
 use proc_macro2::TokenStream;
 use quote::quote;
 use syn::Visibility;
 use tfe_symbolic::model::declared::Observable;
-use tfe_symbolic::program::Request;
 
-/// What an implementation of `FamilyModel` holds of observables: nothing where there are none.
-pub(super) fn members(kernels: &Kernels) -> TokenStream {
-    let observables = &kernels.declared.observables;
-    if observables.is_empty() {
-        return TokenStream::new();
-    }
+/// What an implementation of `FamilyModel` holds of observables, which `body` evaluates.
+pub(super) fn members(observables: &[Observable], body: &TokenStream) -> TokenStream {
     let names = observables.iter().map(|one| &one.name);
-    let request = Request {
-        observables: true,
-        ..Request::default()
-    };
-    let program = kernels.program(request);
-    let body = kernels.body(&program, Given::Nothing).statements;
     let by_site = observables.iter().any(|one| !one.ranges.is_empty());
     let cut = by_site.then(|| {
         quote! {

@@ -4,7 +4,7 @@ use crate::emit::{Emitter, index, less, loop_name};
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::expr::input::{Affine, IndexSymbol, Input};
-use tfe_symbolic::program::{Operand, Output, Program, Statement};
+use tfe_symbolic::program::{Array, Operand, Program, Statement};
 
 /// The only loop of a kernel, and the lowest coordinate that a turn touches, counted from the loop's index.
 #[derive(Clone, Copy, Debug)]
@@ -65,12 +65,10 @@ pub(crate) fn of(program: &Program, coordinates: &Affine) -> Option<Strides> {
 fn stored(statements: &[Statement]) -> Vec<&Affine> {
     let mut places = Vec::new();
     for statement in statements {
-        if let Statement::Store {
-            output: Output::ByQ(place),
-            ..
-        } = statement
+        if let Statement::Store { output, .. } = statement
+            && output.array == Array::ByQ
         {
-            places.push(place);
+            places.push(&output.row);
         }
     }
     places
@@ -85,10 +83,10 @@ fn beyond(place: &Affine, from: &Affine) -> Option<i64> {
 fn touched(statements: &[Statement]) -> impl Iterator<Item = &Affine> {
     statements.iter().flat_map(|statement| {
         let written = match statement {
-            Statement::Store {
-                output: Output::ByQ(place) | Output::ByZ(place) | Output::Force(place),
-                ..
-            } => Some(place),
+            Statement::Store { output, .. } => {
+                matches!(output.array, Array::ByQ | Array::ByZ | Array::Force)
+                    .then_some(&output.row)
+            }
             _ => None,
         };
         statement

@@ -5,13 +5,8 @@ use crate::diagnostic::{Bag, Kind, Role, nearest};
 use crate::model::declared::{Family, Rule, Solver};
 use crate::syntax::ast::{ElementSyntax, Name, Spanned};
 use crate::syntax::context::Context;
+use crate::vocabulary::{ELEMENTS, MAX_POINTS, RULES};
 
-/// The elements a solver can be specialised for.
-pub const ELEMENTS: &[&str] = &["Primal", "Mixed", "ThreeField", "EnergyConserving", "Radau"];
-/// The rules of quadrature.
-pub const RULES: &[&str] = &["reduced", "lobatto", "quadrature"];
-/// The most points a rule can have.
-pub const MAX_POINTS: u64 = 24;
 /// The most nodes an element can have.
 const MAX_NODES: u64 = 12;
 

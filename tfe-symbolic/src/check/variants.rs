@@ -4,9 +4,7 @@ use super::Model;
 use crate::diagnostic::{Bag, Kind, Role, nearest};
 use crate::syntax::ast::Name;
 use crate::syntax::context::Context;
-
-/// What can be done to a model.
-pub const PASSES: &[&str] = &["truncated", "frozen", "routh", "rigid", "elastic"];
+use crate::vocabulary::PASSES;
 
 impl Model {
     /// Names, and the words of the passes; their entries are formulas.

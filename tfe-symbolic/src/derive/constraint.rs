@@ -8,17 +8,16 @@
 //! The velocity v is a leaf of its own in models of both forms. The rate Ȧ = ∂A/∂q v + ∂A/∂t is taken with v as the rate of q, so that
 //! ∂Ȧ/∂v = ∂A/∂q and ∂Ȧ/∂q is the rate of ∂A/∂q: three of the five arrays of second derivatives come from one.
 
-mod sites;
+pub(crate) mod sites;
 
-use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::{Forward, derivative, gradient};
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
-use crate::expr::rewrite::Mapping;
 use crate::model::declared::{Constraint, ConstraintKind};
-pub(crate) use sites::entries as entries_by_site;
+use crate::program::{Array, Place};
 
 /// A and a of one constraint.
 pub(crate) struct Row {
@@ -233,17 +232,9 @@ fn slopes(graph: &mut Graph, of: ExprId, pick: Pick) -> Vec<(Affine, ExprId)> {
 
 /// The expression with all velocities zero.
 fn at_rest(graph: &mut Graph, of: ExprId) -> ExprId {
-    let zero = graph.constant(Constant::ZERO);
-    let mut mapping = Mapping::default();
-    for id in graph.reachable(&[of]) {
-        let node = graph.node(id).clone();
-        let new = match &node {
-            Node::Input(Input::Velocity(_)) => zero,
-            node => graph.remake(node, &mapping),
-        };
-        mapping.set(id, new);
-    }
-    mapping.of(of)
+    graph.with_leaves(of, &mut |graph, input| {
+        matches!(input, Input::Velocity(_)).then(|| graph.constant(Constant::ZERO))
+    })
 }
 
 fn is_zero(graph: &Graph, id: ExprId) -> bool {

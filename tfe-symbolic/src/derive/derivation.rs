@@ -10,19 +10,16 @@
 use std::collections::BTreeMap;
 
 use crate::derive::constraint;
-use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::entry::Entry;
 use crate::derive::quadratic::{self, Writing};
-use crate::derive::sensitivity::{Leaf, entries_by};
 use crate::derive::structure::Structure;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::{Forward, gradient};
 use crate::expr::graph::{ExprId, Graph, Node, SumRange};
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 use crate::model::declared::{Constraint, Declared, Force, Form, Observable, Parameter};
-use crate::pipeline::select_plan::Draft;
-use crate::pipeline::{Pass, Passes};
-use crate::program::count::Counts;
-use crate::program::{By, Program, Request};
+use crate::optimise::passes::{Pass, Passes};
+use crate::program::{Array, Place};
 
 /// What is differentiated.
 #[derive(Clone, Debug)]
@@ -87,13 +84,13 @@ impl From<&Declared> for Model {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Derivation {
-    graph: Graph,
-    entries: Vec<Entry>,
+    pub(crate) graph: Graph,
+    pub(crate) entries: Vec<Entry>,
     /// The same in other ways: by the chain rule backward, by the matrix of an energy that is quadratic in z.
-    written: Vec<Vec<Entry>>,
+    pub(crate) written: Vec<Vec<Entry>>,
     structure: Structure,
-    sensitivities: Vec<Parameter>,
-    passes: Passes,
+    pub(crate) sensitivities: Vec<Parameter>,
+    pub(crate) passes: Passes,
 }
 
 impl Derivation {
@@ -142,7 +139,7 @@ impl Derivation {
         deriver.observables(&observables);
         let mut entries = deriver.entries;
         let constrain = match dof.is_of_run_time() {
-            true => constraint::entries_by_site,
+            true => constraint::sites::entries,
             false => constraint::entries,
         };
         entries.extend(constrain(&mut graph, &constraints));
@@ -177,99 +174,6 @@ impl Derivation {
         }
     }
 
-    /// The program of a kernel.
-    pub fn program(&self, request: Request) -> Program {
-        self.program_of(|array| array.is_wanted(request))
-    }
-
-    /// The program of ∂/∂q and of the forces alone: what the equations M q̈ = f ask for.
-    pub fn forces(&self) -> Program {
-        self.program_of(|array| matches!(array, Array::ByQ | Array::Force))
-    }
-
-    /// The program of H as declared, as the value of the energy function, of a model with a time transformation; the time is its last
-    /// coordinate.
-    ///
-    /// Nothing for models without one.
-    ///
-    /// ```
-    /// use tfe_symbolic::compile::declare;
-    /// use tfe_symbolic::syntax::context::Context;
-    /// use tfe_symbolic::derive::derivation::Derivation;
-    /// use tfe_symbolic::program::Request;
-    ///
-    /// let text = "coordinates(q), momenta(p), hamiltonian = p^2 - q*t, time_transformation = 2 + q";
-    /// let declared = declare(text, &Context::default()).expect("no mistakes in it");
-    /// let hamiltonian = Derivation::hamiltonian(&declared).expect("a time transformation");
-    /// assert_eq!(
-    ///     hamiltonian.to_string(),
-    ///     "t0 = q[0] * q[1]\n\
-    ///      t1 = p[0] * p[0]\n\
-    ///      t2 = t1 - t0\n\
-    ///      E = t2\n"
-    /// );
-    /// ```
-    pub fn hamiltonian(declared: &Declared) -> Option<Program> {
-        let transformation = declared.time_transformation?;
-        let entry = Entry {
-            nest: Vec::new(),
-            place: Place::scalar(Array::Value),
-            value: transformation.hamiltonian,
-        };
-        let draft = Draft::of(declared.graph.clone(), vec![entry], Passes::ALL);
-        Some(Draft::best(vec![draft]))
-    }
-
-    fn program_of(&self, is_wanted: impl Fn(Array) -> bool) -> Program {
-        let draft = |entries: &Vec<Entry>| {
-            let wanted = entries.iter().filter(|entry| is_wanted(entry.place.array));
-            Draft::of(self.graph.clone(), wanted.cloned().collect(), self.passes)
-        };
-        let plain = std::iter::once(&self.entries);
-        Draft::best(plain.chain(&self.written).map(draft).collect())
-    }
-
-    /// The program of the first derivatives and forces differentiated once more, partially at fixed (q, z):
-    ///
-    /// ```text
-    /// ∂E_z/∂a, ∂E_q/∂a, ∂Q/∂a     in the places of E_z, E_q, Q;  a: a parameter of `sensitivity(…)`, or the time
-    /// ```
-    ///
-    /// Empty for the number of no such parameter.
-    ///
-    /// ```
-    /// use tfe_symbolic::compile::declare;
-    /// use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
-    /// use tfe_symbolic::derive::derivation::Derivation;
-    /// use tfe_symbolic::program::By;
-    ///
-    /// let k = Field { name: "k".to_owned(), kind: FieldKind::Scalar };
-    /// let context = Context { fields: vec![k], ..Context::default() };
-    /// let text = "coordinates(x), lagrangian = dot(x)^2/2 - k^2*x^2/2, force(x) = k*cos(t), sensitivity(k)";
-    /// let derivation = Derivation::of(&declare(text, &context).expect("no mistakes in it"));
-    /// assert_eq!(
-    ///     derivation.program_by(By::Parameter(0)).to_string(),
-    ///     "t0 = cos(t)\n\
-    ///      Q[0] = t0\n\
-    ///      t1 = 2 * q[0]\n\
-    ///      t2 = k * t1\n\
-    ///      t3 = -t2\n\
-    ///      E_q[0] = t3\n"
-    /// );
-    /// ```
-    pub fn program_by(&self, by: By) -> Program {
-        let leaf = match by {
-            By::Time => Leaf::Time,
-            By::Parameter(number) => match self.sensitivities.get(number) {
-                Some(parameter) => Leaf::Parameter(parameter),
-                None => return Program::default(),
-            },
-        };
-        let mut graph = self.graph.clone();
-        let entries = entries_by(&mut graph, &self.entries, leaf);
-        Draft::best(vec![Draft::of(graph, entries, self.passes)])
-    }
-
     /// Whether ∂/∂z of the energy function holds the time.
     pub fn momenta_move(&self) -> bool {
         let momenta = self
@@ -283,11 +187,6 @@ impl Derivation {
     /// What is known about the model.
     pub fn structure(&self) -> &Structure {
         &self.structure
-    }
-
-    /// The operations of [`Derivation::program`].
-    pub fn counts(&self, request: Request) -> Counts {
-        Counts::of(&self.program(request))
     }
 }
 

@@ -10,13 +10,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::gradient;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input};
-use crate::expr::rewrite::Mapping;
+use crate::program::{Array, Place};
 
 /// M, b, U and the variables.
 struct Parts {
@@ -94,19 +94,10 @@ impl Slopes {
 
 /// The expression at z = 0.
 fn at_rest(graph: &mut Graph, x: ExprId) -> ExprId {
-    let mut mapping = Mapping::default();
-    for old in graph.reachable(&[x]) {
-        let node = graph.node(old).clone();
-        let new = if is_z(graph, old) {
-            graph.constant(Constant::ZERO)
-        } else if node.children().iter().all(|x| mapping.of(*x) == *x) {
-            old
-        } else {
-            graph.remake(&node, &mapping)
-        };
-        mapping.set(old, new);
-    }
-    mapping.of(x)
+    graph.with_leaves(x, &mut |graph, input| {
+        matches!(input, Input::Velocity(_) | Input::Momentum(_))
+            .then(|| graph.constant(Constant::ZERO))
+    })
 }
 
 /// Whether z stands in sums and products only. Beside |z| or a choice, second derivatives free of z do not make the first ones linear.

@@ -8,13 +8,14 @@
 //!
 //! as a choice and not as a product with zero or one, so that other elements at which f′ is infinite do no harm.
 
-use crate::derive::entry::{Array, Entry};
+use crate::derive::entry::Entry;
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::gradient;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
 use crate::model::declared::Parameter;
-use crate::syntax::ast::Comparison;
+use crate::program::Array;
 
 /// What is differentiated by.
 #[derive(Clone, Copy, Debug)]

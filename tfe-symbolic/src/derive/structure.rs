@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use crate::derive::entry::{Array, Entry};
+use crate::derive::entry::Entry;
 use crate::expr::graph::{ExprId, Graph};
 use crate::expr::input::{Affine, Input};
 use crate::model::declared::Form;
+use crate::program::Array;
 
 /// Where a block of second derivatives can be non-zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -75,6 +76,7 @@ impl Dependence {
                     Input::Coordinate(_) => found.q = true,
                     Input::Velocity(_) | Input::Momentum(_) => found.z = true,
                     Input::Multiplier(_)
+                    | Input::Placeholder(..)
                     | Input::Parameter(_)
                     | Input::ParameterElement(..)
                     | Input::Integer(_) => {}

@@ -1,7 +1,8 @@
 //! What is said of each kind of mistake: all wording is here.
 
-use super::Kind;
+use crate::diagnostic::kind::Kind;
 use crate::expr::function::{Domain, Function};
+use crate::vocabulary::{self, Argument};
 
 impl Kind {
     /// What is wrong: lower case, names in backticks, no full stop.
@@ -346,7 +347,7 @@ impl Kind {
                 format!("did you mean `{nearest}`?")
             }
             Self::UnknownArgument { nearest: None, .. } => {
-                format!("the arguments are {}", backticked(crate::syntax::parse::ARGUMENTS))
+                format!("the arguments are {}", backticked(&Argument::all().map(Argument::word).collect::<Vec<_>>()))
             }
             Self::UnknownSymbol {
                 nearest: None,
@@ -355,10 +356,10 @@ impl Kind {
                 format!("declare `{name}` as a field of the struct, a coordinate or a `let`")
             }
             Self::UnknownElement { nearest: None, .. } => {
-                format!("the elements are {}", backticked(crate::check::ELEMENTS))
+                format!("the elements are {}", backticked(vocabulary::ELEMENTS))
             }
             Self::UnknownRule { nearest: None, .. } => {
-                format!("the rules are {}", backticked(crate::check::RULES))
+                format!("the rules are {}", backticked(vocabulary::RULES))
             }
             Self::UnknownLength {
                 nearest: None,
@@ -478,7 +479,7 @@ impl Kind {
             Self::RepeatedParameter { .. } => "name it once".into(),
             Self::NoPass { name } => format!("say what to do, as in `model({name}, truncated(2))`"),
             Self::UnknownPass { nearest: None, .. } => {
-                format!("the passes are {}", backticked(crate::check::PASSES))
+                format!("the passes are {}", backticked(vocabulary::PASSES))
             }
             Self::PassEntry { pass } => format!("write it like `{}`", usage(pass)),
             Self::TruncationDegree { .. } => "write `truncated(2)` for a linear model".into(),
@@ -561,7 +562,7 @@ impl Kind {
             ),
             Self::NodesOutOfRange { .. } => "choose 2 to 12 nodes".into(),
             Self::PointsOutOfRange { .. } => {
-                format!("choose 1 to {} points", crate::check::MAX_POINTS)
+                format!("choose 1 to {} points", vocabulary::MAX_POINTS)
             }
             Self::RuleNotForFamily { .. } => "use `.quadrature(k)`".into(),
             Self::SolverOfFamily { .. } => {

@@ -76,9 +76,12 @@ impl Graph {
         let depth = depth.checked_sub(1)?;
         match self.node(id) {
             Node::Constant(value) => Some(Sign::Positive.times(*value)),
-            Node::Input(Input::Parameter(_) | Input::ParameterElement(..) | Input::Integer(_)) => {
-                Some(Sign::Positive)
-            }
+            Node::Input(
+                Input::Placeholder(..)
+                | Input::Parameter(_)
+                | Input::ParameterElement(..)
+                | Input::Integer(_),
+            ) => Some(Sign::Positive),
             Node::Input(_) => Some(Sign::Any),
             Node::Call {
                 function: Function::Abs,

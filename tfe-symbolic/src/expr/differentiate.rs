@@ -113,7 +113,7 @@ impl Forward {
     fn chosen(
         &self,
         graph: &mut Graph,
-        (comparison, left, right): (crate::syntax::ast::Comparison, ExprId, ExprId),
+        (comparison, left, right): (crate::expr::comparison::Comparison, ExprId, ExprId),
         then: Option<ExprId>,
         otherwise: Option<ExprId>,
     ) -> Option<ExprId> {

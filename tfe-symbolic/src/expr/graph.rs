@@ -5,11 +5,11 @@
 
 use std::fmt;
 
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input, LoopVariable};
-use crate::syntax::ast::Comparison;
 
 /// An expression of a [`Graph`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -262,6 +262,16 @@ impl Graph {
         self.reachable(&[id]).into_iter().filter_map(leaf).collect()
     }
 
+    /// Whether an index of a coordinate, velocity or momentum in an expression depends on a loop.
+    pub(crate) fn holds_varying_index(&self, id: ExprId) -> bool {
+        self.inputs_of(id).iter().any(|input| match input {
+            Input::Coordinate(at) | Input::Velocity(at) | Input::Momentum(at) => {
+                at.as_constant().is_none()
+            }
+            _ => false,
+        })
+    }
+
     /// `c` and `x` with `id` = c x, where x is no multiple.
     pub(crate) fn as_multiple(&self, id: ExprId) -> (Constant, ExprId) {
         match self.node(id) {
@@ -295,6 +305,7 @@ impl Input {
             | Self::Velocity(index)
             | Self::Momentum(index)
             | Self::Multiplier(index)
+            | Self::Placeholder(_, index)
             | Self::ParameterElement(_, index)
             | Self::Integer(index) => Some(index),
         }
@@ -308,6 +319,7 @@ impl Input {
             Self::Velocity(_) => Self::Velocity(index),
             Self::Momentum(_) => Self::Momentum(index),
             Self::Multiplier(_) => Self::Multiplier(index),
+            Self::Placeholder(number, _) => Self::Placeholder(*number, index),
             Self::ParameterElement(name, _) => Self::ParameterElement(name.clone(), index),
             Self::Integer(_) => Self::Integer(index),
         }
@@ -430,16 +442,11 @@ fn pieces(node: &Node, parenthesised: bool) -> Vec<Piece> {
             then,
             otherwise,
         } => {
-            let sign = match comparison {
-                Comparison::Less => " < ",
-                Comparison::LessOrEqual => " <= ",
-                Comparison::Greater => " > ",
-                Comparison::GreaterOrEqual => " >= ",
-            };
+            let sign = format!(" {} ", comparison.symbol());
             pieces.extend([
                 text("select("),
                 whole(left),
-                text(sign),
+                text(&sign),
                 whole(right),
                 text(", "),
             ]);

@@ -1,14 +1,128 @@
-//! Hash tables of small keys. The engine runs inside of compilers, often not optimised itself, where the hash of the standard library, made
-//! against chosen keys, takes much of the time; here one product a word does. Nothing may depend on the order of such a table.
+//! Hash tables of small keys, which cannot be iterated over: nothing can depend on their order, so that programs are always the same.
+//!
+//! The engine runs inside of compilers, often not optimised itself, where the hash of the standard library, made against chosen keys, takes
+//! much of the time; here one product a word does.
 
+use std::borrow::Borrow;
+use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
-use std::hash::{BuildHasherDefault, Hasher};
+use std::hash::{BuildHasherDefault, Hash, Hasher};
+use std::ops::Index;
 
-/// A map without a useful order.
-pub(crate) type Map<K, V> = HashMap<K, V, BuildHasherDefault<Mixer>>;
+/// A map without an order.
+#[derive(Clone, Debug)]
+pub(crate) struct Map<K, V>(HashMap<K, V, BuildHasherDefault<Mixer>>);
 
-/// A set without a useful order.
-pub(crate) type Set<K> = HashSet<K, BuildHasherDefault<Mixer>>;
+/// A set without an order.
+#[derive(Clone, Debug)]
+pub(crate) struct Set<K>(HashSet<K, BuildHasherDefault<Mixer>>);
+
+impl<K: Eq + Hash, V> Map<K, V> {
+    /// The value of a key.
+    pub(crate) fn get<Q: Eq + Hash + ?Sized>(&self, key: &Q) -> Option<&V>
+    where
+        K: Borrow<Q>,
+    {
+        self.0.get(key)
+    }
+
+    /// The value of a key, to be changed.
+    pub(crate) fn get_mut<Q: Eq + Hash + ?Sized>(&mut self, key: &Q) -> Option<&mut V>
+    where
+        K: Borrow<Q>,
+    {
+        self.0.get_mut(key)
+    }
+
+    /// Whether a key has a value.
+    pub(crate) fn contains_key<Q: Eq + Hash + ?Sized>(&self, key: &Q) -> bool
+    where
+        K: Borrow<Q>,
+    {
+        self.0.contains_key(key)
+    }
+
+    /// Gives a key a value, and returns the one it had.
+    pub(crate) fn insert(&mut self, key: K, value: V) -> Option<V> {
+        self.0.insert(key, value)
+    }
+
+    /// Takes the value of a key away.
+    pub(crate) fn remove<Q: Eq + Hash + ?Sized>(&mut self, key: &Q) -> Option<V>
+    where
+        K: Borrow<Q>,
+    {
+        self.0.remove(key)
+    }
+
+    /// The place of a key, whether it has a value or not.
+    pub(crate) fn entry(&mut self, key: K) -> Entry<'_, K, V> {
+        self.0.entry(key)
+    }
+
+    /// Takes the values of keys away that are not to be kept.
+    pub(crate) fn retain(&mut self, keep: impl Fn(&K) -> bool) {
+        self.0.retain(|key, _| keep(key));
+    }
+
+    /// How many keys have a value.
+    pub(crate) fn len(&self) -> usize {
+        self.0.len()
+    }
+}
+
+impl<K: Eq + Hash> Set<K> {
+    /// Whether an element is in it.
+    pub(crate) fn contains<Q: Eq + Hash + ?Sized>(&self, element: &Q) -> bool
+    where
+        K: Borrow<Q>,
+    {
+        self.0.contains(element)
+    }
+
+    /// Adds an element; whether it is a new one.
+    pub(crate) fn insert(&mut self, element: K) -> bool {
+        self.0.insert(element)
+    }
+}
+
+impl<K, V> Default for Map<K, V> {
+    fn default() -> Self {
+        Self(HashMap::default())
+    }
+}
+
+impl<K> Default for Set<K> {
+    fn default() -> Self {
+        Self(HashSet::default())
+    }
+}
+
+impl<K: Eq + Hash, V> Index<&K> for Map<K, V> {
+    type Output = V;
+
+    fn index(&self, key: &K) -> &V {
+        &self.0[key]
+    }
+}
+
+impl<K: Eq + Hash, V> FromIterator<(K, V)> for Map<K, V> {
+    fn from_iter<T: IntoIterator<Item = (K, V)>>(pairs: T) -> Self {
+        Self(pairs.into_iter().collect())
+    }
+}
+
+impl<K: Eq + Hash> Extend<K> for Set<K> {
+    fn extend<T: IntoIterator<Item = K>>(&mut self, elements: T) {
+        self.0.extend(elements);
+    }
+}
+
+impl<K: Eq + Hash> FromIterator<K> for Set<K> {
+    fn from_iter<T: IntoIterator<Item = K>>(elements: T) -> Self {
+        Self(elements.into_iter().collect())
+    }
+}
 
 /// Mixes words by products.
 #[derive(Clone, Copy, Debug, Default)]
@@ -81,7 +195,7 @@ mod tests {
             key(&mut hasher);
             hasher.finish()
         };
-        let mut found = Set::default();
+        let mut found = std::collections::BTreeSet::new();
         for a in 0..64_u32 {
             for b in 0..64_i128 {
                 found.insert(hash(&|hasher| (a, b - 32).hash(hasher)));

@@ -41,6 +41,8 @@ pub enum Input {
     Momentum(Affine),
     /// The multiplier of the constraint of this number.
     Multiplier(Affine),
+    /// Stands for an expression while others are made, by a number and an index; kernels are given none.
+    Placeholder(u32, Affine),
     /// A scalar field of the struct.
     Parameter(String),
     /// An element of an array field of the struct.
@@ -192,6 +194,7 @@ impl fmt::Display for Input {
             Self::Velocity(index) => write!(f, "v[{index}]"),
             Self::Momentum(index) => write!(f, "p[{index}]"),
             Self::Multiplier(number) => write!(f, "mu[{number}]"),
+            Self::Placeholder(number, index) => write!(f, "placeholder {number}[{index}]"),
             Self::Parameter(name) => f.write_str(name),
             Self::ParameterElement(name, index) => write!(f, "{name}[{index}]"),
             Self::Integer(value) => write!(f, "({value})"),

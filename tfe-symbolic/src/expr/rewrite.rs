@@ -4,7 +4,6 @@ use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node, SumRange, TooLong};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
-use crate::model::declared::Force;
 
 /// The most terms that [`Graph::unroll`] writes out, over all sums of an expression.
 pub(crate) const UNROLL_LIMIT: u64 = 4096;
@@ -289,25 +288,6 @@ pub(crate) fn substitute(affine: &Affine, variable: LoopVariable, value: &Affine
         }
     }
     sum
-}
-
-/// The force on each coordinate that it acts on, where its ranges are literal.
-pub(crate) fn written_out(graph: &mut Graph, force: &Force) -> Vec<(Affine, ExprId)> {
-    let mut forces = vec![(force.target.clone(), force.value)];
-    for range in &force.ranges {
-        let turns = range.start.as_constant().zip(range.end.as_constant());
-        let (start, end) = turns.unwrap_or_default();
-        let mut each = Vec::new();
-        for at in (start..end).map(Affine::constant) {
-            for (target, value) in &forces {
-                let target = substitute(target, range.variable, &at);
-                let value = graph.substitute_loop(*value, range.variable, &at);
-                each.push((target, value));
-            }
-        }
-        forces = each;
-    }
-    forces
 }
 
 #[cfg(test)]

@@ -22,10 +22,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::{Function, Parity};
 use crate::expr::graph::{ExprId, Graph, Node, SumRange};
-use crate::syntax::ast::Comparison;
 
 /// Products of more factors than this stay nested: opening them would make the derivative of a deep composition quadratic in its depth.
 const LONG_PRODUCT: usize = 16;
@@ -158,8 +158,8 @@ impl Graph {
         otherwise: ExprId,
     ) -> ExprId {
         let decided = match (self.as_constant(left), self.as_constant(right)) {
-            (Some(a), Some(b)) => Some(holds(comparison, a.to_f64(), b.to_f64())),
-            _ if left == right => Some(holds(comparison, 0.0, 0.0)),
+            (Some(a), Some(b)) => Some(comparison.holds(a.to_f64(), b.to_f64())),
+            _ if left == right => Some(comparison.holds(0.0, 0.0)),
             _ => None,
         };
         match decided {
@@ -295,7 +295,7 @@ fn fold(function: Function, arguments: &[Constant]) -> Option<Constant> {
         (Function::Sqrt, [x]) if x.exact_sqrt().is_some() => x.exact_sqrt(),
         (Function::Abs, [x]) => Some(x.abs()),
         (Function::Min | Function::Max, [x, y]) => {
-            let first = holds(function.takes_first(), x.to_f64(), y.to_f64());
+            let first = function.takes_first().holds(x.to_f64(), y.to_f64());
             Some(if first { *x } else { *y })
         }
         _ => {
@@ -303,16 +303,6 @@ fn fold(function: Function, arguments: &[Constant]) -> Option<Constant> {
             let value = function.evaluate(&values);
             value.is_finite().then(|| Constant::float(value))
         }
-    }
-}
-
-/// Whether `a comparison b` holds.
-pub(crate) fn holds(comparison: Comparison, a: f64, b: f64) -> bool {
-    match comparison {
-        Comparison::Less => a < b,
-        Comparison::LessOrEqual => a <= b,
-        Comparison::Greater => a > b,
-        Comparison::GreaterOrEqual => a >= b,
     }
 }
 

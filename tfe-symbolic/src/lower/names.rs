@@ -1,12 +1,14 @@
 //! Names and elements of arrays.
 
 use super::{DotRule, Index, Lowerer, Value};
-use crate::check::{MAX_COORDINATES, Slots, Symbol, function_names, is_function};
+use crate::check::{MAX_COORDINATES, Slots, Symbol};
 use crate::diagnostic::{Kind, Span, nearest};
 use crate::expr::constant::Constant;
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 use crate::syntax::ast::{Expr, ExprKind};
 use crate::syntax::context::{FieldKind, Length};
+use crate::vocabulary::function_names;
+use crate::vocabulary::is_function;
 
 /// Where the elements of an indexed array come from.
 enum Array {

@@ -239,7 +239,10 @@ impl Lowerer<'_> {
             lowerer.no_loop(id, value.span)
         })?;
         let is_fixed = |input: &Input| match input {
-            Input::Parameter(_) | Input::ParameterElement(..) | Input::Integer(_) => true,
+            Input::Placeholder(..)
+            | Input::Parameter(_)
+            | Input::ParameterElement(..)
+            | Input::Integer(_) => true,
             Input::Time => pass == "frozen",
             Input::Coordinate(_)
             | Input::Velocity(_)

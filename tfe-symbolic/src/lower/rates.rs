@@ -1,13 +1,11 @@
 //! `dot()`: the total time derivative, by the chain rule.
 
 use super::{DotRule, Lowerer, Value};
-use crate::check::{Model, Symbol};
 use crate::diagnostic::{Kind, Span};
 use crate::expr::differentiate::{derivative, directional};
-use crate::expr::graph::{ExprId, Node};
+use crate::expr::graph::ExprId;
 use crate::expr::input::{Affine, Input};
-use crate::expr::rewrite::Mapping;
-use crate::syntax::ast::{Expr, ExprKind};
+use crate::syntax::ast::Expr;
 
 /// What goes wrong in a total derivative.
 #[derive(Default)]
@@ -69,6 +67,7 @@ impl Lowerer<'_> {
                 None
             }
             Input::Multiplier(_)
+            | Input::Placeholder(..)
             | Input::Parameter(_)
             | Input::ParameterElement(..)
             | Input::Integer(_) => None,
@@ -93,50 +92,12 @@ impl Lowerer<'_> {
         let velocity = Input::Velocity(Affine::constant(at));
         let slope = derivative(&mut self.graph, dissipation, &velocity);
         let force = self.graph.negate(slope);
-        let mut mapping = Mapping::default();
-        for id in self.graph.reachable(&[force]) {
-            let node = self.graph.node(id).clone();
-            let new = match &node {
-                Node::Input(Input::Velocity(at)) => {
-                    derivative(&mut self.graph, energy, &Input::Momentum(at.clone()))
+        self.graph
+            .with_leaves(force, &mut |graph, input| match input {
+                Input::Velocity(at) => {
+                    Some(derivative(graph, energy, &Input::Momentum(at.clone())))
                 }
-                node => self.graph.remake(node, &mapping),
-            };
-            mapping.set(id, new);
-        }
-        mapping.of(force)
+                _ => None,
+            })
     }
-}
-
-/// Which `let`s hold a `dot()`, themselves or by those before them.
-pub(super) fn lets_with_rates(model: &Model) -> Vec<bool> {
-    let mut rates = Vec::with_capacity(model.lets.len());
-    for (_, value) in &model.lets {
-        let found = holds_rate(value, model, &rates);
-        rates.push(found);
-    }
-    rates
-}
-
-fn holds_rate(expr: &Expr, model: &Model, rates: &[bool]) -> bool {
-    let mut stack = vec![expr];
-    while let Some(expr) = stack.pop() {
-        match &expr.node {
-            ExprKind::Call { function, .. }
-                if matches!(function.node.as_str(), "dot" | "body_rate") =>
-            {
-                return true;
-            }
-            ExprKind::Name(name) => {
-                if let Some(Symbol::Let(at)) = model.symbols.get(name)
-                    && rates.get(*at).copied().unwrap_or(false)
-                {
-                    return true;
-                }
-            }
-            _ => {}
-        }
-        stack.extend(expr.children());
-    }
-    false
 }

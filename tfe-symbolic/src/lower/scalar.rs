@@ -1,13 +1,14 @@
 //! Operators and functions.
 
 use super::{Lowerer, Value};
-use crate::check::SPECIAL_FUNCTIONS;
 use crate::diagnostic::{Kind, Span};
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::{Domain, Function};
 use crate::expr::graph::ExprId;
 use crate::expr::input::Input;
-use crate::syntax::ast::{BinaryOperator, Comparison, Expr, ExprKind, Name};
+use crate::syntax::ast::{BinaryOperator, Expr, ExprKind, Name};
+use crate::vocabulary::SPECIAL_FUNCTIONS;
 
 impl Lowerer<'_> {
     /// `a + b - c …`: a chain leans left, and its length must not cost stack.

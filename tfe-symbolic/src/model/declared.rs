@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::expr::graph::{ExprId, Graph, SumRange};
 use crate::expr::input::{Affine, IndexSymbol};
+use crate::expr::rewrite::substitute;
 use crate::model::notation::Notation;
 
 /// Which energy function declares the model.
@@ -117,6 +118,27 @@ pub struct Force {
     pub target: Affine,
     /// Its value.
     pub value: ExprId,
+}
+
+impl Force {
+    /// The force on each coordinate that it acts on, where its ranges are literal.
+    pub(crate) fn written_out(&self, graph: &mut Graph) -> Vec<(Affine, ExprId)> {
+        let mut forces = vec![(self.target.clone(), self.value)];
+        for range in &self.ranges {
+            let turns = range.start.as_constant().zip(range.end.as_constant());
+            let (start, end) = turns.unwrap_or_default();
+            let mut each = Vec::new();
+            for at in (start..end).map(Affine::constant) {
+                for (target, value) in &forces {
+                    let target = substitute(target, range.variable, &at);
+                    let value = graph.substitute_loop(*value, range.variable, &at);
+                    each.push((target, value));
+                }
+            }
+            forces = each;
+        }
+        forces
+    }
 }
 
 /// What a motion shows beside its state; in models of run-time length one number for each site of a range.

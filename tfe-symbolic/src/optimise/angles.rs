@@ -32,10 +32,7 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::Input;
 use crate::expr::rewrite::Mapping;
 use crate::optimise::binarize::arrange;
-use choice::{Choice, How, Need, choose};
-
-/// An angle, `Σ n x`: atoms in order, n ≠ 0, the first n positive. A number is an atom like the others.
-pub(crate) type Angle = Vec<(ExprId, i64)>;
+use choice::{Angle, Choice, How, Need, canonical, choose};
 
 /// The larger Σ |n|, the more steps; beyond this an angle is left alone.
 const LARGEST: u64 = 8;
@@ -180,15 +177,6 @@ fn read(graph: &mut Graph, argument: ExprId) -> Option<(Angle, bool)> {
         return None;
     }
     Some(canonical(parts.into_iter().collect()))
-}
-
-/// The angle or its opposite, whichever begins with a positive coefficient; and whether it is the opposite.
-fn canonical(mut angle: Angle) -> (Angle, bool) {
-    let negative = angle.first().is_some_and(|(_, n)| *n < 0);
-    if negative {
-        angle.iter_mut().for_each(|(_, n)| *n = -*n);
-    }
-    (angle, negative)
 }
 
 /// Sine and cosine of each angle of the choice.

@@ -15,10 +15,7 @@ use crate::expr::hash::Map;
 use crate::optimise::cse::{self, Item, Kind, Operands, Pair};
 use crate::optimise::plan::{Op, Plan, Value};
 use demand::{Multiple, ONE, PositiveConstant, Terms, demanded, gather, multiple};
-use fractions::{Factors, Fractions};
-
-/// Larger powers are left to the method that computes integer powers.
-const LARGEST_PRODUCT_POWER: u32 = 64;
+use fractions::{Factors, Fractions, LARGEST_PRODUCT_POWER};
 
 /// Arranges what the roots need.
 pub(crate) fn arrange(graph: &Graph, roots: &[ExprId]) -> Plan {

@@ -19,7 +19,7 @@ mod tests;
 use crate::expr::constant::Constant;
 use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::{Changes, Formula, rebuild};
-use search::{Candidate, Search};
+use search::{Candidate, Search, weight};
 
 /// Larger plans are left as they are.
 const LARGEST: usize = 130;
@@ -77,10 +77,6 @@ fn improved(
 /// The cost of a plan, that of loops by the turns that short ones have.
 fn cost(plan: &Plan) -> usize {
     plan.ids().map(|id| weight(plan, id)).sum()
-}
-
-fn weight(plan: &Plan, id: OpId) -> usize {
-    plan.cost_of(id) << (3 * plan.loops_of(id).count_ones())
 }
 
 /// Whether a formula needs the operation that it is to replace, with the changes so far.

@@ -1,12 +1,14 @@
 //! Operations of two operands, hash-consed: what is left to do is to put them in order.
 
+use std::collections::BTreeMap;
+
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, SumRange, loop_bit, loops_in};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input};
 use crate::program::cost;
-use crate::syntax::ast::Comparison;
 
 /// An operation of a [`Plan`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -59,7 +61,7 @@ pub(crate) struct Plan {
     /// Whether there is a sum over a range in it.
     reduces: Vec<bool>,
     known: Map<Op, OpId>,
-    values: Map<ExprId, Value>,
+    values: BTreeMap<ExprId, Value>,
 }
 
 impl Plan {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::derive::entry::{Array, Entry};
+use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph};
 use crate::optimise::angles::expand_angles;
@@ -11,10 +11,10 @@ use crate::optimise::canonical_order::with_like_operations_alike;
 use crate::optimise::factor::{BUDGET, take_out_factors};
 use crate::optimise::guard::Guard;
 use crate::optimise::identities::by_identities;
+use crate::optimise::passes::{Pass, Passes};
 use crate::optimise::plan::Plan;
 use crate::optimise::signs::with_fewer_negations;
-use crate::pipeline::{Pass, Passes};
-use crate::program::Program;
+use crate::program::{Array, Program};
 use crate::schedule::balance::{Balance, balances};
 use crate::schedule::loop_nest::Block;
 use crate::schedule::order::in_order;

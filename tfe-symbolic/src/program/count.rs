@@ -54,7 +54,6 @@ impl Counts {
 
     fn note(&mut self, operation: &Operation) {
         let counter = match operation {
-            Operation::Copy(_) => return,
             Operation::Add(..) | Operation::Subtract(..) => &mut self.additions,
             Operation::Multiply(..) => &mut self.multiplications,
             Operation::Divide(..) => &mut self.divisions,
@@ -141,7 +140,7 @@ impl fmt::Display for Counts {
 mod tests {
     use super::*;
     use crate::expr::input::{Affine, Input};
-    use crate::program::{Operand, Output, Temporary};
+    use crate::program::{Array, Operand, Place, Temporary};
 
     #[test]
     fn statements_count_by_kind_and_in_loops_once() {
@@ -152,7 +151,7 @@ mod tests {
                 operation: Operation::Multiply(q(), q()),
             },
             Statement::Store {
-                output: Output::ByQ(Affine::default()),
+                output: Place::vector(Array::ByQ, Affine::default()),
                 value: q(),
                 accumulate: true,
             },

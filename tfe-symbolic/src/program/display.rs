@@ -9,8 +9,8 @@
 
 use std::fmt;
 
-use crate::program::{Operand, Operation, Output, Program, Statement, Temporary};
-use crate::syntax::ast::Comparison;
+use crate::program::place::{Array, Place, Shape};
+use crate::program::{Operand, Operation, Program, Statement, Temporary};
 
 impl fmt::Display for Program {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -49,7 +49,7 @@ fn list(statements: &[Statement], depth: usize, f: &mut fmt::Formatter<'_>) -> f
             Statement::Balance { output, length } => {
                 writeln!(f, "balance {output}, {length} entries")?;
             }
-            Statement::Clear { output } => writeln!(f, "clear {}", array(output))?,
+            Statement::Clear { array } => writeln!(f, "clear {}", name(*array))?,
             Statement::Loop {
                 variable,
                 start,
@@ -66,57 +66,43 @@ fn list(statements: &[Statement], depth: usize, f: &mut fmt::Formatter<'_>) -> f
 
 /// The name of an array of results: E is the energy function, z the velocity or the momentum, Q the generalized force, A and a belong to
 /// constraints.
-fn array(output: &Output) -> &'static str {
-    match output {
-        Output::Value => "E",
-        Output::ByZ(_) => "E_z",
-        Output::ByQ(_) => "E_q",
-        Output::Force(_) => "Q",
-        Output::ZZ(..) => "E_zz",
-        Output::ZQ(..) => "E_zq",
-        Output::QQ(..) => "E_qq",
-        Output::ForceZ(..) => "Q_z",
-        Output::ForceQ(..) => "Q_q",
-        Output::Observable(_) | Output::SiteObservable(_) => "output",
-        Output::Phi(_) | Output::SitePhi(_) => "phi",
-        Output::Row(..) | Output::SiteRow(..) => "A",
-        Output::Drift(_) | Output::SiteDrift(_) => "a",
-        Output::PsiQ(..) => "psi_q",
-        Output::RowRate(..) => "A_rate",
-        Output::Bend(..) => "bend",
-        Output::RateQ(..) => "rate_q",
-        Output::RateV(..) => "rate_v",
+fn name(array: Array) -> &'static str {
+    match array {
+        Array::Value => "E",
+        Array::ByZ => "E_z",
+        Array::ByQ => "E_q",
+        Array::Force => "Q",
+        Array::ZZ => "E_zz",
+        Array::ZQ => "E_zq",
+        Array::QQ => "E_qq",
+        Array::ForceZ => "Q_z",
+        Array::ForceQ => "Q_q",
+        Array::Observable(_) | Array::SiteObservable => "output",
+        Array::Phi(_) | Array::SitePhi => "phi",
+        Array::Row(_) | Array::SiteRow => "A",
+        Array::Drift(_) | Array::SiteDrift => "a",
+        Array::PsiQ(_) => "psi_q",
+        Array::RowRate(_) => "A_rate",
+        Array::Bend => "bend",
+        Array::RateQ => "rate_q",
+        Array::RateV => "rate_v",
     }
 }
 
-impl fmt::Display for Output {
+impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(array(self))?;
-        match self {
-            Self::Value => Ok(()),
-            Self::ByZ(a)
-            | Self::ByQ(a)
-            | Self::Force(a)
-            | Self::SitePhi(a)
-            | Self::SiteDrift(a)
-            | Self::SiteObservable(a) => write!(f, "[{a}]"),
-            Self::ZZ(a, b)
-            | Self::ZQ(a, b)
-            | Self::QQ(a, b)
-            | Self::ForceZ(a, b)
-            | Self::ForceQ(a, b)
-            | Self::Bend(a, b)
-            | Self::RateQ(a, b)
-            | Self::RateV(a, b)
-            | Self::SiteRow(a, b) => {
-                write!(f, "[{a}, {b}]")
-            }
-            Self::Row(number, a) | Self::PsiQ(number, a) | Self::RowRate(number, a) => {
-                write!(f, "[{number}, {a}]")
-            }
-            Self::Observable(number) | Self::Phi(number) | Self::Drift(number) => {
-                write!(f, "[{number}]")
-            }
+        f.write_str(name(self.array))?;
+        let number = self.array.number().map(|number| number.to_string());
+        let indices = match self.array.shape() {
+            Shape::Number => Vec::new(),
+            Shape::Vector => vec![&self.row],
+            Shape::Matrix => vec![&self.row, &self.column],
+        };
+        let indices = indices.into_iter().map(ToString::to_string);
+        let all: Vec<String> = number.into_iter().chain(indices).collect();
+        match all[..] {
+            [] => Ok(()),
+            _ => write!(f, "[{}]", all.join(", ")),
         }
     }
 }
@@ -140,7 +126,6 @@ impl fmt::Display for Operand {
 impl fmt::Display for Operation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Copy(a) => a.fmt(f),
             Self::Add(a, b) => write!(f, "{a} + {b}"),
             Self::Subtract(a, b) => write!(f, "{a} - {b}"),
             Self::Multiply(a, b) => write!(f, "{a} * {b}"),
@@ -159,12 +144,7 @@ impl fmt::Display for Operation {
                 then,
                 otherwise,
             } => {
-                let sign = match comparison {
-                    Comparison::Less => "<",
-                    Comparison::LessOrEqual => "<=",
-                    Comparison::Greater => ">",
-                    Comparison::GreaterOrEqual => ">=",
-                };
+                let sign = comparison.symbol();
                 write!(f, "select({left} {sign} {right}, {then}, {otherwise})")
             }
         }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
-use crate::expr::simplify::holds;
-use crate::program::{Operand, Operation, Output, Program, Statement, Temporary};
+use crate::program::place::{Array, Place};
+use crate::program::{Operand, Operation, Program, Statement, Temporary};
 
 /// What a kernel is given.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -216,7 +216,7 @@ impl Machine<'_> {
                     *place = if *accumulate { *place + value } else { value };
                 }
                 Statement::Balance { output, length } => self.balance(output, length)?,
-                Statement::Clear { output } => self.clear(output),
+                Statement::Clear { array } => self.clear(*array),
             }
         }
         Ok(())
@@ -224,7 +224,6 @@ impl Machine<'_> {
 
     fn operation(&self, operation: &Operation) -> Result<f64, InterpretError> {
         Ok(match operation {
-            Operation::Copy(a) => self.operand(a)?,
             Operation::Add(a, b) => self.operand(a)? + self.operand(b)?,
             Operation::Subtract(a, b) => self.operand(a)? - self.operand(b)?,
             Operation::Multiply(a, b) => self.operand(a)? * self.operand(b)?,
@@ -246,7 +245,7 @@ impl Machine<'_> {
                 then,
                 otherwise,
             } => {
-                let chosen = holds(*comparison, self.operand(left)?, self.operand(right)?);
+                let chosen = comparison.holds(self.operand(left)?, self.operand(right)?);
                 let (then, otherwise) = (self.operand(then)?, self.operand(otherwise)?);
                 if chosen { then } else { otherwise }
             }
@@ -281,6 +280,7 @@ impl Machine<'_> {
                 self.element(name, array, index)
             }
             Input::Integer(index) => Ok(self.index(index)? as f64),
+            Input::Placeholder(..) => Err(InterpretError::Unassigned),
         }
     }
 
@@ -346,7 +346,7 @@ impl Machine<'_> {
         Ok(())
     }
 
-    fn balance(&mut self, output: &Output, length: &Affine) -> Result<(), InterpretError> {
+    fn balance(&mut self, output: &Place, length: &Affine) -> Result<(), InterpretError> {
         for k in 0..self.index(length)? {
             let mut sum = 0.0;
             for l in (0..self.index(length)?).filter(|l| *l != k) {
@@ -358,80 +358,65 @@ impl Machine<'_> {
         Ok(())
     }
 
-    fn place(&mut self, output: &Output) -> Result<&mut f64, InterpretError> {
-        let row = match output {
-            Output::Value | Output::Observable(_) => 0,
-            Output::ByZ(a) | Output::ByQ(a) | Output::Force(a) => self.index(a)?,
-            Output::ZZ(a, _) | Output::ZQ(a, _) | Output::QQ(a, _) => self.index(a)?,
-            Output::ForceZ(a, _) | Output::ForceQ(a, _) => self.index(a)?,
-            Output::Bend(a, _) | Output::RateQ(a, _) | Output::RateV(a, _) => self.index(a)?,
-            Output::Phi(k) | Output::Drift(k) => number(*k)?,
-            Output::Row(k, _) | Output::PsiQ(k, _) | Output::RowRate(k, _) => number(*k)?,
-            Output::SitePhi(a) | Output::SiteRow(a, _) | Output::SiteDrift(a) => self.index(a)?,
-            Output::SiteObservable(a) => self.index(a)?,
-        };
-        let column = match output {
-            Output::ZZ(_, b) | Output::ZQ(_, b) | Output::QQ(_, b) => self.index(b)?,
-            Output::ForceZ(_, b) | Output::ForceQ(_, b) => self.index(b)?,
-            Output::Bend(_, b) | Output::RateQ(_, b) | Output::RateV(_, b) => self.index(b)?,
-            Output::Row(_, b) | Output::PsiQ(_, b) | Output::RowRate(_, b) => self.index(b)?,
-            Output::SiteRow(_, b) => self.index(b)?,
-            _ => 0,
-        };
+    fn place(&mut self, output: &Place) -> Result<&mut f64, InterpretError> {
+        let (row, column) = (self.index(&output.row)?, self.index(&output.column)?);
         let results = &mut self.results;
-        match output {
-            Output::Value => Ok(&mut results.value),
-            Output::Observable(number) => Ok(element_of(&mut results.observables, *number)),
-            Output::SiteObservable(_) => {
+        match output.array {
+            Array::Value => Ok(&mut results.value),
+            Array::Observable(number) => Ok(element_of(&mut results.observables, number)),
+            Array::SiteObservable => {
                 let number = usize::try_from(row).map_err(|_| InterpretError::Overflow)?;
                 Ok(element_of(&mut results.observables, number))
             }
-            Output::ByZ(_) => entry(&mut results.z, row),
-            Output::ByQ(_) => entry(&mut results.q, row),
-            Output::Force(_) => entry(&mut results.force, row),
-            Output::ZZ(..) => entry(entry(&mut results.zz, row)?, column),
-            Output::ZQ(..) => entry(entry(&mut results.zq, row)?, column),
-            Output::QQ(..) => entry(entry(&mut results.qq, row)?, column),
-            Output::ForceZ(..) => entry(entry(&mut results.force_z, row)?, column),
-            Output::ForceQ(..) => entry(entry(&mut results.force_q, row)?, column),
-            Output::Phi(_) | Output::SitePhi(_) => entry(&mut results.phi, row),
-            Output::Row(..) | Output::SiteRow(..) => entry(entry(&mut results.rows, row)?, column),
-            Output::Drift(_) | Output::SiteDrift(_) => entry(&mut results.drift, row),
-            Output::PsiQ(..) => entry(entry(&mut results.psi_q, row)?, column),
-            Output::RowRate(..) => entry(entry(&mut results.row_rates, row)?, column),
-            Output::Bend(..) => entry(entry(&mut results.bend, row)?, column),
-            Output::RateQ(..) => entry(entry(&mut results.rate_q, row)?, column),
-            Output::RateV(..) => entry(entry(&mut results.rate_v, row)?, column),
+            Array::ByZ => entry(&mut results.z, row),
+            Array::ByQ => entry(&mut results.q, row),
+            Array::Force => entry(&mut results.force, row),
+            Array::ZZ => entry(entry(&mut results.zz, row)?, column),
+            Array::ZQ => entry(entry(&mut results.zq, row)?, column),
+            Array::QQ => entry(entry(&mut results.qq, row)?, column),
+            Array::ForceZ => entry(entry(&mut results.force_z, row)?, column),
+            Array::ForceQ => entry(entry(&mut results.force_q, row)?, column),
+            Array::SitePhi => entry(&mut results.phi, row),
+            Array::Phi(k) => entry(&mut results.phi, number(k)?),
+            Array::SiteRow => entry(entry(&mut results.rows, row)?, column),
+            Array::Row(k) => entry(entry(&mut results.rows, number(k)?)?, row),
+            Array::SiteDrift => entry(&mut results.drift, row),
+            Array::Drift(k) => entry(&mut results.drift, number(k)?),
+            Array::PsiQ(k) => entry(entry(&mut results.psi_q, number(k)?)?, row),
+            Array::RowRate(k) => entry(entry(&mut results.row_rates, number(k)?)?, row),
+            Array::Bend => entry(entry(&mut results.bend, row)?, column),
+            Array::RateQ => entry(entry(&mut results.rate_q, row)?, column),
+            Array::RateV => entry(entry(&mut results.rate_v, row)?, column),
         }
     }
 
-    fn clear(&mut self, output: &Output) {
+    fn clear(&mut self, array: Array) {
         let results = &mut self.results;
         let row = |rows: &mut Vec<Vec<f64>>, number: usize| {
             if let Some(row) = rows.get_mut(number) {
                 row.fill(0.0);
             }
         };
-        match output {
-            Output::Value => results.value = 0.0,
-            Output::Observable(_) | Output::SiteObservable(_) => results.observables.fill(0.0),
-            Output::ByZ(_) => results.z.fill(0.0),
-            Output::ByQ(_) => results.q.fill(0.0),
-            Output::Force(_) => results.force.fill(0.0),
-            Output::ZZ(..) => results.zz.iter_mut().for_each(|row| row.fill(0.0)),
-            Output::ZQ(..) => results.zq.iter_mut().for_each(|row| row.fill(0.0)),
-            Output::QQ(..) => results.qq.iter_mut().for_each(|row| row.fill(0.0)),
-            Output::ForceZ(..) => results.force_z.iter_mut().for_each(|row| row.fill(0.0)),
-            Output::ForceQ(..) => results.force_q.iter_mut().for_each(|row| row.fill(0.0)),
-            Output::Phi(_) | Output::SitePhi(_) => results.phi.fill(0.0),
-            Output::Drift(_) | Output::SiteDrift(_) => results.drift.fill(0.0),
-            Output::SiteRow(..) => results.rows.iter_mut().for_each(|row| row.fill(0.0)),
-            Output::Row(number, _) => row(&mut results.rows, *number),
-            Output::PsiQ(number, _) => row(&mut results.psi_q, *number),
-            Output::RowRate(number, _) => row(&mut results.row_rates, *number),
-            Output::Bend(..) => results.bend.iter_mut().for_each(|row| row.fill(0.0)),
-            Output::RateQ(..) => results.rate_q.iter_mut().for_each(|row| row.fill(0.0)),
-            Output::RateV(..) => results.rate_v.iter_mut().for_each(|row| row.fill(0.0)),
+        match array {
+            Array::Value => results.value = 0.0,
+            Array::Observable(_) | Array::SiteObservable => results.observables.fill(0.0),
+            Array::ByZ => results.z.fill(0.0),
+            Array::ByQ => results.q.fill(0.0),
+            Array::Force => results.force.fill(0.0),
+            Array::ZZ => results.zz.iter_mut().for_each(|row| row.fill(0.0)),
+            Array::ZQ => results.zq.iter_mut().for_each(|row| row.fill(0.0)),
+            Array::QQ => results.qq.iter_mut().for_each(|row| row.fill(0.0)),
+            Array::ForceZ => results.force_z.iter_mut().for_each(|row| row.fill(0.0)),
+            Array::ForceQ => results.force_q.iter_mut().for_each(|row| row.fill(0.0)),
+            Array::Phi(_) | Array::SitePhi => results.phi.fill(0.0),
+            Array::Drift(_) | Array::SiteDrift => results.drift.fill(0.0),
+            Array::SiteRow => results.rows.iter_mut().for_each(|row| row.fill(0.0)),
+            Array::Row(number) => row(&mut results.rows, number),
+            Array::PsiQ(number) => row(&mut results.psi_q, number),
+            Array::RowRate(number) => row(&mut results.row_rates, number),
+            Array::Bend => results.bend.iter_mut().for_each(|row| row.fill(0.0)),
+            Array::RateQ => results.rate_q.iter_mut().for_each(|row| row.fill(0.0)),
+            Array::RateV => results.rate_v.iter_mut().for_each(|row| row.fill(0.0)),
         }
     }
 }

@@ -9,9 +9,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::entry::Entry;
 use crate::expr::graph::{ExprId, Graph, SumRange};
 use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
+use crate::program::{Array, Place};
 
 /// Entries (row + k, column + k) for k below the length, and (column + k, row + k), that make the sums over l of (row + l, column + k) vanish.
 #[derive(Clone, Debug, PartialEq, Eq)]

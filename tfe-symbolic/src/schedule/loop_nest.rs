@@ -6,10 +6,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::derive::entry::{Entry, Place};
+use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, SumRange};
 use crate::expr::input::{Affine, IndexSymbol};
+use crate::program::Place;
 
 /// `Σ c x`
 type Terms = Vec<(Constant, ExprId)>;

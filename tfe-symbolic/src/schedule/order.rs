@@ -78,7 +78,7 @@ impl Scope {
         }
         // What comes from outside is read again on the next turn.
         left.retain(
-            |value, _| !matches!(value, Value::Temporary(temporary) if !own.contains(temporary)),
+            |value| !matches!(value, Value::Temporary(temporary) if !own.contains(temporary)),
         );
         Self { left }
     }
@@ -234,7 +234,7 @@ impl Numbers {
 mod tests {
     use super::*;
     use crate::expr::input::Affine;
-    use crate::program::{Output, Program};
+    use crate::program::{Array, Place, Program};
 
     fn coordinate(k: i64) -> Operand {
         Operand::Input(Input::Coordinate(Affine::constant(k)))
@@ -253,7 +253,7 @@ mod tests {
 
     fn store(k: i64, value: u32) -> Statement {
         Statement::Store {
-            output: Output::ByQ(Affine::constant(k)),
+            output: Place::vector(Array::ByQ, Affine::constant(k)),
             value: temporary(value),
             accumulate: false,
         }
@@ -332,7 +332,7 @@ mod tests {
     #[test]
     fn what_is_added_to_a_place_stays_in_order() {
         let add = |k| Statement::Store {
-            output: Output::ByQ(Affine::constant(k)),
+            output: Place::vector(Array::ByQ, Affine::constant(k)),
             value: coordinate(k),
             accumulate: true,
         };

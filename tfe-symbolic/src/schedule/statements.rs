@@ -2,14 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use crate::derive::entry::{Array, Place};
 use crate::expr::function::Function;
 use crate::expr::graph::{SumRange, loop_bit};
 use crate::expr::hash::Map;
 use crate::expr::input::LoopVariable;
 use crate::optimise::canonical_order::ranks;
 use crate::optimise::plan::{Op, OpId, Plan, Value};
-use crate::program::{Operand, Operation, Program, Statement, Temporary};
+use crate::program::{Array, Operand, Operation, Program, Statement, Temporary};
 use crate::schedule::balance::Balance;
 use crate::schedule::loop_nest::{Block, Local, Sink, Target};
 
@@ -32,15 +31,13 @@ pub(crate) fn schedule(
         locals: Map::default(),
     };
     for array in cleared {
-        scheduler.append(Statement::Clear {
-            output: Place::scalar(*array).output(),
-        });
+        scheduler.append(Statement::Clear { array: *array });
     }
     scheduler.angles();
     scheduler.block(root);
     for Balance { first, length } in balances {
         scheduler.append(Statement::Balance {
-            output: first.output(),
+            output: first.clone(),
             length: length.clone(),
         });
     }
@@ -144,7 +141,7 @@ impl Scheduler {
         };
         match &sink.target {
             Target::Store { place, accumulate } => self.append(Statement::Store {
-                output: place.output(),
+                output: place.clone(),
                 value,
                 accumulate: *accumulate,
             }),

@@ -5,11 +5,12 @@
 
 mod apart;
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
-use crate::derive::entry::{Array, Place};
 use crate::expr::graph::{ExprId, SumRange};
+use crate::expr::hash::Set;
 use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
+use crate::program::{Array, Place};
 use crate::schedule::loop_nest::{Block, Sink, Target};
 use apart::all_apart;
 
@@ -133,7 +134,7 @@ fn for_each_store(block: &mut Block, visit: &mut dyn FnMut(&mut bool)) {
 #[derive(Default)]
 struct Turns {
     writers: Vec<Writer>,
-    written: HashSet<(Array, i64, i64)>,
+    written: Set<(Array, i64, i64)>,
     writes: usize,
     /// Arrays of which not all is known.
     unknown: BTreeSet<Array>,

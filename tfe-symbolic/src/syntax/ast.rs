@@ -1,6 +1,8 @@
 //! What the user wrote, and nothing else: the syntax tree of one `#[dynamics(...)]` attribute.
 
-use crate::diagnostic::Span;
+use crate::diagnostic::span::Span;
+use crate::expr::comparison::Comparison;
+use crate::vocabulary::Argument;
 
 /// A piece of syntax with the range of attribute text it came from.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +91,28 @@ pub enum Item {
     },
     /// `crate = path`: where the emitted code finds `tfe` (for renamed dependencies)
     Crate(Spanned<String>),
+}
+
+impl Item {
+    /// Which argument it is.
+    pub fn argument(&self) -> Argument {
+        match self {
+            Self::Coordinates(_) => Argument::Coordinates,
+            Self::Momenta(_) => Argument::Momenta,
+            Self::Let { .. } => Argument::Let,
+            Self::Lagrangian(_) => Argument::Lagrangian,
+            Self::Hamiltonian(_) => Argument::Hamiltonian,
+            Self::Force { .. } => Argument::Force,
+            Self::Dissipation(_) => Argument::Dissipation,
+            Self::TimeTransformation(_) => Argument::TimeTransformation,
+            Self::Constraint { .. } => Argument::Constraint,
+            Self::Output { .. } => Argument::Output,
+            Self::Sensitivity(_) => Argument::Sensitivity,
+            Self::Solver { .. } => Argument::Solver,
+            Self::Model { .. } => Argument::Model,
+            Self::Crate(_) => Argument::Crate,
+        }
+    }
 }
 
 /// `a` or `q[N]` in a list of coordinates or momenta.
@@ -211,19 +235,6 @@ pub enum BinaryOperator {
     Divide,
     /// `^`
     Power,
-}
-
-/// `< <= > >=`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Comparison {
-    /// `<`
-    Less,
-    /// `<=`
-    LessOrEqual,
-    /// `>`
-    Greater,
-    /// `>=`
-    GreaterOrEqual,
 }
 
 impl Spanned<ExprKind> {

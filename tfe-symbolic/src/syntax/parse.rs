@@ -14,44 +14,16 @@ use pest::error::{ErrorVariant, InputLocation};
 use pest::iterators::{Pair, Pairs};
 use pest::pratt_parser::{Assoc, Op, PrattParser};
 
-use crate::check::is_function;
 use crate::diagnostic::{Bag, Kind, Span, nearest};
+use crate::expr::comparison::Comparison;
 use crate::syntax::ast::{
-    Array, BinaryOperator, Comparison, ElementSyntax, Entry, Expr, ExprKind, Item, Name, Pass,
-    Range, Spanned,
+    Array, BinaryOperator, ElementSyntax, Entry, Expr, ExprKind, Item, Name, Pass, Range, Spanned,
 };
+use crate::syntax::grammar::{Rule, TfeParser};
+use crate::vocabulary::{Argument, is_function};
 use expectation::{found_at, wanted};
-use grammar::{Rule, TfeParser};
 use limits::within_limits;
 pub use limits::{MAX_NESTING, MAX_OPERATORS};
-
-/// The generated parser: its `enum Rule` is public and undocumented, so it stays behind a private
-/// module.
-mod grammar {
-    #![allow(missing_docs, unreachable_pub)]
-
-    #[derive(pest_derive::Parser)]
-    #[grammar = "syntax/grammar.pest"]
-    pub struct TfeParser;
-}
-
-/// The words that begin an argument of the attribute.
-pub const ARGUMENTS: &[&str] = &[
-    "coordinates",
-    "momenta",
-    "let",
-    "lagrangian",
-    "hamiltonian",
-    "time_transformation",
-    "force",
-    "dissipation",
-    "constraint",
-    "output",
-    "sensitivity",
-    "solver",
-    "model",
-    "crate",
-];
 
 static PRATT: LazyLock<PrattParser<Rule>> = LazyLock::new(|| {
     PrattParser::new()
@@ -96,46 +68,31 @@ pub fn parse_item(text: &str, offset: usize, bag: &mut Bag) -> Option<Spanned<It
     let blanks = text.len() - text.trim_start().len();
     let word = first_word(text);
     let span = Span::new(offset + blanks, offset + blanks + word.len());
-    let rule = match word {
-        "coordinates" => Rule::coordinates,
-        "momenta" => Rule::momenta,
-        "let" => Rule::binding,
-        "lagrangian" => Rule::lagrangian,
-        "hamiltonian" => Rule::hamiltonian,
-        "force" => Rule::force,
-        "dissipation" => Rule::dissipation,
-        "time_transformation" => Rule::time_transformation,
-        "constraint" => Rule::constraint,
-        "output" => Rule::output,
-        "sensitivity" => Rule::sensitivity,
-        "solver" => Rule::solver,
-        "model" => Rule::model,
-        "crate" => Rule::location,
-        "" => {
-            let found = found_at(text, blanks);
-            let span = Span::new(span.start, offset + found.end);
-            let wanted = "an argument such as `lagrangian = …`".into();
-            bag.push(
-                span,
-                Kind::Expected {
-                    wanted,
-                    found: found.words,
-                },
-            );
-            return None;
-        }
-        _ => {
-            let nearest = nearest(word, ARGUMENTS.iter().copied());
-            bag.push(
-                span,
-                Kind::UnknownArgument {
-                    name: word.to_owned(),
-                    nearest,
-                },
-            );
-            return None;
-        }
+    if word.is_empty() {
+        let found = found_at(text, blanks);
+        let span = Span::new(span.start, offset + found.end);
+        let wanted = "an argument such as `lagrangian = …`".into();
+        bag.push(
+            span,
+            Kind::Expected {
+                wanted,
+                found: found.words,
+            },
+        );
+        return None;
+    }
+    let Some(argument) = Argument::of_word(word) else {
+        let nearest = nearest(word, Argument::all().map(Argument::word));
+        bag.push(
+            span,
+            Kind::UnknownArgument {
+                name: word.to_owned(),
+                nearest,
+            },
+        );
+        return None;
     };
+    let rule = rule_of(argument);
     if let Err((at, kind)) = within_limits(text) {
         bag.push(Span::new(offset + at.start, offset + at.end), kind);
         return None;
@@ -165,6 +122,26 @@ pub fn parse_item(text: &str, offset: usize, bag: &mut Bag) -> Option<Spanned<It
             );
             None
         }
+    }
+}
+
+/// What the grammar calls an argument.
+fn rule_of(argument: Argument) -> Rule {
+    match argument {
+        Argument::Coordinates => Rule::coordinates,
+        Argument::Momenta => Rule::momenta,
+        Argument::Let => Rule::binding,
+        Argument::Lagrangian => Rule::lagrangian,
+        Argument::Hamiltonian => Rule::hamiltonian,
+        Argument::Force => Rule::force,
+        Argument::Dissipation => Rule::dissipation,
+        Argument::TimeTransformation => Rule::time_transformation,
+        Argument::Constraint => Rule::constraint,
+        Argument::Output => Rule::output,
+        Argument::Sensitivity => Rule::sensitivity,
+        Argument::Solver => Rule::solver,
+        Argument::Model => Rule::model,
+        Argument::Crate => Rule::location,
     }
 }
 

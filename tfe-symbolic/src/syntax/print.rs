@@ -3,8 +3,7 @@
 use std::fmt;
 
 use crate::syntax::ast::{
-    Array, BinaryOperator, Comparison, ElementSyntax, Entry, Expr, ExprKind, Item, Pass, Range,
-    Spanned,
+    Array, BinaryOperator, ElementSyntax, Entry, Expr, ExprKind, Item, Pass, Range, Spanned,
 };
 
 impl BinaryOperator {
@@ -24,18 +23,6 @@ impl BinaryOperator {
             Self::Add | Self::Subtract => 1,
             Self::Multiply | Self::Divide => 2,
             Self::Power => NEGATE + 1,
-        }
-    }
-}
-
-impl Comparison {
-    /// The comparison as written.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::Less => "<",
-            Self::LessOrEqual => "<=",
-            Self::Greater => ">",
-            Self::GreaterOrEqual => ">=",
         }
     }
 }

@@ -1,6 +1,5 @@
 //! Whether every coordinate of a model made from another one still has kinetic energy.
 
-use super::removal::holds_varying_index;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::derivative;
 use crate::expr::input::{Affine, Input};
@@ -8,7 +7,7 @@ use crate::model::declared::{Declared, Form, names};
 
 /// The first coordinate whose momentum holds no velocity, or whose velocity no momentum; those that constraints act on do not count.
 pub(super) fn missing(model: &mut Declared) -> Option<String> {
-    if holds_varying_index(&model.graph, model.energy) {
+    if model.graph.holds_varying_index(model.energy) {
         return None;
     }
     for (at, name) in (0..).zip(names(&model.coordinates)) {

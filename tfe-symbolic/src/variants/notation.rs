@@ -1,11 +1,11 @@
 //! The formulas of a model made from another one, for its documentation.
 
-use crate::diagnostic::Bag;
+use super::as_syntax::{as_syntax, call, element, name};
 use crate::expr::graph::ExprId;
-use crate::expr::input::Input;
-use crate::model::declared::{Declared, names};
+use crate::expr::input::{Affine, Input};
+use crate::model::declared::{CoordinateArray, Declared, names};
 use crate::model::notation::{Notation, formula};
-use crate::syntax::parse::parse_expression;
+use crate::syntax::ast::Expr;
 
 /// Longer formulas are for kernels only.
 const READABLE: usize = 400;
@@ -40,34 +40,43 @@ pub(super) fn of(model: &Declared, original: &str, made: &str) -> Notation {
 
 /// An expression in mathematical notation; nothing where it is long or holds indices that vary.
 pub(super) fn text(model: &Declared, value: ExprId) -> Option<String> {
-    let mut graph = model.graph.clone();
-    let (coordinates, momenta) = (names(&model.coordinates), names(&model.momenta));
-    let mut nameless = false;
-    let named = graph.with_leaves(value, &mut |graph, input| {
-        let (names, at, rate) = match input {
-            Input::Coordinate(at) => (&coordinates, at, false),
-            Input::Velocity(at) => (&coordinates, at, true),
-            Input::Momentum(at) => (&momenta, at, false),
-            _ => return None,
-        };
-        let place = at.as_constant().and_then(|at| usize::try_from(at).ok());
-        let Some(name) = place.and_then(|at| names.get(at)) else {
-            nameless = true;
-            return None;
-        };
-        let name = if rate {
-            format!("dot({name})")
-        } else {
-            name.clone()
-        };
-        Some(graph.input(Input::Parameter(name)))
-    });
-    let written = graph.display(named).to_string();
-    if nameless || written.len() > READABLE {
-        return None;
+    let state = |input: &Input| match input {
+        Input::Coordinate(at) => slot(&model.coordinates, at),
+        Input::Velocity(at) => Some(call("dot", vec![slot(&model.coordinates, at)?])),
+        Input::Momentum(at) => slot(&model.momenta, at),
+        _ => None,
+    };
+    // No node is printed in less than a letter.
+    let expr = as_syntax(&model.graph, value, READABLE, &state)?;
+    (expr.to_string().len() <= READABLE).then(|| formula(&expr))
+}
+
+/// The coordinate or momentum at a place of the flat vector, if that is a number.
+fn slot(arrays: &[CoordinateArray], at: &Affine) -> Option<Expr> {
+    let at = at.as_constant()?;
+    let array = arrays.iter().find(|array| {
+        let length = array.length.as_ref().map_or(Some(1), Affine::as_constant);
+        let first = array.first.as_constant();
+        first
+            .zip(length)
+            .is_some_and(|(first, length)| (first..first + length).contains(&at))
+    })?;
+    Some(match &array.length {
+        None => named(&array.name),
+        Some(_) => element(
+            name(&array.name),
+            &Affine::constant(at - array.first.as_constant()?),
+        ),
+    })
+}
+
+/// A single coordinate, which may be what is left of an array: `q[2]`.
+fn named(coordinate: &str) -> Expr {
+    let of_array = coordinate
+        .strip_suffix(']')
+        .and_then(|text| text.split_once('['));
+    match of_array.map(|(array, at)| (array, at.parse())) {
+        Some((array, Ok(at))) => element(name(array), &Affine::constant(at)),
+        _ => name(coordinate),
     }
-    let mut bag = Bag::new();
-    let parsed = parse_expression(&written, &mut bag);
-    // What cannot be read is not told.
-    bag.finish(parsed).ok()?.map(|expr| formula(&expr))
 }

@@ -4,7 +4,6 @@ use super::Reduction;
 use crate::diagnostic::Kind;
 use crate::expr::graph::{ExprId, Graph};
 use crate::expr::input::{Affine, Input};
-use crate::expr::rewrite::written_out;
 use crate::model::declared::{CoordinateArray, Declared, Force};
 
 impl Reduction {
@@ -42,11 +41,11 @@ impl Reduction {
     pub(super) fn write_out(&mut self, pass: &'static str) -> Result<(), Kind> {
         self.model.forces = written_out_forces(&mut self.model, pass)?;
         self.each_formula(&mut |graph, id| {
-            if !holds_varying_index(graph, id) {
+            if !graph.holds_varying_index(id) {
                 return Ok(id);
             }
             match graph.unroll(id) {
-                Ok(id) if !holds_varying_index(graph, id) => Ok(id),
+                Ok(id) if !graph.holds_varying_index(id) => Ok(id),
                 _ => Err(Kind::PassOfLength { pass }),
             }
         })
@@ -123,16 +122,6 @@ fn left(
     Ok(left)
 }
 
-/// Whether an index of a coordinate, velocity or momentum depends on a loop.
-pub(super) fn holds_varying_index(graph: &Graph, id: ExprId) -> bool {
-    graph.inputs_of(id).iter().any(|input| match input {
-        Input::Coordinate(at) | Input::Velocity(at) | Input::Momentum(at) => {
-            at.as_constant().is_none()
-        }
-        _ => false,
-    })
-}
-
 /// The forces, one for each coordinate that they act on.
 pub(super) fn written_out_forces(
     model: &mut Declared,
@@ -147,7 +136,7 @@ pub(super) fn written_out_forces(
         if !force.ranges.iter().all(literal) {
             return Err(Kind::PassOfLength { pass });
         }
-        for (target, value) in written_out(&mut model.graph, force) {
+        for (target, value) in force.written_out(&mut model.graph) {
             if target.as_constant().is_none() {
                 return Err(Kind::PassOfLength { pass });
             }

@@ -9,7 +9,7 @@
 
 use std::collections::BTreeMap;
 
-use super::removal::{holds_varying_index, written_out_forces};
+use super::removal::written_out_forces;
 use super::target::Places;
 use super::{Assignment, Mistake, Reduction};
 use crate::diagnostic::Kind;
@@ -19,8 +19,8 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
 use crate::model::declared::Form;
 
-/// Leaves that stand for q − q₀, v − v₀ and p − p₀ while derivatives are taken; no field has such a name.
-const DEVIATIONS: [&str; 3] = ["__tfe_q", "__tfe_v", "__tfe_p"];
+/// The parts of a state. While derivatives are taken, placeholders of these numbers stand for q − q₀, v − v₀ and p − p₀.
+const PARTS: [fn(Affine) -> Input; 3] = [Input::Coordinate, Input::Velocity, Input::Momentum];
 const PASS: &str = "truncated";
 
 /// The values of one half of the state.
@@ -60,12 +60,12 @@ struct Point {
 }
 
 impl Point {
-    fn half<'a>(&'a self, input: &'a Input) -> Option<(&'a Values, &'a Affine, &'static str)> {
-        let [q, v, p] = DEVIATIONS;
+    /// The values of the half of the state that a leaf belongs to, its index, and its number among [`PARTS`].
+    fn half<'a>(&'a self, input: &'a Input) -> Option<(&'a Values, &'a Affine, u32)> {
         match input {
-            Input::Coordinate(at) => Some((&self.q, at, q)),
-            Input::Velocity(at) => Some((&self.z, at, v)),
-            Input::Momentum(at) => Some((&self.z, at, p)),
+            Input::Coordinate(at) => Some((&self.q, at, 0)),
+            Input::Velocity(at) => Some((&self.z, at, 1)),
+            Input::Momentum(at) => Some((&self.z, at, 2)),
             _ => None,
         }
     }
@@ -136,9 +136,9 @@ impl Reduction {
     fn polynomial(&mut self, of: ExprId, degree: u32, point: &Point) -> Result<ExprId, Kind> {
         let graph = &mut self.model.graph;
         let mut of = of;
-        if point.is_by_place() && holds_varying_index(graph, of) {
+        if point.is_by_place() && graph.holds_varying_index(of) {
             of = graph.unroll(of).unwrap_or(of);
-            if holds_varying_index(graph, of) {
+            if graph.holds_varying_index(of) {
                 return Err(Kind::PassOfLength { pass: PASS });
             }
         }
@@ -153,15 +153,15 @@ impl Reduction {
     }
 }
 
-/// Σ 1/j! Dʲ f[δ, …, δ] with leaves for δ.
+/// Σ 1/j! Dʲ f[δ, …, δ] with placeholders for δ.
 fn series(graph: &mut Graph, of: ExprId, degree: u32, point: &Point) -> ExprId {
     let mut terms = vec![(Constant::ONE, of)];
     let mut derivative = of;
     let mut factorial = 1;
     for order in 1..=degree {
         derivative = directional(graph, derivative, &mut |graph, input| {
-            let (_, at, leaf) = point.half(input)?;
-            Some(graph.input(Input::ParameterElement(leaf.to_owned(), at.clone())))
+            let (_, at, part) = point.half(input)?;
+            Some(graph.input(Input::Placeholder(part, at.clone())))
         });
         // 12! is far from the largest integer.
         factorial *= i64::from(order);
@@ -171,7 +171,7 @@ fn series(graph: &mut Graph, of: ExprId, degree: u32, point: &Point) -> ExprId {
     graph.linear(Constant::ZERO, &terms)
 }
 
-/// q₀ for q, and q − q₀ for the leaf of the deviation.
+/// q₀ for q, and q − q₀ for its placeholder.
 fn at_point(graph: &mut Graph, input: &Input, point: &Point) -> Option<ExprId> {
     if let Some((values, at, _)) = point.half(input) {
         return Some(match values.at(at) {
@@ -179,12 +179,10 @@ fn at_point(graph: &mut Graph, input: &Input, point: &Point) -> Option<ExprId> {
             None => graph.integer(0),
         });
     }
-    let Input::ParameterElement(leaf, at) = input else {
+    let Input::Placeholder(part, at) = input else {
         return None;
     };
-    let kinds = [Input::Coordinate, Input::Velocity, Input::Momentum];
-    let kind = DEVIATIONS.iter().position(|own| own == leaf)?;
-    let input = kinds[kind](at.clone());
+    let input = PARTS.get(*part as usize)?(at.clone());
     let state = graph.input(input.clone());
     Some(match point.half(&input)?.0.at(at) {
         Some(value) => graph.subtract(state, value),

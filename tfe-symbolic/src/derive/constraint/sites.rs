@@ -8,11 +8,12 @@
 //! are equal, too.
 
 use super::{by_leaf, coordinate, is_zero, leaves};
-use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::entry::Entry;
 use crate::expr::differentiate::{Forward, derivative, gradient};
 use crate::expr::graph::{ExprId, Graph};
 use crate::expr::input::{Affine, Input};
 use crate::model::declared::Constraint;
+use crate::program::{Array, Place};
 
 /// What of each constraint is added where, on every turn of its range.
 pub(crate) fn entries(graph: &mut Graph, constraints: &[Constraint]) -> Vec<Entry> {

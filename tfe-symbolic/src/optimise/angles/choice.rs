@@ -6,9 +6,11 @@
 
 use std::collections::BTreeMap;
 
-use super::{Angle, canonical};
 use crate::expr::graph::ExprId;
 use crate::program::cost;
+
+/// An angle, `Σ n x`: atoms in order, n ≠ 0, the first n positive. A number is an atom like the others.
+pub(crate) type Angle = Vec<(ExprId, i64)>;
 
 /// What is wanted of an angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -108,6 +110,15 @@ pub(super) fn choose(wanted: &BTreeMap<Angle, Need>, is_number: &dyn Fn(ExprId) 
         }
     }
     best
+}
+
+/// The angle or its opposite, whichever begins with a positive coefficient; and whether it is the opposite.
+pub(super) fn canonical(mut angle: Angle) -> (Angle, bool) {
+    let negative = angle.first().is_some_and(|(_, n)| *n < 0);
+    if negative {
+        angle.iter_mut().for_each(|(_, n)| *n = -*n);
+    }
+    (angle, negative)
 }
 
 fn size(angle: &Angle) -> u64 {

@@ -5,10 +5,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::LARGEST_PRODUCT_POWER;
 use super::demand::Multiple;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
+
+/// Larger powers are left to the method that computes integer powers.
+pub(super) const LARGEST_PRODUCT_POWER: u32 = 64;
 
 /// Factors with their exponents.
 pub(super) type Factors = Vec<(ExprId, i32)>;

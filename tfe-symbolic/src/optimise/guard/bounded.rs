@@ -6,9 +6,8 @@
 //!
 //! Inputs and numbers are exact. Each operation adds half an ulp of its result, a function a whole one.
 
+use crate::expr::comparison::Comparison;
 use crate::expr::function::Function;
-use crate::expr::simplify::holds;
-use crate::syntax::ast::Comparison;
 
 /// A value and the bound of its error, in units of 2⁻⁵³.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,7 +109,7 @@ impl Bounded {
         let slope = match function {
             // These choose, or drop a sign: nothing is rounded.
             Function::Min | Function::Max => {
-                let first = holds(function.takes_first(), x.value, y.value);
+                let first = function.takes_first().holds(x.value, y.value);
                 return if first { x } else { y };
             }
             Function::Abs => {
@@ -161,7 +160,7 @@ impl Bounded {
         comparison: Comparison,
         [left, right, then, otherwise]: [Self; 4],
     ) -> Self {
-        if holds(comparison, left.value, right.value) {
+        if comparison.holds(left.value, right.value) {
             then
         } else {
             otherwise

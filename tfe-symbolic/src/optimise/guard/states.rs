@@ -82,7 +82,9 @@ impl Regime {
         let (kind, share) = match input {
             // An index or a length.
             Input::Integer(_) => return (8.0 * own).floor(),
-            Input::Parameter(_) | Input::ParameterElement(..) => (Kind::Parameter, 1.0),
+            Input::Placeholder(..) | Input::Parameter(_) | Input::ParameterElement(..) => {
+                (Kind::Parameter, 1.0)
+            }
             // At rest with each other, but not at the place of anything.
             Input::Velocity(_) | Input::Momentum(_) => (Kind::Rate, 0.75),
             Input::Time | Input::Coordinate(_) | Input::Multiplier(_) => (Kind::Coordinate, 1.0),

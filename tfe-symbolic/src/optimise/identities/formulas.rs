@@ -6,6 +6,56 @@ use super::residue::Residue;
 use super::search::{Candidate, Search};
 use crate::optimise::plan::{OpId, Value};
 use crate::optimise::rebuild::Formula;
+use crate::program::cost;
+
+/// How many formulas for one operation are kept.
+const KEPT: usize = 4;
+
+impl Search<'_> {
+    /// The replacements that seem to save most, the best first.
+    pub(super) fn candidates(&self) -> Vec<Candidate> {
+        let mut all: Vec<Candidate> = Vec::new();
+        let uses = self.uses();
+        for target in self.plan.ids() {
+            if self.plan.cost_of(target) == 0 || self.values[target.index()].is_zero() {
+                continue;
+            }
+            let mut own = self.formulas(target, &uses);
+            own.sort_by_key(|candidate| std::cmp::Reverse(candidate.saving));
+            own.truncate(KEPT);
+            all.append(&mut own);
+        }
+        all.sort_by_key(|candidate| std::cmp::Reverse(candidate.saving));
+        all
+    }
+
+    /// Formulas for one operation that may save something.
+    fn formulas(&self, target: OpId, uses: &[u32]) -> Vec<Candidate> {
+        let alone = self.alone(target, uses);
+        let total: usize = alone.values().sum();
+        let unit = cost::ADDITION << (3 * self.plan.loops_of(target).count_ones());
+        let mut found = Found {
+            search: self,
+            target,
+            alone: &alone,
+            total,
+            unit,
+            usable: self.usable(target),
+            candidates: Vec::new(),
+        };
+        found.one();
+        if total > unit {
+            found.two();
+        }
+        if total > 2 * unit {
+            found.three();
+        }
+        if total > 3 * unit {
+            found.four();
+        }
+        found.candidates
+    }
+}
 
 /// The formulas found for one operation.
 pub(super) struct Found<'a> {

@@ -2,16 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use super::formulas::Found;
 use super::residue::{Residue, residues};
-use super::weight;
 use crate::expr::hash::Map;
 use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::Formula;
-use crate::program::cost;
 
-/// How many formulas for one operation are kept.
-const KEPT: usize = 4;
+/// The cost of an operation; in loops, by the turns that short ones have.
+pub(super) fn weight(plan: &Plan, id: OpId) -> usize {
+    plan.cost_of(id) << (3 * plan.loops_of(id).count_ones())
+}
 
 /// A replacement with an estimate of what it saves.
 pub(super) struct Candidate {
@@ -140,25 +139,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The replacements that seem to save most, the best first.
-    pub(super) fn candidates(&self) -> Vec<Candidate> {
-        let mut all: Vec<Candidate> = Vec::new();
-        let uses = self.uses();
-        for target in self.plan.ids() {
-            if self.plan.cost_of(target) == 0 || self.values[target.index()].is_zero() {
-                continue;
-            }
-            let mut own = self.formulas(target, &uses);
-            own.sort_by_key(|candidate| std::cmp::Reverse(candidate.saving));
-            own.truncate(KEPT);
-            all.append(&mut own);
-        }
-        all.sort_by_key(|candidate| std::cmp::Reverse(candidate.saving));
-        all
-    }
-
     /// How often each operation is used.
-    fn uses(&self) -> Vec<u32> {
+    pub(super) fn uses(&self) -> Vec<u32> {
         let mut uses = vec![0; self.plan.len()];
         for id in self.plan.ids() {
             for operand in self.plan.op(id).operands() {
@@ -172,7 +154,7 @@ impl<'a> Search<'a> {
     }
 
     /// The operations that only the target needs, itself with them, and what each costs together with those that only it needs.
-    fn alone(&self, target: OpId, uses: &[u32]) -> BTreeMap<OpId, usize> {
+    pub(super) fn alone(&self, target: OpId, uses: &[u32]) -> BTreeMap<OpId, usize> {
         let mut left: BTreeMap<OpId, u32> = BTreeMap::new();
         let mut alone = BTreeMap::from([(target, weight(self.plan, target))]);
         let mut stack = vec![target];
@@ -189,35 +171,8 @@ impl<'a> Search<'a> {
         alone
     }
 
-    /// Formulas for one operation that may save something.
-    fn formulas(&self, target: OpId, uses: &[u32]) -> Vec<Candidate> {
-        let alone = self.alone(target, uses);
-        let total: usize = alone.values().sum();
-        let unit = cost::ADDITION << (3 * self.plan.loops_of(target).count_ones());
-        let mut found = Found {
-            search: self,
-            target,
-            alone: &alone,
-            total,
-            unit,
-            usable: self.usable(target),
-            candidates: Vec::new(),
-        };
-        found.one();
-        if total > unit {
-            found.two();
-        }
-        if total > 2 * unit {
-            found.three();
-        }
-        if total > 3 * unit {
-            found.four();
-        }
-        found.candidates
-    }
-
     /// The operations that may stand in a formula for the target: they do not need it, and are defined wherever it is.
-    fn usable(&self, target: OpId) -> Vec<bool> {
+    pub(super) fn usable(&self, target: OpId) -> Vec<bool> {
         let mut needs = vec![false; self.plan.len()];
         needs[target.index()] = true;
         let (loops, partial) = (self.plan.loops_of(target), self.partial[target.index()]);
@@ -257,7 +212,7 @@ fn partial(plan: &Plan) -> Vec<u64> {
         let whole = match op {
             Op::Divide(..) | Op::Power(..) | Op::Select { .. } | Op::Loop { .. } => false,
             Op::IntegerPower(_, n) => *n >= 0,
-            Op::Call(function, _) => function.is_entire(),
+            Op::Call(function, _) => function.is_smooth_everywhere(),
             _ => true,
         };
         if !whole {

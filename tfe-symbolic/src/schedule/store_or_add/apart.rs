@@ -1,9 +1,9 @@
 //! Proofs that results never share a place, for ranges that are fixed at run time only.
 
-use crate::derive::entry::Place;
 use crate::expr::graph::SumRange;
 use crate::expr::input::Affine;
 use crate::expr::rewrite::substitute;
+use crate::program::Place;
 
 /// Results and the loops that they are written in.
 type Written<'a> = (&'a [SumRange], &'a Place);

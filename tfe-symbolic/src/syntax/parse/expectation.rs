@@ -1,6 +1,6 @@
 //! pest's errors in words of the language: what could have stood there, and what stands there.
 
-use super::grammar::Rule;
+use crate::syntax::grammar::Rule;
 
 /// What pest would have accepted, in words of the language.
 pub(super) fn wanted(rules: &[Rule]) -> String {

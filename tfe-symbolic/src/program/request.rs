@@ -1,0 +1,31 @@
+//! What programs are asked for.
+
+/// What one kernel computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub struct Request {
+    /// L or H
+    pub value: bool,
+    /// First derivatives and forces
+    pub first: bool,
+    /// ∂²/∂z∂z (the mass matrix of a Lagrangian)
+    pub mass: bool,
+    /// All second derivatives and the derivatives of the forces
+    pub second: bool,
+    /// The observables
+    pub observables: bool,
+    /// φ of the holonomic constraints
+    pub constraint_values: bool,
+    /// A and a of the constraints
+    pub constraint_rows: bool,
+    /// The derivatives of the constraints, with velocities and multipliers
+    pub constraint_second: bool,
+}
+
+/// By what the first derivatives and forces are differentiated once more, at fixed (q, z).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum By {
+    /// The time
+    Time,
+    /// The parameter of this number in `sensitivity(…)`
+    Parameter(usize),
+}
