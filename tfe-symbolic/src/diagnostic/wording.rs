@@ -13,6 +13,15 @@ impl Kind {
             }
             Self::DoubleStar => "`**` is not an operator".into(),
             Self::InclusiveRange => "`..=` is not supported in sums".into(),
+            Self::Condition { word } => format!("`{word}` is not part of the language of formulas"),
+            Self::EqualsSign { .. } => "a formula cannot hold `=`".into(),
+            Self::FieldAccess { object, field } => {
+                format!("a formula cannot read the field `{field}` of `{object}`")
+            }
+            Self::MethodCall { method, .. } => {
+                format!("a formula cannot call the method `{method}`")
+            }
+            Self::Bars => "`|` is not part of the language of formulas".into(),
             Self::NestedTooDeep { limit } => {
                 format!("expression is nested more than {limit} levels deep")
             }
@@ -30,6 +39,7 @@ impl Kind {
             Self::ReservedPrefix { name, .. } => {
                 format!("the name `{name}` begins like those of the generated code")
             }
+            Self::Keyword { name } => format!("`{name}` is a keyword of Rust and cannot be a name"),
             Self::ZeroLength { name, .. } => format!("array `{name}` has no elements"),
             Self::UnknownLength { name, .. } => format!("unknown length `{name}`"),
             Self::LengthNotSimple => {
@@ -104,9 +114,6 @@ impl Kind {
             }
             Self::LinearVelocity { name } => {
                 format!("the momentum of coordinate `{name}` does not depend on any velocity")
-            }
-            Self::NoMomentum { name } => {
-                format!("momentum `{name}` does not appear in the Hamiltonian")
             }
             Self::ConstantEnergy { energy } => {
                 format!("the {energy} does not depend on the state of the system")
@@ -189,7 +196,9 @@ impl Kind {
             Self::MasslessCoordinate { model, name } => {
                 format!("coordinate `{name}` of model `{model}` has no kinetic energy")
             }
-            Self::UnknownSymbol { name, .. } => format!("unknown name `{name}`"),
+            Self::UnknownSymbol { name, .. } | Self::VelocityName { name, .. } => {
+                format!("unknown name `{name}`")
+            }
             Self::UnknownFunction { name, .. } => format!("unknown function `{name}`"),
             Self::NotAFunction { name } => format!("`{name}` is not a function"),
             Self::FunctionAsValue { name } => format!("function `{name}` needs arguments"),
@@ -237,6 +246,7 @@ impl Kind {
             Self::PowerOfVector => "powers of vectors are not defined".into(),
             Self::ScalarPlusVector => "cannot add a number and a vector".into(),
             Self::EmptyVector => "a vector needs at least one component".into(),
+            Self::Matrix => "the components of a vector are numbers, not vectors".into(),
             Self::WholeArray { name } => {
                 format!("array `{name}` has no length known here and needs an index")
             }
@@ -296,6 +306,26 @@ impl Kind {
             Self::MissingOperator { left, right } => format!("write `{left}*{right}`"),
             Self::DoubleStar => "write `^` for a power".into(),
             Self::InclusiveRange => "write `a..b+1`".into(),
+            Self::Condition { .. } => {
+                "write `select(a < b, then, otherwise)`; the comparisons are `<`, `<=`, `>` and `>=`".into()
+            }
+            Self::EqualsSign {
+                left: Some(left),
+                right,
+            } => format!("write what is zero: `{left} - ({right})`"),
+            Self::EqualsSign { left: None, .. } => {
+                "write one expression; parts of it can be named by `let name = …` before it".into()
+            }
+            Self::FieldAccess { object, field } if object == "self" => {
+                format!("the fields of the struct are in scope: write `{field}`")
+            }
+            Self::FieldAccess { object, field } => format!(
+                "formulas use the fields of the struct under the attribute: declare `{object}_{field}: f64`"
+            ),
+            Self::MethodCall { object, method } => format!("write `{method}({object})`"),
+            Self::Bars => {
+                "write `abs(x)` for an absolute value, and the formula itself instead of a closure".into()
+            }
             Self::NestedTooDeep { .. } | Self::TooLong { .. } => {
                 "name parts of it with `let`".into()
             }
@@ -370,7 +400,10 @@ impl Kind {
                 )
             }
             Self::NoCoordinates => "add `coordinates(x)`".into(),
-            Self::NameClash { .. } | Self::ReservedName { .. } | Self::ReservedPrefix { .. } => {
+            Self::NameClash { .. }
+            | Self::ReservedName { .. }
+            | Self::ReservedPrefix { .. }
+            | Self::Keyword { .. } => {
                 "choose another name".into()
             }
             Self::FamilyNotAlone { name } => {
@@ -448,9 +481,6 @@ impl Kind {
             }
             Self::LinearVelocity { name } => {
                 format!("the Lagrangian must hold `dot({name})` other than linearly")
-            }
-            Self::NoMomentum { name } => {
-                format!("add its kinetic energy, such as `{name}^2/(2*m)`")
             }
             Self::ConstantEnergy { .. } => "write kinetic and potential energy".into(),
             Self::DissipationWithoutVelocity => {
@@ -531,6 +561,7 @@ impl Kind {
                 format!("freeze `{name}` too, or truncate about another point")
             }
             Self::NotAFunction { name } => format!("write `{name}*(…)` for a product"),
+            Self::VelocityName { stem, .. } => format!("write `dot({stem})`"),
             Self::FunctionAsValue { name } => format!("write `{name}(…)`"),
             Self::UsedBeforeLet { .. } => "move the `let` up".into(),
             Self::UnsupportedField { .. } => {
@@ -548,6 +579,11 @@ impl Kind {
                 "take a component such as `r[0]`, or use `inner` or `norm`".into()
             }
             Self::VectorExpected => "write a vector as `[a, b, c]`".into(),
+            Self::Matrix => {
+                "there are no matrices: name each row by a `let`, and write a product as \
+                 `[inner(row0, r), inner(row1, r)]`"
+                    .into()
+            }
             Self::ProductOfVectors => "use `inner(a, b)` or `cross(a, b)`".into(),
             Self::PowerOfVector => "use `inner(r, r)` for the square of the length".into(),
             Self::DivisionByVector => "divide by its `norm`".into(),
