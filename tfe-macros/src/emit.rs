@@ -506,9 +506,12 @@ fn written(statement: &Statement) -> Option<&Operand> {
     }
 }
 
-/// An identifier, raw where it must be.
+/// An identifier, raw where it must be; with a line below where not even that is a name (which has been reported).
 pub(crate) fn identifier(name: &str) -> Ident {
-    syn::parse_str::<Ident>(name).unwrap_or_else(|_| Ident::new_raw(name, Span::call_site()))
+    syn::parse_str::<Ident>(name).unwrap_or_else(|_| match name {
+        "_" | "crate" | "self" | "super" | "Self" => format_ident!("__{name}"),
+        name => Ident::new_raw(name, Span::call_site()),
+    })
 }
 
 pub(crate) fn loop_name(variable: LoopVariable) -> Ident {

@@ -1,6 +1,7 @@
 //! From tokens to tokens: the whole expansion, read from top to bottom.
 
 use crate::emit::{self, Emitter};
+use crate::lengths::Lengths;
 use crate::source_map::SourceMap;
 use crate::{constraint, fallback, family, input, page, solver, state, variant};
 use proc_macro2::{Literal, TokenStream};
@@ -174,9 +175,15 @@ impl<'a> Kernels<'a> {
         let observables = self.observables();
         let constraints = constraint::members(self.declared, self.derivation, &self.coordinates);
         let sensitivities = self.sensitivities();
+        let Lengths {
+            constant,
+            statement: lengths,
+        } = Lengths::of(self.declared, item);
         quote! {
             const _: () = {
                 use #path::__private as __tfe;
+
+                #constant
 
                 #[automatically_derived]
                 #[allow(unused_variables, non_snake_case)]
@@ -185,6 +192,7 @@ impl<'a> Kernels<'a> {
                     const FACTS: __tfe::Facts = #facts;
 
                     fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
+                        #lengths
                         #value_statements
                         #value
                     }
@@ -220,6 +228,7 @@ impl<'a> Kernels<'a> {
                         z: &[R; #dof],
                         first: &mut __tfe::First<R, #dof>,
                     ) {
+                        #lengths
                         #first
                     }
 
@@ -232,6 +241,7 @@ impl<'a> Kernels<'a> {
                         first: &mut __tfe::First<R, #dof>,
                         zz: &mut [[R; #dof]; #dof],
                     ) {
+                        #lengths
                         #mass
                     }
 
@@ -243,6 +253,7 @@ impl<'a> Kernels<'a> {
                         first: &mut __tfe::First<R, #dof>,
                         second: &mut __tfe::Second<R, #dof>,
                     ) {
+                        #lengths
                         #second
                     }
 

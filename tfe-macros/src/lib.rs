@@ -10,6 +10,7 @@ mod expand;
 mod fallback;
 mod family;
 mod input;
+mod lengths;
 mod page;
 mod solver;
 mod source_map;
