@@ -644,11 +644,11 @@ fn real(affine: &Affine) -> TokenStream {
 /// A number as a literal; what has none (infinities) by name.
 fn number(value: f64) -> TokenStream {
     if value.is_nan() {
-        quote!(f64::NAN)
+        quote!(::core::primitive::f64::NAN)
     } else if value == f64::INFINITY {
-        quote!(f64::INFINITY)
+        quote!(::core::primitive::f64::INFINITY)
     } else if value == f64::NEG_INFINITY {
-        quote!(f64::NEG_INFINITY)
+        quote!(::core::primitive::f64::NEG_INFINITY)
     } else if value.is_sign_negative() {
         let size = Literal::f64_unsuffixed(-value);
         quote!(-#size)

@@ -58,8 +58,10 @@ fn check(requirement: &Requirement) -> Option<TokenStream> {
     };
     let message = format!("index `{text}`{turns} is outside `{array}` of length {length}");
     let (value, length) = (emit::signed(place), emit::signed(length));
+    let is_positive = place.as_constant().is_some_and(|place| place >= 0);
+    let from_zero = (!is_positive).then(|| quote!(::core::assert!(0 <= #value, #message);));
     let assertion = quote! {
-        ::core::assert!(0 <= #value, #message);
+        #from_zero
         ::core::assert!(#value < #length, #message);
     };
     let nested = nest.iter().rev().fold(assertion, |inner, range| {

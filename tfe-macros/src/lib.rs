@@ -5,6 +5,7 @@
 
 mod balance;
 mod constraint;
+mod docs;
 mod emit;
 mod expand;
 mod fallback;

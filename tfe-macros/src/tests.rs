@@ -1,13 +1,75 @@
 //! Golden expansions: what `#[dynamics]` writes for a few models, as readable Rust. `UPDATE_GOLDEN=1 cargo test -p tfe-macros` rewrites them.
 
 use crate::expand::expand;
-use proc_macro2::TokenStream;
+use proc_macro2::{TokenStream, TokenTree};
 use quote::quote;
+use std::collections::BTreeSet;
 use std::path::Path;
+
+/// What the prelude of Rust defines, and a user may define otherwise.
+const PRELUDE: &[&str] = &[
+    "Some",
+    "None",
+    "Ok",
+    "Err",
+    "Option",
+    "Result",
+    "Vec",
+    "String",
+    "Box",
+    "Default",
+    "Clone",
+    "Copy",
+    "Debug",
+    "PartialEq",
+    "Into",
+    "From",
+    "Iterator",
+    "Send",
+    "Sync",
+    "drop",
+    "core",
+    "std",
+    "NAN",
+    "INFINITY",
+    "NEG_INFINITY",
+    "assert",
+    "panic",
+    "unimplemented",
+    "vec",
+    "format",
+];
+
+/// Names of the prelude that stand at the begin of a path.
+fn relative_paths(tokens: TokenStream, found: &mut Vec<String>) {
+    let mut colons = 0;
+    for token in tokens {
+        match token {
+            TokenTree::Group(group) => relative_paths(group.stream(), found),
+            TokenTree::Ident(ident) if colons < 2 && PRELUDE.contains(&&*ident.to_string()) => {
+                found.push(ident.to_string());
+            }
+            TokenTree::Punct(punct) if punct.as_char() == ':' => {
+                colons += 1;
+                continue;
+            }
+            _ => {}
+        }
+        colons = 0;
+    }
+}
 
 #[track_caller]
 fn check(name: &str, arguments: TokenStream, item: TokenStream) {
-    let file: syn::File = syn::parse2(expand(arguments, item)).expect("expansions are items");
+    let expansion = expand(arguments, item.clone());
+    let mut relative = Vec::new();
+    relative_paths(expansion.clone(), &mut relative);
+    // The user's own types and derives are written as they are; models made from this one repeat both.
+    let (mut own, mut seen) = (Vec::new(), BTreeSet::new());
+    relative_paths(item, &mut own);
+    relative.retain(|path| !own.contains(path) && seen.insert(path.clone()));
+    assert!(relative.is_empty(), "without absolute paths: {relative:?}");
+    let file: syn::File = syn::parse2(expansion).expect("expansions are items");
     let actual = prettyplease::unparse(&file);
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("golden")
@@ -282,4 +344,55 @@ fn a_mistake_leaves_the_struct_and_stubs() {
             }
         ),
     );
+}
+
+#[test]
+fn doc_comments_inside_the_attribute() {
+    check(
+        "documented",
+        quote!(
+            coordinates(x),
+            /// Half of the spring's energy goes to each end.
+            let stretch = x - l,
+            lagrangian = m/2*dot(x)^2 - k/2*stretch^2,
+            /// Above the support, in metres.
+            output(height) = -x,
+            /// For the controller.
+            solver(Fast, Mixed::<2>),
+            /// Without the spring.
+            model(Rigid, truncated(2, x = l)),
+        ),
+        quote!(
+            struct Spring {
+                m: f64,
+                k: f64,
+                l: f64,
+            }
+        ),
+    );
+}
+
+#[test]
+fn names_that_nothing_can_have_are_mistakes_without_a_panic() {
+    for name in ["crate", "self", "super", "Self", "_"] {
+        let name = proc_macro2::Ident::new(name, proc_macro2::Span::call_site());
+        let declarations = [
+            quote!(coordinates(x), lagrangian = dot(x)^2, output(#name) = x),
+            quote!(coordinates(x, y), lagrangian = dot(x)^2 + dot(y)^2, constraint(#name) = x - y),
+            quote!(coordinates(#name), lagrangian = dot(#name)^2),
+            quote!(coordinates(x), let #name = x, lagrangian = dot(x)^2),
+            quote!(coordinates(x), lagrangian = dot(x)^2, solver(#name, Mixed::<2>)),
+            quote!(coordinates(x), lagrangian = dot(x)^2 + cos(x), model(#name, truncated(2))),
+        ];
+        for declaration in declarations {
+            let expansion = expand(
+                declaration.clone(),
+                quote!(
+                    struct Model {}
+                ),
+            )
+            .to_string();
+            assert!(expansion.contains("compile_error"), "{declaration}");
+        }
+    }
 }

@@ -391,8 +391,8 @@ enum Visit {
 const LARGE_LENGTH: u64 = 30;
 /// The largest length that is looked at.
 const MAX_LENGTH: u64 = 1 << 32;
-/// All lengths from 1 to this one are looked at.
-const SMALL_LENGTHS: i64 = 12;
+/// All lengths in between are looked at. Arrays of one element, for which `q[2*i]` is right, are not what anyone means.
+const SMALL_LENGTHS: (i64, i64) = (2, 12);
 
 /// Lengths of parameters of which models with a fixed number of coordinates are believed to be used with one.
 const USUAL_LENGTHS: [i64; 3] = [7, 11, 22];
@@ -412,14 +412,15 @@ fn generic_lengths<'a>(affines: &[&'a Affine]) -> Vec<&'a str> {
 
 /// Lengths to look at: small ones, large ones, and such that each is in turn much larger and much smaller than the others.
 fn assignments(count: usize, large: i64) -> Vec<Vec<i64>> {
-    let equal = (1..=SMALL_LENGTHS).chain([large, 2 * large]);
+    let (least, small) = SMALL_LENGTHS;
+    let equal = (least..=small).chain([large, 2 * large]);
     let mut all: Vec<Vec<i64>> = equal.map(|length| vec![length; count]).collect();
     for at in 0..count {
         for (own, others) in [
-            (large, 1),
-            (large, SMALL_LENGTHS),
-            (1, large),
-            (SMALL_LENGTHS, large),
+            (large, least),
+            (large, small),
+            (least, large),
+            (small, large),
         ] {
             let mut lengths = vec![others; count];
             lengths[at] = own;
