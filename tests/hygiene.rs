@@ -203,6 +203,19 @@ fn they_all_move() {
     assert_eq!(first.elongation(0.0, [0.5], [0.0]), 0.5);
     assert!(motion.energy_error().is_finite());
 
+    let second = shadowed::Second {
+        m: 2.0,
+        w: [1.0; 3],
+    };
+    assert_eq!(second.state([0.0; 2], [1.0; 2]).p, [2.0; 2]);
+    assert_eq!(shadowed::Soft::of(&second, 3.0).k, 3.0);
+    let third = shadowed::Third { n: 3 };
+    assert_eq!(third.last(0.0, &[1.0, 2.0, 3.0], &[0.0; 3]), Ok(3.0));
+    assert_eq!(
+        shadowed::Fourth::<3> {}.state([0.0; 3], [1.0; 3]).p,
+        [1.0; 3]
+    );
+
     let taken = Taken {
         q: 2.0,
         z: 1.0,

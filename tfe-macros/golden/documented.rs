@@ -1,6 +1,7 @@
 ///
 /// * `let stretch`:
 /// Half of the spring's energy goes to each end.
+///
 /// # Derived model
 /// ```text
 /// stretch = x − l

@@ -5,6 +5,8 @@ use proc_macro2::{TokenStream, TokenTree};
 use quote::quote;
 use std::collections::BTreeSet;
 use std::path::Path;
+use tfe_symbolic::syntax::parse;
+use tfe_symbolic::{check, lower};
 
 /// What the prelude of Rust defines, and a user may define otherwise.
 const PRELUDE: &[&str] = &[
@@ -395,4 +397,74 @@ fn names_that_nothing_can_have_are_mistakes_without_a_panic() {
             assert!(expansion.contains("compile_error"), "{declaration}");
         }
     }
+}
+
+/// The code of the page of the language, block by block, without the marks of hidden lines.
+fn examples() -> Vec<String> {
+    let shown = |line: &str| line.strip_prefix("# ").unwrap_or(line).to_owned();
+    let block = |block: &str| block.lines().map(shown).collect::<Vec<_>>().join("\n");
+    let parts = include_str!("../language.md").split("```");
+    parts.skip(1).step_by(2).map(block).collect()
+}
+
+#[test]
+fn the_page_of_the_language_holds_all_that_the_engine_knows() {
+    let words: Vec<&str> = include_str!("../language.md").split_whitespace().collect();
+    let page = words.join(" ");
+    let code = examples().concat();
+    for argument in parse::ARGUMENTS {
+        assert!(page.contains(&format!("| `{argument}")), "{argument}");
+        assert!(code.contains(argument), "no example of {argument}");
+    }
+    for function in check::function_names() {
+        assert!(page.contains(&format!("`{function}(")), "{function}");
+        assert!(
+            code.contains(&format!("{function}(")),
+            "no example of {function}"
+        );
+    }
+    for pass in check::PASSES {
+        assert!(page.contains(&format!("* `{pass}(")), "{pass}");
+        assert!(code.contains(&format!("{pass}(")), "no example of {pass}");
+    }
+    for element in check::ELEMENTS {
+        assert!(page.contains(&format!("`{element}`")), "{element}");
+    }
+    for rule in check::RULES {
+        assert!(page.contains(&format!("`.{rule}(")), "{rule}");
+    }
+    assert_eq!(check::MAX_COORDINATES, 10_000);
+    for limit in [
+        format!("{} levels", parse::MAX_NESTING),
+        format!("{} operators", parse::MAX_OPERATORS),
+        format!("{} Gauss points", check::MAX_POINTS),
+        format!("at most {} terms is written out", lower::SHORT_SUM),
+        format!("at most {} terms in all", lower::LONGEST_WRITTEN_OUT),
+        "10 000 coordinates".to_owned(),
+    ] {
+        assert!(page.contains(&limit), "{limit}");
+    }
+}
+
+#[test]
+fn the_models_on_the_page_of_the_language_are_accepted() {
+    let mut models = 0;
+    for example in examples() {
+        let wrapped = format!("fn main() {{ {example} }}");
+        let function: syn::ItemFn = syn::parse_str(&wrapped).expect("an example is Rust");
+        for statement in &function.block.stmts {
+            let syn::Stmt::Item(syn::Item::Struct(item)) = statement else {
+                continue;
+            };
+            let mut item = item.clone();
+            let attribute = item.attrs.pop().expect("the attribute stands last");
+            let arguments = attribute.meta.require_list().expect("arguments");
+            let expansion = expand(arguments.tokens.clone(), quote!(#item)).to_string();
+            let mistake = expansion.find("compile_error");
+            let mistake = mistake.map(|at| expansion[at..].chars().take(200).collect::<String>());
+            assert_eq!(mistake, None, "{}", item.ident);
+            models += 1;
+        }
+    }
+    assert!(models >= 14, "{models}");
 }

@@ -1,7 +1,8 @@
-//! Mistakes in a declaration: where, what, and the remedy. All wording lives in
-//! `diagnostic/wording.rs`.
+//! Mistakes in a declaration: where, what, and the remedy. All wording lives in `diagnostic/wording.rs` and
+//! `diagnostic/remedies.rs`.
 
 pub mod kind;
+mod remedies;
 mod wording;
 
 use std::fmt::Write as _;

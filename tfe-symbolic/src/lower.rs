@@ -77,7 +77,9 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     let variants = lowerer.variants();
     lowerer.check_usage(form, energy, (&constraints, &forces, dissipation));
     let all_fields = lowerer.used_fields();
-    if let Some(pending) = lowerer.turn_by_turn.take() {
+    if let Some(pending) = lowerer.turn_by_turn.take()
+        && lowerer.bag.is_empty()
+    {
         lowerer.nonlinear_sum(pending.span);
     }
     let requirements = std::mem::take(&mut lowerer.requirements);
