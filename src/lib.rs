@@ -37,29 +37,6 @@ pub use modal::Modal;
 pub use motion::{Motion, Node, Outputs};
 pub use periodic::{Orbit, PeriodicOrbit};
 pub use simulation::{Simulation, Steps, Warning};
-/// # Models made from models
-/// A pendulum, linear and to the fourth degree:
-/// ```
-/// use tfe::prelude::*;
-///
-/// #[dynamics(
-///     coordinates(theta),
-///     lagrangian = m/2*l^2*dot(theta)^2 + m*g*l*cos(theta),
-///     model(Linear, truncated(2)),
-///     model(Cubic, truncated(4)),
-/// )]
-/// struct Pendulum { m: f64, l: f64, g: f64 }
-///
-/// let pendulum = Pendulum { m: 1.0, l: 1.0, g: 9.81 };
-/// assert!(Linear::structure().facts.linear && !Pendulum::structure().facts.linear);
-/// let (linear, cubic) = (Linear::of(&pendulum), Cubic::of(&pendulum));
-/// let end = |motion: Motion<1>| motion.last().q[0];
-/// let full = end(Simulation::new(&pendulum).run(pendulum.state([0.3], [0.0]), 0.0..2.0)?);
-/// let second = end(Simulation::new(&linear).run(linear.state([0.3], [0.0]), 0.0..2.0)?);
-/// let fourth = end(Simulation::new(&cubic).run(cubic.state([0.3], [0.0]), 0.0..2.0)?);
-/// assert!((fourth - full).abs() < 0.02 * (second - full).abs());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub use tfe_macros::dynamics;
 /// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
 pub use tfe_runtime as runtime;
@@ -77,6 +54,11 @@ pub mod prelude {
         Solve, State, ThreeField, WorkPrecision, dynamics, stability,
     };
 }
+
+/// The examples on the page of `dynamics`, tested here because its own crate cannot use this one.
+#[cfg(doctest)]
+#[doc = include_str!("../tfe-macros/language.md")]
+mod language {}
 
 /// What generated code refers to. Not part of the public interface.
 #[doc(hidden)]

@@ -27,6 +27,28 @@ pub mod shadowed {
     pub struct Ok;
     /// Not the scalar parameter.
     pub struct R;
+    /// Not the constructor.
+    pub struct Some;
+    /// Nor this one.
+    pub struct None;
+    /// Nor this one.
+    pub struct Err;
+    /// Not `alloc::vec::Vec`.
+    pub struct Vec;
+    /// Not `alloc::string::String`.
+    pub struct String;
+    /// Not `alloc::boxed::Box`.
+    pub struct Box;
+    /// Not `core::default::Default`.
+    pub struct Default;
+    /// Not `core::clone::Clone`.
+    pub struct Clone;
+    /// Not `core::convert::Into`.
+    pub struct Into;
+    /// Not `core::iter::Iterator`.
+    pub struct Iterator;
+    /// Not the primitive type, in the namespace of modules.
+    pub mod f64 {}
 
     #[tfe::dynamics(
         coordinates(x),
@@ -43,6 +65,39 @@ pub mod shadowed {
         /// Stiffness.
         pub k: f64,
     }
+
+    /// Constraints on positions and velocities, and derivatives by parameters.
+    #[tfe::dynamics(
+        coordinates(x, y),
+        lagrangian = m/2*(dot(x)^2 + dot(y)^2) - w[1]*y,
+        constraint(rod) = x^2 + y^2 - 1,
+        constraint(blade) = dot(x)*sin(t) - dot(y)*cos(t),
+        sensitivity(m, w[1]),
+        model(Soft, elastic(rod = k)),
+    )]
+    pub struct Second {
+        /// Mass.
+        pub m: f64,
+        /// Weights.
+        pub w: [f64; 3],
+    }
+
+    /// A model of run-time length with constraints and outputs by site.
+    #[tfe::dynamics(
+        coordinates(q[n]),
+        lagrangian = sum(i in 0..n, dot(q[i])^2/2) - q[n-2]^2/2,
+        constraint(rod[i in 0..n-1]) = (q[i+1] - q[i])^2 - 1,
+        output(gap[i in 0..n-1]) = q[i+1] - q[i],
+        output(last) = q[n-1],
+    )]
+    pub struct Third {
+        /// Length.
+        pub n: usize,
+    }
+
+    /// A model of a length known to the compiler, with an index that it checks.
+    #[tfe::dynamics(coordinates(q[N]), lagrangian = sum(i in 0..N, dot(q[i])^2/2) - q[N-2]^2/2)]
+    pub struct Fourth<const N: usize> {}
 }
 
 /// Fields named like the emitter's own variables.
@@ -147,6 +202,19 @@ fn they_all_move() {
     assert!((state.q[0] - generic.last().q[0]).abs() < 1e-15);
     assert_eq!(first.elongation(0.0, [0.5], [0.0]), 0.5);
     assert!(motion.energy_error().is_finite());
+
+    let second = shadowed::Second {
+        m: 2.0,
+        w: [1.0; 3],
+    };
+    assert_eq!(second.state([0.0; 2], [1.0; 2]).p, [2.0; 2]);
+    assert_eq!(shadowed::Soft::of(&second, 3.0).k, 3.0);
+    let third = shadowed::Third { n: 3 };
+    assert_eq!(third.last(0.0, &[1.0, 2.0, 3.0], &[0.0; 3]), Ok(3.0));
+    assert_eq!(
+        shadowed::Fourth::<3> {}.state([0.0; 3], [1.0; 3]).p,
+        [1.0; 3]
+    );
 
     let taken = Taken {
         q: 2.0,

@@ -32,6 +32,25 @@ struct Chain<const N: usize> {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
+    impl<const N: usize> Chain<N> {
+        const __TFE_LENGTHS: () = {
+            {
+                ::core::assert!(
+                    0 <= - 1 + 1 * (N as i64), "index `N-1` is outside `q` of length N"
+                );
+                ::core::assert!(
+                    - 1 + 1 * (N as i64) < 0 + 1 * (N as i64),
+                    "index `N-1` is outside `q` of length N"
+                );
+            }
+            {
+                ::core::assert!(
+                    0 < 0 + 1 * (N as i64), "index `0` is outside `q` of length N"
+                );
+            }
+        };
+    }
+    #[automatically_derived]
     #[allow(unused_variables, non_snake_case)]
     impl<const N: usize> __tfe::Model<N> for Chain<N> {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
@@ -44,6 +63,7 @@ const _: () = {
             separable: true,
         };
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
+            let () = Self::__TFE_LENGTHS;
             let a = t.like(self.a);
             let k = t.like(self.k);
             let mut t0 = t.like(0.0);
@@ -92,6 +112,7 @@ const _: () = {
             z: &[R; N],
             first: &mut __tfe::First<R, N>,
         ) {
+            let () = Self::__TFE_LENGTHS;
             let a = t.like(self.a);
             let c = t.like(self.c);
             let f = t.like(self.f);
@@ -126,6 +147,7 @@ const _: () = {
             first: &mut __tfe::First<R, N>,
             zz: &mut [[R; N]; N],
         ) {
+            let () = Self::__TFE_LENGTHS;
             let a = t.like(self.a);
             let c = t.like(self.c);
             let f = t.like(self.f);
@@ -160,6 +182,7 @@ const _: () = {
             first: &mut __tfe::First<R, N>,
             second: &mut __tfe::Second<R, N>,
         ) {
+            let () = Self::__TFE_LENGTHS;
             let a = t.like(self.a);
             let c = t.like(self.c);
             let f = t.like(self.f);

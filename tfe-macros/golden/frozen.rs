@@ -268,7 +268,7 @@ impl SpringPendulum {
 /// # Derived model
 /// ```text
 /// SpringPendulum: frozen r = l; truncated to degree 4
-/// L = m g l + 0.5 m l² θ̇² − 0.5 m g l θ² + 1/24 m g l θ⁴
+/// L = 0.5 m l² θ̇² + m g l − 0.5 m g l θ² + 1/24 m g l θ⁴
 /// coordinates: θ      parameters: m, l, g
 /// operations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other
 /// operations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other
@@ -479,7 +479,7 @@ impl Rod {
                 sines: 0,
                 functions: 0,
             },
-            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = m g l + 0.5 m l² θ\u{307}² − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = 0.5 m l² θ\u{307}² + m g l − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.

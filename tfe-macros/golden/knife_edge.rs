@@ -166,7 +166,7 @@ const _: () = {
             rows: &mut [[R; 3]],
             drift: &mut [R],
         ) {
-            let Some(rows) = rows.first_chunk_mut::<1>() else {
+            let ::core::option::Option::Some(rows) = rows.first_chunk_mut::<1>() else {
                 return;
             };
             let (sin_phi, cos_phi) = q[2].sin_cos();
@@ -181,13 +181,16 @@ const _: () = {
             mu: &[R],
             second: &mut __tfe::ConstraintSecond<'_, R, 3>,
         ) {
-            let Some(mu) = mu.first_chunk::<1>() else {
+            let ::core::option::Option::Some(mu) = mu.first_chunk::<1>() else {
                 return;
             };
-            let Some(psi_q) = second.psi_q.first_chunk_mut::<1>() else {
+            let ::core::option::Option::Some(psi_q) = second.psi_q.first_chunk_mut::<1>()
+            else {
                 return;
             };
-            let Some(row_rates) = second.row_rates.first_chunk_mut::<1>() else {
+            let ::core::option::Option::Some(row_rates) = second
+                .row_rates
+                .first_chunk_mut::<1>() else {
                 return;
             };
             let (sin_phi, cos_phi) = q[2].sin_cos();

@@ -59,7 +59,7 @@ impl Oscillator {
         0.0
     }
 }
-#[derive(Debug)]
+#[derive(::core::fmt::Debug)]
 #[allow(dead_code, missing_docs)]
 struct Fast;
 #[automatically_derived]

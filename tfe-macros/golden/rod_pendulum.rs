@@ -135,7 +135,8 @@ const _: () = {
             },
         ];
         fn constraint_values<R: __tfe::Real>(&self, t: R, q: &[R; 2], values: &mut [R]) {
-            let Some(values) = values.first_chunk_mut::<1>() else {
+            let ::core::option::Option::Some(values) = values.first_chunk_mut::<1>()
+            else {
                 return;
             };
             let l = t.like(self.l);
@@ -152,7 +153,7 @@ const _: () = {
             rows: &mut [[R; 2]],
             drift: &mut [R],
         ) {
-            let Some(rows) = rows.first_chunk_mut::<1>() else {
+            let ::core::option::Option::Some(rows) = rows.first_chunk_mut::<1>() else {
                 return;
             };
             rows[0][0] = t.like(2.0) * q[0];
@@ -166,13 +167,16 @@ const _: () = {
             mu: &[R],
             second: &mut __tfe::ConstraintSecond<'_, R, 2>,
         ) {
-            let Some(mu) = mu.first_chunk::<1>() else {
+            let ::core::option::Option::Some(mu) = mu.first_chunk::<1>() else {
                 return;
             };
-            let Some(psi_q) = second.psi_q.first_chunk_mut::<1>() else {
+            let ::core::option::Option::Some(psi_q) = second.psi_q.first_chunk_mut::<1>()
+            else {
                 return;
             };
-            let Some(row_rates) = second.row_rates.first_chunk_mut::<1>() else {
+            let ::core::option::Option::Some(row_rates) = second
+                .row_rates
+                .first_chunk_mut::<1>() else {
                 return;
             };
             let t0 = t.like(2.0) * v[0];

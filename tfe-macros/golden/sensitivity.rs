@@ -166,7 +166,7 @@ const _: () = {
                 0 => self.omega,
                 1 => self.k[1],
                 2 => self.c,
-                _ => f64::NAN,
+                _ => ::core::primitive::f64::NAN,
             }
         }
         fn first_by<R: __tfe::Real>(

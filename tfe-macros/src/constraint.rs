@@ -61,7 +61,7 @@ impl Kernels<'_> {
     fn chunk(&self, name: &TokenStream, slice: &TokenStream) -> TokenStream {
         let count = &self.count;
         quote! {
-            let Some(#name) = #slice.first_chunk_mut::<#count>() else {
+            let ::core::option::Option::Some(#name) = #slice.first_chunk_mut::<#count>() else {
                 return;
             };
         }
@@ -130,7 +130,7 @@ impl Kernels<'_> {
         });
         let mu = bends.then(|| {
             quote! {
-                let Some(mu) = mu.first_chunk::<#count>() else {
+                let ::core::option::Option::Some(mu) = mu.first_chunk::<#count>() else {
                     return;
                 };
             }

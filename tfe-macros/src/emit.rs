@@ -505,9 +505,12 @@ fn written(statement: &Statement) -> Option<&Operand> {
     }
 }
 
-/// An identifier, raw where it must be.
+/// An identifier, raw where it must be; with a line below where not even that is a name (which has been reported).
 pub(crate) fn identifier(name: &str) -> Ident {
-    syn::parse_str::<Ident>(name).unwrap_or_else(|_| Ident::new_raw(name, Span::call_site()))
+    syn::parse_str::<Ident>(name).unwrap_or_else(|_| match name {
+        "_" | "crate" | "self" | "super" | "Self" => format_ident!("__{name}"),
+        name => Ident::new_raw(name, Span::call_site()),
+    })
 }
 
 pub(crate) fn loop_name(variable: LoopVariable) -> Ident {
@@ -640,11 +643,11 @@ fn real(affine: &Affine) -> TokenStream {
 /// A number as a literal; what has none (infinities) by name.
 fn number(value: f64) -> TokenStream {
     if value.is_nan() {
-        quote!(f64::NAN)
+        quote!(::core::primitive::f64::NAN)
     } else if value == f64::INFINITY {
-        quote!(f64::INFINITY)
+        quote!(::core::primitive::f64::INFINITY)
     } else if value == f64::NEG_INFINITY {
-        quote!(f64::NEG_INFINITY)
+        quote!(::core::primitive::f64::NEG_INFINITY)
     } else if value.is_sign_negative() {
         let size = Literal::f64_unsuffixed(-value);
         quote!(-#size)

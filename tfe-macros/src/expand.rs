@@ -1,6 +1,8 @@
 //! From tokens to tokens: the whole expansion, read from top to bottom.
 
+use crate::docs::Docs;
 use crate::emit::{self, Emitter};
+use crate::lengths::Lengths;
 use crate::source_map::SourceMap;
 use crate::{constraint, fallback, family, input, page, solver, state, variant};
 use proc_macro2::{Literal, TokenStream};
@@ -34,7 +36,7 @@ pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
         return wrong(error.to_compile_error());
     }
     match compile::declare(&map.text, &input::context(&item_struct)) {
-        Ok(declared) => model(&declared, item_struct),
+        Ok(declared) => model(&declared, item_struct, &Docs::of(&map)),
         Err(diagnostics) => wrong(
             diagnostics
                 .iter()
@@ -45,18 +47,21 @@ pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
 }
 
 /// The struct with the derived model in its documentation, the kernels, the methods, and the specialised solvers.
-pub(crate) fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
+pub(crate) fn model(declared: &Declared, mut item: ItemStruct, docs: &Docs) -> TokenStream {
     let derivation = Derivation::of(declared);
     let path = runtime_path(declared);
     let variants: Vec<_> = declared
         .variants
         .iter()
         .map(|one| {
-            let (made, methods) = variant::expand(one, &item, &path);
-            let model = model(&one.model, made);
+            let (made, methods) = variant::expand(one, &item, &path, docs);
+            let model = model(&one.model, made, &docs.of_outputs());
             quote!(#model #methods)
         })
         .collect();
+    for line in docs.others() {
+        item.attrs.push(syn::parse_quote!(#[doc = #line]));
+    }
     let documented = item
         .attrs
         .iter()
@@ -65,16 +70,16 @@ pub(crate) fn model(declared: &Declared, mut item: ItemStruct) -> TokenStream {
         item.attrs.push(syn::parse_quote!(#[doc = #line]));
     }
     if declared.is_of_run_time_length() {
-        let family = family::expand(declared, &derivation, &item, &path);
+        let family = family::expand(declared, &derivation, (&item, docs), &path);
         return quote!(#item #family #(#variants)*);
     }
     let kernels = Kernels::new(declared, &derivation, &item, &path);
     let implementation = kernels.implementation();
-    let methods = kernels.methods();
+    let methods = kernels.methods(docs);
     let solvers = declared
         .solvers
         .iter()
-        .map(|solver| solver::expand(solver, declared, &item, &path));
+        .map(|solver| solver::expand(solver, declared, (&item, docs), &path));
     quote! {
         #item
         #implementation
@@ -178,9 +183,15 @@ impl<'a> Kernels<'a> {
         let observables = self.observables();
         let constraints = constraint::members(self.declared, self.derivation, &self.coordinates);
         let sensitivities = self.sensitivities();
+        let Lengths {
+            constant,
+            statement: lengths,
+        } = Lengths::of(self.declared, item);
         quote! {
             const _: () = {
                 use #path::__private as __tfe;
+
+                #constant
 
                 #[automatically_derived]
                 #[allow(unused_variables, non_snake_case)]
@@ -189,6 +200,7 @@ impl<'a> Kernels<'a> {
                     const FACTS: __tfe::Facts = #facts;
 
                     fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
+                        #lengths
                         #value_statements
                         #value
                     }
@@ -224,6 +236,7 @@ impl<'a> Kernels<'a> {
                         z: &[R; #dof],
                         first: &mut __tfe::First<R, #dof>,
                     ) {
+                        #lengths
                         #first
                     }
 
@@ -236,6 +249,7 @@ impl<'a> Kernels<'a> {
                         first: &mut __tfe::First<R, #dof>,
                         zz: &mut [[R; #dof]; #dof],
                     ) {
+                        #lengths
                         #mass
                     }
 
@@ -247,6 +261,7 @@ impl<'a> Kernels<'a> {
                         first: &mut __tfe::First<R, #dof>,
                         second: &mut __tfe::Second<R, #dof>,
                     ) {
+                        #lengths
                         #second
                     }
 
@@ -338,7 +353,7 @@ impl<'a> Kernels<'a> {
             fn sensitivity_parameter(&self, index: usize) -> f64 {
                 match index {
                     #(#values)*
-                    _ => f64::NAN,
+                    _ => ::core::primitive::f64::NAN,
                 }
             }
 
@@ -357,7 +372,7 @@ impl<'a> Kernels<'a> {
             .map(|field| field.kind.clone());
         match kind {
             Some(FieldKind::Array(Length::Literal(_))) => quote!(self.#field[#element]),
-            _ => quote!(self.#field.get(#element).copied().unwrap_or(f64::NAN)),
+            _ => quote!(self.#field.get(#element).copied().unwrap_or(::core::primitive::f64::NAN)),
         }
     }
 
@@ -402,7 +417,7 @@ impl<'a> Kernels<'a> {
     }
 
     /// `state`, `structure`, and one method for each observable.
-    fn methods(&self) -> TokenStream {
+    fn methods(&self, docs: &Docs) -> TokenStream {
         let Self {
             path, dof, item, ..
         } = self;
@@ -421,7 +436,9 @@ impl<'a> Kernels<'a> {
         let observables = self.declared.observables.iter().enumerate().map(|(k, Observable { name, .. })| {
             let (method, k) = (emit::identifier(name), Literal::usize_unsuffixed(k));
             let doc = format!(" The observable `{name}` at time `{time}`, coordinates `q` and {second_doc} `{second}`.");
+            let own = docs.attributes("output", name);
             quote! {
+                #own
                 #[doc = #doc]
                 #vis fn #method(&self, #time: f64, q: [f64; #dof], #second: [f64; #dof]) -> f64 {
                     let mut values = [0.0; #count];

@@ -161,7 +161,7 @@ fn solver_stub(solver: &Ident, item: &DeriveInput, path: &TokenStream) -> TokenS
     let (name, vis) = (&item.ident, &item.vis);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
     quote! {
-        #[derive(Debug)]
+        #[derive(::core::fmt::Debug)]
         #[allow(dead_code, missing_docs)]
         #vis struct #solver;
 

@@ -5,6 +5,7 @@ mod observable;
 mod sites;
 pub(crate) mod strides;
 
+use crate::docs::Docs;
 use crate::emit::{self, Body, Emitter};
 use crate::page;
 use proc_macro2::{Literal, TokenStream};
@@ -21,7 +22,7 @@ use tfe_symbolic::program::{Program, Request};
 pub(crate) fn expand(
     declared: &Declared,
     derivation: &Derivation,
-    item: &ItemStruct,
+    (item, docs): (&ItemStruct, &Docs),
     path: &TokenStream,
 ) -> TokenStream {
     let kernels = Kernels {
@@ -30,7 +31,7 @@ pub(crate) fn expand(
         dof: length(&declared.dof),
     };
     let implementation = kernels.implementation(item, path);
-    let methods = kernels.methods(item, path);
+    let methods = kernels.methods(item, docs, path);
     quote!(#implementation #methods)
 }
 
@@ -381,7 +382,7 @@ impl Kernels<'_> {
     }
 
     /// `state`, `structure`, and one method for each observable.
-    fn methods(&self, item: &ItemStruct, path: &TokenStream) -> TokenStream {
+    fn methods(&self, item: &ItemStruct, docs: &Docs, path: &TokenStream) -> TokenStream {
         let (name, vis) = (&item.ident, &item.vis);
         let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
         let (second, second_doc) = match self.declared.form {
@@ -389,8 +390,11 @@ impl Kernels<'_> {
             Form::Hamiltonian => (quote!(p), "momenta"),
         };
         let observables = self.declared.observables.iter();
-        let observables =
-            observables.map(|one| observable::method(one, vis, &second, second_doc, path));
+        let observables = observables.map(|one| {
+            let own = docs.attributes("output", &one.name);
+            let method = observable::method(one, vis, &second, second_doc, path);
+            quote!(#own #method)
+        });
         let structure = page::structure(self.declared, self.derivation, path);
         quote! {
             #[automatically_derived]

@@ -75,6 +75,9 @@ fn page(declared: &Declared, derivation: &Derivation) -> String {
             .collect();
         let _ = write!(page, "\nconstraints             {}", kinds.join(", "));
     }
+    for remark in &declared.remarks {
+        let _ = write!(page, "\nremark                  {remark}");
+    }
     let total = kernels.second.additions + kernels.second.multiplications;
     if total > LARGE {
         let _ = write!(

@@ -1,5 +1,6 @@
 //! Steppers for one model and one element: `solver(Name, Mixed::<4>)`.
 
+use crate::docs::Docs;
 use crate::emit::{identifier, index};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -10,7 +11,7 @@ use tfe_symbolic::model::declared::{Declared, Family, Form, Rule, Solver};
 pub(crate) fn expand(
     solver: &Solver,
     declared: &Declared,
-    item: &ItemStruct,
+    (item, docs): (&ItemStruct, &Docs),
     path: &TokenStream,
 ) -> TokenStream {
     let path = quote!(#path::__private);
@@ -33,7 +34,9 @@ pub(crate) fn expand(
         described(solver)
     );
     let text = name.to_string();
+    let own = docs.attributes("solver", &solver.name);
     quote! {
+        #own
         #[doc = #title]
         #vis struct #name {
             model: #model,

@@ -12,6 +12,8 @@ pub(crate) struct SourceMap {
     pub(crate) text: String,
     entries: Vec<(Range<usize>, Span)>,
     end: Span,
+    /// Doc comments between arguments, which are no part of the text: where they stood, and what stood right of `doc =`.
+    pub(crate) docs: Vec<(usize, TokenStream)>,
 }
 
 impl SourceMap {
@@ -21,8 +23,21 @@ impl SourceMap {
             text: String::new(),
             entries: Vec::new(),
             end: Span::call_site(),
+            docs: Vec::new(),
         };
-        map.walk(tokens);
+        let mut tokens = tokens.into_iter().peekable();
+        let mut before_docs = Vec::new();
+        while let Some(token) = tokens.next() {
+            match doc_text(&token, tokens.peek()) {
+                Some(text) => {
+                    tokens.next();
+                    map.walk(before_docs.drain(..).collect());
+                    map.docs.push((map.text.len(), text));
+                }
+                None => before_docs.push(token),
+            }
+        }
+        map.walk(before_docs.into_iter().collect());
         map.end = map
             .entries
             .last()
@@ -101,6 +116,22 @@ impl SourceMap {
                 (span, span)
             }
         }
+    }
+}
+
+/// What stands right of `doc =` in `#[doc = …]`, of which `///` is short for.
+fn doc_text(hash: &TokenTree, brackets: Option<&TokenTree>) -> Option<TokenStream> {
+    let (TokenTree::Punct(hash), Some(TokenTree::Group(group))) = (hash, brackets) else {
+        return None;
+    };
+    let mut tokens = group.stream().into_iter();
+    match (tokens.next()?, tokens.next()?) {
+        (TokenTree::Ident(word), TokenTree::Punct(equals))
+            if hash.as_char() == '#' && word == "doc" && equals.as_char() == '=' =>
+        {
+            Some(tokens.collect())
+        }
+        _ => None,
     }
 }
 

@@ -1,13 +1,77 @@
 //! Golden expansions: what `#[dynamics]` writes for a few models, as readable Rust. `UPDATE_GOLDEN=1 cargo test -p tfe-macros` rewrites them.
 
 use crate::expand::expand;
-use proc_macro2::TokenStream;
+use proc_macro2::{TokenStream, TokenTree};
 use quote::quote;
+use std::collections::BTreeSet;
 use std::path::Path;
+use tfe_symbolic::syntax::parse;
+use tfe_symbolic::{check, lower, vocabulary};
+
+/// What the prelude of Rust defines, and a user may define otherwise.
+const PRELUDE: &[&str] = &[
+    "Some",
+    "None",
+    "Ok",
+    "Err",
+    "Option",
+    "Result",
+    "Vec",
+    "String",
+    "Box",
+    "Default",
+    "Clone",
+    "Copy",
+    "Debug",
+    "PartialEq",
+    "Into",
+    "From",
+    "Iterator",
+    "Send",
+    "Sync",
+    "drop",
+    "core",
+    "std",
+    "NAN",
+    "INFINITY",
+    "NEG_INFINITY",
+    "assert",
+    "panic",
+    "unimplemented",
+    "vec",
+    "format",
+];
+
+/// Names of the prelude that stand at the begin of a path.
+fn relative_paths(tokens: TokenStream, found: &mut Vec<String>) {
+    let mut colons = 0;
+    for token in tokens {
+        match token {
+            TokenTree::Group(group) => relative_paths(group.stream(), found),
+            TokenTree::Ident(ident) if colons < 2 && PRELUDE.contains(&&*ident.to_string()) => {
+                found.push(ident.to_string());
+            }
+            TokenTree::Punct(punct) if punct.as_char() == ':' => {
+                colons += 1;
+                continue;
+            }
+            _ => {}
+        }
+        colons = 0;
+    }
+}
 
 #[track_caller]
 fn check(name: &str, arguments: TokenStream, item: TokenStream) {
-    let file: syn::File = syn::parse2(expand(arguments, item)).expect("expansions are items");
+    let expansion = expand(arguments, item.clone());
+    let mut relative = Vec::new();
+    relative_paths(expansion.clone(), &mut relative);
+    // The user's own types and derives are written as they are; models made from this one repeat both.
+    let (mut own, mut seen) = (Vec::new(), BTreeSet::new());
+    relative_paths(item, &mut own);
+    relative.retain(|path| !own.contains(path) && seen.insert(path.clone()));
+    assert!(relative.is_empty(), "without absolute paths: {relative:?}");
+    let file: syn::File = syn::parse2(expansion).expect("expansions are items");
     let actual = prettyplease::unparse(&file);
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("golden")
@@ -282,4 +346,125 @@ fn a_mistake_leaves_the_struct_and_stubs() {
             }
         ),
     );
+}
+
+#[test]
+fn doc_comments_inside_the_attribute() {
+    check(
+        "documented",
+        quote!(
+            coordinates(x),
+            /// Half of the spring's energy goes to each end.
+            let stretch = x - l,
+            lagrangian = m/2*dot(x)^2 - k/2*stretch^2,
+            /// Above the support, in metres.
+            output(height) = -x,
+            /// For the controller.
+            solver(Fast, Mixed::<2>),
+            /// Without the spring.
+            model(Rigid, truncated(2, x = l)),
+        ),
+        quote!(
+            struct Spring {
+                m: f64,
+                k: f64,
+                l: f64,
+            }
+        ),
+    );
+}
+
+#[test]
+fn names_that_nothing_can_have_are_mistakes_without_a_panic() {
+    for name in ["crate", "self", "super", "Self", "_"] {
+        let name = proc_macro2::Ident::new(name, proc_macro2::Span::call_site());
+        let declarations = [
+            quote!(coordinates(x), lagrangian = dot(x)^2, output(#name) = x),
+            quote!(coordinates(x, y), lagrangian = dot(x)^2 + dot(y)^2, constraint(#name) = x - y),
+            quote!(coordinates(#name), lagrangian = dot(#name)^2),
+            quote!(coordinates(x), let #name = x, lagrangian = dot(x)^2),
+            quote!(coordinates(x), lagrangian = dot(x)^2, solver(#name, Mixed::<2>)),
+            quote!(coordinates(x), lagrangian = dot(x)^2 + cos(x), model(#name, truncated(2))),
+        ];
+        for declaration in declarations {
+            let expansion = expand(
+                declaration.clone(),
+                quote!(
+                    struct Model {}
+                ),
+            )
+            .to_string();
+            assert!(expansion.contains("compile_error"), "{declaration}");
+        }
+    }
+}
+
+/// The code of the page of the language, block by block, without the marks of hidden lines.
+fn examples() -> Vec<String> {
+    let shown = |line: &str| line.strip_prefix("# ").unwrap_or(line).to_owned();
+    let block = |block: &str| block.lines().map(shown).collect::<Vec<_>>().join("\n");
+    let parts = include_str!("../language.md").split("```");
+    parts.skip(1).step_by(2).map(block).collect()
+}
+
+#[test]
+fn the_page_of_the_language_holds_all_that_the_engine_knows() {
+    let words: Vec<&str> = include_str!("../language.md").split_whitespace().collect();
+    let page = words.join(" ");
+    let code = examples().concat();
+    for argument in vocabulary::Argument::all().map(vocabulary::Argument::word) {
+        assert!(page.contains(&format!("| `{argument}")), "{argument}");
+        assert!(code.contains(argument), "no example of {argument}");
+    }
+    for function in vocabulary::function_names() {
+        assert!(page.contains(&format!("`{function}(")), "{function}");
+        assert!(
+            code.contains(&format!("{function}(")),
+            "no example of {function}"
+        );
+    }
+    for pass in vocabulary::PASSES {
+        assert!(page.contains(&format!("* `{pass}(")), "{pass}");
+        assert!(code.contains(&format!("{pass}(")), "no example of {pass}");
+    }
+    for element in vocabulary::ELEMENTS {
+        assert!(page.contains(&format!("`{element}`")), "{element}");
+    }
+    for rule in vocabulary::RULES {
+        assert!(page.contains(&format!("`.{rule}(")), "{rule}");
+    }
+    assert_eq!(check::MAX_COORDINATES, 10_000);
+    for limit in [
+        format!("{} levels", parse::MAX_NESTING),
+        format!("{} operators", parse::MAX_OPERATORS),
+        format!("{} Gauss points", vocabulary::MAX_POINTS),
+        format!("at most {} terms is written out", lower::SHORT_SUM),
+        format!("at most {} terms in all", lower::LONGEST_WRITTEN_OUT),
+        "10 000 coordinates".to_owned(),
+    ] {
+        assert!(page.contains(&limit), "{limit}");
+    }
+}
+
+#[test]
+fn the_models_on_the_page_of_the_language_are_accepted() {
+    let mut models = 0;
+    for example in examples() {
+        let wrapped = format!("fn main() {{ {example} }}");
+        let function: syn::ItemFn = syn::parse_str(&wrapped).expect("an example is Rust");
+        for statement in &function.block.stmts {
+            let syn::Stmt::Item(syn::Item::Struct(item)) = statement else {
+                continue;
+            };
+            let mut item = item.clone();
+            let attribute = item.attrs.pop().expect("the attribute stands last");
+            let arguments = attribute.meta.require_list().expect("arguments");
+            let expansion = expand(arguments.tokens.clone(), quote!(#item)).to_string();
+            let mistake = expansion.find("compile_error");
+            let mistake = mistake.map(|at| expansion[at..].chars().take(200).collect::<String>());
+            assert_eq!(mistake, None, "{}", item.ident);
+            models += 1;
+        }
+    }
+    assert!(models >= 14, "{models}");
 }

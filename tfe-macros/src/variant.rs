@@ -1,9 +1,11 @@
 //! Models made from the declared one: `model(Name, truncated(2), frozen(r = l))`.
 
+use crate::docs::Docs;
 use crate::emit::identifier;
 use crate::input::plain;
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
+use syn::parse::Parser;
 use syn::punctuated::Punctuated;
 use syn::{Attribute, Field, Fields, ItemStruct, Meta, Path, Token, parse_quote};
 use tfe_symbolic::model::declared::{Projection, Variant};
@@ -16,13 +18,17 @@ pub(crate) fn expand(
     variant: &Variant,
     original: &ItemStruct,
     path: &TokenStream,
+    docs: &Docs,
 ) -> (ItemStruct, TokenStream) {
     let title = format!(
         " `{}` from [`{}`]: {}.",
         variant.model.name, original.ident, variant.made
     );
     let fields = fields(variant, original);
-    let item = renamed(&variant.model.name, &title, fields, original);
+    let mut item = renamed(&variant.model.name, &title, fields, original);
+    let own = docs.attributes("model", &variant.model.name);
+    let own = syn::Attribute::parse_outer.parse2(own).unwrap_or_default();
+    item.attrs.splice(0..0, own);
     let of = of(variant, &item, original);
     let of_state = of_state(variant, &item, original, path);
     (item, quote!(#of #of_state))

@@ -111,6 +111,8 @@ pub struct Model {
     pub names_missing: bool,
     /// Fields of a type that formulas cannot use.
     other_fields: Vec<String>,
+    /// The names of all solvers, those with mistakes too.
+    solver_names: Vec<String>,
     /// Where the elements of all solvers stand, those with mistakes too.
     solver_spans: Vec<Span>,
     /// The elements of `solvers` as written, and where.
@@ -311,8 +313,33 @@ fn array_length(name: &Name, length: &Expr, context: &Context, bag: &mut Bag) ->
     unknown_length(&name.node)
 }
 
+/// The keywords of Rust that cannot be written as raw identifiers, hence name nothing in generated code.
+const KEYWORDS_WITHOUT_RAW_FORM: &[&str] = &["crate", "self", "super", "Self"];
+
+/// Whether Rust refuses the name even in its raw form.
+fn keyword(name: &str) -> Option<Kind> {
+    KEYWORDS_WITHOUT_RAW_FORM
+        .contains(&name)
+        .then(|| Kind::Keyword {
+            name: name.to_owned(),
+        })
+}
+
+/// Checks the name of a struct that will be generated: formulas do not see it.
+pub(crate) fn unusable_type_name(name: &str) -> Option<Kind> {
+    match name {
+        "_" => Some(Kind::Keyword {
+            name: name.to_owned(),
+        }),
+        name => keyword(name),
+    }
+}
+
 /// Checks a new name against the words of the language.
 pub(crate) fn reserved(name: &str, field: bool) -> Option<Kind> {
+    if let Some(kind) = keyword(name) {
+        return Some(kind);
+    }
     if name.starts_with("__tfe") {
         Some(Kind::ReservedPrefix {
             name: name.to_owned(),
@@ -517,6 +544,8 @@ impl Model {
             if let Some(taken) = taken {
                 let name = name.clone();
                 bag.push(*span, Kind::NameClash { name, taken });
+            } else if let Some(kind) = unusable_type_name(name) {
+                bag.push(*span, kind);
             }
             names.push(name);
         }

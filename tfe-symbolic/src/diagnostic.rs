@@ -1,7 +1,9 @@
-//! Mistakes in a declaration: where, what, and the remedy. All wording lives in `diagnostic/wording.rs`. May import `expr` and
+//! Mistakes in a declaration: where, what, and the remedy. All wording lives in `diagnostic/wording.rs` and
+//! `diagnostic/remedies.rs`. May import `expr` and
 //! `vocabulary`.
 
 pub mod kind;
+mod remedies;
 pub mod span;
 mod wording;
 

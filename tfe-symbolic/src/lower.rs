@@ -30,7 +30,7 @@ use crate::check::Model;
 use crate::diagnostic::{Bag, Kind, Span};
 use crate::expr::graph::{ExprId, Graph};
 use crate::expr::hash::Map;
-use crate::expr::input::{Affine, LoopVariable};
+use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
 use crate::model::declared::{CoordinateArray, Declared, Form, Requirement};
 use crate::syntax::ast::{Expr, ExprKind};
 use crate::syntax::context::Context;
@@ -78,9 +78,15 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     }
     let used_fields = lowerer.used_fields();
     let variants = lowerer.variants();
-    lowerer.check_usage(form, energy, &constraints);
+    lowerer.check_usage(form, energy, (&constraints, &forces, dissipation));
     let all_fields = lowerer.used_fields();
+    if let Some(pending) = lowerer.turn_by_turn.take()
+        && lowerer.bag.is_empty()
+    {
+        lowerer.nonlinear_sum(pending.span);
+    }
     let requirements = std::mem::take(&mut lowerer.requirements);
+    let remarks = std::mem::take(&mut lowerer.remarks);
     let graph = lowerer.graph;
     let arrays = |slots: &[crate::check::Slots]| {
         let array = |slots: &crate::check::Slots| CoordinateArray {
@@ -109,6 +115,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         crate_path: model.crate_path.clone(),
         used_fields,
         requirements,
+        remarks: Vec::new(),
         notation: formulas::formulas(model),
     };
     // What is made from a wrong model would repeat its mistakes.
@@ -120,6 +127,8 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
             }
         }
     }
+    // Models made from this one may lack what the remarks are about.
+    declared.remarks = remarks;
     let Some((rate, (_, span))) = rate.zip(model.time_transformation.as_ref()) else {
         return Some(declared);
     };
@@ -166,6 +175,27 @@ struct Index {
     variable: LoopVariable,
     start: Affine,
     end: Affine,
+    /// Its value, where the sum is written out turn by turn while it is lowered.
+    at: Option<i64>,
+}
+
+impl Index {
+    /// What the index stands for in formulas and in other indices.
+    fn value(&self) -> Affine {
+        match self.at {
+            Some(at) => Affine::constant(at),
+            None => Affine::symbol(IndexSymbol::Loop(self.variable)),
+        }
+    }
+}
+
+/// A nonlinear expression around a sum that can be written out only if sums around it are.
+#[derive(Clone, Debug)]
+struct TurnByTurn {
+    /// The indices of those sums.
+    variables: Vec<LoopVariable>,
+    /// The sum inside.
+    span: Span,
 }
 
 /// A declaration whose formula may have an index of its own.
@@ -203,12 +233,18 @@ struct Lowerer<'a> {
     terms: Option<u64>,
     /// The number of terms of each loop that was made.
     loops: Map<ExprId, Option<u64>>,
+    /// Set where the sums around the formula at hand have to be written out turn by turn.
+    turn_by_turn: Option<TurnByTurn>,
+    /// The lengths of sums of vectors, by the place of their indices.
+    vector_sums: Map<Span, usize>,
     /// The smallest and largest value of indices that vary, as far as they are numbers.
     extents: Map<Affine, Option<(i64, i64)>>,
     /// Which fields formulas use.
     fields: Vec<bool>,
     /// What must hold of lengths that are known at run time only.
     requirements: Vec<Requirement>,
+    /// What is unusual about the declaration, though no mistake.
+    remarks: Vec<String>,
 }
 
 impl<'a> Lowerer<'a> {
@@ -232,9 +268,12 @@ impl<'a> Lowerer<'a> {
             hidden_loops: 0,
             terms: Some(1),
             loops: Map::default(),
+            turn_by_turn: None,
+            vector_sums: Map::default(),
             extents: Map::default(),
             fields: vec![false; context.fields.len()],
             requirements: Vec::new(),
+            remarks: Vec::new(),
         };
         // A length is a use of the field.
         for slots in model.coordinates.iter().chain(&model.momenta) {
@@ -330,6 +369,11 @@ impl<'a> Lowerer<'a> {
             ExprKind::Vector(components) => {
                 if components.is_empty() {
                     self.report(expr.span, Kind::EmptyVector);
+                    return Value::Error;
+                }
+                let row = |part: &&Expr| matches!(part.node, ExprKind::Vector(_));
+                if let Some(row) = components.iter().find(row) {
+                    self.report(row.span, Kind::Matrix);
                     return Value::Error;
                 }
                 let values: Vec<_> = components.iter().map(|part| self.scalar(part)).collect();

@@ -2,6 +2,7 @@
 
 use num_dual::{DualNum, HyperDual64};
 use proptest::prelude::*;
+use tfe_symbolic::compile::declare;
 use tfe_symbolic::derive::derivation::{Derivation, Model};
 use tfe_symbolic::expr::differentiate::derivative;
 use tfe_symbolic::expr::function::Function;
@@ -10,6 +11,7 @@ use tfe_symbolic::expr::input::{Affine, Input};
 use tfe_symbolic::model::declared::{Force, Form, Observable, Parameter};
 use tfe_symbolic::program::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{By, Request};
+use tfe_symbolic::syntax::context::Context;
 
 const ALL: Request = Request {
     value: true,
@@ -327,4 +329,27 @@ proptest! {
         prop_assert!((dsum - (2.0 * df + 3.0 * dg)).abs() < DIGITS * (1.0 + df.abs() + dg.abs()));
         prop_assert!((dproduct - (df * g + f * dg)).abs() < DIGITS * (1.0 + (df * g).abs() + (f * dg).abs()));
     }
+}
+
+#[test]
+fn exponents_beyond_32_bits_are_differentiated() {
+    let text = "coordinates(x, y), lagrangian = dot(x)^2/2 + dot(y)^2/2 \
+        - (x^-2147483648)^2 - (x^2147483647*y)^-1 - sqrt(x)^-2147483648 - ((x + y - 1)^-2147483648)^-1";
+    let declared = declare(text, &Context::default()).expect("a model");
+    let program = Derivation::of(&declared).program(ALL);
+    let x = 1.0 + 1e-10;
+    let environment = Environment {
+        q: vec![x, 1.0],
+        z: vec![0.0; 2],
+        ..Environment::default()
+    };
+    let results = interpret(&program, &environment).expect("a complete environment");
+    let n = 2_f64.powi(31);
+    let powers = [-2.0 * n, 1.0 - n, -n / 2.0, n].map(|exponent| (exponent, x.powf(exponent)));
+    let value: f64 = powers.iter().map(|(_, power)| -power).sum();
+    let slope: f64 = powers.iter().map(|(n, power)| -n * power / x).sum();
+    // An exponent magnifies the rounding of its base, here that of the input.
+    let digits = 4.0 * n * f64::EPSILON;
+    assert!((results.value - value).abs() < digits * value.abs());
+    assert!((results.q[0] - slope).abs() < digits * slope.abs());
 }

@@ -328,7 +328,7 @@ fn passes_one_after_another() {
     assert_eq!(
         both.to_string(),
         "Model: truncated to degree 2 about r = l\n\
-         L = m g l − 0.5 k (l − r)² − m g (l − r) + 0.5 m (r\u{307}² + l² θ\u{307}²) − 0.5 m g l θ²\n\
+         L = m g l − 0.5 k (r − l)² + m g (r − l) + 0.5 m (r\u{307}² + l² θ\u{307}²) − 0.5 m g l θ²\n\
          Q(r) = −c r\u{307}\n\
          Q(θ) = −l² c θ\u{307}\n\
          coordinates: r, θ      parameters: m, l, g, k, c"

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 use tfe_symbolic::compile::declare;
 use tfe_symbolic::diagnostic::{Diagnostic, Kind};
-use tfe_symbolic::model::declared::Declared;
+use tfe_symbolic::model::declared::{Declared, Requirement};
 use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
 struct Case {
@@ -164,6 +164,15 @@ fn shown(model: &Declared) -> String {
     }
     if let Some(path) = &model.crate_path {
         let _ = writeln!(out, "crate {path}");
+    }
+    for remark in &model.remarks {
+        let _ = writeln!(out, "remark: {remark}");
+    }
+    for requirement in &model.requirements {
+        if let Requirement::Index { text, ranges, .. } = requirement {
+            let separator = if ranges.is_empty() { "" } else { " for " };
+            let _ = writeln!(out, "to be checked: {text}{separator}{ranges}");
+        }
     }
     out.trim_end().to_owned()
 }

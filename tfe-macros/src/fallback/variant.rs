@@ -85,7 +85,13 @@ pub(super) fn stubs(
     let fields = fields.iter();
     let added = (0..variant.added.len()).map(|at| format_ident!("__{at}"));
     quote! {
-        #[derive(Clone, Copy, Debug, PartialEq, Default)]
+        #[derive(
+            ::core::clone::Clone,
+            ::core::marker::Copy,
+            ::core::fmt::Debug,
+            ::core::cmp::PartialEq,
+            ::core::default::Default,
+        )]
         #[allow(dead_code, missing_docs)]
         #vis struct #name #generics #where_clause { #(pub #fields: f64),* }
 

@@ -78,7 +78,7 @@ pub(super) fn method(
         }
         None => quote! {
             let values = #private::family_observables(self, t, q, #second, || (#column, 1))?;
-            ::core::result::Result::Ok(values.first().copied().unwrap_or(f64::NAN))
+            ::core::result::Result::Ok(values.first().copied().unwrap_or(::core::primitive::f64::NAN))
         },
         Some(range) => {
             let length = sites::length(range);

@@ -1,6 +1,6 @@
 //! Requests for specialised steppers.
 
-use super::Model;
+use super::{Model, unusable_type_name};
 use crate::diagnostic::{Bag, Kind, Role, nearest};
 use crate::model::declared::{Family, Rule, Solver};
 use crate::syntax::ast::{ElementSyntax, Name, Spanned};
@@ -8,7 +8,7 @@ use crate::syntax::context::Context;
 use crate::vocabulary::{ELEMENTS, MAX_POINTS, RULES};
 
 /// The most nodes an element can have.
-const MAX_NODES: u64 = 12;
+const MAX_NODES: u32 = 12;
 
 impl Model {
     /// `solver(Name, Mixed::<4>)`
@@ -19,7 +19,7 @@ impl Model {
         context: &Context,
         bag: &mut Bag,
     ) {
-        let taken = if self.solvers.iter().any(|solver| solver.name == name.node) {
+        let taken = if self.solver_names.contains(&name.node) {
             Some(Role::Solver)
         } else {
             (name.node == context.struct_name).then_some(Role::Struct)
@@ -33,6 +33,10 @@ impl Model {
                 },
             );
         }
+        if let Some(kind) = unusable_type_name(&name.node) {
+            bag.push(name.span, kind);
+        }
+        self.solver_names.push(name.node.clone());
         let syntax = &element.node;
         let family = match syntax.family.node.as_str() {
             "Primal" => Some(Family::Primal),
@@ -51,11 +55,14 @@ impl Model {
             }
         };
         let nodes = syntax.nodes.node;
-        if !(2..=MAX_NODES).contains(&nodes) {
+        let count = u32::try_from(nodes).ok();
+        let count = count.filter(|count| (2..=MAX_NODES).contains(count));
+        if count.is_none() {
             bag.push(syntax.nodes.span, Kind::NodesOutOfRange { nodes });
         }
         let rule = quadrature_rule(syntax, bag);
-        if let (Some(family), Some(rule), Ok(nodes)) = (family, rule, u32::try_from(nodes)) {
+        // What comes after relies on numbers of nodes that elements can have.
+        if let (Some(family), Some(rule), Some(nodes)) = (family, rule, count) {
             self.solvers.push(Solver {
                 name: name.node.clone(),
                 family,

@@ -1,6 +1,6 @@
 //! Models made from the declared one: `model(Name, truncated(2), frozen(r = l))`.
 
-use super::Model;
+use super::{Model, unusable_type_name};
 use crate::diagnostic::{Bag, Kind, Role, nearest};
 use crate::syntax::ast::Name;
 use crate::syntax::context::Context;
@@ -16,6 +16,9 @@ impl Model {
                     taken,
                 };
                 bag.push(name.span, name_clash);
+            }
+            if let Some(kind) = unusable_type_name(&name.node) {
+                bag.push(name.span, kind);
             }
             if passes.is_empty() {
                 let span = name.span;
@@ -40,8 +43,7 @@ impl Model {
         if before.any(|(other, _)| other.node == name.node) {
             return Some(Role::Model);
         }
-        let mut solvers = self.solvers.iter();
-        if solvers.any(|solver| solver.name == name.node) {
+        if self.solver_names.contains(&name.node) {
             return Some(Role::Solver);
         }
         (name.node == context.struct_name).then_some(Role::Struct)

@@ -48,6 +48,34 @@ kinds! {
     DoubleStar,
     /// `a..=b`
     InclusiveRange,
+    /// `if a < b { x } else { y }`
+    Condition {
+        /// `if` or `match`.
+        word: &'static str,
+    },
+    /// `a = b` inside a formula.
+    EqualsSign {
+        /// What stands left of it, where the formula is that of a constraint.
+        left: Option<String>,
+        /// What stands right of it.
+        right: String,
+    },
+    /// `link.m`
+    FieldAccess {
+        /// What stands left of the point.
+        object: String,
+        /// The name right of it.
+        field: String,
+    },
+    /// `x.sin()`
+    MethodCall {
+        /// What stands left of the point.
+        object: String,
+        /// The name right of it.
+        method: String,
+    },
+    /// `|x| x^2`, or `|x|` for an absolute value.
+    Bars,
     /// Too many brackets, powers or signs inside each other.
     NestedTooDeep {
         /// The deepest nesting that is read.
@@ -98,6 +126,11 @@ kinds! {
         name: String,
         /// The field that has it, if it is a field.
         field: bool,
+    },
+    /// A keyword that no item of Rust can have as its name: `crate`, `self`, `super`, `Self`, `_`.
+    Keyword {
+        /// The keyword.
+        name: String,
     },
     /// `q[0]`
     ZeroLength {
@@ -220,11 +253,6 @@ kinds! {
     /// A coordinate whose momentum ∂L/∂v holds no velocity.
     LinearVelocity {
         /// The coordinate.
-        name: String,
-    },
-    /// A momentum that is not in the Hamiltonian.
-    NoMomentum {
-        /// The momentum.
         name: String,
     },
     /// An energy without coordinates, velocities and momenta.
@@ -420,6 +448,13 @@ kinds! {
         /// What may have been meant.
         nearest: Option<String>,
     },
+    /// `theta_dot`, where `theta` is declared.
+    VelocityName {
+        /// The name.
+        name: String,
+        /// What it may be the rate of.
+        stem: String,
+    },
     /// A function that does not exist.
     UnknownFunction {
         /// The name.
@@ -510,6 +545,8 @@ kinds! {
     ScalarPlusVector,
     /// `[]`
     EmptyVector,
+    /// `[[a, b], [c, d]]`
+    Matrix,
     /// An array whose length the macro does not know, without an index.
     WholeArray {
         /// The array.

@@ -1,8 +1,7 @@
-//! What is said of each kind of mistake: all wording is here.
+//! What is said of each kind of mistake: the remedies are in `remedies`.
 
 use crate::diagnostic::kind::Kind;
 use crate::expr::function::{Domain, Function};
-use crate::vocabulary::{self, Argument};
 
 impl Kind {
     /// What is wrong: lower case, names in backticks, no full stop.
@@ -14,6 +13,15 @@ impl Kind {
             }
             Self::DoubleStar => "`**` is not an operator".into(),
             Self::InclusiveRange => "`..=` is not supported in sums".into(),
+            Self::Condition { word } => format!("`{word}` is not part of the language of formulas"),
+            Self::EqualsSign { .. } => "a formula cannot hold `=`".into(),
+            Self::FieldAccess { object, field } => {
+                format!("a formula cannot read the field `{field}` of `{object}`")
+            }
+            Self::MethodCall { method, .. } => {
+                format!("a formula cannot call the method `{method}`")
+            }
+            Self::Bars => "`|` is not part of the language of formulas".into(),
             Self::NestedTooDeep { limit } => {
                 format!("expression is nested more than {limit} levels deep")
             }
@@ -31,6 +39,7 @@ impl Kind {
             Self::ReservedPrefix { name, .. } => {
                 format!("the name `{name}` begins like those of the generated code")
             }
+            Self::Keyword { name } => format!("`{name}` is a keyword of Rust and cannot be a name"),
             Self::ZeroLength { name, .. } => format!("array `{name}` has no elements"),
             Self::UnknownLength { name, .. } => format!("unknown length `{name}`"),
             Self::LengthNotSimple => {
@@ -105,9 +114,6 @@ impl Kind {
             }
             Self::LinearVelocity { name } => {
                 format!("the momentum of coordinate `{name}` does not depend on any velocity")
-            }
-            Self::NoMomentum { name } => {
-                format!("momentum `{name}` does not appear in the Hamiltonian")
             }
             Self::ConstantEnergy { energy } => {
                 format!("the {energy} does not depend on the state of the system")
@@ -190,7 +196,9 @@ impl Kind {
             Self::MasslessCoordinate { model, name } => {
                 format!("coordinate `{name}` of model `{model}` has no kinetic energy")
             }
-            Self::UnknownSymbol { name, .. } => format!("unknown name `{name}`"),
+            Self::UnknownSymbol { name, .. } | Self::VelocityName { name, .. } => {
+                format!("unknown name `{name}`")
+            }
             Self::UnknownFunction { name, .. } => format!("unknown function `{name}`"),
             Self::NotAFunction { name } => format!("`{name}` is not a function"),
             Self::FunctionAsValue { name } => format!("function `{name}` needs arguments"),
@@ -238,6 +246,7 @@ impl Kind {
             Self::PowerOfVector => "powers of vectors are not defined".into(),
             Self::ScalarPlusVector => "cannot add a number and a vector".into(),
             Self::EmptyVector => "a vector needs at least one component".into(),
+            Self::Matrix => "the components of a vector are numbers, not vectors".into(),
             Self::WholeArray { name } => {
                 format!("array `{name}` has no length known here and needs an index")
             }
@@ -291,305 +300,6 @@ impl Kind {
         }
     }
 
-    /// The remedy, where there is one to name.
-    pub fn help(&self) -> Option<String> {
-        Some(match self {
-            Self::MissingOperator { left, right } => format!("write `{left}*{right}`"),
-            Self::DoubleStar => "write `^` for a power".into(),
-            Self::InclusiveRange => "write `a..b+1`".into(),
-            Self::NestedTooDeep { .. } | Self::TooLong { .. } => {
-                "name parts of it with `let`".into()
-            }
-            Self::UnknownArgument {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::UnknownSymbol {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::UnknownFunction {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::UnknownLength {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::UnknownElement {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::UnknownRule {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::ForceTarget {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::UnknownParameter {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::UnknownPass {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::UnknownCoordinate {
-                nearest: Some(nearest),
-                ..
-            }
-            | Self::UnknownConstraint {
-                nearest: Some(nearest),
-                ..
-            } => {
-                format!("did you mean `{nearest}`?")
-            }
-            Self::UnknownArgument { nearest: None, .. } => {
-                format!("the arguments are {}", backticked(&Argument::all().map(Argument::word).collect::<Vec<_>>()))
-            }
-            Self::UnknownSymbol {
-                nearest: None,
-                name,
-            } => {
-                format!("declare `{name}` as a field of the struct, a coordinate or a `let`")
-            }
-            Self::UnknownElement { nearest: None, .. } => {
-                format!("the elements are {}", backticked(vocabulary::ELEMENTS))
-            }
-            Self::UnknownRule { nearest: None, .. } => {
-                format!("the rules are {}", backticked(vocabulary::RULES))
-            }
-            Self::UnknownLength {
-                nearest: None,
-                name,
-            } => {
-                format!(
-                    "declare `const {name}: usize` on the struct, or a field `{name}: usize`, or \
-                     write a number"
-                )
-            }
-            Self::NoCoordinates => "add `coordinates(x)`".into(),
-            Self::NameClash { .. } | Self::ReservedName { .. } | Self::ReservedPrefix { .. } => {
-                "choose another name".into()
-            }
-            Self::FamilyNotAlone { name } => {
-                format!("make the others elements of `{name}`, or give all arrays literal lengths")
-            }
-            Self::RunTimeLength { .. } => {
-                "give the coordinates a length known here, such as `q[10]`".into()
-            }
-            Self::ConstraintNotAffine { .. } => {
-                "write a condition on positions, or one in which velocities stand linearly, such \
-                 as `dot(x)*sin(phi) - dot(y)*cos(phi)`"
-                    .into()
-            }
-            Self::ConstraintWithoutCoordinate { .. } => {
-                "write what must vanish, such as `x^2 + y^2 - l^2`".into()
-            }
-            Self::RepeatedConstraint { name, .. } => format!("remove `{name}`"),
-            Self::MomentumInConstraint => "write the velocity instead, such as `dot(x)`".into(),
-            Self::VelocityConstraintOfFamily { .. } => {
-                "write a condition on positions, or give the coordinates a length known here, such \
-                 as `q[10]`"
-                    .into()
-            }
-            Self::ConstraintRange { .. } => {
-                "write the constraints out, or give the array and the range literal lengths".into()
-            }
-            Self::TooManyConstraints { .. } => "split the family into several shorter ones".into(),
-            Self::SumInConstraint { limit, .. } => {
-                format!("make the length a number of at most {limit}, or write the sum out")
-            }
-            Self::ParameterOfConstraint { .. } => {
-                "remove it from `sensitivity`: derivatives of constraints by parameters are not \
-                 available"
-                    .into()
-            }
-            Self::SolverOfConstraints { nodes, .. }
-            | Self::SolverOfTransformation { nodes, .. } => format!("use `Mixed::<{nodes}>`"),
-            Self::ListInRange { .. } => {
-                "bound the range by numbers and fields of type `usize`".into()
-            }
-            Self::OutputFamily => "declare one `output` an element".into(),
-            Self::NoEnergy => "add `lagrangian = …` or `hamiltonian = …`".into(),
-            Self::TwoEnergies => "keep one of them".into(),
-            Self::NoMomenta => "add `momenta(…)`, one for each coordinate, in their order".into(),
-            Self::TransformationOfLagrangian => {
-                "declare the model by `momenta(…)` and `hamiltonian = …`".into()
-            }
-            Self::TransformationOfFamily { .. } => {
-                "give the coordinates a length known here, such as `q[10]`".into()
-            }
-            Self::TransformationWith {
-                argument: "constraint",
-            } => "choose coordinates that satisfy the constraints, or remove one of the two".into(),
-            Self::TransformationWith { .. } => "remove one of the two".into(),
-            Self::TransformationNotPositive => {
-                "write dt/dτ, such as the distance from a singularity".into()
-            }
-            Self::PowerOfLoop { limit } => format!(
-                "make the length a number of at most {limit}, or remove `time_transformation`"
-            ),
-            Self::MomentaWithLagrangian => {
-                "remove `momenta`; they follow from the Lagrangian as ∂L/∂v".into()
-            }
-            Self::MomentaMismatch { .. } => {
-                "declare one momentum for each coordinate, in the same order and of the same \
-                 lengths"
-                    .into()
-            }
-            Self::UnusedCoordinate { name, .. } => format!("remove `{name}` from `coordinates`"),
-            Self::UnusedField { name } => {
-                format!("remove it, or name it `_{name}` if other code needs it")
-            }
-            Self::NoVelocity { name } => {
-                format!("add its kinetic energy, such as `m/2*dot({name})^2`")
-            }
-            Self::LinearVelocity { name } => {
-                format!("the Lagrangian must hold `dot({name})` other than linearly")
-            }
-            Self::NoMomentum { name } => {
-                format!("add its kinetic energy, such as `{name}^2/(2*m)`")
-            }
-            Self::ConstantEnergy { .. } => "write kinetic and potential energy".into(),
-            Self::DissipationWithoutVelocity => {
-                "a Rayleigh function holds velocities, such as `c/2*dot(x)^2`".into()
-            }
-            Self::NoSensitivity => "name fields of the struct, as in `sensitivity(omega)`".into(),
-            Self::UnknownParameter {
-                nearest: None,
-                name,
-            } => format!("declare `{name}` as a field of the struct"),
-            Self::NotAParameter { target, role: None } if target == "t" => {
-                "derivatives by the time come with those by any parameter".into()
-            }
-            Self::NotAParameter { .. } => {
-                "derivatives are taken by fields of type `f64` and by elements of array fields, \
-                 such as `k[2]`"
-                    .into()
-            }
-            Self::ArrayOfParameters { name } => {
-                format!("name its elements, as in `{name}[0], {name}[1]`")
-            }
-            Self::IndexNotLiteral { array, .. } => {
-                format!("name each element, as in `{array}[0], {array}[1]`")
-            }
-            Self::RepeatedParameter { .. } => "name it once".into(),
-            Self::NoPass { name } => format!("say what to do, as in `model({name}, truncated(2))`"),
-            Self::UnknownPass { nearest: None, .. } => {
-                format!("the passes are {}", backticked(vocabulary::PASSES))
-            }
-            Self::PassEntry { pass } => format!("write it like `{}`", usage(pass)),
-            Self::TruncationDegree { .. } => "write `truncated(2)` for a linear model".into(),
-            Self::UnknownCoordinate { nearest: None, .. } => {
-                "name a coordinate as declared, such as `x` or `q[2]`; momenta and velocities \
-                 belong to truncations"
-                    .into()
-            }
-            Self::RepeatedEntry { .. } => "give it once".into(),
-            Self::PassValue { .. } => "write numbers and fields of the struct".into(),
-            Self::PassOfLength {
-                pass: "frozen" | "rigid" | "elastic",
-            } => "give arrays of coordinates literal lengths of at most some thousand".into(),
-            Self::PassOfLength { .. } => {
-                "give arrays of coordinates literal lengths of at most some thousand, or say the \
-                 same of all elements of the only array"
-                    .into()
-            }
-            Self::TruncationOfConstraints => {
-                "choose coordinates that satisfy the constraints, or make them springs by \
-                 `elastic(name = k)` first"
-                    .into()
-            }
-            Self::NoTaylorPolynomial => "give another point, such as `truncated(2, r = l)`".into(),
-            Self::NotCyclic { .. } => {
-                "ignore coordinates only that appear by their velocities; `structure()` lists the cyclic ones".into()
-            }
-            Self::CyclicConstrained { .. } => {
-                "choose coordinates that satisfy the constraint".into()
-            }
-            Self::CyclicForced { name } => {
-                format!("keep `{name}`, or declare the model without the force")
-            }
-            Self::RouthName { name, .. } => format!("give the field or output `{name}` another name"),
-            Self::CyclicNotQuadratic { .. } => "declare the model by a Hamiltonian".into(),
-            Self::FrozenHamiltonian => "declare the model by a Lagrangian".into(),
-            Self::NotASpring { .. } => {
-                "name a field of type `f64` whose energy is a square, such as `k/2*(r - l)^2`"
-                    .into()
-            }
-            Self::UnknownConstraint { nearest: None, .. } => "name a constraint as declared".into(),
-            Self::ElasticVelocity { .. } => {
-                "name constraints on positions, or declare a `dissipation` instead".into()
-            }
-            Self::NothingLeft { .. } => "leave one coordinate at least".into(),
-            Self::ConstraintLeft { .. } => {
-                "freeze fewer coordinates, or declare the constraint in another model".into()
-            }
-            Self::MasslessCoordinate { name, .. } => {
-                format!("freeze `{name}` too, or truncate about another point")
-            }
-            Self::NotAFunction { name } => format!("write `{name}*(…)` for a product"),
-            Self::FunctionAsValue { name } => format!("write `{name}(…)`"),
-            Self::UsedBeforeLet { .. } => "move the `let` up".into(),
-            Self::UnsupportedField { .. } => {
-                "formulas use fields of type `f64`, `[f64; N]`, `Vec<f64>` and `usize`".into()
-            }
-            Self::Acceleration => "forces and energies depend on velocities at most".into(),
-            Self::VelocityInHamiltonian { .. } | Self::VelocityOfLoop => {
-                "write the momenta instead".into()
-            }
-            Self::RateOfMomentum => "write the force that changes it".into(),
-            Self::VariableExponent { base, exponent } => {
-                format!("write `exp(({exponent})*ln({base}))` if the base is always positive")
-            }
-            Self::ScalarExpected { .. } => {
-                "take a component such as `r[0]`, or use `inner` or `norm`".into()
-            }
-            Self::VectorExpected => "write a vector as `[a, b, c]`".into(),
-            Self::ProductOfVectors => "use `inner(a, b)` or `cross(a, b)`".into(),
-            Self::PowerOfVector => "use `inner(r, r)` for the square of the length".into(),
-            Self::DivisionByVector => "divide by its `norm`".into(),
-            Self::WholeArray { name } => format!("write an element such as `{name}[i]`"),
-            Self::IndexNotConstant { .. } => {
-                "an index that varies needs a coordinate array or an array field".into()
-            }
-            Self::NonlinearSum { limit } => format!(
-                "make the length a number of at most {limit}, or rewrite the energy as a sum of \
-                 local terms"
-            ),
-            Self::NodesOutOfRange { .. } => "choose 2 to 12 nodes".into(),
-            Self::PointsOutOfRange { .. } => {
-                format!("choose 1 to {} points", vocabulary::MAX_POINTS)
-            }
-            Self::RuleNotForFamily { .. } => "use `.quadrature(k)`".into(),
-            Self::SolverOfFamily { .. } => {
-                "give the coordinates literal lengths, or use `Simulation`".into()
-            }
-            Self::Expected { .. }
-            | Self::NumberTooLarge { .. }
-            | Self::RepeatedArgument { .. }
-            | Self::ZeroLength { .. }
-            | Self::LengthNotSimple
-            | Self::TooManyCoordinates { .. }
-            | Self::ForceTarget { .. }
-            | Self::UnknownFunction { .. }
-            | Self::WrongArity { .. }
-            | Self::NoSuchElement { .. }
-            | Self::DivisionByZero
-            | Self::OutsideDomain { .. }
-            | Self::WrongLength { .. }
-            | Self::ScalarPlusVector
-            | Self::EmptyVector
-            | Self::IndexNotInteger { .. }
-            | Self::IndexNotAffine { .. }
-            | Self::IndexOutOfRange { .. }
-            | Self::EmptyRange { .. } => return None,
-        })
-    }
-
     /// The field of the struct that is to blame.
     pub fn field(&self) -> Option<&str> {
         match self {
@@ -614,28 +324,7 @@ fn domain_words(function: Function) -> &'static str {
     }
 }
 
-/// A pass as it may be written.
-fn usage(pass: &str) -> &'static str {
-    match pass {
-        "frozen" => "frozen(r = l)",
-        "routh" => "routh(phi, psi)",
-        "rigid" => "rigid(rod = k)",
-        "elastic" => "elastic(rod = k)",
-        _ => "truncated(4, theta = 0)",
-    }
-}
-
 /// `3 arguments`
 fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
-}
-
-/// `` `a`, `b` and `c` ``
-fn backticked(names: &[&str]) -> String {
-    let mut names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-    match names.pop() {
-        None => String::new(),
-        Some(last) if names.is_empty() => last,
-        Some(last) => format!("{} and {last}", names.join(", ")),
-    }
 }

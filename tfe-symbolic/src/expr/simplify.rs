@@ -30,6 +30,10 @@ use crate::expr::graph::{ExprId, Graph, Node, SumRange};
 /// Products of more factors than this stay nested: opening them would make the derivative of a deep composition quadratic in its depth.
 const LONG_PRODUCT: usize = 16;
 
+/// The largest whole exponent of a factor of a product; powers beyond it are calls of `powf`. Passes negate exponents and add
+/// those of equal factors in `i32`: two thousand factors, as many as one expression can have, stay far from overflow.
+const MAX_EXPONENT: u32 = 1 << 20;
+
 impl Graph {
     /// a + b
     pub fn add(&mut self, a: ExprId, b: ExprId) -> ExprId {
@@ -241,8 +245,8 @@ impl Graph {
         let mut factors: Vec<(ExprId, i32)> = Vec::with_capacity(collected.len());
         for (x, n) in collected {
             match i32::try_from(n) {
-                Ok(n) => factors.push((x, n)),
-                Err(_) => {
+                Ok(n) if n.unsigned_abs() <= MAX_EXPONENT => factors.push((x, n)),
+                _ => {
                     let exponent = self.constant(Constant::integer(n));
                     factors.push((self.intern(Node::Power { base: x, exponent }), 1));
                 }
@@ -528,5 +532,11 @@ mod tests {
         assert_ne!(square, power);
         let one = g.integer(1);
         assert_eq!(g.divide(square, square), one);
+        for exponent in [i64::from(i32::MIN), i64::from(i32::MIN) - 1, i64::MIN] {
+            let exponent = g.integer(exponent);
+            let power = g.power(x, exponent);
+            let base = Node::Power { base: x, exponent };
+            assert_eq!(*g.node(power), base);
+        }
     }
 }

@@ -86,7 +86,7 @@ impl Lowerer<'_> {
 
     fn index_symbol(&mut self, name: &str, expr: &Expr) -> Option<Affine> {
         if let Some(index) = self.index(name) {
-            return Some(Affine::symbol(IndexSymbol::Loop(index.variable)));
+            return Some(index.value());
         }
         let symbol = match self.symbol(name) {
             Some(Symbol::ConstParameter) => IndexSymbol::ConstParameter(name.to_owned()),
@@ -222,15 +222,14 @@ impl Lowerer<'_> {
         if fits {
             return true;
         }
-        let outside = SIZES.iter().map(|size| self.outside(place, length, *size));
-        let Some(sides) = outside.collect::<Option<Vec<Side>>>() else {
+        let Some(side) = self.always_outside(place, length) else {
             if let Some(length) = length {
                 self.require_index(array, place, Extent::Known(length.clone()));
             }
             return true;
         };
         // The extremes say it more plainly than the index itself, where they are attained.
-        let value = if sides[0] == Side::Above { high } else { low };
+        let value = if side == Side::Above { high } else { low };
         let length = length.map(Affine::to_string);
         let array = array.to_owned();
         let (value, ranges) = (value.to_string(), self.ranges_of(place));
@@ -306,13 +305,57 @@ impl Lowerer<'_> {
         }
     }
 
-    /// On which side some trip of the loops around leaves the array, when generic lengths take some
-    /// sizes; `None` if none does, as far as a reasonable number of trips tells.
-    fn outside(&self, place: &Affine, length: Option<&Affine>, size: Sizes) -> Option<Side> {
+    /// The side on which an index leaves its array whatever the generic lengths are; `None` if there may be lengths for which it
+    /// stays inside. Lengths for which nothing is indexed at all say nothing.
+    ///
+    /// An index beyond the end for small lengths and for large ones is so in between, because index and length are affine in each
+    /// length; one that changes sides may be inside for some lengths.
+    fn always_outside(&self, place: &Affine, length: Option<&Affine>) -> Option<Side> {
+        let needed = self.loops_around(place);
+        let bounds = needed.iter().flat_map(|index| [&index.start, &index.end]);
+        let affines: Vec<&Affine> = bounds.chain([place]).chain(length).collect();
+        let names = generic_lengths(&affines);
+        let weight = |affine: &Affine| {
+            let coefficients = affine.terms.iter().map(|(_, factor)| factor.unsigned_abs());
+            coefficients.fold(affine.constant.unsigned_abs(), u64::saturating_add)
+        };
+        let weights = affines.iter().map(|affine| weight(affine));
+        let large = weights.fold(LARGE_LENGTH, u64::saturating_add);
+        let of_run_time = affines.iter().any(|affine| affine.is_of_run_time());
+        let looked_at = if of_run_time && !self.is_of_run_time_length() {
+            // Nothing checks lengths of such models when they run, so that usual ones have to do.
+            USUAL_LENGTHS.map(|length| vec![length; names.len()]).into()
+        } else {
+            assignments(names.len(), large.min(MAX_LENGTH) as i64)
+        };
+        let mut side = None;
+        for lengths in looked_at {
+            let length_of = |name: &str| {
+                let at = names.iter().position(|other| *other == name);
+                at.map_or(0, |at| lengths[at])
+            };
+            let mut nest = Nest {
+                indices: &needed,
+                size: &length_of,
+                values: Vec::new(),
+                trips: 0,
+            };
+            let length = length.map_or(i64::MAX, |length| nest.evaluate(length));
+            match nest.visit(place, length) {
+                Visit::Outside(found) if side.is_none_or(|side| side == found) => {
+                    side = Some(found);
+                }
+                Visit::NoTurns => {}
+                Visit::Inside | Visit::Outside(_) => return None,
+            }
+        }
+        side
+    }
+
+    /// Only the loops that have a say in an index, lest long ones beside them use up the trips.
+    fn loops_around(&self, place: &Affine) -> Vec<Index> {
         let depends = |affine: &Affine, index: &Index| affine.depends_on(index.variable);
-        // Only the loops that have a say, lest long ones beside them use up the trips.
-        let needed: Vec<Index> = self
-            .indices
+        self.indices
             .iter()
             .filter(|index| {
                 let bounds = |other: &&Index| [&other.start, &other.end].map(Clone::clone);
@@ -323,21 +366,7 @@ impl Lowerer<'_> {
                     })
             })
             .cloned()
-            .collect();
-        let rank = |name: &str| {
-            let lengths = self.context.fields.iter().map(|field| &field.name);
-            let names = self.context.const_parameters.iter().chain(lengths);
-            names.take_while(|other| *other != name).count().min(5) as i64
-        };
-        let size = |name: &str| size.0 + size.1 * rank(name);
-        let mut nest = Nest {
-            indices: &needed,
-            size: &size,
-            values: Vec::new(),
-            trips: 0,
-        };
-        let length = length.map_or(i64::MAX, |length| nest.evaluate(length));
-        nest.outside(place, length)
+            .collect()
     }
 }
 
@@ -347,10 +376,59 @@ enum Side {
     Above,
 }
 
-/// Sizes given to generic lengths, in the order of their declaration: (first, step). An index that
-/// is outside for all of these is outside for good: they put any two lengths in either order.
-type Sizes = (i64, i64);
-const SIZES: [Sizes; 3] = [(7, 3), (22, -3), (11, 0)];
+/// What the trips through a nest of loops show of an index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Visit {
+    /// Some trip leaves the array.
+    Outside(Side),
+    /// All trips that were looked at stay inside.
+    Inside,
+    /// There is no trip.
+    NoTurns,
+}
+
+/// A length that counts as large where all numbers in indices are small; their sizes are added.
+const LARGE_LENGTH: u64 = 30;
+/// The largest length that is looked at.
+const MAX_LENGTH: u64 = 1 << 32;
+/// All lengths in between are looked at. Arrays of one element, for which `q[2*i]` is right, are not what anyone means.
+const SMALL_LENGTHS: (i64, i64) = (2, 12);
+
+/// Lengths of parameters of which models with a fixed number of coordinates are believed to be used with one.
+const USUAL_LENGTHS: [i64; 3] = [7, 11, 22];
+
+/// The generic lengths that stand in indices, each once.
+fn generic_lengths<'a>(affines: &[&'a Affine]) -> Vec<&'a str> {
+    let mut names: Vec<&str> = Vec::new();
+    for (symbol, _) in affines.iter().flat_map(|affine| &affine.terms) {
+        if let IndexSymbol::ConstParameter(name) | IndexSymbol::Field(name) = symbol
+            && !names.contains(&name.as_str())
+        {
+            names.push(name);
+        }
+    }
+    names
+}
+
+/// Lengths to look at: small ones, large ones, and such that each is in turn much larger and much smaller than the others.
+fn assignments(count: usize, large: i64) -> Vec<Vec<i64>> {
+    let (least, small) = SMALL_LENGTHS;
+    let equal = (least..=small).chain([large, 2 * large]);
+    let mut all: Vec<Vec<i64>> = equal.map(|length| vec![length; count]).collect();
+    for at in 0..count {
+        for (own, others) in [
+            (large, least),
+            (large, small),
+            (least, large),
+            (small, large),
+        ] {
+            let mut lengths = vec![others; count];
+            lengths[at] = own;
+            all.push(lengths);
+        }
+    }
+    all
+}
 
 /// A nest of loops that is run to see where an index goes.
 struct Nest<'a> {
@@ -384,30 +462,37 @@ impl Nest<'_> {
             })
     }
 
-    fn outside(&mut self, place: &Affine, length: i64) -> Option<Side> {
+    fn visit(&mut self, place: &Affine, length: i64) -> Visit {
         self.trips += 1;
         let Some(index) = self.indices.get(self.values.len()) else {
             let value = self.evaluate(place);
             return if value < 0 {
-                Some(Side::Below)
+                Visit::Outside(Side::Below)
+            } else if value >= length {
+                Visit::Outside(Side::Above)
             } else {
-                (value >= length).then_some(Side::Above)
+                Visit::Inside
             };
         };
         let (start, end) = (self.evaluate(&index.start), self.evaluate(&index.end));
-        // From the end, where indices that run too far do so.
-        for value in (start..end).rev() {
+        let mut found = Visit::NoTurns;
+        // The last and the first turn first: indices that run too far do so there.
+        let ends = [end.saturating_sub(1), start];
+        let ends = ends.into_iter().filter(|_| start < end);
+        for value in ends.chain((start.saturating_add(1)..end.saturating_sub(1)).rev()) {
             if self.trips > TRIPS {
-                return None;
+                return Visit::Inside;
             }
             self.values.push(value);
-            let side = self.outside(place, length);
+            let visit = self.visit(place, length);
             self.values.pop();
-            if side.is_some() {
-                return side;
+            match visit {
+                Visit::Outside(_) => return visit,
+                Visit::Inside => found = Visit::Inside,
+                Visit::NoTurns => {}
             }
         }
-        None
+        found
     }
 }
 

@@ -71,6 +71,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
+            at: None,
         });
         let result = self.value(value);
         self.indices.pop();

@@ -144,6 +144,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
+            at: None,
         });
         let value = self.scalar(value);
         self.indices.pop();

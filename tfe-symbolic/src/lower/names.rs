@@ -94,15 +94,34 @@ impl Lowerer<'_> {
                 .map(String::as_str)
                 .chain(["t", "pi"]);
             let nearest = nearest(&name, known);
-            Kind::UnknownSymbol { name, nearest }
+            match self.rate_in_words(&name) {
+                Some(stem) => Kind::VelocityName { name, stem },
+                None => Kind::UnknownSymbol { name, nearest },
+            }
         };
         self.report(span, kind);
     }
 
+    /// `theta` of `theta_dot`, `thetadot`, `dot_theta` and `dtheta`, where `theta` is a coordinate or a `let`.
+    fn rate_in_words(&self, name: &str) -> Option<String> {
+        let stems = [
+            name.strip_suffix("_dot"),
+            name.strip_suffix("dot"),
+            name.strip_prefix("dot_"),
+            name.strip_prefix('d'),
+        ];
+        let has_rate = |stem: &&str| {
+            let symbol = self.symbol(stem);
+            matches!(symbol, Some(Symbol::Coordinate(_) | Symbol::Let(_)))
+        };
+        let stem = stems.into_iter().flatten().find(has_rate);
+        stem.map(str::to_owned)
+    }
+
     pub(super) fn name(&mut self, name: &str, span: Span) -> Value {
         if let Some(index) = self.index(name) {
-            let variable = Affine::symbol(IndexSymbol::Loop(index.variable));
-            return Value::Scalar(self.graph.input(Input::Integer(variable)));
+            let value = index.value();
+            return Value::Scalar(self.graph.input(Input::Integer(value)));
         }
         match name {
             "t" => return Value::Scalar(self.graph.input(Input::Time)),
@@ -356,6 +375,12 @@ impl Lowerer<'_> {
 
     /// Reports a call of something that is no function.
     pub(super) fn not_a_function(&mut self, name: &str, span: Span) {
+        // A `let` that could not be read may have been meant as a function; its mistake has been reported.
+        if let Some(Symbol::Let(at)) = self.symbol(name)
+            && matches!(self.model.lets[*at].1.node, ExprKind::Error)
+        {
+            return;
+        }
         let name = name.to_owned();
         let kind = if self.index(&name).is_some()
             || self.model.symbols.contains_key(&name)

@@ -1,4 +1,5 @@
-//! What must hold of lengths that are known at run time only: checked once for each model, before it is evaluated.
+//! What must hold of lengths that are not known here: those of run time are checked once for each model, before it is evaluated,
+//! const parameters where the kernels are compiled for their values.
 
 use super::Lowerer;
 use crate::expr::graph::SumRange;
@@ -66,7 +67,8 @@ impl Lowerer<'_> {
     }
 
     fn require(&mut self, requirement: Requirement) {
-        if self.is_of_run_time_length() && !self.requirements.contains(&requirement) {
+        let is_checked = self.is_of_run_time_length() || is_of_const_parameters(&requirement);
+        if is_checked && !self.requirements.contains(&requirement) {
             self.requirements.push(requirement);
         }
     }
@@ -87,4 +89,20 @@ impl Lowerer<'_> {
         needed.reverse();
         needed
     }
+}
+
+/// Whether it can be checked as soon as const parameters are known.
+fn is_of_const_parameters(requirement: &Requirement) -> bool {
+    let Requirement::Index {
+        nest,
+        place,
+        length: Extent::Known(length),
+        ..
+    } = requirement
+    else {
+        return false;
+    };
+    let bounds = nest.iter().flat_map(|range| [&range.start, &range.end]);
+    let mut affines = bounds.chain([place, length]);
+    affines.all(|affine| !affine.is_of_run_time() && !affine.holds_entry())
 }

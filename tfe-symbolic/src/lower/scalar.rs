@@ -115,7 +115,7 @@ impl Lowerer<'_> {
         // One loop as a factor is linear still.
         match (self.written_out(a), self.written_out(b)) {
             (None, None) => {
-                self.nonlinear_sum(span);
+                self.cannot_be_written_out(&[a, b], span);
                 None
             }
             (left, right) => {

@@ -123,6 +123,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
+            at: None,
         });
         self.require_turns(&sites);
         let value = formula(self);

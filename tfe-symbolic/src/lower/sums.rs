@@ -1,14 +1,15 @@
 //! Sums over ranges: written out where short, loops elsewhere.
 
-use super::{Index, LONGEST_WRITTEN_OUT, Lowerer, SHORT_SUM, Value};
+use super::{Index, LONGEST_WRITTEN_OUT, Lowerer, SHORT_SUM, TurnByTurn, Value};
 use crate::check::reserved;
 use crate::diagnostic::{Kind, Role, Span};
-use crate::expr::graph::{ExprId, SumRange};
-use crate::expr::input::{Affine, IndexSymbol};
+use crate::expr::graph::{ExprId, Node, SumRange};
+use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
 use crate::syntax::ast::{Expr, Range};
 
 impl Lowerer<'_> {
     pub(super) fn sum(&mut self, range: &Range, body: &Expr) -> Value {
+        let whole_range = range;
         let bounds = (self.affine(&range.start), self.affine(&range.end));
         self.index_name(&range.variable.node, range.variable.span);
         let whole = range.start.span.join(range.end.span);
@@ -28,6 +29,10 @@ impl Lowerer<'_> {
                     .extreme(&length, true)
                     .and_then(|most| most.as_constant());
                 if longest.is_some_and(|most| most <= 0) {
+                    if self.indices.iter().any(|index| index.at.is_some()) {
+                        // One turn of a sum around it, on which this one is empty.
+                        return self.empty_sum(range);
+                    }
                     let range = format!("{}..{}", range.start, range.end);
                     self.report(whole, Kind::EmptyRange { range });
                     return Value::Error;
@@ -57,19 +62,39 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
+            at: None,
         });
         if known {
             self.require_turns(&range);
         }
         let before = self.terms.replace(1);
+        let mistakes = self.bag.len();
         let value = self.value(body);
         let terms = count
             .zip(self.terms)
             .and_then(|(count, inner)| count.checked_mul(inner));
         self.terms = before.zip(terms).map(|(before, terms)| before.max(terms));
-        self.indices.pop();
+        let index = self.indices.pop();
         if !known {
             return Value::Error;
+        }
+        if let Value::Vector(components) = &value {
+            let span = whole_range.variable.span;
+            self.vector_sums.insert(span, components.len());
+        }
+        if let Some(pending) = self.turn_by_turn.take() {
+            self.terms = before;
+            if self.bag.len() > mistakes {
+                return Value::Error;
+            }
+            let own = pending.variables.contains(&range.variable);
+            let bounds = (range.start.as_constant(), range.end.as_constant());
+            let (Some(mut index), (Some(start), Some(end)), true) = (index, bounds, own) else {
+                // The sum to be written out stands further outside.
+                self.turn_by_turn = Some(pending);
+                return Value::Error;
+            };
+            return self.each_turn((start, end), &mut index, body);
         }
         match value {
             Value::Scalar(id) => Value::Scalar(self.sum_of(range, id, terms)),
@@ -77,6 +102,43 @@ impl Lowerer<'_> {
                 Some(lowerer.sum_of(range.clone(), id, terms))
             }),
             Value::Error => Value::Error,
+        }
+    }
+
+    /// A sum over a literal range, lowered anew for each value of its index.
+    fn each_turn(&mut self, (first, end): (i64, i64), index: &mut Index, body: &Expr) -> Value {
+        let mut total: Option<Value> = None;
+        for at in first..end {
+            index.at = Some(at);
+            index.start = Affine::constant(at);
+            index.end = Affine::constant(at + 1);
+            self.indices.push(index.clone());
+            let value = self.value(body);
+            self.indices.pop();
+            total = match (total, value) {
+                (_, Value::Error) => return Value::Error,
+                (None, value) => Some(value),
+                (Some(Value::Scalar(sum)), Value::Scalar(value)) => {
+                    Some(Value::Scalar(self.graph.add(sum, value)))
+                }
+                (Some(Value::Vector(sum)), Value::Vector(value)) => {
+                    let pairs = sum.into_iter().zip(value);
+                    let added = pairs.map(|(a, b)| self.graph.add(a, b));
+                    Some(Value::Vector(added.collect()))
+                }
+                // The same formula gives values of the same shape.
+                (Some(_), _) => return Value::Error,
+            };
+        }
+        total.unwrap_or_else(|| Value::Scalar(self.graph.integer(0)))
+    }
+
+    /// Zero, or a vector of zeros where the sum is one of vectors.
+    fn empty_sum(&mut self, range: &Range) -> Value {
+        let zero = self.graph.integer(0);
+        match self.vector_sums.get(&range.variable.span) {
+            Some(length) => Value::Vector(vec![zero; *length]),
+            None => Value::Scalar(zero),
         }
     }
 
@@ -167,8 +229,57 @@ impl Lowerer<'_> {
         }
         let written_out = self.written_out(id);
         if written_out.is_none() {
-            self.nonlinear_sum(span);
+            self.cannot_be_written_out(&[id], span);
         }
         written_out
+    }
+
+    /// Asks the sums around for another attempt, turn by turn, where that makes the ranges of these sums literal; else reports it.
+    pub(super) fn cannot_be_written_out(&mut self, sums: &[ExprId], span: Span) {
+        match self.sums_around(sums) {
+            Some(variables) => {
+                let pending = self.turn_by_turn.get_or_insert(TurnByTurn {
+                    variables: Vec::new(),
+                    span,
+                });
+                pending.variables.extend(variables);
+            }
+            None => self.nonlinear_sum(span),
+        }
+    }
+
+    /// The indices around on which the ranges of sums depend, where all those ranges are literal but for these indices and short.
+    fn sums_around(&self, sums: &[ExprId]) -> Option<Vec<LoopVariable>> {
+        let mut bounds: Vec<&Affine> = Vec::new();
+        let mut terms = 1;
+        for id in self.graph.reachable(sums) {
+            if let Node::Loop { range, .. } = self.graph.node(id) {
+                bounds.extend([&range.start, &range.end]);
+            }
+            if let Some(count) = self.loops.get(&id) {
+                terms = terms.max((*count)?);
+            }
+        }
+        let mut needed = Vec::new();
+        while let Some(bound) = bounds.pop() {
+            let is_loop = |(symbol, _): &(IndexSymbol, i64)| matches!(symbol, IndexSymbol::Loop(_));
+            if !bound.terms.iter().all(is_loop) {
+                return None;
+            }
+            for variable in bound.variables() {
+                let around = |index: &&Index| index.variable == variable && index.at.is_none();
+                let Some(index) = self.indices.iter().find(around) else {
+                    continue;
+                };
+                if !needed.contains(&variable) {
+                    needed.push(variable);
+                    bounds.extend([&index.start, &index.end]);
+                    let length = index.end.plus_scaled(&index.start, -1)?;
+                    let most = self.extreme(&length, true)?.as_constant()?;
+                    terms = terms.checked_mul(u64::try_from(most).ok()?)?;
+                }
+            }
+        }
+        (!needed.is_empty() && terms <= LONGEST_WRITTEN_OUT).then_some(needed)
     }
 }

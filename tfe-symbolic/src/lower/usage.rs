@@ -4,8 +4,8 @@ use super::Lowerer;
 use crate::diagnostic::{Kind, Span};
 use crate::expr::differentiate::derivative;
 use crate::expr::graph::ExprId;
-use crate::expr::input::{Affine, Input};
-use crate::model::declared::{Constraint, Form};
+use crate::expr::input::{Affine, IndexSymbol, Input};
+use crate::model::declared::{Constraint, Force, Form};
 use crate::syntax::context::FieldKind;
 
 /// Which elements of a flat vector occur.
@@ -44,7 +44,7 @@ impl Lowerer<'_> {
         &mut self,
         form: Form,
         energy: Option<ExprId>,
-        constraints: &[Constraint],
+        others: (&[Constraint], &[Force], Option<ExprId>),
     ) {
         if self.model.incomplete {
             return;
@@ -53,7 +53,7 @@ impl Lowerer<'_> {
         if let Some(energy) = energy
             && !self.model.coordinates.is_empty()
         {
-            self.check_energy(form, energy, constraints);
+            self.check_energy(form, energy, others);
         }
     }
 
@@ -89,7 +89,12 @@ impl Lowerer<'_> {
         }
     }
 
-    fn check_energy(&mut self, form: Form, energy: ExprId, constraints: &[Constraint]) {
+    fn check_energy(
+        &mut self,
+        form: Form,
+        energy: ExprId,
+        (constraints, forces, dissipation): (&[Constraint], &[Force], Option<ExprId>),
+    ) {
         let inputs = self.graph.inputs_of(energy);
         let model = self.model;
         let state = |input: &Input| {
@@ -139,6 +144,7 @@ impl Lowerer<'_> {
             Input::Coordinate(at) | Input::Velocity(at) => Some(at),
             _ => None,
         });
+        let moved = self.moved_by_forces(form, forces, dissipation);
         for (number, slots) in model.coordinates.iter().enumerate() {
             if wrong[number] {
                 continue;
@@ -161,6 +167,10 @@ impl Lowerer<'_> {
                 };
                 let name = element(&slots.name.node);
                 let (span, kind) = match (coordinates.has(flat), fibres.has(flat), form) {
+                    (false, false, _) if moved.has(flat) => {
+                        self.remark_forces_only(&name, form);
+                        break;
+                    }
                     (false, false, _) => (
                         slots.name.span,
                         Kind::UnusedCoordinate {
@@ -169,13 +179,15 @@ impl Lowerer<'_> {
                         },
                     ),
                     (true, false, Form::Lagrangian) => (slots.name.span, Kind::NoVelocity { name }),
-                    (true, false, Form::Hamiltonian) => match model.momenta.get(number) {
-                        Some(momentum) => {
-                            let name = element(&momentum.name.node);
-                            (momentum.name.span, Kind::NoMomentum { name })
+                    (true, false, Form::Hamiltonian) => {
+                        if let Some(momentum) = model.momenta.get(number) {
+                            let momentum = element(&momentum.name.node);
+                            self.remarks.push(format!(
+                                "momentum `{momentum}` does not appear in the Hamiltonian: `{name}` is constant"
+                            ));
                         }
-                        None => continue,
-                    },
+                        break;
+                    }
                     (_, true, Form::Lagrangian) if self.linear_velocity(energy, flat) => {
                         (slots.name.span, Kind::LinearVelocity { name })
                     }
@@ -188,6 +200,42 @@ impl Lowerer<'_> {
         }
     }
 
+    /// The coordinates whose motion forces determine: of a Lagrangian model those that a force or the dissipation acts on, of a
+    /// Hamiltonian model also those that forces depend on.
+    fn moved_by_forces(
+        &self,
+        form: Form,
+        forces: &[Force],
+        dissipation: Option<ExprId>,
+    ) -> Coverage {
+        let mut inputs: Vec<Input> = dissipation
+            .iter()
+            .flat_map(|dissipation| self.graph.inputs_of(*dissipation))
+            .filter(|input| matches!(input, Input::Velocity(_)))
+            .collect();
+        for force in forces {
+            inputs.extend(targets(force).into_iter().map(Input::Coordinate));
+            if form == Form::Hamiltonian {
+                inputs.extend(self.graph.inputs_of(force.value));
+            }
+        }
+        Coverage::of(self, &inputs, |input| match input {
+            Input::Coordinate(at) | Input::Velocity(at) | Input::Momentum(at) => Some(at),
+            _ => None,
+        })
+    }
+
+    fn remark_forces_only(&mut self, name: &str, form: Form) {
+        let energy = form.name();
+        let consequence = match form {
+            Form::Lagrangian => "the forces on it must balance, and its momentum is zero",
+            Form::Hamiltonian => "it is constant",
+        };
+        let remark =
+            format!("coordinate `{name}` appears in forces, not in the {energy}: {consequence}");
+        self.remarks.push(remark);
+    }
+
     /// Whether ∂L/∂v of a coordinate holds no velocity, so that the mass matrix has a zero row.
     fn linear_velocity(&mut self, energy: ExprId, at: usize) -> bool {
         if self.graph.contains_sum(energy) {
@@ -198,4 +246,19 @@ impl Lowerer<'_> {
         let holds = |input: &Input| matches!(input, Input::Velocity(_));
         !self.graph.inputs_of(momentum).iter().any(holds)
     }
+}
+
+/// The coordinates that a force acts on, one by one where its range is literal.
+fn targets(force: &Force) -> Vec<Affine> {
+    let [range] = &force.ranges[..] else {
+        return vec![force.target.clone()];
+    };
+    let (Some(start), Some(end)) = (range.start.as_constant(), range.end.as_constant()) else {
+        return vec![force.target.clone()];
+    };
+    let factor = force.target.factor_of(range.variable);
+    let index = Affine::symbol(IndexSymbol::Loop(range.variable));
+    let fixed = force.target.plus_scaled(&index, factor.wrapping_neg());
+    let target = |at| fixed.as_ref()?.plus_scaled(&Affine::constant(at), factor);
+    (start..end).filter_map(target).collect()
 }

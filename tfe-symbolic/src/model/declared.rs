@@ -344,8 +344,10 @@ pub struct Declared {
     pub crate_path: Option<String>,
     /// The fields that formulas use, in the order of the struct.
     pub used_fields: Vec<String>,
-    /// What must hold of lengths that are known at run time only; empty unless [`Declared::is_of_run_time_length`].
+    /// What must hold of lengths that are not known here: of run time, or const parameters.
     pub requirements: Vec<Requirement>,
+    /// What is unusual about the declaration, though no mistake: sentences with names between backticks.
+    pub remarks: Vec<String>,
     /// The formulas as the user wrote them, in mathematical notation.
     pub notation: Notation,
 }

@@ -5,6 +5,7 @@
 
 mod expectation;
 mod limits;
+mod slips;
 
 use std::ops::Range as Bytes;
 use std::sync::LazyLock;
@@ -24,6 +25,7 @@ use crate::vocabulary::{Argument, is_function};
 use expectation::{found_at, wanted};
 use limits::within_limits;
 pub use limits::{MAX_NESTING, MAX_OPERATORS};
+use slips::slip;
 
 static PRATT: LazyLock<PrattParser<Rule>> = LazyLock::new(|| {
     PrattParser::new()
@@ -107,6 +109,10 @@ pub fn parse_item(text: &str, offset: usize, bag: &mut Bag) -> Option<Spanned<It
             let at = match error.location {
                 InputLocation::Pos(at) | InputLocation::Span((at, _)) => at,
             };
+            if let Some((place, kind)) = slip(word, text, at) {
+                bag.push(Span::new(offset + place.start, offset + place.end), kind);
+                return None;
+            }
             let wanted = match &error.variant {
                 ErrorVariant::ParsingError { positives, .. } => wanted(positives),
                 ErrorVariant::CustomError { message } => message.clone(),

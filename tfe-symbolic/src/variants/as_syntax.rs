@@ -24,13 +24,14 @@ pub(super) fn as_syntax(
         if size > most {
             return None;
         }
-        let expr = written(node, &|child| built[&child].0.clone(), state)?;
+        let expr = written(graph, node, &|child| built[&child].0.clone(), state)?;
         built.insert(id, (expr, size));
     }
     built.remove(&id).map(|(expr, _)| expr)
 }
 
 fn written(
+    graph: &Graph,
     node: &Node,
     child: &dyn Fn(ExprId) -> Expr,
     state: &dyn Fn(&Input) -> Option<Expr>,
@@ -50,9 +51,10 @@ fn written(
             constant: number,
             terms,
         } => {
+            let (number, terms) = without_outer_sign(graph, *number, terms);
             let mut sum: Option<Expr> = None;
             for (coefficient, x) in terms {
-                sum = Some(plus(sum, *coefficient, child(*x))?);
+                sum = Some(plus(sum, coefficient, child(x))?);
             }
             match number.is_zero() {
                 true => sum?,
@@ -63,6 +65,15 @@ fn written(
             }
         }
         Node::Product(factors) => {
+            // Parameters first, as people write.
+            let moves = |x: ExprId| {
+                !matches!(
+                    graph.node(x),
+                    Node::Input(Input::Parameter(_) | Input::ParameterElement(..))
+                )
+            };
+            let mut factors = factors.clone();
+            factors.sort_by_key(|(x, _)| moves(*x));
             let powers = factors.iter().map(|(x, exponent)| match exponent {
                 1 => child(*x),
                 _ => {
@@ -104,6 +115,26 @@ fn written(
             body: Box::new(child(*body)),
         }),
     })
+}
+
+/// −(a − b) as b − a, and a sum that begins with a negative term with its first positive one in front.
+fn without_outer_sign(
+    graph: &Graph,
+    number: Constant,
+    terms: &[(Constant, ExprId)],
+) -> (Constant, Vec<(Constant, ExprId)>) {
+    let opposite = match terms {
+        [(c, x)] if number.is_zero() && *c == Constant::MINUS_ONE => graph.as_sum(*x),
+        _ => None,
+    };
+    let (number, mut terms) = match opposite {
+        Some((number, inner)) => (-number, inner.iter().map(|(c, x)| (-*c, *x)).collect()),
+        None => (number, terms.to_vec()),
+    };
+    if let Some(first) = terms.iter().position(|(c, _)| !c.is_negative()) {
+        terms[..=first].rotate_right(1);
+    }
+    (number, terms)
 }
 
 /// The sum with one more term c x.

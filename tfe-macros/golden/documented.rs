@@ -1,0 +1,521 @@
+///
+/// * `let stretch`:
+/// Half of the spring's energy goes to each end.
+///
+/// # Derived model
+/// ```text
+/// stretch = x − l
+/// L = ½ m ẋ² − ½ k stretch²
+/// coordinates: x      parameters: m, k, l
+/// operations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other
+/// operations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other
+/// operations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other
+/// declared by             Lagrangian, 1 coordinates
+/// depends on time         no
+/// forces                  no
+/// linear                  yes
+/// quadratic in v          yes
+/// constant L_vv           yes, diagonal
+/// separable (L_vq = 0)    yes
+/// cyclic coordinates      none
+/// pattern L_vv            (0,0)
+/// pattern L_vq            zero
+/// pattern L_qq            (0,0)
+/// ```
+struct Spring {
+    m: f64,
+    k: f64,
+    l: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<1> for Spring {
+        const FORM: __tfe::Form = __tfe::Form::Lagrangian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: false,
+            forced: false,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: true,
+            separable: true,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let t0 = q[0] - l;
+            let t1 = z[0] * z[0];
+            let t2 = m * t1;
+            let t3 = t0 * t0;
+            let t4 = k * t3;
+            let t5 = t2 - t4;
+            t.like(0.5) * t5
+        }
+        const LANES: bool = false;
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            first.z[0] = m * z[0];
+            let t0 = l - q[0];
+            first.q[0] = k * t0;
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            zz[0][0] = m;
+            first.z[0] = m * z[0];
+            let t0 = l - q[0];
+            first.q[0] = k * t0;
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            second: &mut __tfe::Second<R, 1>,
+        ) {
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            second.zz[0][0] = m;
+            first.z[0] = m * z[0];
+            let t0 = l - q[0];
+            first.q[0] = k * t0;
+            second.qq[0][0] = -k;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height"];
+        fn observables<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            values: &mut [R],
+        ) {
+            values[0] = -q[0];
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl Spring {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    fn state(&self, q: [f64; 1], v: [f64; 1]) -> ::tfe::__private::State<1> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "Spring",
+            form: ::tfe::__private::Form::Lagrangian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: false,
+                forced: false,
+                quadratic_in_z: true,
+                constant_mass: true,
+                linear: true,
+                separable: true,
+            },
+            cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
+            value: ::tfe::__private::Operations {
+                additions: 2,
+                multiplications: 5,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 1,
+                multiplications: 2,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 1,
+                multiplications: 2,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            page: "stretch = x − l\nL = ½ m x\u{307}² − ½ k stretch²\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+        }
+    }
+    /// Above the support, in metres.
+    ///
+    /// The observable `height` at time `t`, coordinates `q` and velocities `v`.
+    fn height(&self, t: f64, q: [f64; 1], v: [f64; 1]) -> f64 {
+        let mut values = [0.0; 1];
+        ::tfe::__private::Model::observables(self, t, &q, &v, &mut values);
+        values[0]
+    }
+}
+/// For the controller.
+///
+/// Steps [`Spring`] with one element, `Mixed::<2>`: no generics, no allocation, tables and sizes constant.
+struct Fast {
+    model: Spring,
+    start: f64,
+    step: f64,
+    steps: u64,
+    memory: ::tfe::__private::Memory<1>,
+    numbers: [f64; ::tfe::__private::numbers_len(
+        Fast::ELEMENT,
+        ::tfe::__private::Form::Lagrangian,
+        1,
+        0,
+    )],
+    pivots: [usize; ::tfe::__private::pivots_len(
+        Fast::ELEMENT,
+        ::tfe::__private::Form::Lagrangian,
+        1,
+        0,
+    )],
+}
+#[automatically_derived]
+#[allow(dead_code)]
+impl Fast {
+    const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::mixed(2);
+    const TABLES: ::tfe::__private::Scheme<
+        { Fast::ELEMENT.points() },
+        { Fast::ELEMENT.unknowns() },
+    > = ::tfe::__private::Scheme::new(Fast::ELEMENT);
+    /// The size of the stepper, all its memory included.
+    const BYTES: usize = ::core::mem::size_of::<Self>();
+    /// A stepper of length `h` that begins at time zero. It keeps a copy of the parameters.
+    fn new(model: &Spring, h: f64) -> Self {
+        Self {
+            model: Spring {
+                m: ::core::clone::Clone::clone(&model.m),
+                k: ::core::clone::Clone::clone(&model.k),
+                l: ::core::clone::Clone::clone(&model.l),
+            },
+            start: 0.0,
+            step: h,
+            steps: 0,
+            memory: ::tfe::__private::Memory::new(),
+            numbers: [0.0; ::tfe::__private::numbers_len(
+                Fast::ELEMENT,
+                ::tfe::__private::Form::Lagrangian,
+                1,
+                0,
+            )],
+            pivots: [0; ::tfe::__private::pivots_len(
+                Fast::ELEMENT,
+                ::tfe::__private::Form::Lagrangian,
+                1,
+                0,
+            )],
+        }
+    }
+    /// The time of the next step's start.
+    fn time(&self) -> f64 {
+        self.start + self.steps as f64 * self.step
+    }
+    /// Makes the next step start at `time`.
+    fn set_time(&mut self, time: f64) {
+        self.start = time;
+        self.steps = 0;
+    }
+    /// What the steps so far have cost.
+    fn statistics(&self) -> &::tfe::__private::Statistics {
+        self.memory.statistics()
+    }
+    /// Moves `state` over one element.
+    ///
+    /// # Errors
+    /// Says why the element could not be solved; `state` is unchanged then.
+    fn advance(
+        &mut self,
+        state: &mut ::tfe::__private::State<1>,
+    ) -> ::core::result::Result<(), ::tfe::__private::StepError> {
+        let method = ::tfe::__private::Method {
+            model: &self.model,
+            tables: &Self::TABLES,
+            control: ::core::default::Default::default(),
+        };
+        let workspace = ::tfe::__private::Workspace {
+            numbers: &mut self.numbers,
+            pivots: &mut self.pivots,
+        };
+        let start = self.start + self.steps as f64 * self.step;
+        let interval = ::tfe::__private::Interval {
+            start,
+            length: self.step,
+            impulses: &[],
+        };
+        method.advance(&mut self.memory, workspace, interval, state)?;
+        self.steps += 1;
+        ::core::result::Result::Ok(())
+    }
+}
+#[automatically_derived]
+impl ::core::fmt::Debug for Fast {
+    fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
+        f.debug_struct("Fast")
+            .field("time", &self.time())
+            .field("step", &self.step)
+            .field("statistics", self.memory.statistics())
+            .finish_non_exhaustive()
+    }
+}
+/// Without the spring.
+///
+/// `Rigid` from [`Spring`]: truncated to degree 2 about `x = l`.
+///
+/// # Derived model
+/// ```text
+/// Spring: truncated to degree 2 about x = l
+/// L = 0.5 (m ẋ² − k (x − l)²)
+/// coordinates: x      parameters: m, k, l
+/// operations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other
+/// operations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other
+/// operations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other
+/// declared by             Lagrangian, 1 coordinates
+/// depends on time         no
+/// forces                  no
+/// linear                  yes
+/// quadratic in v          yes
+/// constant L_vv           yes, diagonal
+/// separable (L_vq = 0)    yes
+/// cyclic coordinates      none
+/// pattern L_vv            (0,0)
+/// pattern L_vq            zero
+/// pattern L_qq            (0,0)
+/// ```
+struct Rigid {
+    m: f64,
+    k: f64,
+    l: f64,
+}
+const _: () = {
+    use ::tfe::__private as __tfe;
+    #[automatically_derived]
+    #[allow(unused_variables, non_snake_case)]
+    impl __tfe::Model<1> for Rigid {
+        const FORM: __tfe::Form = __tfe::Form::Lagrangian;
+        const FACTS: __tfe::Facts = __tfe::Facts {
+            time_dependent: false,
+            forced: false,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: true,
+            separable: true,
+        };
+        fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            let t0 = q[0] - l;
+            let t1 = z[0] * z[0];
+            let t2 = m * t1;
+            let t3 = t0 * t0;
+            let t4 = k * t3;
+            let t5 = t2 - t4;
+            t.like(0.5) * t5
+        }
+        const LANES: bool = false;
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        #[inline(always)]
+        fn first_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            first.z[0] = m * z[0];
+            let t0 = l - q[0];
+            first.q[0] = k * t0;
+        }
+        #[inline(always)]
+        fn first_and_mass_inline<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            zz[0][0] = m;
+            first.z[0] = m * z[0];
+            let t0 = l - q[0];
+            first.q[0] = k * t0;
+        }
+        fn second<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            second: &mut __tfe::Second<R, 1>,
+        ) {
+            let k = t.like(self.k);
+            let l = t.like(self.l);
+            let m = t.like(self.m);
+            second.zz[0][0] = m;
+            first.z[0] = m * z[0];
+            let t0 = l - q[0];
+            first.q[0] = k * t0;
+            second.qq[0][0] = -k;
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height"];
+        fn observables<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            values: &mut [R],
+        ) {
+            values[0] = -q[0];
+        }
+    }
+};
+#[automatically_derived]
+#[allow(dead_code)]
+impl Rigid {
+    /// The state with coordinates `q` and velocities `v` = dq/dt at time zero; its momenta are p = ∂L/∂v.
+    ///
+    /// Where no momentum belongs to the velocity (a Hamiltonian with singular ∂²H/∂p²) the momenta are NaN, and a run refuses them.
+    fn state(&self, q: [f64; 1], v: [f64; 1]) -> ::tfe::__private::State<1> {
+        ::tfe::__private::state(self, 0.0, q, v)
+    }
+    /// What was derived from the declaration: a page when printed.
+    fn structure() -> ::tfe::__private::Structure {
+        ::tfe::__private::Structure {
+            name: "Rigid",
+            form: ::tfe::__private::Form::Lagrangian,
+            facts: ::tfe::__private::Facts {
+                time_dependent: false,
+                forced: false,
+                quadratic_in_z: true,
+                constant_mass: true,
+                linear: true,
+                separable: true,
+            },
+            cyclic: &[],
+            conserved: &[],
+            diagonal_mass: true,
+            value: ::tfe::__private::Operations {
+                additions: 2,
+                multiplications: 5,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            first: ::tfe::__private::Operations {
+                additions: 1,
+                multiplications: 2,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            second: ::tfe::__private::Operations {
+                additions: 1,
+                multiplications: 2,
+                divisions: 0,
+                sines: 0,
+                functions: 0,
+            },
+            page: "Spring: truncated to degree 2 about x = l\nL = 0.5 (m x\u{307}² − k (x − l)²)\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+        }
+    }
+    /// Above the support, in metres.
+    ///
+    /// The observable `height` at time `t`, coordinates `q` and velocities `v`.
+    fn height(&self, t: f64, q: [f64; 1], v: [f64; 1]) -> f64 {
+        let mut values = [0.0; 1];
+        ::tfe::__private::Model::observables(self, t, &q, &v, &mut values);
+        values[0]
+    }
+}
+#[automatically_derived]
+#[allow(dead_code)]
+impl Rigid {
+    /// The model with the parameters of a [`Spring`].
+    fn of(original: &Spring) -> Self {
+        Self {
+            m: ::core::clone::Clone::clone(&original.m),
+            k: ::core::clone::Clone::clone(&original.k),
+            l: ::core::clone::Clone::clone(&original.l),
+        }
+    }
+}

@@ -1,0 +1,352 @@
+//! The remedy for each kind of mistake.
+
+use crate::diagnostic::kind::Kind;
+use crate::vocabulary::{self, Argument};
+
+impl Kind {
+    /// The remedy, where there is one to name.
+    pub fn help(&self) -> Option<String> {
+        Some(match self {
+            Self::MissingOperator { left, right } => format!("write `{left}*{right}`"),
+            Self::DoubleStar => "write `^` for a power".into(),
+            Self::InclusiveRange => "write `a..b+1`".into(),
+            Self::Condition { .. } => {
+                "write `select(a < b, then, otherwise)`; the comparisons are `<`, `<=`, `>` and `>=`".into()
+            }
+            Self::EqualsSign {
+                left: Some(left),
+                right,
+            } => format!("write what is zero: `{left} - ({right})`"),
+            Self::EqualsSign { left: None, .. } => {
+                "write one expression; parts of it can be named by `let name = …` before it".into()
+            }
+            Self::FieldAccess { object, field } if object == "self" => {
+                format!("the fields of the struct are in scope: write `{field}`")
+            }
+            Self::FieldAccess { object, field } => format!(
+                "formulas use the fields of the struct under the attribute: declare `{object}_{field}: f64`"
+            ),
+            Self::MethodCall { object, method } => format!("write `{method}({object})`"),
+            Self::Bars => {
+                "write `abs(x)` for an absolute value, and the formula itself instead of a closure".into()
+            }
+            Self::NestedTooDeep { .. } | Self::TooLong { .. } => {
+                "name parts of it with `let`".into()
+            }
+            Self::UnknownArgument {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownSymbol {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownFunction {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownLength {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownElement {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownRule {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::ForceTarget {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownParameter {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownPass {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownCoordinate {
+                nearest: Some(nearest),
+                ..
+            }
+            | Self::UnknownConstraint {
+                nearest: Some(nearest),
+                ..
+            } => {
+                format!("did you mean `{nearest}`?")
+            }
+            Self::UnknownArgument { nearest: None, .. } => {
+                format!("the arguments are {}", backticked(&Argument::all().map(Argument::word).collect::<Vec<_>>()))
+            }
+            Self::UnknownSymbol {
+                nearest: None,
+                name,
+            } => {
+                format!("declare `{name}` as a field of the struct, a coordinate or a `let`")
+            }
+            Self::UnknownElement { nearest: None, .. } => {
+                format!("the elements are {}", backticked(vocabulary::ELEMENTS))
+            }
+            Self::UnknownRule { nearest: None, .. } => {
+                format!("the rules are {}", backticked(vocabulary::RULES))
+            }
+            Self::UnknownLength {
+                nearest: None,
+                name,
+            } => {
+                format!(
+                    "declare `const {name}: usize` on the struct, or a field `{name}: usize`, or \
+                     write a number"
+                )
+            }
+            Self::NoCoordinates => "add `coordinates(x)`".into(),
+            Self::NameClash { .. }
+            | Self::ReservedName { .. }
+            | Self::ReservedPrefix { .. }
+            | Self::Keyword { .. } => {
+                "choose another name".into()
+            }
+            Self::FamilyNotAlone { name } => {
+                format!("make the others elements of `{name}`, or give all arrays literal lengths")
+            }
+            Self::RunTimeLength { .. } => {
+                "give the coordinates a length known here, such as `q[10]`".into()
+            }
+            Self::ConstraintNotAffine { .. } => {
+                "write a condition on positions, or one in which velocities stand linearly, such \
+                 as `dot(x)*sin(phi) - dot(y)*cos(phi)`"
+                    .into()
+            }
+            Self::ConstraintWithoutCoordinate { .. } => {
+                "write what must vanish, such as `x^2 + y^2 - l^2`".into()
+            }
+            Self::RepeatedConstraint { name, .. } => format!("remove `{name}`"),
+            Self::MomentumInConstraint => "write the velocity instead, such as `dot(x)`".into(),
+            Self::VelocityConstraintOfFamily { .. } => {
+                "write a condition on positions, or give the coordinates a length known here, such \
+                 as `q[10]`"
+                    .into()
+            }
+            Self::ConstraintRange { .. } => {
+                "write the constraints out, or give the array and the range literal lengths".into()
+            }
+            Self::TooManyConstraints { .. } => "split the family into several shorter ones".into(),
+            Self::SumInConstraint { limit, .. } => {
+                format!("make the length a number of at most {limit}, or write the sum out")
+            }
+            Self::ParameterOfConstraint { .. } => {
+                "remove it from `sensitivity`: derivatives of constraints by parameters are not \
+                 available"
+                    .into()
+            }
+            Self::SolverOfConstraints { nodes, .. }
+            | Self::SolverOfTransformation { nodes, .. } => format!("use `Mixed::<{nodes}>`"),
+            Self::ListInRange { .. } => {
+                "bound the range by numbers and fields of type `usize`".into()
+            }
+            Self::OutputFamily => "declare one `output` an element".into(),
+            Self::NoEnergy => "add `lagrangian = …` or `hamiltonian = …`".into(),
+            Self::TwoEnergies => "keep one of them".into(),
+            Self::NoMomenta => "add `momenta(…)`, one for each coordinate, in their order".into(),
+            Self::TransformationOfLagrangian => {
+                "declare the model by `momenta(…)` and `hamiltonian = …`".into()
+            }
+            Self::TransformationOfFamily { .. } => {
+                "give the coordinates a length known here, such as `q[10]`".into()
+            }
+            Self::TransformationWith {
+                argument: "constraint",
+            } => "choose coordinates that satisfy the constraints, or remove one of the two".into(),
+            Self::TransformationWith { .. } => "remove one of the two".into(),
+            Self::TransformationNotPositive => {
+                "write dt/dτ, such as the distance from a singularity".into()
+            }
+            Self::PowerOfLoop { limit } => format!(
+                "make the length a number of at most {limit}, or remove `time_transformation`"
+            ),
+            Self::MomentaWithLagrangian => {
+                "remove `momenta`; they follow from the Lagrangian as ∂L/∂v".into()
+            }
+            Self::MomentaMismatch { .. } => {
+                "declare one momentum for each coordinate, in the same order and of the same \
+                 lengths"
+                    .into()
+            }
+            Self::UnusedCoordinate { name, .. } => format!("remove `{name}` from `coordinates`"),
+            Self::UnusedField { name } => {
+                format!("remove it, or name it `_{name}` if other code needs it")
+            }
+            Self::NoVelocity { name } => {
+                format!("add its kinetic energy, such as `m/2*dot({name})^2`")
+            }
+            Self::LinearVelocity { name } => {
+                format!("the Lagrangian must hold `dot({name})` other than linearly")
+            }
+            Self::ConstantEnergy { .. } => "write kinetic and potential energy".into(),
+            Self::DissipationWithoutVelocity => {
+                "a Rayleigh function holds velocities, such as `c/2*dot(x)^2`".into()
+            }
+            Self::NoSensitivity => "name fields of the struct, as in `sensitivity(omega)`".into(),
+            Self::UnknownParameter {
+                nearest: None,
+                name,
+            } => format!("declare `{name}` as a field of the struct"),
+            Self::NotAParameter { target, role: None } if target == "t" => {
+                "derivatives by the time come with those by any parameter".into()
+            }
+            Self::NotAParameter { .. } => {
+                "derivatives are taken by fields of type `f64` and by elements of array fields, \
+                 such as `k[2]`"
+                    .into()
+            }
+            Self::ArrayOfParameters { name } => {
+                format!("name its elements, as in `{name}[0], {name}[1]`")
+            }
+            Self::IndexNotLiteral { array, .. } => {
+                format!("name each element, as in `{array}[0], {array}[1]`")
+            }
+            Self::RepeatedParameter { .. } => "name it once".into(),
+            Self::NoPass { name } => format!("say what to do, as in `model({name}, truncated(2))`"),
+            Self::UnknownPass { nearest: None, .. } => {
+                format!("the passes are {}", backticked(vocabulary::PASSES))
+            }
+            Self::PassEntry { pass } => format!("write it like `{}`", usage(pass)),
+            Self::TruncationDegree { .. } => "write `truncated(2)` for a linear model".into(),
+            Self::UnknownCoordinate { nearest: None, .. } => {
+                "name a coordinate as declared, such as `x` or `q[2]`; momenta and velocities \
+                 belong to truncations"
+                    .into()
+            }
+            Self::RepeatedEntry { .. } => "give it once".into(),
+            Self::PassValue { .. } => "write numbers and fields of the struct".into(),
+            Self::PassOfLength {
+                pass: "frozen" | "rigid" | "elastic",
+            } => "give arrays of coordinates literal lengths of at most some thousand".into(),
+            Self::PassOfLength { .. } => {
+                "give arrays of coordinates literal lengths of at most some thousand, or say the \
+                 same of all elements of the only array"
+                    .into()
+            }
+            Self::TruncationOfConstraints => {
+                "choose coordinates that satisfy the constraints, or make them springs by \
+                 `elastic(name = k)` first"
+                    .into()
+            }
+            Self::NoTaylorPolynomial => "give another point, such as `truncated(2, r = l)`".into(),
+            Self::NotCyclic { .. } => {
+                "ignore coordinates only that appear by their velocities; `structure()` lists the cyclic ones".into()
+            }
+            Self::CyclicConstrained { .. } => {
+                "choose coordinates that satisfy the constraint".into()
+            }
+            Self::CyclicForced { name } => {
+                format!("keep `{name}`, or declare the model without the force")
+            }
+            Self::RouthName { name, .. } => format!("give the field or output `{name}` another name"),
+            Self::CyclicNotQuadratic { .. } => "declare the model by a Hamiltonian".into(),
+            Self::FrozenHamiltonian => "declare the model by a Lagrangian".into(),
+            Self::NotASpring { .. } => {
+                "name a field of type `f64` whose energy is a square, such as `k/2*(r - l)^2`"
+                    .into()
+            }
+            Self::UnknownConstraint { nearest: None, .. } => "name a constraint as declared".into(),
+            Self::ElasticVelocity { .. } => {
+                "name constraints on positions, or declare a `dissipation` instead".into()
+            }
+            Self::NothingLeft { .. } => "leave one coordinate at least".into(),
+            Self::ConstraintLeft { .. } => {
+                "freeze fewer coordinates, or declare the constraint in another model".into()
+            }
+            Self::MasslessCoordinate { name, .. } => {
+                format!("freeze `{name}` too, or truncate about another point")
+            }
+            Self::NotAFunction { name } => format!("write `{name}*(…)` for a product"),
+            Self::VelocityName { stem, .. } => format!("write `dot({stem})`"),
+            Self::FunctionAsValue { name } => format!("write `{name}(…)`"),
+            Self::UsedBeforeLet { .. } => "move the `let` up".into(),
+            Self::UnsupportedField { .. } => {
+                "formulas use fields of type `f64`, `[f64; N]`, `Vec<f64>` and `usize`".into()
+            }
+            Self::Acceleration => "forces and energies depend on velocities at most".into(),
+            Self::VelocityInHamiltonian { .. } | Self::VelocityOfLoop => {
+                "write the momenta instead".into()
+            }
+            Self::RateOfMomentum => "write the force that changes it".into(),
+            Self::VariableExponent { base, exponent } => {
+                format!("write `exp(({exponent})*ln({base}))` if the base is always positive")
+            }
+            Self::ScalarExpected { .. } => {
+                "take a component such as `r[0]`, or use `inner` or `norm`".into()
+            }
+            Self::VectorExpected => "write a vector as `[a, b, c]`".into(),
+            Self::Matrix => {
+                "there are no matrices: name each row by a `let`, and write a product as \
+                 `[inner(row0, r), inner(row1, r)]`"
+                    .into()
+            }
+            Self::ProductOfVectors => "use `inner(a, b)` or `cross(a, b)`".into(),
+            Self::PowerOfVector => "use `inner(r, r)` for the square of the length".into(),
+            Self::DivisionByVector => "divide by its `norm`".into(),
+            Self::WholeArray { name } => format!("write an element such as `{name}[i]`"),
+            Self::IndexNotConstant { .. } => {
+                "an index that varies needs a coordinate array or an array field".into()
+            }
+            Self::NonlinearSum { limit } => format!(
+                "make the length a number of at most {limit}, or rewrite the energy as a sum of \
+                 local terms"
+            ),
+            Self::NodesOutOfRange { .. } => "choose 2 to 12 nodes".into(),
+            Self::PointsOutOfRange { .. } => {
+                format!("choose 1 to {} points", vocabulary::MAX_POINTS)
+            }
+            Self::RuleNotForFamily { .. } => "use `.quadrature(k)`".into(),
+            Self::SolverOfFamily { .. } => {
+                "give the coordinates literal lengths, or use `Simulation`".into()
+            }
+            Self::Expected { .. }
+            | Self::NumberTooLarge { .. }
+            | Self::RepeatedArgument { .. }
+            | Self::ZeroLength { .. }
+            | Self::LengthNotSimple
+            | Self::TooManyCoordinates { .. }
+            | Self::ForceTarget { .. }
+            | Self::UnknownFunction { .. }
+            | Self::WrongArity { .. }
+            | Self::NoSuchElement { .. }
+            | Self::DivisionByZero
+            | Self::OutsideDomain { .. }
+            | Self::WrongLength { .. }
+            | Self::ScalarPlusVector
+            | Self::EmptyVector
+            | Self::IndexNotInteger { .. }
+            | Self::IndexNotAffine { .. }
+            | Self::IndexOutOfRange { .. }
+            | Self::EmptyRange { .. } => return None,
+        })
+    }
+}
+
+/// A pass as it may be written.
+fn usage(pass: &str) -> &'static str {
+    match pass {
+        "frozen" => "frozen(r = l)",
+        "routh" => "routh(phi, psi)",
+        "rigid" => "rigid(rod = k)",
+        "elastic" => "elastic(rod = k)",
+        _ => "truncated(4, theta = 0)",
+    }
+}
+
+/// `` `a`, `b` and `c` ``
+fn backticked(names: &[&str]) -> String {
+    let mut names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match names.pop() {
+        None => String::new(),
+        Some(last) if names.is_empty() => last,
+        Some(last) => format!("{} and {last}", names.join(", ")),
+    }
+}

@@ -1,0 +1,153 @@
+//! What users of Rust and of other notations write by habit where the grammar stops: each with a message of its own.
+
+use std::ops::Range as Bytes;
+
+use crate::diagnostic::Kind;
+use crate::vocabulary::is_function;
+
+/// The habit behind a syntax error at a place of the text of an argument, and what to underline.
+pub(super) fn slip(argument: &str, text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
+    let at = at + (text[at..].len() - text[at..].trim_start().len());
+    condition(text, at).or_else(|| match text[at..].chars().next()? {
+        '=' => equals_sign(argument, text, at),
+        '.' => point(text, at),
+        '|' => Some((at..at + 1, Kind::Bars)),
+        _ => None,
+    })
+}
+
+/// `if a < b { x } else { y }`: the grammar reads `if` as a name and stops further on.
+fn condition(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
+    let word_before = words(&text[..at]).find_map(|word| match &text[word.clone()] {
+        "if" => Some((word, "if")),
+        "match" => Some((word, "match")),
+        _ => None,
+    });
+    let word_here = words(&text[at..]).next().filter(|word| word.start == 0);
+    let (place, word) = word_before.or_else(|| match &text[at..][word_here?] {
+        "if" => Some((at..at + "if".len(), "if")),
+        "match" => Some((at..at + "match".len(), "match")),
+        _ => None,
+    })?;
+    Some((place, Kind::Condition { word }))
+}
+
+/// `x^2 + y^2 = l^2`, `a == b`
+fn equals_sign(argument: &str, text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
+    // The first `=` separates the name of the argument from its formula.
+    let first = text.find('=').filter(|first| *first < at)?;
+    let rest = text[at + 1..].trim_start();
+    let (is_doubled, right) = match rest.strip_prefix('=') {
+        Some(right) => (true, right),
+        None => (false, rest),
+    };
+    let (left, right) = (text[first + 1..at].trim(), right.trim().to_owned());
+    let is_equation = argument == "constraint" && is_balanced(left) && !right.contains('=');
+    if is_doubled && !is_equation {
+        // A comparison inside `select`.
+        return None;
+    }
+    let left = is_equation.then(|| left.to_owned());
+    Some((at..at + 1, Kind::EqualsSign { left, right }))
+}
+
+/// `link.m`, `x.sin()`
+fn point(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
+    let object = words(&text[..at]).last()?;
+    if !text[object.end..at].trim().is_empty() {
+        return None;
+    }
+    let blanks = text[at + 1..].len() - text[at + 1..].trim_start().len();
+    let start = at + 1 + blanks;
+    let field = words(&text[start..])
+        .next()
+        .filter(|word| word.start == 0)?;
+    let end = start + field.end;
+    let (name, field) = (text[object.clone()].to_owned(), text[start..end].to_owned());
+    let called = text[end..].trim_start().starts_with('(');
+    let kind = if called && is_function(&field) {
+        Kind::MethodCall {
+            object: name,
+            method: field,
+        }
+    } else {
+        Kind::FieldAccess {
+            object: name,
+            field,
+        }
+    };
+    Some((object.start..end, kind))
+}
+
+/// The places of names, in order.
+fn words(text: &str) -> impl Iterator<Item = Bytes<usize>> {
+    let is_word = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let mut from = 0;
+    std::iter::from_fn(move || {
+        loop {
+            let start = from + text[from..].find(is_word)?;
+            let length = text[start..].find(|letter| !is_word(letter));
+            from = length.map_or(text.len(), |length| start + length);
+            if !text[start..].starts_with(|letter: char| letter.is_ascii_digit()) {
+                return Some(start..from);
+            }
+        }
+    })
+}
+
+/// Whether brackets are closed in the text.
+fn is_balanced(text: &str) -> bool {
+    let mut depth = 0i64;
+    for letter in text.chars() {
+        match letter {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            _ => {}
+        }
+        if depth < 0 {
+            return false;
+        }
+    }
+    depth == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(text: &str, underlined: &str, expected: &str) {
+        let at = text.find('§').expect("the place of the error");
+        let text = text.replace('§', "");
+        let argument = words(&text).next().map_or("", |word| &text[word]);
+        let (place, kind) = slip(argument, &text, at).expect("a known habit");
+        assert_eq!((&text[place], kind.name()), (underlined, expected));
+    }
+
+    #[test]
+    fn habits_are_recognised() {
+        check("output(a) = if x § < 0 {1} else {2}", "if", "Condition");
+        check("output(a) = §match x {}", "match", "Condition");
+        check("constraint(rod) = x^2 §= l^2", "=", "EqualsSign");
+        check("output(a) = link §. m", "link . m", "FieldAccess");
+        check("output(a) = x§.sin()", "x.sin", "MethodCall");
+        check("output(a) = §|x| x^2", "|", "Bars");
+    }
+
+    #[test]
+    fn other_places_are_left_to_the_grammar() {
+        for text in [
+            "output(a) = x + §)",
+            "output(a) = 2 §.5",
+            "§= 3",
+            "constraint(a) = select(x §== y, 1, 2)",
+        ] {
+            let at = text.find('§').expect("the place of the error");
+            assert_eq!(
+                slip("constraint", &text.replace('§', ""), at),
+                None,
+                "{text}"
+            );
+        }
+    }
+}
