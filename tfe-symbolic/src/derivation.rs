@@ -7,6 +7,7 @@
 //! A function of sums, such as `sqrt(sum(i in 0..n, q[i]^2))`, couples all with all. There each inner sum S counts as a further leaf of
 //! the body, and the chain rule continues into it: ∂f/∂q = (∂f/∂S)(∂S/∂q), in one more loop.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use crate::angles::expand_angles;
@@ -24,6 +25,7 @@ use crate::quadratic::{self, Writing};
 use crate::sensitivity::{Leaf, entries_by};
 use crate::squares::by_squares;
 use crate::structure::Structure;
+use crate::table::Map;
 
 /// Larger energies, in expressions, are not written by squares.
 const SQUARED: usize = 300;
@@ -97,6 +99,8 @@ pub struct Derivation {
     written: Vec<Vec<Entry>>,
     structure: Structure,
     sensitivities: Vec<Parameter>,
+    /// The programs that have been asked for: each is optimised once, which takes most of the time of an expansion.
+    programs: RefCell<Map<Request, Program>>,
 }
 
 impl Derivation {
@@ -150,12 +154,18 @@ impl Derivation {
             written,
             structure,
             sensitivities,
+            programs: RefCell::default(),
         }
     }
 
-    /// The program of a kernel.
+    /// The program of a kernel. It is kept, and found when it is asked for again.
     pub fn program(&self, request: Request) -> Program {
-        self.program_of(|array| array.is_wanted(request))
+        if let Some(program) = self.programs.borrow().get(&request) {
+            return program.clone();
+        }
+        let program = self.program_of(|array| array.is_wanted(request));
+        self.programs.borrow_mut().insert(request, program.clone());
+        program
     }
 
     /// The program of ∂/∂q and of the forces alone: what the equations M q̈ = f ask for.
