@@ -1,6 +1,6 @@
 //! From tokens to tokens: the whole expansion, read from top to bottom.
 
-use crate::emit::{self, Emitter};
+use crate::emit::{self, Emitter, Signature};
 use crate::source_map::SourceMap;
 use crate::{constraint, fallback, family, input, page, solver, state, variant};
 use proc_macro2::{Literal, TokenStream};
@@ -126,6 +126,17 @@ impl<'a> Kernels<'a> {
         self.emitted(&self.derivation.program(request), second)
     }
 
+    /// The body of a kernel that is cut into parts where it is long.
+    fn body_in_parts(
+        &self,
+        request: Request,
+        second: TokenStream,
+        signature: &Signature,
+    ) -> emit::Body {
+        Emitter::new(&self.coordinates, second)
+            .body_in_parts(&self.derivation.program(request), signature)
+    }
+
     fn emitted(&self, program: &Program, second: TokenStream) -> emit::Body {
         Emitter::new(&self.coordinates, second).body(program)
     }
@@ -143,7 +154,14 @@ impl<'a> Kernels<'a> {
             value: true,
             ..nothing
         };
-        let value = self.body(value, argument());
+        let at = Signature {
+            name: "value",
+            parameters: quote!(t: R, q: &[R; #dof], z: &[R; #dof]),
+            arguments: quote!(t, q, z),
+            inline: false,
+        };
+        let value = self.body_in_parts(value, argument(), &at);
+        let mut parts = value.parts;
         let (value_statements, value) = (value.statements, value.value);
         let value = value.unwrap_or_else(|| quote!(t.like(0.0)));
         let first = Request {
@@ -162,9 +180,44 @@ impl<'a> Kernels<'a> {
         let lanes = self.declared.constraints.is_empty()
             && !self.derivation.structure().linear
             && page::total(&self.derivation.counts(mass)) <= LANES_LIMIT;
-        let first = self.body(first, argument()).statements;
-        let mass = self.body(mass, argument()).statements;
-        let second = self.body(second, quote!(second.)).statements;
+        let firsts = |name| Signature {
+            name,
+            parameters: quote!(t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>),
+            arguments: quote!(t, q, z, first),
+            inline: lanes,
+        };
+        let with = |name, parameter: TokenStream, argument: TokenStream, inline| {
+            let first = firsts(name);
+            let (parameters, arguments) = (first.parameters, first.arguments);
+            Signature {
+                name,
+                parameters: quote!(#parameters, #parameter),
+                arguments: quote!(#arguments, #argument),
+                inline,
+            }
+        };
+        let first = self.body_in_parts(first, argument(), &firsts("first"));
+        let masses = with(
+            "first_and_mass",
+            quote!(zz: &mut [[R; #dof]; #dof]),
+            quote!(zz),
+            lanes,
+        );
+        let mass = self.body_in_parts(mass, argument(), &masses);
+        let seconds = quote!(second: &mut __tfe::Second<R, #dof>);
+        let seconds = with("second", seconds, quote!(second), false);
+        let second = self.body_in_parts(second, quote!(second.), &seconds);
+        parts.extend([first.parts, mass.parts, second.parts]);
+        let (first, mass, second) = (first.statements, mass.statements, second.statements);
+        let parts = (!parts.is_empty()).then(|| {
+            quote! {
+                #[automatically_derived]
+                #[allow(unused_variables, non_snake_case, clippy::too_many_arguments)]
+                impl #impl_generics #name #type_generics #where_clause {
+                    #parts
+                }
+            }
+        });
         let form = match self.declared.form {
             Form::Lagrangian => quote!(Lagrangian),
             Form::Hamiltonian => quote!(Hamiltonian),
@@ -251,6 +304,8 @@ impl<'a> Kernels<'a> {
                     #constraints
                     #sensitivities
                 }
+
+                #parts
             };
         }
     }

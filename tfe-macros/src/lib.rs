@@ -11,6 +11,7 @@ mod fallback;
 mod family;
 mod input;
 mod page;
+mod parts;
 mod solver;
 mod source_map;
 mod state;
