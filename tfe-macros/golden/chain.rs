@@ -43,6 +43,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// L(q, v, t): 4 +−, 8 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
             let a = t.like(self.a);
             let k = t.like(self.k);
@@ -65,25 +66,7 @@ const _: () = {
             t0
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; N],
-            z: &[R; N],
-            first: &mut __tfe::First<R, N>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; N],
-            z: &[R; N],
-            first: &mut __tfe::First<R, N>,
-            zz: &mut [[R; N]; N],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// L_v, L_q and Q: 6 +−, 7 ×, 1 sin/cos
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -108,15 +91,16 @@ const _: () = {
                 let t4 = a * t3;
                 let t5 = k + t4;
                 let t6 = t5 * t2;
-                first.q[i] += -t6;
+                first.q[i] -= t6;
                 first.q[i + 1] += t6;
             }
             for i in 0..N {
                 first.z[i] = t.like(self.m[i]) * z[i];
                 let t7 = c * z[i];
-                first.force[i] += -t7;
+                first.force[i] -= t7;
             }
         }
+        /// L_v, L_q and Q, and L_vv: 6 +−, 7 ×, 1 sin/cos
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -142,16 +126,36 @@ const _: () = {
                 let t4 = a * t3;
                 let t5 = k + t4;
                 let t6 = t5 * t2;
-                first.q[i] += -t6;
+                first.q[i] -= t6;
                 first.q[i + 1] += t6;
             }
             for i in 0..N {
                 let t7 = c * z[i];
                 first.z[i] = t.like(self.m[i]) * z[i];
-                first.force[i] += -t7;
+                first.force[i] -= t7;
                 zz[i][i] = t.like(self.m[i]);
             }
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            first: &mut __tfe::First<R, N>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            first: &mut __tfe::First<R, N>,
+            zz: &mut [[R; N]; N],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 11 +−, 8 ×, 1 sin/cos
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -179,7 +183,7 @@ const _: () = {
                 let t4 = a * t3;
                 let t5 = k + t4;
                 let t6 = t5 * t2;
-                first.q[i] += -t6;
+                first.q[i] -= t6;
                 first.q[i + 1] += t6;
                 let t7 = t.like(3.0) * t4;
                 let t8 = k + t7;
@@ -193,7 +197,7 @@ const _: () = {
             for i in 0..N {
                 let t11 = c * z[i];
                 first.z[i] = t.like(self.m[i]) * z[i];
-                first.force[i] += -t11;
+                first.force[i] -= t11;
                 second.zz[i][i] = t.like(self.m[i]);
                 second.force_z[i][i] = t10;
             }

@@ -42,6 +42,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// L(q, v, t): 4 +−, 10 ×, 1 sin/cos, 1 other
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let g = t.like(self.g);
             let k = t.like(self.k);
@@ -65,25 +66,7 @@ const _: () = {
             t8 - t13
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-            zz: &mut [[R; 2]; 2],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// L_v, L_q and Q: 2 +−, 11 ×, 1 sin/cos, 1 other
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -115,6 +98,7 @@ const _: () = {
             let t10 = c * z[1];
             first.force[1] = -t10;
         }
+        /// L_v, L_q and Q, and L_vv: 2 +−, 11 ×, 1 sin/cos, 1 other
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -149,6 +133,26 @@ const _: () = {
             first.q[1] = t9 * t5;
             first.force[1] = -t10;
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 3 +−, 14 ×, 1 sin/cos, 1 other
         fn second<R: __tfe::Real>(
             &self,
             t: R,

@@ -232,8 +232,14 @@ impl<'a> Emitter<'a> {
                 && self.reads.get(target) == Some(&1)
                 && written(next) == Some(&Operand::Temporary(*target))
             {
-                let value = self.operation(operation);
-                tokens.extend(self.write(next, value));
+                let taken_away = match operation {
+                    Operation::Negate(a) => self.take_away(next, a),
+                    _ => None,
+                };
+                tokens.extend(taken_away.unwrap_or_else(|| {
+                    let value = self.operation(operation);
+                    self.write(next, value)
+                }));
                 rest = &after[1..];
             } else {
                 tokens.extend(self.statement(statement));
@@ -291,6 +297,24 @@ impl<'a> Emitter<'a> {
             Statement::Balance { output, length } => balance(&self.second, output, length),
             Statement::Clear { output } => self.clear(output),
         }
+    }
+
+    /// `place -= value`, where the negative of `value` is added to a place.
+    fn take_away(&mut self, statement: &Statement, value: &Operand) -> Option<TokenStream> {
+        let Statement::Store {
+            output,
+            accumulate: true,
+            ..
+        } = statement
+        else {
+            return None;
+        };
+        let told = *output == Output::Value || (self.by_entries && block(output).is_some());
+        if told || (self.assigns && matches!(output, Output::ByQ(_))) {
+            return None;
+        }
+        let (place, value) = (self.place(output), self.operand(value));
+        Some(quote!(#place -= #value;))
     }
 
     /// A store, an accumulation or an assignment of `value`.
@@ -713,9 +737,10 @@ fn symbol_tokens(symbol: &IndexSymbol) -> TokenStream {
     }
 }
 
+/// An integer as an `i64` expression: `i as i64 + 1`.
 pub(crate) fn signed(affine: &Affine) -> TokenStream {
-    let constant = Literal::i64_unsuffixed(affine.constant);
-    let terms = affine.terms.iter().map(|(symbol, coefficient)| {
+    let mut sum = TokenStream::new();
+    for (symbol, coefficient) in &affine.terms {
         let symbol = match symbol {
             // Whatever a list holds, sums of entries do not overflow.
             IndexSymbol::Entry(..) => {
@@ -724,13 +749,24 @@ pub(crate) fn signed(affine: &Affine) -> TokenStream {
             }
             symbol => symbol_tokens(symbol),
         };
-        if *coefficient == -1 {
-            return quote!(- (#symbol as i64));
-        }
-        let coefficient = Literal::i64_unsuffixed(*coefficient);
-        quote!(+ #coefficient * (#symbol as i64))
-    });
-    quote!(#constant #(#terms)*)
+        let size = Literal::u64_unsuffixed(coefficient.unsigned_abs());
+        let operator = match (*coefficient < 0, sum.is_empty()) {
+            (true, _) => quote!(-),
+            (false, true) => TokenStream::new(),
+            (false, false) => quote!(+),
+        };
+        sum.extend(match coefficient.unsigned_abs() {
+            1 => quote!(#operator (#symbol as i64)),
+            _ => quote!(#operator #size * (#symbol as i64)),
+        });
+    }
+    let size = Literal::u64_unsuffixed(affine.constant.unsigned_abs());
+    match affine.constant {
+        0 if !sum.is_empty() => sum,
+        constant if constant < 0 => quote!(#sum - #size),
+        _ if sum.is_empty() => quote!(#size),
+        _ => quote!(#sum + #size),
+    }
 }
 
 /// An integer as a number.

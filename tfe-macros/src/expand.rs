@@ -180,6 +180,7 @@ impl<'a> Kernels<'a> {
         let lanes = self.declared.constraints.is_empty()
             && !self.derivation.structure().linear
             && page::total(&self.derivation.counts(mass)) <= LANES_LIMIT;
+        let [value_doc, first_doc, mass_doc, second_doc] = self.docs();
         let firsts = |name| Signature {
             name,
             parameters: quote!(t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>),
@@ -218,6 +219,44 @@ impl<'a> Kernels<'a> {
                 }
             }
         });
+        let first_parameters = firsts("first").parameters;
+        let mass_parameters = masses.parameters;
+        let firsts_and_masses = match lanes {
+            false => quote! {
+                #[doc = #first_doc]
+                fn first<R: __tfe::Real>(&self, #first_parameters) {
+                    #first
+                }
+
+                #[doc = #mass_doc]
+                fn first_and_mass<R: __tfe::Real>(&self, #mass_parameters) {
+                    #mass
+                }
+            },
+            true => quote! {
+                const LANES: bool = true;
+
+                #[doc = #first_doc]
+                #[inline(always)]
+                fn first_inline<R: __tfe::Real>(&self, #first_parameters) {
+                    #first
+                }
+
+                #[doc = #mass_doc]
+                #[inline(always)]
+                fn first_and_mass_inline<R: __tfe::Real>(&self, #mass_parameters) {
+                    #mass
+                }
+
+                fn first<R: __tfe::Real>(&self, #first_parameters) {
+                    self.first_inline(t, q, z, first);
+                }
+
+                fn first_and_mass<R: __tfe::Real>(&self, #mass_parameters) {
+                    self.first_and_mass_inline(t, q, z, first, zz);
+                }
+            },
+        };
         let form = match self.declared.form {
             Form::Lagrangian => quote!(Lagrangian),
             Form::Hamiltonian => quote!(Hamiltonian),
@@ -237,57 +276,15 @@ impl<'a> Kernels<'a> {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;
 
+                    #[doc = #value_doc]
                     fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
                         #value_statements
                         #value
                     }
 
-                    const LANES: bool = #lanes;
+                    #firsts_and_masses
 
-                    fn first<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R; #dof],
-                        z: &[R; #dof],
-                        first: &mut __tfe::First<R, #dof>,
-                    ) {
-                        self.first_inline(t, q, z, first);
-                    }
-
-                    fn first_and_mass<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R; #dof],
-                        z: &[R; #dof],
-                        first: &mut __tfe::First<R, #dof>,
-                        zz: &mut [[R; #dof]; #dof],
-                    ) {
-                        self.first_and_mass_inline(t, q, z, first, zz);
-                    }
-
-                    #[inline(always)]
-                    fn first_inline<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R; #dof],
-                        z: &[R; #dof],
-                        first: &mut __tfe::First<R, #dof>,
-                    ) {
-                        #first
-                    }
-
-                    #[inline(always)]
-                    fn first_and_mass_inline<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R; #dof],
-                        z: &[R; #dof],
-                        first: &mut __tfe::First<R, #dof>,
-                        zz: &mut [[R; #dof]; #dof],
-                    ) {
-                        #mass
-                    }
-
+                    #[doc = #second_doc]
                     fn second<R: __tfe::Real>(
                         &self,
                         t: R,
@@ -308,6 +305,53 @@ impl<'a> Kernels<'a> {
                 #parts
             };
         }
+    }
+
+    /// A line for each kernel: value, first derivatives, those with the mass matrix, all.
+    fn docs(&self) -> [String; 4] {
+        let nothing = Request::default();
+        let first = Request {
+            first: true,
+            ..nothing
+        };
+        let (letter, z) = match self.declared.form {
+            Form::Lagrangian => ('L', 'v'),
+            Form::Hamiltonian => ('H', 'p'),
+        };
+        let forced = self.derivation.structure().forced;
+        let firsts = match forced {
+            true => format!("{letter}_{z}, {letter}_q and Q"),
+            false => format!("{letter}_{z} and {letter}_q"),
+        };
+        let second = match forced {
+            true => format!("{firsts}, {letter}_{z}{z}, {letter}_{z}q, {letter}_qq, Q_{z} and Q_q"),
+            false => format!("{firsts}, {letter}_{z}{z}, {letter}_{z}q and {letter}_qq"),
+        };
+        let all = [
+            (
+                format!("{letter}(q, {z}, t)"),
+                Request {
+                    value: true,
+                    ..nothing
+                },
+            ),
+            (firsts.clone(), first),
+            (
+                format!("{firsts}, and {letter}_{z}{z}"),
+                Request {
+                    mass: true,
+                    ..first
+                },
+            ),
+            (
+                second,
+                Request {
+                    second: true,
+                    ..first
+                },
+            ),
+        ];
+        all.map(|(formula, request)| page::kernel(&formula, &self.derivation.counts(request)))
     }
 
     fn coordinate_name(&self) -> TokenStream {
