@@ -36,17 +36,14 @@ const _: () = {
         const __TFE_LENGTHS: () = {
             {
                 ::core::assert!(
-                    0 <= - 1 + 1 * (N as i64), "index `N-1` is outside `q` of length N"
+                    0 <= (N as i64) - 1, "index `N-1` is outside `q` of length N"
                 );
                 ::core::assert!(
-                    - 1 + 1 * (N as i64) < 0 + 1 * (N as i64),
-                    "index `N-1` is outside `q` of length N"
+                    (N as i64) - 1 < (N as i64), "index `N-1` is outside `q` of length N"
                 );
             }
             {
-                ::core::assert!(
-                    0 < 0 + 1 * (N as i64), "index `0` is outside `q` of length N"
-                );
+                ::core::assert!(0 < (N as i64), "index `0` is outside `q` of length N");
             }
         };
     }
@@ -62,6 +59,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// L(q, v, t): 4 +−, 8 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
             let () = Self::__TFE_LENGTHS;
             let a = t.like(self.a);
@@ -85,25 +83,7 @@ const _: () = {
             t0
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; N],
-            z: &[R; N],
-            first: &mut __tfe::First<R, N>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; N],
-            z: &[R; N],
-            first: &mut __tfe::First<R, N>,
-            zz: &mut [[R; N]; N],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// L_v, L_q and Q: 6 +−, 7 ×, 1 sin/cos
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -129,15 +109,16 @@ const _: () = {
                 let t4 = a * t3;
                 let t5 = k + t4;
                 let t6 = t5 * t2;
-                first.q[i] += -t6;
+                first.q[i] -= t6;
                 first.q[i + 1] += t6;
             }
             for i in 0..N {
                 first.z[i] = t.like(self.m[i]) * z[i];
                 let t7 = c * z[i];
-                first.force[i] += -t7;
+                first.force[i] -= t7;
             }
         }
+        /// L_v, L_q and Q, and L_vv: 6 +−, 7 ×, 1 sin/cos
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -164,16 +145,36 @@ const _: () = {
                 let t4 = a * t3;
                 let t5 = k + t4;
                 let t6 = t5 * t2;
-                first.q[i] += -t6;
+                first.q[i] -= t6;
                 first.q[i + 1] += t6;
             }
             for i in 0..N {
                 let t7 = c * z[i];
                 first.z[i] = t.like(self.m[i]) * z[i];
-                first.force[i] += -t7;
+                first.force[i] -= t7;
                 zz[i][i] = t.like(self.m[i]);
             }
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            first: &mut __tfe::First<R, N>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; N],
+            z: &[R; N],
+            first: &mut __tfe::First<R, N>,
+            zz: &mut [[R; N]; N],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 11 +−, 8 ×, 1 sin/cos
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -202,7 +203,7 @@ const _: () = {
                 let t4 = a * t3;
                 let t5 = k + t4;
                 let t6 = t5 * t2;
-                first.q[i] += -t6;
+                first.q[i] -= t6;
                 first.q[i + 1] += t6;
                 let t7 = t.like(3.0) * t4;
                 let t8 = k + t7;
@@ -216,7 +217,7 @@ const _: () = {
             for i in 0..N {
                 let t11 = c * z[i];
                 first.z[i] = t.like(self.m[i]) * z[i];
-                first.force[i] += -t11;
+                first.force[i] -= t11;
                 second.zz[i][i] = t.like(self.m[i]);
                 second.force_z[i][i] = t10;
             }

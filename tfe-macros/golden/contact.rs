@@ -42,6 +42,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// L(q, v, t): 4 +−, 10 ×, 1 sin/cos, 1 other
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let g = t.like(self.g);
             let k = t.like(self.k);
@@ -65,25 +66,7 @@ const _: () = {
             t8 - t13
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-            zz: &mut [[R; 2]; 2],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// L_v, L_q and Q: 2 +−, 10 ×, 1 sin/cos, 2 other
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -116,6 +99,7 @@ const _: () = {
             first.q[1] = -t11;
             first.force[1] = -t7;
         }
+        /// L_v, L_q and Q, and L_vv: 2 +−, 10 ×, 1 sin/cos, 2 other
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -151,6 +135,26 @@ const _: () = {
             first.q[1] = -t11;
             first.force[1] = -t3;
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 3 +−, 13 ×, 1 sin/cos, 5 other
         fn second<R: __tfe::Real>(
             &self,
             t: R,

@@ -10,7 +10,7 @@
 /// operations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other
 /// operations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other
 /// operations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other
-/// declared by             Lagrangian, 1 coordinates
+/// declared by             Lagrangian, 1 coordinate
 /// depends on time         no
 /// forces                  no
 /// linear                  yes
@@ -41,6 +41,7 @@ const _: () = {
             linear: true,
             separable: true,
         };
+        /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
             let k = t.like(self.k);
             let l = t.like(self.l);
@@ -53,28 +54,8 @@ const _: () = {
             let t5 = t2 - t4;
             t.like(0.5) * t5
         }
-        const LANES: bool = false;
+        /// L_v and L_q: 1 +−, 2 ×
         fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-            zz: &mut [[R; 1]; 1],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
-        #[inline(always)]
-        fn first_inline<R: __tfe::Real>(
             &self,
             t: R,
             q: &[R; 1],
@@ -88,8 +69,8 @@ const _: () = {
             let t0 = l - q[0];
             first.q[0] = k * t0;
         }
-        #[inline(always)]
-        fn first_and_mass_inline<R: __tfe::Real>(
+        /// L_v and L_q, and L_vv: 1 +−, 2 ×
+        fn first_and_mass<R: __tfe::Real>(
             &self,
             t: R,
             q: &[R; 1],
@@ -105,6 +86,7 @@ const _: () = {
             let t0 = l - q[0];
             first.q[0] = k * t0;
         }
+        /// L_v and L_q, L_vv, L_vq and L_qq: 1 +−, 2 ×
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -186,7 +168,7 @@ impl Spring {
                 sines: 0,
                 functions: 0,
             },
-            page: "stretch = x − l\nL = ½ m x\u{307}² − ½ k stretch²\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "stretch = x − l\nL = ½ m x\u{307}² − ½ k stretch²\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
     /// Above the support, in metres.
@@ -319,7 +301,7 @@ impl ::core::fmt::Debug for Fast {
 /// operations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other
 /// operations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other
 /// operations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other
-/// declared by             Lagrangian, 1 coordinates
+/// declared by             Lagrangian, 1 coordinate
 /// depends on time         no
 /// forces                  no
 /// linear                  yes
@@ -350,6 +332,7 @@ const _: () = {
             linear: true,
             separable: true,
         };
+        /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
             let k = t.like(self.k);
             let l = t.like(self.l);
@@ -362,28 +345,8 @@ const _: () = {
             let t5 = t2 - t4;
             t.like(0.5) * t5
         }
-        const LANES: bool = false;
+        /// L_v and L_q: 1 +−, 2 ×
         fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-            zz: &mut [[R; 1]; 1],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
-        #[inline(always)]
-        fn first_inline<R: __tfe::Real>(
             &self,
             t: R,
             q: &[R; 1],
@@ -397,8 +360,8 @@ const _: () = {
             let t0 = l - q[0];
             first.q[0] = k * t0;
         }
-        #[inline(always)]
-        fn first_and_mass_inline<R: __tfe::Real>(
+        /// L_v and L_q, and L_vv: 1 +−, 2 ×
+        fn first_and_mass<R: __tfe::Real>(
             &self,
             t: R,
             q: &[R; 1],
@@ -414,6 +377,7 @@ const _: () = {
             let t0 = l - q[0];
             first.q[0] = k * t0;
         }
+        /// L_v and L_q, L_vv, L_vq and L_qq: 1 +−, 2 ×
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -495,7 +459,7 @@ impl Rigid {
                 sines: 0,
                 functions: 0,
             },
-            page: "Spring: truncated to degree 2 about x = l\nL = 0.5 (m x\u{307}² − k (x − l)²)\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "Spring: truncated to degree 2 about x = l\nL = 0.5 (m x\u{307}² − k (x − l)²)\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
     /// Above the support, in metres.

@@ -54,33 +54,23 @@ const _: () = {
             __tfe::checks::field_length(
                 "m",
                 self.m.len(),
-                &[(0 + 1 * (self.n as i64), "i", "i in 0..n")],
+                &[((self.n as i64), "i", "i in 0..n")],
             )?;
-            __tfe::checks::turns("i in 0..n", 0, 0 + 1 * (self.n as i64))?;
-            __tfe::checks::turns("i in 0..w", 0, 0 + 1 * (self.w as i64))?;
+            __tfe::checks::turns("i in 0..n", 0, (self.n as i64))?;
+            __tfe::checks::turns("i in 0..w", 0, (self.w as i64))?;
             for i in 0..self.w {
-                __tfe::checks::index(
-                    ("q", "i+1", "i in 0..w"),
-                    1 + 1 * (i as i64),
-                    self.n,
-                )?;
+                __tfe::checks::index(("q", "i+1", "i in 0..w"), (i as i64) + 1, self.n)?;
             }
             for i in 0..self.w {
-                __tfe::checks::index(
-                    ("q", "i", "i in 0..w"),
-                    0 + 1 * (i as i64),
-                    self.n,
-                )?;
+                __tfe::checks::index(("q", "i", "i in 0..w"), (i as i64), self.n)?;
             }
             __tfe::checks::index(("q", "0", ""), 0, self.n)?;
-            __tfe::checks::index(("q", "n-1", ""), -1 + 1 * (self.n as i64), self.n)?;
+            __tfe::checks::index(("q", "n-1", ""), (self.n as i64) - 1, self.n)?;
             ::core::result::Result::Ok(())
         }
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R]) -> R {
-            let (q, z) = (
-                &q[..1usize.saturating_add(self.n)],
-                &z[..1usize.saturating_add(self.n)],
-            );
+            let __tfe_length = 1usize.saturating_add(self.n);
+            let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
             let a = t.like(self.a);
             let k = t.like(self.k);
             let t0 = q[0] - q[1];
@@ -114,14 +104,12 @@ const _: () = {
             z: &[R],
             first: __tfe::Gradient<'_, R>,
         ) {
-            let (q, z) = (
-                &q[..1usize.saturating_add(self.n)],
-                &z[..1usize.saturating_add(self.n)],
-            );
+            let __tfe_length = 1usize.saturating_add(self.n);
+            let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
             let first = __tfe::Gradient {
-                z: &mut first.z[..1usize.saturating_add(self.n)],
-                q: &mut first.q[..1usize.saturating_add(self.n)],
-                force: &mut first.force[..1usize.saturating_add(self.n)],
+                z: &mut first.z[..__tfe_length],
+                q: &mut first.q[..__tfe_length],
+                force: &mut first.force[..__tfe_length],
             };
             let a = t.like(self.a);
             let k = t.like(self.k);
@@ -130,7 +118,7 @@ const _: () = {
             let t1 = k * t0;
             let mut t2 = t1;
             first.z[0] = z[0];
-            first.q[0] += -t1;
+            first.q[0] -= t1;
             first.force[self.n] = -z[self.n];
             for i in 0..self.n {
                 first.z[i + 1] = t.like(self.m[i]) * z[i + 1];
@@ -153,21 +141,19 @@ const _: () = {
             z: &[R],
             first: __tfe::Gradient<'_, R>,
         ) {
-            let (q, z) = (
-                &q[..1usize.saturating_add(self.n)],
-                &z[..1usize.saturating_add(self.n)],
-            );
+            let __tfe_length = 1usize.saturating_add(self.n);
+            let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
             let first = __tfe::Gradient {
                 z: first.z,
-                q: &mut first.q[..1usize.saturating_add(self.n)],
-                force: &mut first.force[..1usize.saturating_add(self.n)],
+                q: &mut first.q[..__tfe_length],
+                force: &mut first.force[..__tfe_length],
             };
             let a = t.like(self.a);
             let k = t.like(self.k);
             let t0 = q[0] - q[1];
             let t1 = k * t0;
             let mut t2 = t1;
-            first.q[0] += -t1;
+            first.q[0] -= t1;
             first.force[self.n] = -z[self.n];
             for i in 0..self.w {
                 let t3 = q[i + 1] - q[i + 2];
@@ -186,10 +172,8 @@ const _: () = {
             z: &[R],
             entries: &mut __E,
         ) {
-            let (q, z) = (
-                &q[..1usize.saturating_add(self.n)],
-                &z[..1usize.saturating_add(self.n)],
-            );
+            let __tfe_length = 1usize.saturating_add(self.n);
+            let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
             entries.add(__tfe::Block::ZZ, 0, 0, t.like(1.0));
             for i in 0..self.n {
                 entries.add(__tfe::Block::ZZ, i + 1, i + 1, t.like(self.m[i]));
@@ -203,14 +187,12 @@ const _: () = {
             first: __tfe::Gradient<'_, R>,
             entries: &mut __E,
         ) {
-            let (q, z) = (
-                &q[..1usize.saturating_add(self.n)],
-                &z[..1usize.saturating_add(self.n)],
-            );
+            let __tfe_length = 1usize.saturating_add(self.n);
+            let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
             let first = __tfe::Gradient {
-                z: &mut first.z[..1usize.saturating_add(self.n)],
-                q: &mut first.q[..1usize.saturating_add(self.n)],
-                force: &mut first.force[..1usize.saturating_add(self.n)],
+                z: &mut first.z[..__tfe_length],
+                q: &mut first.q[..__tfe_length],
+                force: &mut first.force[..__tfe_length],
             };
             let a = t.like(self.a);
             let k = t.like(self.k);
@@ -221,7 +203,7 @@ const _: () = {
             let t3 = -k;
             let mut t4 = t3;
             first.z[0] = z[0];
-            first.q[0] += -t1;
+            first.q[0] -= t1;
             entries.add(__tfe::Block::ZZ, 0, 0, t.like(1.0));
             first.force[self.n] = -z[self.n];
             entries.add(__tfe::Block::QQ, 0, 0, t3);
@@ -263,10 +245,8 @@ const _: () = {
         }
         const OBSERVABLES: &'static [&'static str] = &["extension"];
         fn observables<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R], values: &mut [R]) {
-            let (q, z) = (
-                &q[..1usize.saturating_add(self.n)],
-                &z[..1usize.saturating_add(self.n)],
-            );
+            let __tfe_length = 1usize.saturating_add(self.n);
+            let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
             values[0] = q[self.n] - q[1];
         }
     }

@@ -44,6 +44,7 @@ const _: () = {
             linear: false,
             separable: false,
         };
+        /// L(q, v, t): 4 +−, 10 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let g = t.like(self.g);
             let k = t.like(self.k);
@@ -66,25 +67,7 @@ const _: () = {
             t8 - t12
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-            zz: &mut [[R; 2]; 2],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// L_v and L_q: 3 +−, 10 ×, 1 sin/cos
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -113,6 +96,7 @@ const _: () = {
             first.q[0] = t9 + t5;
             first.q[1] = -t7;
         }
+        /// L_v and L_q, and L_vv: 3 +−, 11 ×, 1 sin/cos
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -145,6 +129,26 @@ const _: () = {
             let t10 = t6 * t2;
             first.q[1] = -t10;
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// L_v and L_q, L_vv, L_vq and L_qq: 4 +−, 16 ×, 1 sin/cos
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -273,7 +277,7 @@ impl SpringPendulum {
 /// operations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other
 /// operations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other
 /// operations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other
-/// declared by             Lagrangian, 1 coordinates
+/// declared by             Lagrangian, 1 coordinate
 /// depends on time         no
 /// forces                  no
 /// linear                  no
@@ -307,6 +311,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// L(q, v, t): 3 +−, 8 ×, 1 ÷
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
             let g = t.like(self.g);
             let l = t.like(self.l);
@@ -325,25 +330,7 @@ const _: () = {
             m * t10
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-            zz: &mut [[R; 1]; 1],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// L_v and L_q: 1 +−, 7 ×, 1 ÷
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -365,6 +352,7 @@ const _: () = {
             let t6 = t5 / t.like(6.0);
             first.q[0] = t6 - t3;
         }
+        /// L_v and L_q, and L_vv: 1 +−, 7 ×, 1 ÷
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -388,6 +376,26 @@ const _: () = {
             let t6 = t5 / t.like(6.0);
             first.q[0] = t6 - t3;
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// L_v and L_q, L_vv, L_vq and L_qq: 2 +−, 8 ×, 1 ÷
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -479,7 +487,7 @@ impl Rod {
                 sines: 0,
                 functions: 0,
             },
-            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = 0.5 m l² θ\u{307}² + m g l − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = 0.5 m l² θ\u{307}² + m g l − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.

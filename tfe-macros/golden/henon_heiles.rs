@@ -34,6 +34,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// H(q, p, t): 5 +−, 7 ×, 1 ÷
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let lambda = t.like(self.lambda);
             let t0 = q[0] * q[0];
@@ -51,25 +52,7 @@ const _: () = {
             t8 + t11
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-            zz: &mut [[R; 2]; 2],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// H_p and H_q: 3 +−, 6 ×
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -91,6 +74,7 @@ const _: () = {
             let t6 = lambda * t5;
             first.q[1] = q[1] + t6;
         }
+        /// H_p and H_q, and H_pp: 3 +−, 6 ×
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -115,6 +99,26 @@ const _: () = {
             let t6 = lambda * t5;
             first.q[1] = q[1] + t6;
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// H_p and H_q, H_pp, H_pq and H_qq: 4 +−, 7 ×
         fn second<R: __tfe::Real>(
             &self,
             t: R,

@@ -40,6 +40,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// L(q, v, t): 3 +−, 9 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 3], z: &[R; 3]) -> R {
             let alpha = t.like(self.alpha);
             let g = t.like(self.g);
@@ -59,28 +60,8 @@ const _: () = {
             let t11 = t.like(0.5) * t7;
             t11 + t10
         }
-        const LANES: bool = false;
+        /// L_v and L_q: 5 ×, 1 sin/cos
         fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 3],
-            z: &[R; 3],
-            first: &mut __tfe::First<R, 3>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 3],
-            z: &[R; 3],
-            first: &mut __tfe::First<R, 3>,
-            zz: &mut [[R; 3]; 3],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
-        #[inline(always)]
-        fn first_inline<R: __tfe::Real>(
             &self,
             t: R,
             q: &[R; 3],
@@ -98,8 +79,8 @@ const _: () = {
             let t1 = g * m;
             first.q[0] = t0 * t1;
         }
-        #[inline(always)]
-        fn first_and_mass_inline<R: __tfe::Real>(
+        /// L_v and L_q, and L_vv: 5 ×, 1 sin/cos
+        fn first_and_mass<R: __tfe::Real>(
             &self,
             t: R,
             q: &[R; 3],
@@ -121,6 +102,7 @@ const _: () = {
             let t1 = g * m;
             first.q[0] = t0 * t1;
         }
+        /// L_v and L_q, L_vv, L_vq and L_qq: 5 ×, 1 sin/cos
         fn second<R: __tfe::Real>(
             &self,
             t: R,

@@ -7,7 +7,7 @@
 /// operations, value: 1 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other
 /// operations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other
 /// operations, gradient and second derivatives: 0 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other
-/// declared by             Lagrangian, 1 coordinates
+/// declared by             Lagrangian, 1 coordinate
 /// depends on time         no
 /// forces                  no
 /// linear                  no
@@ -41,6 +41,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// L(q, v, t): 1 +−, 6 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
             let g = t.like(self.g);
             let l = t.like(self.l);
@@ -55,25 +56,7 @@ const _: () = {
             m * t5
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-            zz: &mut [[R; 1]; 1],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// L_v and L_q: 5 ×, 1 sin/cos
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -93,6 +76,7 @@ const _: () = {
             let t3 = t1 * t0;
             first.q[0] = -t3;
         }
+        /// L_v and L_q, and L_vv: 5 ×, 1 sin/cos
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -114,6 +98,26 @@ const _: () = {
             let t3 = t1 * t0;
             first.q[0] = -t3;
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// L_v and L_q, L_vv, L_vq and L_qq: 6 ×, 1 sin/cos
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -190,7 +194,7 @@ impl Pendulum {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m l² θ\u{307}² + m g l cos θ\ncoordinates: θ      parameters: m, l, g\noperations, value: 1 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "L = ½ m l² θ\u{307}² + m g l cos θ\ncoordinates: θ      parameters: m, l, g\noperations, value: 1 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
 }

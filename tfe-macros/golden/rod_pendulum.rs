@@ -38,6 +38,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let g = t.like(self.g);
             let m = t.like(self.m);
@@ -49,28 +50,8 @@ const _: () = {
             let t5 = t4 - t0;
             m * t5
         }
-        const LANES: bool = false;
+        /// L_v and L_q: 3 ×
         fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-            zz: &mut [[R; 2]; 2],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
-        #[inline(always)]
-        fn first_inline<R: __tfe::Real>(
             &self,
             t: R,
             q: &[R; 2],
@@ -84,8 +65,8 @@ const _: () = {
             let t0 = g * m;
             first.q[1] = -t0;
         }
-        #[inline(always)]
-        fn first_and_mass_inline<R: __tfe::Real>(
+        /// L_v and L_q, and L_vv: 3 ×
+        fn first_and_mass<R: __tfe::Real>(
             &self,
             t: R,
             q: &[R; 2],
@@ -102,6 +83,7 @@ const _: () = {
             let t0 = g * m;
             first.q[1] = -t0;
         }
+        /// L_v and L_q, L_vv, L_vq and L_qq: 3 ×
         fn second<R: __tfe::Real>(
             &self,
             t: R,

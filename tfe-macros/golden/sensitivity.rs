@@ -7,7 +7,7 @@
 /// operations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other
 /// operations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other
 /// operations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other
-/// declared by             Lagrangian, 1 coordinates
+/// declared by             Lagrangian, 1 coordinate
 /// depends on time         yes
 /// forces                  yes
 /// linear                  no
@@ -42,6 +42,7 @@ const _: () = {
             linear: false,
             separable: true,
         };
+        /// L(q, v, t): 2 +−, 8 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
             let m = t.like(self.m);
             let t0 = z[0] * z[0];
@@ -56,25 +57,7 @@ const _: () = {
             t5 - t8
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 1],
-            z: &[R; 1],
-            first: &mut __tfe::First<R, 1>,
-            zz: &mut [[R; 1]; 1],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// L_v, L_q and Q: 2 +−, 7 ×, 1 sin/cos
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -99,6 +82,7 @@ const _: () = {
             let t7 = q[0] * t6;
             first.q[0] = -t7;
         }
+        /// L_v, L_q and Q, and L_vv: 2 +−, 7 ×, 1 sin/cos
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -125,6 +109,26 @@ const _: () = {
             let t7 = q[0] * t6;
             first.q[0] = -t7;
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            z: &[R; 1],
+            first: &mut __tfe::First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 3 +−, 8 ×, 1 sin/cos
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -255,7 +259,7 @@ impl Duffing {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m x\u{307}² − ½ k[0] x² − k[1]/4 x⁴\nD = ½ c x\u{307}²\nQ(x) = amplitude cos(ω t)\ncoordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c\noperations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinates\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)\npattern Q_v             (0,0)\npattern Q_q             zero",
+            page: "L = ½ m x\u{307}² − ½ k[0] x² − k[1]/4 x⁴\nD = ½ c x\u{307}²\nQ(x) = amplitude cos(ω t)\ncoordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c\noperations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)\npattern Q_v             (0,0)\npattern Q_q             zero",
         }
     }
 }

@@ -41,6 +41,7 @@ const _: () = {
             linear: false,
             separable: false,
         };
+        /// H(q, p, t): 4 +−, 6 ×, 1 ÷, 2 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let a = t.like(self.a);
             let omega = t.like(self.omega);
@@ -59,25 +60,7 @@ const _: () = {
             t8 / t10
         }
         const LANES: bool = true;
-        fn first<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-        ) {
-            self.first_inline(t, q, z, first);
-        }
-        fn first_and_mass<R: __tfe::Real>(
-            &self,
-            t: R,
-            q: &[R; 2],
-            z: &[R; 2],
-            first: &mut __tfe::First<R, 2>,
-            zz: &mut [[R; 2]; 2],
-        ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
-        }
+        /// H_p, H_q and Q: 6 +−, 16 ×, 1 ÷, 2 sin/cos
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -118,6 +101,7 @@ const _: () = {
             first.force[1] = z[0] * t13;
             first.force[0] = -t13;
         }
+        /// H_p, H_q and Q, and H_pp: 6 +−, 16 ×, 1 ÷, 2 sin/cos
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -160,6 +144,26 @@ const _: () = {
             first.force[1] = z[0] * t13;
             first.force[0] = -t13;
         }
+        fn first<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+        ) {
+            self.first_inline(t, q, z, first);
+        }
+        fn first_and_mass<R: __tfe::Real>(
+            &self,
+            t: R,
+            q: &[R; 2],
+            z: &[R; 2],
+            first: &mut __tfe::First<R, 2>,
+            zz: &mut [[R; 2]; 2],
+        ) {
+            self.first_and_mass_inline(t, q, z, first, zz);
+        }
+        /// H_p, H_q and Q, H_pp, H_pq, H_qq, Q_p and Q_q: 9 +−, 32 ×, 1 ÷, 2 sin/cos
         fn second<R: __tfe::Real>(
             &self,
             t: R,

@@ -1,6 +1,7 @@
 //! Programs of the engine as Rust statements.
 
 use crate::balance::balance;
+use crate::parts::{Part, Parts};
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,11 +32,27 @@ pub(crate) struct Emitter<'a> {
     taken: BTreeSet<String>,
     numbered: usize,
     parameters: BTreeMap<String, Ident>,
+    /// The places of what later parts read.
+    keeps: BTreeMap<Temporary, usize>,
     value: Option<TokenStream>,
+}
+
+/// What the functions of a kernel in parts are called and given.
+pub(crate) struct Signature {
+    /// The kernel: its parts are `__tfe_name_1`, ….
+    pub(crate) name: &'static str,
+    /// After `&self`, with types.
+    pub(crate) parameters: TokenStream,
+    /// The same without types.
+    pub(crate) arguments: TokenStream,
+    /// Whether the parts are written into the place of their call, as they must be where they are compiled for its instruction set.
+    pub(crate) inline: bool,
 }
 
 /// The statements of a kernel, and the expression of the energy function where it was asked for.
 pub(crate) struct Body {
+    /// The functions that the statements call, members of an `impl` of the model; none but for long kernels.
+    pub(crate) parts: TokenStream,
     /// `let` statements, loops and assignments.
     pub(crate) statements: TokenStream,
     /// The value of the energy function.
@@ -58,6 +75,7 @@ impl<'a> Emitter<'a> {
             taken: BTreeSet::new(),
             numbered: 0,
             parameters: BTreeMap::new(),
+            keeps: BTreeMap::new(),
             value: None,
         }
     }
@@ -92,9 +110,92 @@ impl<'a> Emitter<'a> {
         let statements = self.statements(&program.statements);
         let parameters = self.parameters();
         Body {
+            parts: TokenStream::new(),
             statements: quote!(#parameters #statements),
             value: self.value,
         }
+    }
+
+    /// The body of a kernel that is cut into parts where it is long.
+    pub(crate) fn body_in_parts(mut self, program: &Program, signature: &Signature) -> Body {
+        let Some(Parts { parts, kept, value }) = Parts::of(&program.statements) else {
+            return self.body(program);
+        };
+        self.survey(&program.statements);
+        let count = Literal::usize_unsuffixed(kept);
+        let (mut functions, mut calls) = (TokenStream::new(), TokenStream::new());
+        for (number, part) in (1_usize..).zip(&parts) {
+            let Signature {
+                name,
+                parameters,
+                arguments,
+                inline,
+            } = signature;
+            let doc = format!(" Part {number} of {} of `{name}`.", parts.len());
+            let inline = match inline {
+                true => quote!(always),
+                false => quote!(never),
+            };
+            let name = format_ident!("__tfe_{name}_{number}");
+            let body = self.part(part);
+            functions.extend(quote! {
+                #[doc = #doc]
+                #[inline(#inline)]
+                fn #name<R: __tfe::Real>(&self, #parameters, kept: &mut [R; #count]) {
+                    #body
+                }
+            });
+            calls.extend(quote!(self.#name(#arguments, &mut kept);));
+        }
+        self.parameters.clear();
+        let value = value.map(
+            |(operand, place)| match place.map(Literal::usize_unsuffixed) {
+                Some(place) => quote!(kept[#place]),
+                None => self.operand(&operand),
+            },
+        );
+        let parameters = self.parameters();
+        Body {
+            parts: functions,
+            statements: quote! {
+                #parameters
+                let mut kept = [t.like(0.0); #count];
+                #calls
+            },
+            value,
+        }
+    }
+
+    fn part(&mut self, part: &Part) -> TokenStream {
+        self.parameters.clear();
+        self.keeps.clone_from(&part.keeps);
+        let (names, places): (Vec<_>, Vec<_>) = part
+            .reads
+            .iter()
+            .map(|(temporary, place)| (self.name(*temporary), Literal::usize_unsuffixed(*place)))
+            .unzip();
+        let reads = (!names.is_empty()).then(|| quote!(let [#(#names),*] = [#(kept[#places]),*];));
+        let statements = self.statements(&part.statements);
+        // Running sums are kept when they have their last value.
+        let sums = part
+            .statements
+            .iter()
+            .filter_map(|statement| match statement {
+                Statement::Accumulator { target, .. } => Some(self.kept(*target)),
+                _ => None,
+            });
+        let sums: TokenStream = sums.collect();
+        let parameters = self.parameters();
+        quote!(#parameters #reads #statements #sums)
+    }
+
+    /// Hands a value on, if a later part reads it.
+    fn kept(&self, temporary: Temporary) -> TokenStream {
+        let Some(place) = self.keeps.get(&temporary) else {
+            return TokenStream::new();
+        };
+        let (name, place) = (self.name(temporary), Literal::usize_unsuffixed(*place));
+        quote!(kept[#place] = #name;)
     }
 
     /// The parameters that have been read so far.
@@ -131,8 +232,14 @@ impl<'a> Emitter<'a> {
                 && self.reads.get(target) == Some(&1)
                 && written(next) == Some(&Operand::Temporary(*target))
             {
-                let value = self.operation(operation);
-                tokens.extend(self.write(next, value));
+                let taken_away = match operation {
+                    Operation::Negate(a) => self.take_away(next, a),
+                    _ => None,
+                };
+                tokens.extend(taken_away.unwrap_or_else(|| {
+                    let value = self.operation(operation);
+                    self.write(next, value)
+                }));
                 rest = &after[1..];
             } else {
                 tokens.extend(self.statement(statement));
@@ -151,7 +258,8 @@ impl<'a> Emitter<'a> {
                     }
                     _ => self.define(*target),
                 };
-                quote!(let #name = #value;)
+                let kept = self.kept(*target);
+                quote!(let #name = #value; #kept)
             }
             Statement::SineCosine {
                 sine,
@@ -159,9 +267,11 @@ impl<'a> Emitter<'a> {
                 argument,
             } => {
                 let of = self.operand(argument);
+                let kept = [*sine, *cosine];
                 let sine = self.define_of_coordinate(*sine, "sin", Some(argument));
                 let cosine = self.define_of_coordinate(*cosine, "cos", Some(argument));
-                quote!(let (#sine, #cosine) = #of.sin_cos();)
+                let kept = kept.map(|one| self.kept(one));
+                quote!(let (#sine, #cosine) = #of.sin_cos(); #(#kept)*)
             }
             Statement::Accumulator { target, start } => {
                 let start = self.operand(start);
@@ -187,6 +297,25 @@ impl<'a> Emitter<'a> {
             Statement::Balance { output, length } => balance(&self.second, output, length, index),
             Statement::Clear { array } => self.clear(*array),
         }
+    }
+
+    /// `place -= value`, where the negative of `value` is added to a place.
+    fn take_away(&mut self, statement: &Statement, value: &Operand) -> Option<TokenStream> {
+        let Statement::Store {
+            output,
+            accumulate: true,
+            ..
+        } = statement
+        else {
+            return None;
+        };
+        let array = output.array;
+        let told = array == Array::Value || (self.by_entries && block(array).is_some());
+        if told || (self.assigns && array == Array::ByQ) {
+            return None;
+        }
+        let (place, value) = (self.place(output), self.operand(value));
+        Some(quote!(#place -= #value;))
     }
 
     /// A store, an accumulation or an assignment of `value`.
@@ -459,6 +588,7 @@ impl<'a> Emitter<'a> {
             "mu",
             "psi_q",
             "row_rates",
+            "kept",
         ];
         let temporary = field
             .strip_prefix('t')
@@ -610,9 +740,10 @@ fn symbol_tokens(symbol: &IndexSymbol) -> TokenStream {
     }
 }
 
+/// An integer as an `i64` expression: `i as i64 + 1`.
 pub(crate) fn signed(affine: &Affine) -> TokenStream {
-    let constant = Literal::i64_unsuffixed(affine.constant);
-    let terms = affine.terms.iter().map(|(symbol, coefficient)| {
+    let mut sum = TokenStream::new();
+    for (symbol, coefficient) in &affine.terms {
         let symbol = match symbol {
             // Whatever a list holds, sums of entries do not overflow.
             IndexSymbol::Entry(..) => {
@@ -621,13 +752,24 @@ pub(crate) fn signed(affine: &Affine) -> TokenStream {
             }
             symbol => symbol_tokens(symbol),
         };
-        if *coefficient == -1 {
-            return quote!(- (#symbol as i64));
-        }
-        let coefficient = Literal::i64_unsuffixed(*coefficient);
-        quote!(+ #coefficient * (#symbol as i64))
-    });
-    quote!(#constant #(#terms)*)
+        let size = Literal::u64_unsuffixed(coefficient.unsigned_abs());
+        let operator = match (*coefficient < 0, sum.is_empty()) {
+            (true, _) => quote!(-),
+            (false, true) => TokenStream::new(),
+            (false, false) => quote!(+),
+        };
+        sum.extend(match coefficient.unsigned_abs() {
+            1 => quote!(#operator (#symbol as i64)),
+            _ => quote!(#operator #size * (#symbol as i64)),
+        });
+    }
+    let size = Literal::u64_unsuffixed(affine.constant.unsigned_abs());
+    match affine.constant {
+        0 if !sum.is_empty() => sum,
+        constant if constant < 0 => quote!(#sum - #size),
+        _ if sum.is_empty() => quote!(#size),
+        _ => quote!(#sum + #size),
+    }
 }
 
 /// An integer as a number.

@@ -1,7 +1,7 @@
 //! From tokens to tokens: the whole expansion, read from top to bottom.
 
 use crate::docs::Docs;
-use crate::emit::{self, Emitter};
+use crate::emit::{self, Emitter, Signature};
 use crate::lengths::Lengths;
 use crate::source_map::SourceMap;
 use crate::{constraint, fallback, family, input, page, solver, state, variant};
@@ -135,6 +135,17 @@ impl<'a> Kernels<'a> {
         self.emitted(&self.derivation.program(request), second)
     }
 
+    /// The body of a kernel that is cut into parts where it is long.
+    fn body_in_parts(
+        &self,
+        request: Request,
+        second: TokenStream,
+        signature: &Signature,
+    ) -> emit::Body {
+        Emitter::new(&self.coordinates, second)
+            .body_in_parts(&self.derivation.program(request), signature)
+    }
+
     fn emitted(&self, program: &Program, second: TokenStream) -> emit::Body {
         Emitter::new(&self.coordinates, second).body(program)
     }
@@ -152,7 +163,14 @@ impl<'a> Kernels<'a> {
             value: true,
             ..nothing
         };
-        let value = self.body(value, argument());
+        let at = Signature {
+            name: "value",
+            parameters: quote!(t: R, q: &[R; #dof], z: &[R; #dof]),
+            arguments: quote!(t, q, z),
+            inline: false,
+        };
+        let value = self.body_in_parts(value, argument(), &at);
+        let mut parts = value.parts;
         let (value_statements, value) = (value.statements, value.value);
         let value = value.unwrap_or_else(|| quote!(t.like(0.0)));
         let first = Request {
@@ -171,9 +189,91 @@ impl<'a> Kernels<'a> {
         let lanes = self.declared.constraints.is_empty()
             && !self.derivation.structure().linear
             && page::total(&self.derivation.counts(mass)) <= LANES_LIMIT;
-        let first = self.body(first, argument()).statements;
-        let mass = self.body(mass, argument()).statements;
-        let second = self.body(second, quote!(second.)).statements;
+        let [value_doc, first_doc, mass_doc, second_doc] = self.docs();
+        let firsts = |name| Signature {
+            name,
+            parameters: quote!(t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>),
+            arguments: quote!(t, q, z, first),
+            inline: lanes,
+        };
+        let with = |name, parameter: TokenStream, argument: TokenStream, inline| {
+            let first = firsts(name);
+            let (parameters, arguments) = (first.parameters, first.arguments);
+            Signature {
+                name,
+                parameters: quote!(#parameters, #parameter),
+                arguments: quote!(#arguments, #argument),
+                inline,
+            }
+        };
+        let first = self.body_in_parts(first, argument(), &firsts("first"));
+        let masses = with(
+            "first_and_mass",
+            quote!(zz: &mut [[R; #dof]; #dof]),
+            quote!(zz),
+            lanes,
+        );
+        let mass = self.body_in_parts(mass, argument(), &masses);
+        let seconds = quote!(second: &mut __tfe::Second<R, #dof>);
+        let seconds = with("second", seconds, quote!(second), false);
+        let second = self.body_in_parts(second, quote!(second.), &seconds);
+        parts.extend([first.parts, mass.parts, second.parts]);
+        let (first, mass, second) = (first.statements, mass.statements, second.statements);
+        let parts = (!parts.is_empty()).then(|| {
+            quote! {
+                #[automatically_derived]
+                #[allow(unused_variables, non_snake_case, clippy::too_many_arguments)]
+                impl #impl_generics #name #type_generics #where_clause {
+                    #parts
+                }
+            }
+        });
+        let first_parameters = firsts("first").parameters;
+        let mass_parameters = masses.parameters;
+        let Lengths {
+            constant,
+            statement: lengths,
+        } = Lengths::of(self.declared, item);
+        let firsts_and_masses = match lanes {
+            false => quote! {
+                #[doc = #first_doc]
+                fn first<R: __tfe::Real>(&self, #first_parameters) {
+                    #lengths
+                    #first
+                }
+
+                #[doc = #mass_doc]
+                fn first_and_mass<R: __tfe::Real>(&self, #mass_parameters) {
+                    #lengths
+                    #mass
+                }
+            },
+            true => quote! {
+                const LANES: bool = true;
+
+                #[doc = #first_doc]
+                #[inline(always)]
+                fn first_inline<R: __tfe::Real>(&self, #first_parameters) {
+                    #lengths
+                    #first
+                }
+
+                #[doc = #mass_doc]
+                #[inline(always)]
+                fn first_and_mass_inline<R: __tfe::Real>(&self, #mass_parameters) {
+                    #lengths
+                    #mass
+                }
+
+                fn first<R: __tfe::Real>(&self, #first_parameters) {
+                    self.first_inline(t, q, z, first);
+                }
+
+                fn first_and_mass<R: __tfe::Real>(&self, #mass_parameters) {
+                    self.first_and_mass_inline(t, q, z, first, zz);
+                }
+            },
+        };
         let form = match self.declared.form {
             Form::Lagrangian => quote!(Lagrangian),
             Form::Hamiltonian => quote!(Hamiltonian),
@@ -183,10 +283,6 @@ impl<'a> Kernels<'a> {
         let observables = self.observables();
         let constraints = constraint::members(self.declared, self.derivation, &self.coordinates);
         let sensitivities = self.sensitivities();
-        let Lengths {
-            constant,
-            statement: lengths,
-        } = Lengths::of(self.declared, item);
         quote! {
             const _: () = {
                 use #path::__private as __tfe;
@@ -199,60 +295,16 @@ impl<'a> Kernels<'a> {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;
 
+                    #[doc = #value_doc]
                     fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
                         #lengths
                         #value_statements
                         #value
                     }
 
-                    const LANES: bool = #lanes;
+                    #firsts_and_masses
 
-                    fn first<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R; #dof],
-                        z: &[R; #dof],
-                        first: &mut __tfe::First<R, #dof>,
-                    ) {
-                        self.first_inline(t, q, z, first);
-                    }
-
-                    fn first_and_mass<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R; #dof],
-                        z: &[R; #dof],
-                        first: &mut __tfe::First<R, #dof>,
-                        zz: &mut [[R; #dof]; #dof],
-                    ) {
-                        self.first_and_mass_inline(t, q, z, first, zz);
-                    }
-
-                    #[inline(always)]
-                    fn first_inline<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R; #dof],
-                        z: &[R; #dof],
-                        first: &mut __tfe::First<R, #dof>,
-                    ) {
-                        #lengths
-                        #first
-                    }
-
-                    #[inline(always)]
-                    fn first_and_mass_inline<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R; #dof],
-                        z: &[R; #dof],
-                        first: &mut __tfe::First<R, #dof>,
-                        zz: &mut [[R; #dof]; #dof],
-                    ) {
-                        #lengths
-                        #mass
-                    }
-
+                    #[doc = #second_doc]
                     fn second<R: __tfe::Real>(
                         &self,
                         t: R,
@@ -270,8 +322,57 @@ impl<'a> Kernels<'a> {
                     #constraints
                     #sensitivities
                 }
+
+                #parts
             };
         }
+    }
+
+    /// A line for each kernel: value, first derivatives, those with the mass matrix, all.
+    fn docs(&self) -> [String; 4] {
+        let nothing = Request::default();
+        let first = Request {
+            first: true,
+            ..nothing
+        };
+        let (letter, z) = match self.declared.form {
+            Form::Lagrangian => ('L', 'v'),
+            Form::Hamiltonian => ('H', 'p'),
+        };
+        let forced = self.derivation.structure().forced;
+        let firsts = match forced {
+            true => format!("{letter}_{z}, {letter}_q and Q"),
+            false => format!("{letter}_{z} and {letter}_q"),
+        };
+        let second = match forced {
+            true => format!("{firsts}, {letter}_{z}{z}, {letter}_{z}q, {letter}_qq, Q_{z} and Q_q"),
+            false => format!("{firsts}, {letter}_{z}{z}, {letter}_{z}q and {letter}_qq"),
+        };
+        let all = [
+            (
+                format!("{letter}(q, {z}, t)"),
+                Request {
+                    value: true,
+                    ..nothing
+                },
+            ),
+            (firsts.clone(), first),
+            (
+                format!("{firsts}, and {letter}_{z}{z}"),
+                Request {
+                    mass: true,
+                    ..first
+                },
+            ),
+            (
+                second,
+                Request {
+                    second: true,
+                    ..first
+                },
+            ),
+        ];
+        all.map(|(formula, request)| page::kernel(&formula, &self.derivation.counts(request)))
     }
 
     fn coordinate_name(&self) -> TokenStream {

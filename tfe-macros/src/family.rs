@@ -79,9 +79,11 @@ impl Kernels<'_> {
     /// Cuts the slices to the length of the model.
     fn cut(&self, given: Given) -> TokenStream {
         let dof = &self.dof;
+        // Parameters may have any name; a model cannot have this one.
+        let length = quote!(__tfe_length);
         let forced = self.derivation.structure().forced;
         let cut = |array: TokenStream, is_written: bool| match is_written {
-            true => quote!(&mut first.#array[..#dof]),
+            true => quote!(&mut first.#array[..#length]),
             false => quote!(first.#array),
         };
         let (z, force) = (
@@ -91,11 +93,12 @@ impl Kernels<'_> {
         let cut = match given {
             Given::Nothing => TokenStream::new(),
             _ => quote! {
-                let first = __tfe::Gradient { z: #z, q: &mut first.q[..#dof], force: #force };
+                let first = __tfe::Gradient { z: #z, q: &mut first.q[..#length], force: #force };
             },
         };
         quote! {
-            let (q, z) = (&q[..#dof], &z[..#dof]);
+            let #length = #dof;
+            let (q, z) = (&q[..#length], &z[..#length]);
             #cut
         }
     }

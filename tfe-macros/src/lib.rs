@@ -13,6 +13,7 @@ mod family;
 mod input;
 mod lengths;
 mod page;
+mod parts;
 mod solver;
 mod source_map;
 mod state;

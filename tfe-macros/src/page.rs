@@ -101,6 +101,32 @@ fn told(counts: &Counts) -> String {
     )
 }
 
+/// A line of documentation for a kernel: what it computes, and of how many operations.
+pub(crate) fn kernel(formula: &str, counts: &Counts) -> String {
+    let Operations {
+        additions,
+        multiplications,
+        divisions,
+        sines,
+        functions,
+    } = operations(counts);
+    let kinds = [
+        (additions, "+−"),
+        (multiplications, "×"),
+        (divisions, "÷"),
+        (sines, "sin/cos"),
+        (functions, "other"),
+    ];
+    let counted = kinds.into_iter().filter(|(count, _)| *count > 0);
+    let counted: Vec<String> = counted
+        .map(|(count, kind)| format!("{count} {kind}"))
+        .collect();
+    match counted.is_empty() {
+        true => format!(" {formula}: no operations"),
+        false => format!(" {formula}: {}", counted.join(", ")),
+    }
+}
+
 /// The kinds that are told apart.
 struct Operations {
     additions: usize,

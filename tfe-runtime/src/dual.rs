@@ -4,7 +4,7 @@
 //! kernels for it.
 
 use crate::real::Real;
-use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// x + ε x′ with ε² = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,6 +83,12 @@ impl Neg for Dual {
 impl AddAssign for Dual {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
+    }
+}
+
+impl SubAssign for Dual {
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
     }
 }
 

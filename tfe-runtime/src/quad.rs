@@ -108,6 +108,13 @@ macro_rules! register {
             }
         }
 
+        impl core::ops::SubAssign for $name {
+            #[inline(always)]
+            fn sub_assign(&mut self, other: Self) {
+                *self = *self - other;
+            }
+        }
+
         impl crate::real::Real for $name {
             type Mask = $mask;
 

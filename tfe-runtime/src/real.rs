@@ -2,7 +2,7 @@
 
 use crate::trigonometry;
 use core::fmt::Debug;
-use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A number that kernels compute with: `f64`, `f32`, or several `f64` side by side.
 ///
@@ -16,6 +16,7 @@ pub trait Real:
     + Div<Output = Self>
     + Neg<Output = Self>
     + AddAssign
+    + SubAssign
 {
     /// What a comparison gives: `bool`, or one truth value a lane.
     type Mask: Copy;
@@ -403,6 +404,13 @@ impl<const W: usize> AddAssign for Lanes<W> {
     #[inline]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
+    }
+}
+
+impl<const W: usize> SubAssign for Lanes<W> {
+    #[inline]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
     }
 }
 

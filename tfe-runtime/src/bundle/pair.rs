@@ -3,7 +3,7 @@
 
 use crate::points::four::{self, Four, Precise};
 use crate::real::Real;
-use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// So many trajectories share a kernel call.
 pub(super) const LANES: usize = 8;
@@ -128,6 +128,13 @@ impl<V: Real> AddAssign for Pair<V> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
+    }
+}
+
+impl<V: Real> SubAssign for Pair<V> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
     }
 }
 

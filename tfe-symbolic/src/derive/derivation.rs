@@ -7,6 +7,7 @@
 //! A function of sums, such as `sqrt(sum(i in 0..n, q[i]^2))`, couples all with all. There each inner sum S counts as a further leaf of
 //! the body, and the chain rule continues into it: ∂f/∂q = (∂f/∂S)(∂S/∂q), in one more loop.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use crate::derive::constraint;
@@ -16,10 +17,11 @@ use crate::derive::structure::Structure;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::{Forward, gradient};
 use crate::expr::graph::{ExprId, Graph, Node, SumRange};
+use crate::expr::hash::Map;
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 use crate::model::declared::{Constraint, Declared, Force, Form, Observable, Parameter};
 use crate::optimise::passes::{Pass, Passes};
-use crate::program::{Array, Place};
+use crate::program::{Array, Place, Program, Request};
 
 /// What is differentiated.
 #[derive(Clone, Debug)]
@@ -91,6 +93,8 @@ pub struct Derivation {
     structure: Structure,
     pub(crate) sensitivities: Vec<Parameter>,
     pub(crate) passes: Passes,
+    /// The programs that have been asked for: each is optimised once, which takes most of the time of an expansion.
+    pub(crate) programs: RefCell<Map<Request, Program>>,
 }
 
 impl Derivation {
@@ -171,6 +175,7 @@ impl Derivation {
             structure,
             sensitivities,
             passes,
+            programs: RefCell::default(),
         }
     }
 

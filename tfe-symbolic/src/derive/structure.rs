@@ -299,9 +299,13 @@ impl fmt::Display for Structure {
             Form::Hamiltonian => ('H', 'p'),
         };
         let yes = |condition: bool| if condition { "yes" } else { "no" };
+        let coordinates = match self.dof.as_constant() {
+            Some(1) => "coordinate",
+            _ => "coordinates",
+        };
         writeln!(
             f,
-            "declared by             {}, {} coordinates",
+            "declared by             {}, {} {coordinates}",
             self.form.name(),
             self.dof
         )?;

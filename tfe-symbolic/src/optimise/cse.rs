@@ -36,22 +36,74 @@ const LONGEST: usize = 400;
 pub(crate) fn extract(kind: Kind, sets: &mut [Operands], first_pair: Item) -> Vec<Pair> {
     let mut search = Search {
         kind,
-        sets,
+        sets: sets.iter().map(Operand::of).collect(),
         places: Map::default(),
         queue: BinaryHeap::new(),
         made: Vec::new(),
         first_pair,
     };
     search.run();
+    for (set, found) in sets.iter_mut().zip(search.sets) {
+        if found.changed {
+            *set = found.items.into_iter().collect();
+        }
+    }
     search.made
 }
 
 /// A candidate with the saving that it had when it was queued; the earliest pair first among equals.
 type Candidate = (i32, std::cmp::Reverse<Pair>);
 
-struct Search<'a> {
+/// One of the sets while it is searched.
+struct Operand {
+    /// In ascending order.
+    items: Vec<(Item, i32)>,
+    /// The sum of all sizes of signs or exponents.
+    size: i32,
+    changed: bool,
+}
+
+impl Operand {
+    fn of(operands: &Operands) -> Self {
+        Self {
+            items: operands.iter().map(|(item, n)| (*item, *n)).collect(),
+            size: operands.values().map(|n| n.abs()).sum(),
+            changed: false,
+        }
+    }
+
+    /// The sign or exponent; zero of what is not there.
+    fn get(&self, item: Item) -> i32 {
+        match self.items.binary_search_by_key(&item, |(item, _)| *item) {
+            Ok(at) => self.items[at].1,
+            Err(_) => 0,
+        }
+    }
+
+    /// Sets the sign or exponent, to zero where it is to go.
+    fn set(&mut self, item: Item, n: i32) {
+        self.changed = true;
+        match self.items.binary_search_by_key(&item, |(item, _)| *item) {
+            Ok(at) => {
+                self.size += n.abs() - self.items[at].1.abs();
+                if n == 0 {
+                    self.items.remove(at);
+                } else {
+                    self.items[at].1 = n;
+                }
+            }
+            Err(at) if n != 0 => {
+                self.size += n.abs();
+                self.items.insert(at, (item, n));
+            }
+            Err(_) => {}
+        }
+    }
+}
+
+struct Search {
     kind: Kind,
-    sets: &'a mut [Operands],
+    sets: Vec<Operand>,
     /// Where a pair may occur: complete, but not always up to date.
     places: Map<Pair, Vec<usize>>,
     queue: BinaryHeap<Candidate>,
@@ -59,14 +111,14 @@ struct Search<'a> {
     first_pair: Item,
 }
 
-impl Search<'_> {
+impl Search {
     fn run(&mut self) {
         let mut candidates = Vec::new();
         for set in 0..self.sets.len() {
-            if self.sets[set].len() > LONGEST {
+            let items = self.sets[set].items.clone();
+            if items.len() > LONGEST {
                 continue;
             }
-            let items: Vec<Item> = self.sets[set].keys().copied().collect();
             for (at, first) in items.iter().enumerate() {
                 for second in &items[at..] {
                     candidates.extend(self.note(set, *first, *second));
@@ -86,12 +138,14 @@ impl Search<'_> {
         }
     }
 
-    fn note(&mut self, set: usize, first: Item, second: Item) -> Option<Pair> {
-        let (first, second) = (first.min(second), first.max(second));
-        let sign = match self.kind {
-            Kind::Product => 1,
+    /// Notes that two operands of a set are a pair, and gives it where something may be saved: it is in another set too, or here twice.
+    fn note(&mut self, set: usize, first: (Item, i32), second: (Item, i32)) -> Option<Pair> {
+        let ((first, a), (second, b)) = (first.min(second), first.max(second));
+        let (sign, twice) = match self.kind {
+            Kind::Product if first == second => (1, a >= 4),
+            Kind::Product => (1, a.min(b) >= 2),
             Kind::Sum if first == second => return None,
-            Kind::Sum => self.sets[set].get(&first)? * self.sets[set].get(&second)?,
+            Kind::Sum => (a * b, false),
         };
         let pair = Pair {
             first,
@@ -102,7 +156,7 @@ impl Search<'_> {
         if places.last() != Some(&set) {
             places.push(set);
         }
-        Some(pair)
+        (twice || places.len() > 1).then_some(pair)
     }
 
     fn enqueue(&mut self, mut candidates: Vec<Pair>) {
@@ -118,12 +172,15 @@ impl Search<'_> {
 
     /// How often the pair can be taken out of a set.
     fn occurrences(&self, set: usize, pair: Pair) -> i32 {
-        let of = |item| self.sets[set].get(&item).copied().unwrap_or(0);
-        let (first, second) = (of(pair.first), of(pair.second));
+        let set = &self.sets[set];
+        let first = set.get(pair.first);
+        if first == 0 {
+            return 0;
+        }
         match self.kind {
-            Kind::Sum => i32::from(first * second == pair.sign),
+            Kind::Sum => i32::from(first * set.get(pair.second) == pair.sign),
             Kind::Product if pair.first == pair.second => first / 2,
-            Kind::Product => first.min(second),
+            Kind::Product => first.min(set.get(pair.second)),
         }
     }
 
@@ -136,11 +193,7 @@ impl Search<'_> {
         for set in places {
             let count = self.occurrences(*set, pair);
             total += count;
-            let rest: i32 = self.sets[*set]
-                .values()
-                .map(|exponent| exponent.abs())
-                .sum();
-            if count == 1 && rest == 2 {
+            if count == 1 && self.sets[*set].size == 2 {
                 complete = 1;
             }
         }
@@ -151,33 +204,29 @@ impl Search<'_> {
         let item = self.first_pair + self.made.len() as Item;
         self.made.push(pair);
         let mut candidates = Vec::new();
-        for set in self.places.remove(&pair).unwrap_or_default() {
-            let count = self.occurrences(set, pair);
+        for at in self.places.remove(&pair).unwrap_or_default() {
+            let count = self.occurrences(at, pair);
             if count == 0 {
                 continue;
             }
-            let operands = &mut self.sets[set];
-            match self.kind {
+            let set = &mut self.sets[at];
+            let own = match self.kind {
                 Kind::Sum => {
-                    let sign = operands.remove(&pair.first).unwrap_or(1);
-                    operands.remove(&pair.second);
-                    operands.insert(item, sign);
+                    let sign = set.get(pair.first);
+                    set.set(pair.first, 0);
+                    set.set(pair.second, 0);
+                    sign
                 }
                 Kind::Product => {
                     for part in [pair.first, pair.second] {
-                        if let Some(exponent) = operands.get_mut(&part) {
-                            *exponent -= count;
-                            if *exponent <= 0 {
-                                operands.remove(&part);
-                            }
-                        }
+                        set.set(part, (set.get(part) - count).max(0));
                     }
-                    operands.insert(item, count);
+                    count
                 }
-            }
-            let others: Vec<Item> = self.sets[set].keys().copied().collect();
-            for other in others {
-                candidates.extend(self.note(set, item, other));
+            };
+            set.set(item, own);
+            for other in set.items.clone() {
+                candidates.extend(self.note(at, (item, own), other));
             }
         }
         self.enqueue(candidates);

@@ -10,9 +10,14 @@ use crate::program::count::Counts;
 use crate::program::{Array, By, Place, Program, Request};
 
 impl Derivation {
-    /// The program of a kernel.
+    /// The program of a kernel. It is kept, and found when it is asked for again.
     pub fn program(&self, request: Request) -> Program {
-        self.program_of(|array| array.is_wanted(request))
+        if let Some(program) = self.programs.borrow().get(&request) {
+            return program.clone();
+        }
+        let program = self.program_of(|array| array.is_wanted(request));
+        self.programs.borrow_mut().insert(request, program.clone());
+        program
     }
 
     /// The program of ∂/∂q and of the forces alone: what the equations M q̈ = f ask for.
