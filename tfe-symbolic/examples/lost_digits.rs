@@ -53,12 +53,7 @@ fn main() {
         }
     });
     let mut outcomes: Vec<Outcome> = outcomes.into_inner().unwrap_or_default();
-    outcomes.sort_by(|a, b| {
-        a.label
-            .len()
-            .cmp(&b.label.len())
-            .then(a.label.cmp(&b.label))
-    });
+    outcomes.sort_by_key(|one| one.number);
     println!("{}", offenders(&outcomes, PRINTED, ENTRIES));
     println!(
         "seed {seed}, models {first}..{}, {:.0} s",

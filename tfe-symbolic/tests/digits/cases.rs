@@ -46,24 +46,30 @@ fn springs_and_a_fourth_power() -> Model {
     w.finish(&energy)
 }
 
-/// m (x − y)² (ẋ² + ẏ²)
+/// (ẋ² + ẏ²)/2 + m (x − y)² ẋ²
 fn squared_difference_as_mass() -> Model {
     let mut w = Writer::new(KIND, Form::Lagrangian, &["x", "y"]);
-    let (x, y, m) = (w.q(0), w.q(1), w.parameter("m"));
+    let (x, y, m, vx) = (w.q(0), w.q(1), w.parameter("m"), w.z(0));
     let kinetic = kinetic(&mut w);
     let difference = w.subtract(&x, &y);
     let square = w.power(&difference, 2);
     let mass = w.multiply(&m, &square);
-    let energy = w.multiply(&mass, &kinetic);
+    let velocity_square = w.power(&vx, 2);
+    let term = w.multiply(&mass, &velocity_square);
+    let energy = w.add(&kinetic, &term);
     w.finish(&energy)
 }
 
-/// q̇²/2 − k (q − l)²/2
+/// (q̇² + q² φ̇²)/2 − k (q − l)²/2
 fn spring_from_a_length() -> Model {
-    let mut w = Writer::new(KIND, Form::Lagrangian, &["q"]);
+    let mut w = Writer::new(KIND, Form::Lagrangian, &["q", "phi"]);
     let (q, k, l) = (w.q(0), w.parameter("k"), w.parameter("l"));
-    let kinetic = kinetic(&mut w);
-    let (stretch, two) = (w.subtract(&q, &l), w.integer(2));
+    let (vq, vphi, two) = (w.z(0), w.z(1), w.integer(2));
+    let (vq2, q2, vphi2) = (w.power(&vq, 2), w.power(&q, 2), w.power(&vphi, 2));
+    let turning = w.multiply(&q2, &vphi2);
+    let kinetic = w.add(&vq2, &turning);
+    let kinetic = w.divide(&kinetic, &two);
+    let stretch = w.subtract(&q, &l);
     let square = w.power(&stretch, 2);
     let spring = w.multiply(&k, &square);
     let spring = w.divide(&spring, &two);

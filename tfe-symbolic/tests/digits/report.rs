@@ -1,10 +1,11 @@
 //! What a run found: a table of counts, and the worst models in full.
 
+use std::cmp::Ordering;
 use std::fmt::Write as _;
 
 use super::cases::cases;
 use super::formula::State;
-use super::judge::{Disagreement, LIMIT, Offence, Verdict, judge};
+use super::judge::{LIMIT, Loss, Offence, Verdict, judge};
 use super::models::{KINDS, model};
 use super::random::Random;
 use super::writer::Model;
@@ -12,7 +13,8 @@ use super::writer::Model;
 /// A model and what came out for it.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    pub label: String,
+    /// The number of a random model; cases come before.
+    pub number: Option<usize>,
     pub kind: &'static str,
     pub text: String,
     pub parameters: Vec<String>,
@@ -26,25 +28,21 @@ const THRESHOLDS: [f64; 3] = [LIMIT, 100.0, 1e4];
 pub fn random_outcome(seed: u64, number: usize) -> Outcome {
     let mut random = Random::new(seed, number as u64);
     let model = model(&mut random, number);
-    outcome(number.to_string(), &model, &mut random)
+    outcome(Some(number), &model, &mut random)
 }
 
 /// The fixed cases.
 pub fn case_outcomes(seed: u64) -> Vec<Outcome> {
-    let judged = |(number, model): (usize, Model)| {
-        let mut random = Random::new(seed, number as u64);
-        outcome(format!("case {number}"), &model, &mut random)
+    let judged = |(number, model): (u64, &Model)| {
+        let mut random = Random::new(seed, number);
+        outcome(None, model, &mut random)
     };
-    cases()
-        .into_iter()
-        .enumerate()
-        .map(|(number, model)| judged((number, model)))
-        .collect()
+    (0..).zip(&cases()).map(judged).collect()
 }
 
-fn outcome(label: String, model: &Model, random: &mut Random) -> Outcome {
+fn outcome(number: Option<usize>, model: &Model, random: &mut Random) -> Outcome {
     Outcome {
-        label,
+        number,
         kind: model.kind,
         text: model.text.clone(),
         parameters: model.parameters.clone(),
@@ -53,22 +51,30 @@ fn outcome(label: String, model: &Model, random: &mut Random) -> Outcome {
 }
 
 impl Outcome {
-    /// The largest loss of an entry, without and with the convention for angles.
-    fn losses(&self) -> [f64; 2] {
-        [self.verdict.raw, self.verdict.loss]
+    /// The largest loss of an entry.
+    fn loss(&self) -> Loss {
+        largest(&self.verdict.offences)
     }
 
-    fn disagreement(&self) -> f64 {
-        let found = self.verdict.disagreements.iter().map(|found| found.loss);
-        found.fold(0.0, f64::max)
+    /// The largest difference between kernels.
+    fn difference(&self) -> Loss {
+        largest(&self.verdict.disagreements)
     }
 
     /// Whether the engine refuses the model, or a kernel loses more than [`LIMIT`] with the convention for angles, or two kernels differ by
     /// more than twice that.
     pub fn is_bad(&self) -> bool {
-        let loses = self.verdict.loss > LIMIT || self.disagreement() > 2.0 * LIMIT;
+        let loses = self.loss().loss > LIMIT || self.difference().loss > 2.0 * LIMIT;
         self.verdict.refused.is_some() || loses
     }
+}
+
+fn largest(offences: &[Offence]) -> Loss {
+    let losses = offences.iter().map(|offence| offence.loss);
+    losses.fold(Loss::default(), |a, b| Loss {
+        loss: a.loss.max(b.loss),
+        raw: a.raw.max(b.raw),
+    })
 }
 
 /// How many models lose more than the thresholds, by kind.
@@ -76,39 +82,38 @@ pub fn table(outcomes: &[Outcome]) -> String {
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "{:<12} {:>7} {:>8} {:>8} | {:^20} | {:^20} | {:^20}",
-        "", "models", "refused", "entries", "loss", "without angles", "kernels differ"
+        "{:<12} {:>6} {:>7} {:>9} | {:^20} | {:^20} | {:^20}",
+        "", "models", "refused", "judged", "loss", "without angles", "kernels differ"
     );
-    let _ = write!(text, "{:<12} {:>7} {:>8} {:>8}", "", "", "", "judged");
+    let _ = write!(text, "{:<12} {:>6} {:>7} {:>9}", "", "", "", "");
     for _ in 0..3 {
         let _ = write!(text, " | {:>6} {:>6} {:>6}", ">8", ">100", ">1e4");
     }
-    let _ = writeln!(text);
+    text.push('\n');
     for kind in ["cases"].iter().chain(&KINDS).chain(&["all"]) {
         let of_kind = |outcome: &&Outcome| outcome.kind == *kind || *kind == "all";
         let models: Vec<&Outcome> = outcomes.iter().filter(of_kind).collect();
         let refused = models.iter().filter(|one| one.verdict.refused.is_some());
-        let compared: usize = models.iter().map(|one| one.verdict.compared).sum();
+        let judged: usize = models.iter().map(|one| one.verdict.judged).sum();
         let _ = write!(
             text,
-            "{kind:<12} {:>7} {:>8} {:>8}",
+            "{kind:<12} {:>6} {:>7} {judged:>9}",
             models.len(),
             refused.count(),
-            compared
         );
         let measures: [fn(&Outcome) -> f64; 3] = [
-            |one| one.losses()[1],
-            |one| one.losses()[0],
-            Outcome::disagreement,
+            |one| one.loss().loss,
+            |one| one.loss().raw,
+            |one| one.difference().loss,
         ];
         for measure in measures {
-            let _ = write!(text, " |");
+            text.push_str(" |");
             for threshold in THRESHOLDS {
                 let above = models.iter().filter(|one| measure(one) > threshold);
                 let _ = write!(text, " {:>6}", above.count());
             }
         }
-        let _ = writeln!(text);
+        text.push('\n');
     }
     text
 }
@@ -118,65 +123,44 @@ pub fn offenders(outcomes: &[Outcome], models: usize, entries: usize) -> String 
     let mut text = String::new();
     for one in outcomes {
         if let Some(refused) = &one.verdict.refused {
-            let _ = writeln!(text, "{} refused: {refused}\n    {}", one.label, one.text);
+            let _ = writeln!(text, "{}refused: {refused}", heading(one));
         }
     }
-    let mut bad: Vec<&Outcome> = outcomes
-        .iter()
-        .filter(|one| !one.verdict.offences.is_empty() || !one.verdict.disagreements.is_empty())
-        .collect();
-    let key = |one: &Outcome| (one.verdict.loss.max(one.disagreement()), one.verdict.raw);
-    bad.sort_by(|a, b| {
-        key(b)
-            .partial_cmp(&key(a))
-            .unwrap_or(std::cmp::Ordering::Equal)
-    });
+    let lost = |one: &&Outcome| one.loss().raw > LIMIT || one.difference().raw > LIMIT;
+    let mut bad: Vec<&Outcome> = outcomes.iter().filter(lost).collect();
+    let key = |one: &Outcome| (one.loss(), one.difference());
+    bad.sort_by(|a, b| key(b).partial_cmp(&key(a)).unwrap_or(Ordering::Equal));
     for one in bad.into_iter().take(models) {
-        let [raw, loss] = one.losses();
-        let _ = writeln!(
-            text,
-            "\n{} ({}): loss {loss:.3e}, without angles {raw:.3e}\n    {}",
-            one.label, one.kind, one.text
-        );
+        text.push_str(&heading(one));
         for offence in one.verdict.offences.iter().take(entries) {
-            text.push_str(&line_of_offence(offence, &one.parameters));
+            text.push_str(&described(offence, &one.parameters, "loses"));
         }
-        for found in one.verdict.disagreements.iter().take(entries) {
-            text.push_str(&line_of_disagreement(found, &one.parameters));
+        for offence in one.verdict.disagreements.iter().take(entries) {
+            text.push_str(&described(offence, &one.parameters, "differs"));
         }
     }
     text
 }
 
-fn line_of_offence(offence: &Offence, parameters: &[String]) -> String {
-    format!(
-        "  {} in `{}`: loss {:.3e}, without angles {:.3e}; {}\n    kernel {:e} plain {:e} exact {:e}\n    {}\n",
-        offence.entry,
-        offence.kernel,
-        offence.loss,
-        offence.raw,
-        offence.regime,
-        offence.found,
-        offence.plain,
-        offence.exact,
-        listed(&offence.state, parameters)
-    )
+fn heading(one: &Outcome) -> String {
+    let number = one.number.map(|number| format!("model {number}, "));
+    let number = number.unwrap_or_default();
+    format!("\n{number}{}: {}\n", one.kind, one.text)
 }
 
-fn line_of_disagreement(found: &Disagreement, parameters: &[String]) -> String {
-    format!(
-        "  {} differs: loss {:.3e}, without angles {:.3e}; {}\n    `{}` {:e} `{}` {:e} exact {:e}\n    {}\n",
-        found.entry,
-        found.loss,
-        found.raw,
-        found.regime,
-        found.kernels[0],
-        found.found[0],
-        found.kernels[1],
-        found.found[1],
-        found.exact,
-        listed(&found.state, parameters)
-    )
+fn described(offence: &Offence, parameters: &[String], verb: &str) -> String {
+    let Loss { loss, raw } = offence.loss;
+    let mut text = format!(
+        "  {} {verb}: {loss:.1e}, without angles {raw:.1e}; {}\n   ",
+        offence.entry, offence.regime
+    );
+    for (kernel, found) in &offence.found {
+        let _ = write!(text, " `{kernel}` {found:e}");
+    }
+    let (plain, exact) = (offence.plain, offence.exact);
+    let state = listed(&offence.state, parameters);
+    let _ = writeln!(text, " plain {plain:e} exact {exact:e}\n    {state}");
+    text
 }
 
 fn listed(state: &State, parameters: &[String]) -> String {

@@ -4,13 +4,20 @@ use super::formula::State;
 use super::random::Random;
 use super::writer::Model;
 
-/// How many states a regime has.
-pub const STATES: usize = 8;
+/// At how many states of a regime kernels run.
+const STATES: usize = 8;
+
+/// At how many more the rounding of the formula is looked at, where a kernel is worse than at the others.
+const FURTHER: usize = 24;
+
+/// So many states with equal inputs have exactly equal ones.
+const EXACT: usize = 2;
 
 /// States of one kind and one scale.
 pub struct Regime {
     pub name: String,
     pub states: Vec<State>,
+    pub further: Vec<State>,
 }
 
 /// A vector in which all inputs are alike.
@@ -18,11 +25,11 @@ pub struct Regime {
 enum Spread {
     /// ±(1/2 … 2) S
     Generic,
-    /// Equal, and in half of the states equal but for some ulps.
+    /// Equal, and in most states equal but for some ulps.
     Equal,
     /// S u (1 + δ r), with u of the state and r of the input.
     Near(f64),
-    /// As before, but every other one of the other sign.
+    /// As before, but every other one of the other sign; for δ = 0 equal but for some ulps.
     Opposite(f64),
 }
 
@@ -71,6 +78,11 @@ fn vector(random: &mut Random, shape: Shape, length: usize, base: f64, exact: bo
         Spread::Equal => center * (1.0 + random.signed(0.5, ULPS) * f64::EPSILON),
         Spread::Near(delta) => center * (1.0 + delta * random.signed(0.5, 1.0)),
         Spread::Opposite(delta) => {
+            let delta = if delta == 0.0 && !exact {
+                ULPS * f64::EPSILON
+            } else {
+                delta
+            };
             let sign = if at % 2 == 0 { 1.0 } else { -1.0 };
             sign * center * (1.0 + delta * random.signed(0.5, 1.0))
         }
@@ -79,7 +91,7 @@ fn vector(random: &mut Random, shape: Shape, length: usize, base: f64, exact: bo
 }
 
 fn state(random: &mut Random, plan: Plan, model: &Model, number: usize) -> State {
-    let exact = number % 2 == 0;
+    let exact = number < EXACT;
     // Less than an octave, so that powers of all states are of one size.
     let base = random.between(0.8, 1.25);
     let own = |random: &mut Random| random.between(0.8, 1.25);
@@ -151,31 +163,41 @@ pub fn regimes(random: &mut Random, model: &Model) -> Vec<Regime> {
     }
     let mut regimes = Vec::new();
     for (name, plan) in plans {
-        let states = (0..STATES).map(|number| state(random, plan, model, number));
-        let states = states.collect();
-        regimes.push(Regime { name, states });
+        let sizes = vec![1.0; model.parameters.len()];
+        regimes.push(regime(random, name, plan, model, &sizes));
     }
-    // Parameters of very different sizes, those of all states of a regime alike.
-    for turn in 0..3 {
-        let near = shape(Spread::Near(1e-6), [1.0, 1e3, 1.0][turn]);
-        let plan = Plan {
-            q: [GENERIC, near, near][turn],
-            ..PLAIN
-        };
-        let sizes: Vec<f64> = (0..model.parameters.len())
-            .map(|_| 10f64.powf(random.between(-6.0, 6.0)))
-            .collect();
-        let states = (0..STATES).map(|number| {
-            let mut state = state(random, plan, model, number);
-            for (parameter, size) in state.parameters.iter_mut().zip(&sizes) {
-                *parameter *= size;
-            }
-            state
-        });
-        let states = states.collect();
-        let name = ["generic q", "q near 1e-6 at 1e3", "q near 1e-6 at 1e0"][turn];
+    let near = |scale: f64| Plan {
+        q: shape(Spread::Near(1e-6), scale),
+        ..PLAIN
+    };
+    let plans = [
+        ("generic", PLAIN),
+        ("q near 1e-6 at 1e3", near(1e3)),
+        ("q near 1e-6 at 1e0", near(1.0)),
+    ];
+    for (name, plan) in plans {
         let name = format!("{name}, parameters 1e-6 … 1e6");
-        regimes.push(Regime { name, states });
+        let size = |_| 10f64.powf(random.between(-6.0, 6.0));
+        let sizes: Vec<f64> = (0..model.parameters.len()).map(size).collect();
+        regimes.push(regime(random, name, plan, model, &sizes));
     }
     regimes
+}
+
+/// The states of a regime; parameters are so much larger than others, alike in all states.
+fn regime(random: &mut Random, name: String, plan: Plan, model: &Model, sizes: &[f64]) -> Regime {
+    let mut one = |number: usize| {
+        let mut state = state(random, plan, model, number);
+        for (parameter, size) in state.parameters.iter_mut().zip(sizes) {
+            *parameter *= size;
+        }
+        state
+    };
+    let states = (0..STATES).map(&mut one).collect();
+    let further = (STATES..STATES + FURTHER).map(one).collect();
+    Regime {
+        name,
+        states,
+        further,
+    }
 }
