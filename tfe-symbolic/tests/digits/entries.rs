@@ -1,6 +1,6 @@
 //! The entries of the results of all kernels, each with its formula.
 
-use tfe_symbolic::interpret::Results;
+use tfe_symbolic::program::interpret::Results;
 
 use super::formula::{Id, Input};
 use super::writer::Model;

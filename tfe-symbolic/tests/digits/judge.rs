@@ -19,9 +19,9 @@
 //! from it drowns in the rounding of the formula as written.
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::Results;
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::program::interpret::Results;
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 use super::entries::{Entry, entries};
 use super::formula::{Schedule, State};

@@ -1,7 +1,7 @@
 //! The kernels of a model, run by the interpreter.
 
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::program::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{Program, Request};
 
 use super::entries::Array;
