@@ -7,7 +7,7 @@ use digits::double_double::DoubleDouble;
 use digits::report::{Outcome, case_outcomes, offenders, random_outcome, table};
 
 const SEED: u64 = 1;
-const MODELS: usize = 60;
+const MODELS: usize = 30;
 
 fn check(outcomes: &[Outcome]) {
     let bad: Vec<Outcome> = outcomes

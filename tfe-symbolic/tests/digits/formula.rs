@@ -471,6 +471,8 @@ impl Schedule {
 
     pub fn evaluate<S: Scalar>(&self, state: &State, shift: Shift) -> Vec<S> {
         let mut values: Vec<S> = Vec::with_capacity(self.steps.len());
+        // Sines and cosines by their angles.
+        let mut waves: Vec<(usize, (S, S))> = Vec::new();
         for Step { node, parts } in &self.steps {
             let [a, b, c, d] = parts.map(|part| values.get(part).copied());
             let value = match (node, a, b) {
@@ -482,15 +484,25 @@ impl Schedule {
                 (Node::Divide(..), Some(a), Some(b)) => a.divide(b),
                 (Node::Negate(_), Some(a), _) => a.negate(),
                 (Node::Power(_, n), Some(a), _) => a.power(*n),
-                (Node::Call(function, _), Some(a), _) => {
-                    let trigonometric = matches!(function, Function::Sin | Function::Cos);
-                    match shift {
-                        Some((angle, amount)) if angle == parts[0] && trigonometric => {
-                            a.add(S::from_f64(amount)).call(*function)
+                (Node::Call(function @ (Function::Sin | Function::Cos), _), Some(a), _) => {
+                    let angle = parts[0];
+                    let known = waves.iter().find(|(known, _)| *known == angle);
+                    let (sine, cosine) = match (known, shift) {
+                        (Some((_, pair)), _) => *pair,
+                        (None, Some((shifted, amount))) if shifted == angle => {
+                            a.add(S::from_f64(amount)).sin_cos()
                         }
-                        _ => a.call(*function),
+                        (None, _) => a.sin_cos(),
+                    };
+                    if known.is_none() {
+                        waves.push((angle, (sine, cosine)));
+                    }
+                    match function {
+                        Function::Sin => sine,
+                        _ => cosine,
                     }
                 }
+                (Node::Call(function, _), Some(a), _) => a.call(*function),
                 (Node::Select { comparison, .. }, Some(a), Some(b)) => {
                     let difference = a.subtract(b).to_f64();
                     let holds = match comparison {

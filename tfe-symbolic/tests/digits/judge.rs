@@ -18,6 +18,8 @@
 //! States in which the formula itself overflows are left out, as are those at the kink of an `abs` or `select`, and those whose distance
 //! from it drowns in the rounding of the formula as written.
 
+use std::time::{Duration, Instant};
+
 use tfe_symbolic::compile::declare;
 use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::program::interpret::Results;
@@ -63,6 +65,9 @@ pub struct Verdict {
     pub refused: Option<String>,
     /// How many pairs of entries and regimes were judged.
     pub judged: usize,
+    /// How long the engine took, and how long the judgement.
+    pub deriving: Duration,
+    pub judging: Duration,
     /// The worst regime of each entry that loses more than [`LIMIT`], worst first.
     pub offences: Vec<Offence>,
     /// The worst regime of each entry that differs by more than [`LIMIT`] between kernels, worst first.
@@ -89,7 +94,10 @@ pub fn judge(model: &Model, random: &mut Random) -> Verdict {
             return verdict;
         }
     };
+    let start = Instant::now();
     let kernels = kernels(&Derivation::of(&declared));
+    verdict.deriving = start.elapsed();
+    let start = Instant::now();
     let mut model = model.clone();
     let entries = entries(&mut model);
     let roots: Vec<_> = entries.iter().map(|entry| entry.formula).collect();
@@ -105,6 +113,7 @@ pub fn judge(model: &Model, random: &mut Random) -> Verdict {
         };
         case.judge(&mut verdict);
     }
+    verdict.judging = start.elapsed();
     for list in [&mut verdict.offences, &mut verdict.disagreements] {
         list.sort_by(|a, b| {
             b.loss
@@ -129,7 +138,7 @@ struct Case<'a> {
 struct Worst {
     error: f64,
     value: Value,
-    found: Vec<(&'static str, f64)>,
+    found: [(usize, f64); 2],
 }
 
 impl Case<'_> {
@@ -158,9 +167,12 @@ impl Case<'_> {
                 let Some(worst) = worst.filter(|worst| worst.error > LIMIT * allowed) else {
                     continue;
                 };
-                let with_angles = values
+                let judged = values
                     .iter()
-                    .map(|value| value.allowance() + reference.by_angles(value, place));
+                    .filter(|value| value.state < self.results.len());
+                let with_angles = judged
+                    .map(|value| value.allowance() + reference.by_angles(value, place))
+                    .chain([allowed]);
                 let loss = Loss {
                     loss: worst.error / largest(with_angles),
                     raw: worst.error / allowed,
@@ -172,18 +184,22 @@ impl Case<'_> {
 
     /// The largest error of a kernel, and the largest difference between two.
     fn worst(&self, entry: &Entry, values: &[Value]) -> [Option<Worst>; 2] {
+        let wanted: Vec<usize> = (0..self.kernels.len())
+            .filter(|kernel| self.kernels[*kernel].arrays.contains(&entry.array))
+            .collect();
         let mut worst: [Option<Worst>; 2] = [None, None];
-        let mut keep = |which: usize, error: f64, value: &Value, found: &[(&'static str, f64)]| {
+        let mut keep = |which: usize, error: f64, value: &Value, found: [(usize, f64); 2]| {
             // NaN is as wrong as can be.
             let error = if error.is_nan() { f64::INFINITY } else { error };
             if worst[which]
                 .as_ref()
                 .is_none_or(|worst| error > worst.error)
             {
+                let value = *value;
                 worst[which] = Some(Worst {
                     error,
-                    value: *value,
-                    found: found.to_vec(),
+                    value,
+                    found,
                 });
             }
         };
@@ -191,35 +207,33 @@ impl Case<'_> {
             let Some(results) = self.results.get(value.state) else {
                 continue;
             };
-            let of_kernel = |(kernel, results): (&Kernel, &Option<Results>)| {
-                let found = || results.as_ref().map_or(f64::NAN, |found| entry.of(found));
-                let wanted = kernel.arrays.contains(&entry.array);
-                wanted.then(|| (kernel.name, found()))
-            };
-            let mut found: Vec<(&'static str, f64)> = self
-                .kernels
-                .iter()
-                .zip(results)
-                .filter_map(of_kernel)
-                .collect();
-            for one in &found {
-                keep(0, distance(one.1, value.exact), value, &[*one]);
+            let (mut least, mut most) = ((0, f64::INFINITY), (0, f64::NEG_INFINITY));
+            for kernel in &wanted {
+                let results = results[*kernel].as_ref();
+                let found = results.map_or(f64::NAN, |results| entry.of(results));
+                let one = (*kernel, found);
+                keep(0, distance(found, value.exact), value, [one; 2]);
+                least = if found < least.1 { one } else { least };
+                most = if found > most.1 { one } else { most };
             }
-            found.sort_by(|a, b| a.1.total_cmp(&b.1));
-            if let [least, .., most] = found[..] {
-                keep(1, most.1 - least.1, value, &[least, most]);
+            if least.1 < most.1 {
+                keep(1, most.1 - least.1, value, [least, most]);
             }
         }
         worst
     }
 
     fn offence(&self, entry: &Entry, worst: Worst, loss: Loss) -> Offence {
+        let found = worst
+            .found
+            .map(|(kernel, found)| (self.kernels[kernel].name, found));
+        let same = worst.found[0].0 == worst.found[1].0;
         Offence {
             loss,
             entry: entry.name.clone(),
             regime: self.regime.name.clone(),
             state: self.regime.states[worst.value.state].clone(),
-            found: worst.found,
+            found: found.into_iter().take(if same { 1 } else { 2 }).collect(),
             plain: worst.value.plain,
             exact: worst.value.exact.hi,
         }

@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 use std::fmt::Write as _;
+use std::time::Duration;
 
 use super::cases::cases;
 use super::formula::State;
@@ -82,14 +83,22 @@ pub fn table(outcomes: &[Outcome]) -> String {
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "{:<12} {:>6} {:>7} {:>9} | {:^20} | {:^20} | {:^20}",
-        "", "models", "refused", "judged", "loss", "without angles", "kernels differ"
+        "{:<12} {:>6} {:>7} {:>9} | {:^20} | {:^20} | {:^20} | {:>7} {:>7}",
+        "",
+        "models",
+        "refused",
+        "judged",
+        "loss",
+        "without angles",
+        "kernels differ",
+        "derive",
+        "judge"
     );
     let _ = write!(text, "{:<12} {:>6} {:>7} {:>9}", "", "", "", "");
     for _ in 0..3 {
         let _ = write!(text, " | {:>6} {:>6} {:>6}", ">8", ">100", ">1e4");
     }
-    text.push('\n');
+    let _ = writeln!(text, " | {:>7} {:>7}", "s", "s");
     for kind in ["cases"].iter().chain(&KINDS).chain(&["all"]) {
         let of_kind = |outcome: &&Outcome| outcome.kind == *kind || *kind == "all";
         let models: Vec<&Outcome> = outcomes.iter().filter(of_kind).collect();
@@ -113,7 +122,10 @@ pub fn table(outcomes: &[Outcome]) -> String {
                 let _ = write!(text, " {:>6}", above.count());
             }
         }
-        text.push('\n');
+        let deriving: Duration = models.iter().map(|one| one.verdict.deriving).sum();
+        let judging: Duration = models.iter().map(|one| one.verdict.judging).sum();
+        let (deriving, judging) = (deriving.as_secs_f64(), judging.as_secs_f64());
+        let _ = writeln!(text, " | {deriving:>7.1} {judging:>7.1}");
     }
     text
 }

@@ -42,6 +42,7 @@ pub trait Scalar: Copy {
     fn divide(self, other: Self) -> Self;
     fn negate(self) -> Self;
     fn power(self, n: i32) -> Self;
+    fn sin_cos(self) -> (Self, Self);
     fn call(self, function: Function) -> Self;
 }
 
@@ -92,6 +93,10 @@ impl Scalar for f64 {
         self.powi(n)
     }
 
+    fn sin_cos(self) -> (Self, Self) {
+        (self.sin(), self.cos())
+    }
+
     fn call(self, function: Function) -> Self {
         match function {
             Function::Sin => self.sin(),
@@ -140,6 +145,10 @@ impl Scalar for DoubleDouble {
 
     fn power(self, n: i32) -> Self {
         Self::power(self, n)
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        Self::sin_cos(self)
     }
 
     fn call(self, function: Function) -> Self {

@@ -53,6 +53,7 @@ struct Plan {
     parameters: Shape,
     /// The same u for coordinates and parameters.
     tied: bool,
+    time: f64,
 }
 
 const PLAIN: Plan = Plan {
@@ -60,6 +61,7 @@ const PLAIN: Plan = Plan {
     z: GENERIC,
     parameters: GENERIC,
     tied: false,
+    time: 1.0,
 };
 
 const fn shape(spread: Spread, scale: f64) -> Shape {
@@ -108,7 +110,7 @@ fn state(random: &mut Random, plan: Plan, model: &Model, number: usize) -> State
         *parameter = parameter.abs();
     }
     State {
-        time: random.between(0.5, 2.0),
+        time: plan.time * random.between(0.5, 2.0),
         q: vector(random, plan.q, model.dof, base, exact),
         z: vector(random, plan.z, model.dof, z_base, exact),
         mu: vector(random, GENERIC, model.constraints.len(), 1.0, exact),
@@ -150,6 +152,7 @@ pub fn regimes(random: &mut Random, model: &Model) -> Vec<Regime> {
         let name = format!("q opposite to {delta:.0e} at {scale:.0e}");
         plans.push((name, Plan { q, ..PLAIN }));
     }
+    plans.push(("t at 1e5".to_owned(), Plan { time: 1e5, ..PLAIN }));
     for scale in [1e-3, 1e-8] {
         let small = shape(Spread::Generic, scale);
         plans.push((format!("q {scale:.0e}"), Plan { q: small, ..PLAIN }));
