@@ -35,7 +35,10 @@ pub struct Entry {
     pub array: Array,
     pub row: usize,
     pub column: usize,
+    /// By the chain rule in forward mode.
     pub formula: Id,
+    /// Of derivatives of an energy, the same with the first derivative in reverse mode.
+    pub reverse: Id,
 }
 
 impl Entry {
@@ -92,6 +95,11 @@ struct List<'a> {
 
 impl List<'_> {
     fn push(&mut self, array: Array, row: usize, column: usize, formula: Id) {
+        self.push_both(array, row, column, [formula; 2]);
+    }
+
+    fn push_both(&mut self, array: Array, row: usize, column: usize, formulas: [Id; 2]) {
+        let [formula, reverse] = formulas;
         let name = match array {
             Array::Value => "Value".to_owned(),
             Array::ByZ
@@ -108,6 +116,7 @@ impl List<'_> {
             row,
             column,
             formula,
+            reverse,
         });
     }
 
@@ -118,26 +127,24 @@ impl List<'_> {
     fn energy(&mut self) {
         let (energy, n) = (self.model.energy, self.model.dof);
         self.push(Array::Value, 0, 0, energy);
+        let zero = self.model.formulas.integer(0);
+        let gradient = self.model.formulas.gradient(energy);
         for i in 0..n {
-            let (by_z, by_q) = (Input::Velocity(i), Input::Coordinate(i));
-            let (by_z, by_q) = (self.slope(energy, by_z), self.slope(energy, by_q));
-            self.push(Array::ByZ, i, 0, by_z);
-            self.push(Array::ByQ, i, 0, by_q);
+            let by = [Input::Velocity(i), Input::Coordinate(i)];
+            let [by_z, by_q] = by.map(|by| {
+                let reverse = gradient.get(&by).copied().unwrap_or(zero);
+                [self.slope(energy, by), reverse]
+            });
+            self.push_both(Array::ByZ, i, 0, by_z);
+            self.push_both(Array::ByQ, i, 0, by_q);
             for j in 0..n {
                 let (z, q) = (Input::Velocity(j), Input::Coordinate(j));
-                let second = self.slope(by_z, q);
-                self.push(Array::ZQ, i, j, second);
-                // Each symmetric pair by one formula.
-                if j <= i {
-                    let (zz, qq) = (self.slope(by_z, z), self.slope(by_q, q));
-                    for (row, column) in [(i, j), (j, i)] {
-                        self.push(Array::ZZ, row, column, zz);
-                        self.push(Array::QQ, row, column, qq);
-                        if i == j {
-                            break;
-                        }
-                    }
-                }
+                let second = by_z.map(|first| self.slope(first, q));
+                self.push_both(Array::ZQ, i, j, second);
+                let second = by_z.map(|first| self.slope(first, z));
+                self.push_both(Array::ZZ, i, j, second);
+                let second = by_q.map(|first| self.slope(first, q));
+                self.push_both(Array::QQ, i, j, second);
             }
         }
     }

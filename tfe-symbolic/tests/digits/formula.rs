@@ -236,6 +236,77 @@ impl Formulas {
         self.slopes[&(root, by)]
     }
 
+    /// All first derivatives that do not vanish, in reverse mode.
+    pub fn gradient(&mut self, root: Id) -> HashMap<Input, Id> {
+        let mut slopes = HashMap::new();
+        let mut adjoints: HashMap<Id, Id> = HashMap::new();
+        adjoints.insert(root, self.integer(1));
+        for id in self.reachable(&[root]).into_iter().rev() {
+            let Some(adjoint) = adjoints.get(&id).copied() else {
+                continue;
+            };
+            let node = self.node(id);
+            if let Node::Input(input) = node {
+                slopes.insert(input, adjoint);
+            }
+            for (part, share) in self.shares(id, adjoint) {
+                let sum = match adjoints.get(&part) {
+                    Some(known) => self.add(*known, share),
+                    None => share,
+                };
+                adjoints.insert(part, sum);
+            }
+        }
+        slopes
+    }
+
+    /// What the parts of an operation get of its adjoint.
+    fn shares(&mut self, id: Id, adjoint: Id) -> Vec<(Id, Id)> {
+        match self.node(id) {
+            Node::Number { .. } | Node::Input(_) => Vec::new(),
+            Node::Add(a, b) => vec![(a, adjoint), (b, adjoint)],
+            Node::Subtract(a, b) => vec![(a, adjoint), (b, self.negate(adjoint))],
+            Node::Multiply(a, b) => {
+                let (left, right) = (self.multiply(adjoint, b), self.multiply(adjoint, a));
+                vec![(a, left), (b, right)]
+            }
+            Node::Divide(a, b) => {
+                let above = self.divide(adjoint, b);
+                let below = self.multiply(above, id);
+                vec![(a, above), (b, self.negate(below))]
+            }
+            Node::Negate(a) => vec![(a, self.negate(adjoint))],
+            Node::Power(a, n) => {
+                let (number, lower) = (self.integer(i64::from(n)), self.power(a, n - 1));
+                let slope = self.multiply(number, lower);
+                vec![(a, self.multiply(slope, adjoint))]
+            }
+            Node::Call(function, a) => vec![(a, self.called(id, function, a, adjoint))],
+            Node::Select {
+                comparison,
+                left,
+                right,
+                then,
+                otherwise,
+            } => {
+                let zero = self.integer(0);
+                let mut branch = |then: Id, otherwise: Id| {
+                    self.intern(Node::Select {
+                        comparison,
+                        left,
+                        right,
+                        then,
+                        otherwise,
+                    })
+                };
+                vec![
+                    (then, branch(adjoint, zero)),
+                    (otherwise, branch(zero, adjoint)),
+                ]
+            }
+        }
+    }
+
     /// d/dt with q̇ = v; velocities stay as they are.
     pub fn rate(&mut self, root: Id) -> Id {
         for id in self.reachable(&[root]) {

@@ -7,8 +7,9 @@
 //! ```
 //!
 //! over the states of the regime, where `exact` is the formula in double-double numbers and `plain` the same formula in `f64`. Numbers in a
-//! declaration stand for the decimal fractions that they are. An entry that seems to lose more than [`LIMIT`] gets a second hearing, in
-//! which the divisor is the maximum over four times as many states: a formula may be exact at a few states by chance.
+//! declaration stand for the decimal fractions that they are. The user writes an energy and not its derivatives: for these, `plain` is the
+//! worse one of forward and reverse mode. An entry that seems to lose more than [`LIMIT`] is judged again with the maximum over four times
+//! as many states in the divisor: a formula may be exact at a few states by chance.
 //!
 //! **Convention for angles.** A sine or cosine of a sum of angles may be computed from those of the angles: sin(a − b) = sin a cos b −
 //! cos a sin b is the sine of an angle that differs by some ulps of a and b, and not of a − b. Hence each part of an argument of a sine or
@@ -102,12 +103,15 @@ pub fn judge(model: &Model, random: &mut Random) -> Verdict {
     let entries = entries(&mut model);
     let roots: Vec<_> = entries.iter().map(|entry| entry.formula).collect();
     let schedule = Schedule::of(&model.formulas, &roots);
+    let roots: Vec<_> = entries.iter().map(|entry| entry.reverse).collect();
+    let reverse = Schedule::of(&model.formulas, &roots);
     for regime in regimes(random, &model) {
         let states = regime.states.iter();
         let case = Case {
             kernels: &kernels,
             entries: &entries,
             schedule: &schedule,
+            reverse: &reverse,
             regime: &regime,
             results: states.map(|state| run(&kernels, &model, state)).collect(),
         };
@@ -129,6 +133,7 @@ struct Case<'a> {
     kernels: &'a [Kernel],
     entries: &'a [Entry],
     schedule: &'a Schedule,
+    reverse: &'a Schedule,
     regime: &'a Regime,
     /// By state, and then by kernel.
     results: Vec<Vec<Option<Results>>>,
@@ -143,10 +148,10 @@ struct Worst {
 
 impl Case<'_> {
     fn judge(&self, verdict: &mut Verdict) {
-        let mut reference = Reference::of(self.schedule, &self.regime.states);
+        let mut reference = Reference::of(self.schedule, self.reverse, &self.regime.states);
         verdict.judged += self.entries.len();
         let suspect = |entry: &&Entry| {
-            let values = reference.values(self.schedule.place(entry.formula));
+            let values = reference.values(entry);
             let [error, difference] = self.worst(entry, &values);
             let error = error.map_or(0.0, |worst| worst.error);
             let difference = difference.map_or(0.0, |worst| worst.error);
@@ -158,8 +163,7 @@ impl Case<'_> {
         }
         reference.extend(&self.regime.further);
         for entry in suspects {
-            let place = self.schedule.place(entry.formula);
-            let values = reference.values(place);
+            let values = reference.values(entry);
             let allowed = largest(values.iter().map(Value::allowance));
             let [error, difference] = self.worst(entry, &values);
             let lists = [&mut verdict.offences, &mut verdict.disagreements];
@@ -171,7 +175,7 @@ impl Case<'_> {
                     .iter()
                     .filter(|value| value.state < self.results.len());
                 let with_angles = judged
-                    .map(|value| value.allowance() + reference.by_angles(value, place))
+                    .map(|value| value.allowance() + reference.by_angles(value, entry))
                     .chain([allowed]);
                 let loss = Loss {
                     loss: worst.error / largest(with_angles),

@@ -1,6 +1,7 @@
 //! The formulas of a model at some states: plainly in `f64`, exactly, and what is not known of them.
 
 use super::double_double::DoubleDouble;
+use super::entries::Entry;
 use super::formula::{Schedule, State, ulp};
 
 /// Added to what the formula may lose: below it, double-double numbers have no more digits than others.
@@ -14,6 +15,8 @@ struct Values<'a> {
     state: &'a State,
     plain: Vec<f64>,
     exact: Vec<DoubleDouble>,
+    /// Plainly, by the schedule of derivatives in reverse mode.
+    reverse: Vec<f64>,
     /// By how much all values change with the angles, once it has been asked for.
     by_angles: Option<Vec<f64>>,
 }
@@ -25,27 +28,32 @@ pub struct Value {
     pub state: usize,
     pub plain: f64,
     pub exact: DoubleDouble,
+    /// The larger error of the formula in forward and in reverse mode.
+    rounding: f64,
 }
 
 impl Value {
     /// What the formula loses, and an ulp of the value.
     pub fn allowance(&self) -> f64 {
-        distance(self.plain, self.exact) + ulp(self.exact.hi) + UNDERFLOW
+        self.rounding + ulp(self.exact.hi) + UNDERFLOW
     }
 }
 
 /// The values at all states of a regime.
 pub struct Reference<'a> {
     schedule: &'a Schedule,
+    reverse: &'a Schedule,
     values: Vec<Values<'a>>,
     /// Whether a state is away from all kinks.
     usable: Vec<bool>,
 }
 
 impl<'a> Reference<'a> {
-    pub fn of(schedule: &'a Schedule, states: &'a [State]) -> Self {
+    /// By the schedules of the formulas in forward and in reverse mode.
+    pub fn of(schedule: &'a Schedule, reverse: &'a Schedule, states: &'a [State]) -> Self {
         let mut reference = Self {
             schedule,
+            reverse,
             values: Vec::new(),
             usable: Vec::new(),
         };
@@ -55,32 +63,39 @@ impl<'a> Reference<'a> {
 
     /// Adds states.
     pub fn extend(&mut self, states: &'a [State]) {
-        let schedule = self.schedule;
+        let (schedule, reverse) = (self.schedule, self.reverse);
         self.values.extend(states.iter().map(|state| Values {
             state,
             plain: schedule.evaluate(state, None),
             exact: schedule.evaluate(state, None),
+            reverse: reverse.evaluate(state, None),
             by_angles: None,
         }));
         self.usable = self.away_from_kinks();
     }
 
-    /// The value in this place at all states that count: where the formula is finite and away from kinks.
-    pub fn values(&self, place: usize) -> Vec<Value> {
+    /// The value of an entry at all states that count: where the formula is finite and away from kinks.
+    pub fn values(&self, entry: &Entry) -> Vec<Value> {
+        let place = self.schedule.place(entry.formula);
+        let other = self.reverse.place(entry.reverse);
         let value = |(state, values): (usize, &Values)| {
             let (plain, exact) = (values.plain[place], values.exact[place]);
+            let reverse = values.reverse[other];
+            let rounding = distance(plain, exact).max(distance(reverse, exact));
             let finite = plain.is_finite() && exact.hi.is_finite() && exact.lo.is_finite();
             (finite && self.usable[state]).then_some(Value {
                 state,
                 plain,
                 exact,
+                rounding,
             })
         };
         self.values.iter().enumerate().filter_map(value).collect()
     }
 
     /// By how much a value changes where each part of each angle does by half an ulp.
-    pub fn by_angles(&mut self, value: &Value, place: usize) -> f64 {
+    pub fn by_angles(&mut self, value: &Value, entry: &Entry) -> f64 {
+        let place = self.schedule.place(entry.formula);
         let values = &mut self.values[value.state];
         let (schedule, state) = (self.schedule, values.state);
         let (plain, exact) = (&values.plain, &values.exact);
