@@ -23,7 +23,7 @@ static INVERSE_FACTORIALS: LazyLock<[DoubleDouble; 32]> = LazyLock::new(|| {
 
 /// π/2 in four parts.
 const QUARTER_TURN: [f64; 4] = [
-    1.570_796_326_794_896_6,
+    std::f64::consts::FRAC_PI_2,
     6.123_233_995_736_766e-17,
     -1.497_384_904_859_169_8e-33,
     4.320_574_262_296_449e-50,
