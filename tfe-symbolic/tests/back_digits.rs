@@ -1,0 +1,95 @@
+//! No kernel loses digits against the formula as the user wrote it: random models, at states where rounding hurts, against double-double
+//! numbers. The long run is `cargo run --release --example lost_digits`.
+
+mod digits;
+
+use digits::double_double::DoubleDouble;
+use digits::report::{Outcome, case_outcomes, offenders, random_outcome, table};
+
+const SEED: u64 = 1;
+const MODELS: usize = 30;
+
+fn check(outcomes: &[Outcome]) {
+    let bad: Vec<Outcome> = outcomes
+        .iter()
+        .filter(|one| one.is_bad())
+        .cloned()
+        .collect();
+    assert!(
+        bad.is_empty(),
+        "{}\n{}",
+        table(outcomes),
+        offenders(&bad, 5, 1)
+    );
+}
+
+#[test]
+fn models_that_once_lost_digits() {
+    check(&case_outcomes(SEED));
+}
+
+#[test]
+fn random_models() {
+    let outcomes: Vec<Outcome> = (0..MODELS)
+        .map(|number| random_outcome(SEED, number))
+        .collect();
+    check(&outcomes);
+}
+
+/// Values to 32 digits.
+#[test]
+fn double_double_functions() {
+    let check = |found: DoubleDouble, hi: f64, lo: f64| {
+        let error = found.subtract(DoubleDouble { hi, lo });
+        assert!(
+            error.hi.abs() <= 1e-29 * hi.abs(),
+            "{found:?} {hi:e} {lo:e}"
+        );
+    };
+    let x = DoubleDouble::from;
+    check(
+        x(1e8).sin_cos().0,
+        0.931639027109726,
+        -6.480822977380808e-18,
+    );
+    check(
+        x(1e8).sin_cos().1,
+        -0.3633850893556905,
+        -2.682587018538354e-17,
+    );
+    check(
+        x(3.0).sin_cos().0,
+        0.1411200080598672,
+        8.577269787017502e-18,
+    );
+    check(
+        x(1e-5).sin_cos().0,
+        9.999999999833334e-6,
+        6.182336062862823e-22,
+    );
+    check(
+        x(22.0).sin_cos().0,
+        -0.008851309290403876,
+        2.8485303089220057e-19,
+    );
+    check(
+        x(11.0).sin_cos().1,
+        0.004425697988050785,
+        3.2449142686784373e-19,
+    );
+    check(x(1.0).exp(), std::f64::consts::E, 1.4456468917292502e-16);
+    check(x(-20.5).exp(), 1.2501528663867426e-9, 6.448235878237776e-26);
+    check(
+        x(300.0).exp(),
+        1.9424263952412558e130,
+        1.1143145370175699e114,
+    );
+    check(x(3.0).ln(), 1.0986122886681098, -9.07129723500153e-17);
+    check(x(1e-4).ln(), -9.210340371976182, -8.601326140234914e-16);
+    check(
+        x(2.0).sqrt(),
+        std::f64::consts::SQRT_2,
+        -9.667293313452913e-17,
+    );
+    check(x(1e10 + 1.0).sqrt(), 100000.000005, 5.5831538348198e-12);
+}
