@@ -9,9 +9,9 @@
 
 use std::error::Error;
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::Context;
-use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::program::Request;
+use tfe_symbolic::syntax::context::Context;
 
 /// A model: its name, its declaration, and the counts of SymPy's cse (the better of with and without basic optimisations), CasADi's SX with
 /// cse, SymForce's cse.

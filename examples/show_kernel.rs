@@ -5,9 +5,9 @@
 
 use std::error::Error;
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind};
-use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::program::Request;
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 const CART: &str = "coordinates(x, theta),
 let tip_x = x + l*sin(theta),

@@ -5,11 +5,11 @@ use tfe::Model;
 use tfe::prelude::dynamics;
 use tfe::runtime::{By, ConstraintKind, ConstraintSecond, First, Second};
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind, Length};
-use tfe_symbolic::declared::{self, Constraint, Parameter};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::{self, Constraint, Parameter};
+use tfe_symbolic::program::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{self, Program, Request};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
 /// The engine's side of a model: derived at run time from the text of the declaration.
 struct Oracle {

@@ -3,7 +3,7 @@
 use crate::emit::index;
 use proc_macro2::TokenStream;
 use quote::quote;
-use tfe_symbolic::input::Affine;
+use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::program::Output;
 
 /// The sums of all columns at once where their number is known, else one by one.

@@ -3,8 +3,8 @@
 use crate::emit::{self, Emitter};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
-use tfe_symbolic::declared::{Constraint, ConstraintKind, Declared};
-use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::{Constraint, ConstraintKind, Declared};
 use tfe_symbolic::program::{Output, Program, Request, Statement};
 
 /// What an implementation of `Model` holds of constraints: nothing where there are none.

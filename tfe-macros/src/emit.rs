@@ -4,10 +4,10 @@ use crate::balance::balance;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::{BTreeMap, BTreeSet};
-use tfe_symbolic::ast::Comparison;
-use tfe_symbolic::function::Function;
-use tfe_symbolic::input::{Affine, IndexSymbol, Input, LoopVariable};
+use tfe_symbolic::expr::function::Function;
+use tfe_symbolic::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 use tfe_symbolic::program::{Operand, Operation, Output, Program, Statement, Temporary};
+use tfe_symbolic::syntax::ast::Comparison;
 
 /// Writes programs of one model.
 pub(crate) struct Emitter<'a> {

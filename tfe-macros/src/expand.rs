@@ -7,11 +7,11 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;
 use tfe_symbolic::compile;
-use tfe_symbolic::context::{FieldKind, Length};
-use tfe_symbolic::declared::{Declared, Form, Observable, Parameter, names};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::input::Affine;
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::expr::input::Affine;
+use tfe_symbolic::model::declared::{Declared, Form, Observable, Parameter, names};
 use tfe_symbolic::program::{By, Program, Request};
+use tfe_symbolic::syntax::context::{FieldKind, Length};
 
 /// Kernels of more operations are not compiled once more for several points at once: they would take longer to compile than they save.
 const LANES_LIMIT: usize = 4000;

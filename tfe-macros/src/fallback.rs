@@ -9,9 +9,9 @@ use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{quote, quote_spanned};
 use std::collections::BTreeSet;
 use syn::{Data, DeriveInput, ItemStruct, Visibility};
-use tfe_symbolic::ast::{Array, ExprKind, Item};
 use tfe_symbolic::diagnostic::{Bag, Diagnostic};
-use tfe_symbolic::parse;
+use tfe_symbolic::syntax::ast::{Array, ExprKind, Item};
+use tfe_symbolic::syntax::parse;
 use variant::Variant;
 
 /// `compile_error!` under the tokens that the diagnostic speaks of.

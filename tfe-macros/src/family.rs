@@ -12,9 +12,9 @@ use quote::quote;
 use std::collections::BTreeMap;
 use strides::Strides;
 use syn::ItemStruct;
-use tfe_symbolic::declared::{Declared, Extent, Form, Requirement};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::input::Affine;
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::expr::input::Affine;
+use tfe_symbolic::model::declared::{Declared, Extent, Form, Requirement};
 use tfe_symbolic::program::{Program, Request};
 
 /// `impl FamilyModel for Name`, and the methods.

@@ -5,7 +5,7 @@ use syn::{
     DeriveInput, Expr, ExprLit, Fields, GenericArgument, GenericParam, ItemStruct, Lit,
     PathArguments, Type,
 };
-use tfe_symbolic::context::{Context, Field, FieldKind, Length};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
 /// The struct under the attribute.
 ///

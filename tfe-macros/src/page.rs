@@ -3,10 +3,10 @@
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use std::fmt::Write as _;
-use tfe_symbolic::count::Counts;
-use tfe_symbolic::declared::{Declared, Form, names};
-use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::{Declared, Form, names};
 use tfe_symbolic::program::Request;
+use tfe_symbolic::program::count::Counts;
 
 /// Beyond so many operations the compiler's time for a kernel is felt.
 const LARGE: usize = 10_000;

@@ -4,7 +4,7 @@ use crate::emit::{identifier, index};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;
-use tfe_symbolic::declared::{Declared, Family, Form, Rule, Solver};
+use tfe_symbolic::model::declared::{Declared, Family, Form, Rule, Solver};
 
 /// The struct `solver.name` with everything that it needs as constants: element, tables, sizes.
 pub(crate) fn expand(

@@ -4,8 +4,8 @@ use crate::emit::{Emitter, index};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::Visibility;
-use tfe_symbolic::declared::{Declared, TimeTransformation, names};
-use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::{Declared, TimeTransformation, names};
 
 /// `state`; with a time transformation also `state_at`, and H as declared, which both need.
 pub(crate) fn methods(declared: &Declared, vis: &Visibility, path: &TokenStream) -> TokenStream {

@@ -7,7 +7,7 @@ use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 use syn::punctuated::Punctuated;
 use syn::{Attribute, Field, Fields, ItemStruct, Meta, Path, Token, parse_quote};
-use tfe_symbolic::declared::{Projection, Variant};
+use tfe_symbolic::model::declared::{Projection, Variant};
 
 /// The derives that hold of the model made as they hold of the original.
 const DERIVES: [&str; 5] = ["Clone", "Copy", "Debug", "PartialEq", "Default"];

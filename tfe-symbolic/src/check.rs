@@ -9,12 +9,12 @@ mod variants;
 
 use std::collections::BTreeMap;
 
-use crate::ast::{Array, Expr, ExprKind, Item, Name, Pass, Range, Spanned};
-use crate::context::{Context, FieldKind, Length};
-use crate::declared::{Form, Solver};
 use crate::diagnostic::{Bag, Kind, Role, Span, nearest};
-use crate::function::Function;
-use crate::input::{Affine, IndexSymbol};
+use crate::expr::function::Function;
+use crate::expr::input::{Affine, IndexSymbol};
+use crate::model::declared::{Form, Solver};
+use crate::syntax::ast::{Array, Expr, ExprKind, Item, Name, Pass, Range, Spanned};
+use crate::syntax::context::{Context, FieldKind, Length};
 pub use solver::{ELEMENTS, MAX_POINTS, RULES};
 pub use variants::PASSES;
 

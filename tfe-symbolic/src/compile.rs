@@ -1,12 +1,12 @@
 //! The pipeline from text to a declared model.
 
-use crate::ast::{ExprKind, Item, Spanned};
 use crate::check::{self, Arguments};
-use crate::context::{Context, FieldKind};
-use crate::declared::Declared;
 use crate::diagnostic::{Bag, Diagnostic, Span};
 use crate::lower::lower;
-use crate::parse::{first_word, parse_item, split_arguments};
+use crate::model::declared::Declared;
+use crate::syntax::ast::{ExprKind, Item, Spanned};
+use crate::syntax::context::{Context, FieldKind};
+use crate::syntax::parse::{first_word, parse_item, split_arguments};
 
 /// Reads a whole attribute: splits, parses, checks, lowers.
 ///

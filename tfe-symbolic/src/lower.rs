@@ -23,15 +23,15 @@ mod vector;
 
 use std::collections::HashMap;
 
-use crate::ast::{Expr, ExprKind};
 use crate::check::Model;
-use crate::context::Context;
-use crate::declared::{CoordinateArray, Declared, Form, Requirement};
 use crate::diagnostic::{Bag, Kind, Span};
-use crate::graph::{ExprId, Graph};
-use crate::input::{Affine, LoopVariable};
-use crate::notation::Notation;
-use crate::reduce;
+use crate::expr::graph::{ExprId, Graph};
+use crate::expr::input::{Affine, LoopVariable};
+use crate::model::declared::{CoordinateArray, Declared, Form, Requirement};
+use crate::model::notation::Notation;
+use crate::syntax::ast::{Expr, ExprKind};
+use crate::syntax::context::Context;
+use crate::variants;
 
 /// The longest sum that is written out wherever it stands.
 pub const SHORT_SUM: u64 = 16;
@@ -111,7 +111,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     // What is made from a wrong model would repeat its mistakes.
     if bag.is_empty() {
         for (name, steps) in &variants {
-            match reduce::variant(&declared, name, steps, &all_fields) {
+            match variants::variant(&declared, name, steps, &all_fields) {
                 Ok(variant) => declared.variants.push(variant),
                 Err((span, kind)) => bag.push(span, kind),
             }

@@ -1,10 +1,15 @@
 //! Straight-line programs with loops: what is emitted as Rust, and what the interpreter runs.
 //!
-//! CONTRACT between the engine (which schedules programs) and the emitter.
+//! CONTRACT between the engine (which schedules programs) and the emitter. The files of the folder count, run and print programs. May import
+//! `expr` only.
 
-use crate::ast::Comparison;
-use crate::function::Function;
-use crate::input::{Affine, Input, LoopVariable};
+pub mod count;
+mod display;
+pub mod interpret;
+
+use crate::expr::function::Function;
+use crate::expr::input::{Affine, Input, LoopVariable};
+use crate::syntax::ast::Comparison;
 
 /// A value computed by a program. Each is assigned once (accumulators: declared once, then added to or assigned).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

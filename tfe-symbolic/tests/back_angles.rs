@@ -1,10 +1,10 @@
 //! Sines and cosines of sums of angles: the values are those of the model as it is written, and the differences are of the stated size.
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::program::Request;
+use tfe_symbolic::program::interpret::{Environment, interpret};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 const TEXT: &str = "coordinates(a, b, c), \
     lagrangian = (dot(a)^2 + dot(b)^2 + dot(c)^2)/2 + dot(a)*cos(a - b) + dot(b)*sin(a + b - c) + dot(c)*cos(2*b + w) + cos(a) + sin(b) + cos(c + 2) \

@@ -2,11 +2,11 @@
 
 use num_dual::{DualNum, HyperHyperDual64};
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind, Length};
-use tfe_symbolic::declared::{Constraint, ConstraintKind};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::{Constraint, ConstraintKind};
 use tfe_symbolic::program::Request;
+use tfe_symbolic::program::interpret::{Environment, Results, interpret};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
 /// A declaration and the same equations by hand.
 trait System {

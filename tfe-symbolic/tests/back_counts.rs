@@ -3,10 +3,10 @@
 //! Each counts the energy function, its gradient and the upper half of its second derivatives together, as they are computed in one program.
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::Context;
-use tfe_symbolic::count::Counts;
-use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::program::Request;
+use tfe_symbolic::program::count::Counts;
+use tfe_symbolic::syntax::context::Context;
 
 const ALL: Request = Request {
     value: true,

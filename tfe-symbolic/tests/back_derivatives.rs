@@ -2,13 +2,13 @@
 
 use num_dual::{DualNum, HyperDual64};
 use proptest::prelude::*;
-use tfe_symbolic::declared::{Force, Form, Observable, Parameter};
-use tfe_symbolic::derivation::{Derivation, Model};
-use tfe_symbolic::differentiate::derivative;
-use tfe_symbolic::function::Function;
-use tfe_symbolic::graph::{ExprId, Graph};
-use tfe_symbolic::input::{Affine, Input};
-use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::derive::derivation::{Derivation, Model};
+use tfe_symbolic::expr::differentiate::derivative;
+use tfe_symbolic::expr::function::Function;
+use tfe_symbolic::expr::graph::{ExprId, Graph};
+use tfe_symbolic::expr::input::{Affine, Input};
+use tfe_symbolic::model::declared::{Force, Form, Observable, Parameter};
+use tfe_symbolic::program::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{By, Request};
 
 const ALL: Request = Request {

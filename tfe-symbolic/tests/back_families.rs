@@ -1,11 +1,11 @@
 //! Models of run-time length: the same programs at any length, equal to the models written out, and what lengths must obey.
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind};
-use tfe_symbolic::declared::{Declared, Requirement};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::{Declared, Requirement};
 use tfe_symbolic::program::Request;
+use tfe_symbolic::program::interpret::{Environment, Results, interpret};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 const ALL: Request = Request {
     value: true,

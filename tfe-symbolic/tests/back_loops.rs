@@ -1,10 +1,10 @@
 //! Families in loops against the same models written out, and what the loops look like.
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind};
-use tfe_symbolic::derivation::{Derivation, Model};
-use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::derive::derivation::{Derivation, Model};
+use tfe_symbolic::program::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{Program, Request};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 const ALL: Request = Request {
     value: true,

@@ -1,11 +1,11 @@
 //! Models made from models, against closed forms and against the derivatives of the originals.
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind};
-use tfe_symbolic::declared::{Declared, Variant};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::{Declared, Variant};
 use tfe_symbolic::program::Request;
+use tfe_symbolic::program::interpret::{Environment, Results, interpret};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 const PARAMETERS: [(&str, f64); 6] = [
     ("m", 1.3),

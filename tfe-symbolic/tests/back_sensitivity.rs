@@ -2,10 +2,10 @@
 //! dual numbers in `back_derivatives`, and with difference quotients in the oracle test of `tfe`.
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind, Length};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::program::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{By, Program};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
 /// A model with numbers k and c, and arrays m and w of N and any number of elements.
 fn derivation(text: &str) -> Derivation {

@@ -2,11 +2,11 @@
 
 use num_dual::{DualNum, HyperDual64};
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind};
-use tfe_symbolic::declared::{Declared, Requirement};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::{Declared, Requirement};
 use tfe_symbolic::program::Request;
+use tfe_symbolic::program::interpret::{Environment, interpret};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 /// Rods between neighbours, two equations beside them, and a rail: x[i-1] and x[0] are one coordinate at its first site.
 const TEXT: &str = "coordinates(x[n], y[n]), lagrangian = sum(i in 0..n, dot(x[i])^2/2 + dot(y[i])^2/2), \

@@ -1,10 +1,10 @@
 //! What is found out about models, and how programs are written.
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::Context;
-use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::derive::structure::Pattern;
 use tfe_symbolic::program::Request;
-use tfe_symbolic::structure::Pattern;
+use tfe_symbolic::syntax::context::Context;
 
 #[track_caller]
 fn derivation(text: &str) -> Derivation {

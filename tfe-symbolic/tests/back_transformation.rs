@@ -1,11 +1,11 @@
 //! Models with a time transformation against the extended models written by hand.
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind};
-use tfe_symbolic::declared::Declared;
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, Results, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::Declared;
+use tfe_symbolic::program::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{Program, Request};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 const ALL: Request = Request {
     value: true,

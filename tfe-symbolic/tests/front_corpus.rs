@@ -19,9 +19,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, Field, FieldKind, Length};
-use tfe_symbolic::declared::Declared;
 use tfe_symbolic::diagnostic::{Diagnostic, Kind};
+use tfe_symbolic::model::declared::Declared;
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
 struct Case {
     name: String,

@@ -1,13 +1,13 @@
 //! The parser: precedence, blanks, round trip through print, and texts that would exhaust the stack.
 
 use proptest::prelude::*;
-use tfe_symbolic::ast::{
+use tfe_symbolic::compile::declare;
+use tfe_symbolic::diagnostic::{Bag, Span};
+use tfe_symbolic::syntax::ast::{
     BinaryOperator, Comparison, ElementSyntax, Entry, Expr, ExprKind, Item, Pass, Range, Spanned,
 };
-use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::Context;
-use tfe_symbolic::diagnostic::{Bag, Span};
-use tfe_symbolic::parse::{
+use tfe_symbolic::syntax::context::Context;
+use tfe_symbolic::syntax::parse::{
     MAX_NESTING, MAX_OPERATORS, parse_expression, parse_item, split_arguments,
 };
 

@@ -7,7 +7,7 @@ use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::BTreeSet;
 use syn::{Data, DeriveInput, Field, Type};
-use tfe_symbolic::ast::{Entry, Pass};
+use tfe_symbolic::syntax::ast::{Entry, Pass};
 
 /// What can be told of `model(Name, …)`.
 #[derive(Clone)]

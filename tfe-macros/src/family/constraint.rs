@@ -4,8 +4,8 @@ use super::sites::{self, Sites};
 use crate::emit::Emitter;
 use proc_macro2::TokenStream;
 use quote::quote;
-use tfe_symbolic::declared::Declared;
-use tfe_symbolic::derivation::Derivation;
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::Declared;
 use tfe_symbolic::program::{Program, Request};
 
 /// What an implementation of `FamilyModel` holds of constraints: nothing where there are none.

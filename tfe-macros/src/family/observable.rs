@@ -6,7 +6,7 @@ use crate::emit;
 use proc_macro2::TokenStream;
 use quote::quote;
 use syn::Visibility;
-use tfe_symbolic::declared::Observable;
+use tfe_symbolic::model::declared::Observable;
 use tfe_symbolic::program::Request;
 
 /// What an implementation of `FamilyModel` holds of observables: nothing where there are none.

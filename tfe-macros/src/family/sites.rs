@@ -3,7 +3,7 @@
 use crate::emit;
 use proc_macro2::TokenStream;
 use quote::quote;
-use tfe_symbolic::graph::SumRange;
+use tfe_symbolic::expr::graph::SumRange;
 
 /// A name and the range of its sites; of a single one, no range.
 pub(super) type Sites<'a> = (&'a str, &'a [SumRange]);

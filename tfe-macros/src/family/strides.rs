@@ -3,7 +3,7 @@
 use crate::emit::{Emitter, index, less, loop_name};
 use proc_macro2::TokenStream;
 use quote::quote;
-use tfe_symbolic::input::{Affine, IndexSymbol, Input};
+use tfe_symbolic::expr::input::{Affine, IndexSymbol, Input};
 use tfe_symbolic::program::{Operand, Output, Program, Statement};
 
 /// The only loop of a kernel, and the lowest coordinate that a turn touches, counted from the loop's index.

@@ -1,10 +1,10 @@
 //! Requests for specialised steppers.
 
 use super::Model;
-use crate::ast::{ElementSyntax, Name, Spanned};
-use crate::context::Context;
-use crate::declared::{Family, Rule, Solver};
 use crate::diagnostic::{Bag, Kind, Role, nearest};
+use crate::model::declared::{Family, Rule, Solver};
+use crate::syntax::ast::{ElementSyntax, Name, Spanned};
+use crate::syntax::context::Context;
 
 /// The elements a solver can be specialised for.
 pub const ELEMENTS: &[&str] = &["Primal", "Mixed", "ThreeField", "EnergyConserving", "Radau"];

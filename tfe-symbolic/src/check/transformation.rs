@@ -1,9 +1,9 @@
 //! What a time transformation asks of the arguments beside it.
 
 use super::Model;
-use crate::declared::{CLOCK_MOMENTUM, Family, Form, Rule, Solver};
 use crate::diagnostic::{Bag, Kind, Role};
-use crate::input::IndexSymbol;
+use crate::expr::input::IndexSymbol;
+use crate::model::declared::{CLOCK_MOMENTUM, Family, Form, Rule, Solver};
 
 impl Model {
     /// A Hamiltonian, a number of coordinates known here, and nothing that p_t = −H stands in the way of.

@@ -1,9 +1,9 @@
 //! Models made from the declared one: `model(Name, truncated(2), frozen(r = l))`.
 
 use super::Model;
-use crate::ast::Name;
-use crate::context::Context;
 use crate::diagnostic::{Bag, Kind, Role, nearest};
+use crate::syntax::ast::Name;
+use crate::syntax::context::Context;
 
 /// What can be done to a model.
 pub const PASSES: &[&str] = &["truncated", "frozen", "routh", "rigid", "elastic"];

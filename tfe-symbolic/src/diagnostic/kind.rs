@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::function::Function;
+use crate::expr::function::Function;
 
 /// Declares [`Kind`] together with the list of its variants' names.
 macro_rules! kinds {

@@ -1,7 +1,7 @@
 //! What is said of each kind of mistake: all wording is here.
 
 use super::Kind;
-use crate::function::{Domain, Function};
+use crate::expr::function::{Domain, Function};
 
 impl Kind {
     /// What is wrong: lower case, names in backticks, no full stop.
@@ -346,7 +346,7 @@ impl Kind {
                 format!("did you mean `{nearest}`?")
             }
             Self::UnknownArgument { nearest: None, .. } => {
-                format!("the arguments are {}", backticked(crate::parse::ARGUMENTS))
+                format!("the arguments are {}", backticked(crate::syntax::parse::ARGUMENTS))
             }
             Self::UnknownSymbol {
                 nearest: None,

@@ -1,12 +1,12 @@
 //! Indices: affine arithmetic on the syntax, and the values that an index can take.
 
 use super::{Index, Lowerer};
-use crate::ast::{BinaryOperator, Expr, ExprKind};
 use crate::check::Symbol;
-use crate::context::FieldKind;
-use crate::declared::Extent;
 use crate::diagnostic::{Kind, Span};
-use crate::input::{Affine, IndexSymbol};
+use crate::expr::input::{Affine, IndexSymbol};
+use crate::model::declared::Extent;
+use crate::syntax::ast::{BinaryOperator, Expr, ExprKind};
+use crate::syntax::context::FieldKind;
 
 /// How many trips of a nest are looked at before an index is believed to stay inside.
 const TRIPS: u64 = 20_000;

@@ -1,13 +1,13 @@
 //! Constraints: one scalar equation a row, each told what kind it is.
 
 use super::{DotRule, Index, LONGEST_WRITTEN_OUT, Lowerer, Setting, Value};
-use crate::ast::{Expr, ExprKind, Name, Range};
 use crate::check::Symbol;
-use crate::constraint::{holds_state, is_affine, kind, normal};
-use crate::declared::{Constraint, ConstraintKind, Family, Parameter, Rule, Solver};
+use crate::derive::constraint::{holds_state, is_affine, kind, normal};
 use crate::diagnostic::{Kind, Span};
-use crate::graph::ExprId;
-use crate::input::{Affine, Input};
+use crate::expr::graph::ExprId;
+use crate::expr::input::{Affine, Input};
+use crate::model::declared::{Constraint, ConstraintKind, Family, Parameter, Rule, Solver};
+use crate::syntax::ast::{Expr, ExprKind, Name, Range};
 
 /// One scalar equation of a declaration.
 pub(super) struct Row {

@@ -1,12 +1,12 @@
 //! Forces on coordinates, and the dissipation.
 
 use super::{DotRule, Index, Lowerer, SHORT_SUM, Setting, Value};
-use crate::ast::{Expr, ExprKind};
 use crate::check::Symbol;
-use crate::declared::{Force, Form};
 use crate::diagnostic::{Kind, nearest};
-use crate::graph::{ExprId, SumRange};
-use crate::input::{Affine, Input};
+use crate::expr::graph::{ExprId, SumRange};
+use crate::expr::input::{Affine, Input};
+use crate::model::declared::{Force, Form};
+use crate::syntax::ast::{Expr, ExprKind};
 
 impl Lowerer<'_> {
     /// `force(target) = value`
@@ -163,7 +163,7 @@ impl Lowerer<'_> {
                 })
                 .collect(),
             _ => {
-                let index = Affine::symbol(crate::input::IndexSymbol::Loop(variable));
+                let index = Affine::symbol(crate::expr::input::IndexSymbol::Loop(variable));
                 let target = index.plus_scaled(first, 1).unwrap_or(index);
                 vec![Force {
                     ranges: vec![range],

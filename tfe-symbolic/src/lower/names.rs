@@ -1,12 +1,12 @@
 //! Names and elements of arrays.
 
 use super::{DotRule, Index, Lowerer, Value};
-use crate::ast::{Expr, ExprKind};
 use crate::check::{MAX_COORDINATES, Slots, Symbol, function_names, is_function};
-use crate::constant::Constant;
-use crate::context::{FieldKind, Length};
 use crate::diagnostic::{Kind, Span, nearest};
-use crate::input::{Affine, IndexSymbol, Input, LoopVariable};
+use crate::expr::constant::Constant;
+use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
+use crate::syntax::ast::{Expr, ExprKind};
+use crate::syntax::context::{FieldKind, Length};
 
 /// Where the elements of an indexed array come from.
 enum Array {

@@ -1,13 +1,13 @@
 //! The passes of `model(Name, …)`: their entries, with formulas in the arena.
 
 use super::{Lowerer, Setting};
-use crate::ast::{self, Entry, Expr, ExprKind, Name};
 use crate::check::{Symbol, reserved};
-use crate::context::FieldKind;
 use crate::diagnostic::{Kind, Span, nearest};
-use crate::graph::ExprId;
-use crate::input::Input;
-use crate::reduce::{Assignment, Ignored, MAX_DEGREE, Pass, Spring, Step, Target};
+use crate::expr::graph::ExprId;
+use crate::expr::input::Input;
+use crate::syntax::ast::{self, Entry, Expr, ExprKind, Name};
+use crate::syntax::context::FieldKind;
+use crate::variants::{Assignment, Ignored, MAX_DEGREE, Pass, Spring, Step, Target};
 
 impl Lowerer<'_> {
     /// The models made from this one: name, and what is done from left to right.

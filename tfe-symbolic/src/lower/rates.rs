@@ -1,13 +1,13 @@
 //! `dot()`: the total time derivative, by the chain rule.
 
 use super::{DotRule, Lowerer, Value};
-use crate::ast::{Expr, ExprKind};
 use crate::check::{Model, Symbol};
 use crate::diagnostic::{Kind, Span};
-use crate::differentiate::{derivative, directional};
-use crate::graph::{ExprId, Node};
-use crate::input::{Affine, Input};
-use crate::rewrite::Mapping;
+use crate::expr::differentiate::{derivative, directional};
+use crate::expr::graph::{ExprId, Node};
+use crate::expr::input::{Affine, Input};
+use crate::expr::rewrite::Mapping;
+use crate::syntax::ast::{Expr, ExprKind};
 
 /// What goes wrong in a total derivative.
 #[derive(Default)]

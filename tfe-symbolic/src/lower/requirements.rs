@@ -1,9 +1,9 @@
 //! What must hold of lengths that are known at run time only: checked once for each model, before it is evaluated.
 
 use super::Lowerer;
-use crate::declared::{Extent, Requirement};
-use crate::graph::SumRange;
-use crate::input::{Affine, IndexSymbol};
+use crate::expr::graph::SumRange;
+use crate::expr::input::{Affine, IndexSymbol};
+use crate::model::declared::{Extent, Requirement};
 
 impl Lowerer<'_> {
     /// Whether some array of coordinates has a length known at run time only.

@@ -1,13 +1,13 @@
 //! Operators and functions.
 
 use super::{Lowerer, Value};
-use crate::ast::{BinaryOperator, Comparison, Expr, ExprKind, Name};
 use crate::check::SPECIAL_FUNCTIONS;
-use crate::constant::Constant;
 use crate::diagnostic::{Kind, Span};
-use crate::function::{Domain, Function};
-use crate::graph::ExprId;
-use crate::input::Input;
+use crate::expr::constant::Constant;
+use crate::expr::function::{Domain, Function};
+use crate::expr::graph::ExprId;
+use crate::expr::input::Input;
+use crate::syntax::ast::{BinaryOperator, Comparison, Expr, ExprKind, Name};
 
 impl Lowerer<'_> {
     /// `a + b - c …`: a chain leans left, and its length must not cost stack.

@@ -3,12 +3,12 @@
 //! Naming a field there is no use of it: a field that no formula holds is reported as unused all the same.
 
 use super::Lowerer;
-use crate::ast::{Expr, ExprKind};
 use crate::check::Symbol;
-use crate::context::{FieldKind, Length};
-use crate::declared::{Constraint, Parameter};
 use crate::diagnostic::{Kind, Span, nearest};
-use crate::input::{Affine, IndexSymbol};
+use crate::expr::input::{Affine, IndexSymbol};
+use crate::model::declared::{Constraint, Parameter};
+use crate::syntax::ast::{Expr, ExprKind};
+use crate::syntax::context::{FieldKind, Length};
 
 impl Lowerer<'_> {
     pub(super) fn sensitivities(&mut self, constraints: &[Constraint]) -> Vec<Parameter> {

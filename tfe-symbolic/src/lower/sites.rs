@@ -2,12 +2,12 @@
 
 use super::constraints::{Row, components};
 use super::{DeclaredPlace, Index, LONGEST_WRITTEN_OUT, Lowerer};
-use crate::ast::{Expr, Name, Range};
-use crate::constraint::{holds_state, holds_velocity, kind, normal};
-use crate::declared::{Constraint, Observable};
+use crate::derive::constraint::{holds_state, holds_velocity, kind, normal};
 use crate::diagnostic::Kind;
-use crate::graph::{ExprId, SumRange};
-use crate::input::{Affine, IndexSymbol};
+use crate::expr::graph::{ExprId, SumRange};
+use crate::expr::input::{Affine, IndexSymbol};
+use crate::model::declared::{Constraint, Observable};
+use crate::syntax::ast::{Expr, Name, Range};
 
 /// What is known of the constraints before the one at hand.
 #[derive(Default)]

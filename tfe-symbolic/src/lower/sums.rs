@@ -1,11 +1,11 @@
 //! Sums over ranges: written out where short, loops elsewhere.
 
 use super::{Index, LONGEST_WRITTEN_OUT, Lowerer, SHORT_SUM, Value};
-use crate::ast::{Expr, Range};
 use crate::check::reserved;
 use crate::diagnostic::{Kind, Role, Span};
-use crate::graph::{ExprId, SumRange};
-use crate::input::{Affine, IndexSymbol};
+use crate::expr::graph::{ExprId, SumRange};
+use crate::expr::input::{Affine, IndexSymbol};
+use crate::syntax::ast::{Expr, Range};
 
 impl Lowerer<'_> {
     pub(super) fn sum(&mut self, range: &Range, body: &Expr) -> Value {

@@ -1,15 +1,15 @@
 //! Steps in a time τ of their own, dt = g dτ: the model extended by its time as a coordinate.
 
 use super::{Lowerer, Setting};
-use crate::constant::Constant;
-use crate::declared::{
+use crate::diagnostic::Kind;
+use crate::expr::constant::Constant;
+use crate::expr::differentiate::derivative;
+use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::input::{Affine, Input};
+use crate::expr::rewrite::{Mapping, UNROLL_LIMIT, written_out};
+use crate::model::declared::{
     CLOCK, CLOCK_MOMENTUM, CoordinateArray, Declared, Force, TimeTransformation,
 };
-use crate::diagnostic::Kind;
-use crate::differentiate::derivative;
-use crate::graph::{ExprId, Graph, Node};
-use crate::input::{Affine, Input};
-use crate::rewrite::{Mapping, UNROLL_LIMIT, written_out};
 
 impl Lowerer<'_> {
     /// g of `time_transformation = g`, without loops.

@@ -1,12 +1,12 @@
 //! What the energy leaves out: coordinates, velocities, fields.
 
 use super::Lowerer;
-use crate::context::FieldKind;
-use crate::declared::{Constraint, Form};
 use crate::diagnostic::{Kind, Span};
-use crate::differentiate::derivative;
-use crate::graph::ExprId;
-use crate::input::{Affine, Input};
+use crate::expr::differentiate::derivative;
+use crate::expr::graph::ExprId;
+use crate::expr::input::{Affine, Input};
+use crate::model::declared::{Constraint, Form};
+use crate::syntax::context::FieldKind;
 
 /// Which elements of a flat vector occur.
 struct Coverage(Vec<bool>);

@@ -1,10 +1,10 @@
 //! Functions of vectors, in components.
 
 use super::{Lowerer, Value};
-use crate::ast::Expr;
 use crate::diagnostic::{Kind, Span};
-use crate::function::Function;
-use crate::graph::ExprId;
+use crate::expr::function::Function;
+use crate::expr::graph::ExprId;
+use crate::syntax::ast::Expr;
 
 type Vector3 = [ExprId; 3];
 

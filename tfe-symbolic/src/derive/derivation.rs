@@ -1,0 +1,636 @@
+//! From a declared model to the entries of its kernels: which derivative goes where, inside which loops.
+//!
+//! The energy is split into terms, each a nest of ranges around a body. A body is differentiated once by its *slots*, the distinct leaves
+//! such as `q[i]` and `q[i+1]`. A first derivative by the slot `q[a]` adds to entry a, a second one by two slots adds to (a, b) and to (b, a):
+//! this holds also where both indices happen to be equal.
+//!
+//! A function of sums, such as `sqrt(sum(i in 0..n, q[i]^2))`, couples all with all. There each inner sum S counts as a further leaf of
+//! the body, and the chain rule continues into it: ∂f/∂q = (∂f/∂S)(∂S/∂q), in one more loop.
+
+use std::collections::BTreeMap;
+
+use crate::derive::constraint;
+use crate::derive::entry::{Array, Entry, Place};
+use crate::derive::quadratic::{self, Writing};
+use crate::derive::sensitivity::{Leaf, entries_by};
+use crate::derive::squares::by_squares;
+use crate::derive::structure::Structure;
+use crate::expr::constant::Constant;
+use crate::expr::differentiate::{Forward, gradient};
+use crate::expr::graph::{ExprId, Graph, Node, SumRange};
+use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
+use crate::model::declared::{Constraint, Declared, Force, Form, Observable, Parameter};
+use crate::optimise::angles::expand_angles;
+use crate::pipeline::select_plan::Draft;
+use crate::program::count::Counts;
+use crate::program::{By, Program, Request};
+
+/// Larger energies, in expressions, are not written by squares.
+const SQUARED: usize = 300;
+
+/// What is differentiated.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Lagrangian or Hamiltonian.
+    pub form: Form,
+    /// The number of coordinates.
+    pub dof: Affine,
+    /// The expressions.
+    pub graph: Graph,
+    /// L or H.
+    pub energy: ExprId,
+    /// The Rayleigh function D(v, q) of a Lagrangian model; Q = −∂D/∂v.
+    pub dissipation: Option<ExprId>,
+    /// The generalized forces.
+    pub forces: Vec<Force>,
+    /// The constraints, free of sums over ranges; those by site of models of run-time length are holonomic.
+    pub constraints: Vec<Constraint>,
+    /// The observables.
+    pub observables: Vec<Observable>,
+    /// The parameters by which derivatives are wanted.
+    pub sensitivities: Vec<Parameter>,
+}
+
+impl From<&Declared> for Model {
+    fn from(declared: &Declared) -> Self {
+        Self {
+            form: declared.form,
+            dof: declared.dof.clone(),
+            graph: declared.graph.clone(),
+            energy: declared.energy,
+            dissipation: declared.dissipation,
+            forces: declared.forces.clone(),
+            constraints: declared.constraints.clone(),
+            observables: declared.observables.clone(),
+            sensitivities: declared.sensitivities.clone(),
+        }
+    }
+}
+
+/// All derivatives of a model.
+///
+/// ```
+/// use tfe_symbolic::compile::declare;
+/// use tfe_symbolic::syntax::context::Context;
+/// use tfe_symbolic::derive::derivation::Derivation;
+/// use tfe_symbolic::program::Request;
+///
+/// let text = "coordinates(a), lagrangian = dot(a)^2/2 + 9.81*cos(a)";
+/// let declared = declare(text, &Context::default()).expect("no mistakes in it");
+/// let derivation = Derivation::of(&declared);
+/// let first = derivation.program(Request { first: true, ..Request::default() });
+/// assert_eq!(
+///     first.to_string(),
+///     "t0 = sin(q[0])\n\
+///      E_z[0] = v[0]\n\
+///      t1 = 9.81 * t0\n\
+///      t2 = -t1\n\
+///      E_q[0] = t2\n"
+/// );
+/// assert!(derivation.structure().separable);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Derivation {
+    graph: Graph,
+    entries: Vec<Entry>,
+    /// The same in other ways: by the matrix of an energy that is quadratic in z, by squares.
+    written: Vec<Vec<Entry>>,
+    structure: Structure,
+    sensitivities: Vec<Parameter>,
+}
+
+impl Derivation {
+    /// Differentiates a declared model.
+    pub fn of(declared: &Declared) -> Self {
+        Self::of_model(Model::from(declared))
+    }
+
+    /// Differentiates a model.
+    pub fn of_model(model: Model) -> Self {
+        let Model {
+            form,
+            dof,
+            mut graph,
+            energy,
+            dissipation,
+            forces,
+            constraints,
+            observables,
+            sensitivities,
+        } = model;
+        graph.ranges_are_checked = dof.is_of_run_time();
+        let mut deriver = Deriver {
+            form,
+            graph: &mut graph,
+            entries: Vec::new(),
+        };
+        deriver.energy(energy);
+        if let Some(dissipation) = dissipation {
+            deriver.dissipation(dissipation);
+        }
+        for force in &forces {
+            deriver.force(force.ranges.clone(), force.target.clone(), force.value);
+        }
+        deriver.observables(&observables);
+        let mut entries = deriver.entries;
+        let constrain = match dof.is_of_run_time() {
+            true => constraint::entries_by_site,
+            false => constraint::entries,
+        };
+        entries.extend(constrain(&mut graph, &constraints));
+        let structure = Structure::of(&graph, form, &dof, &entries);
+        let by_matrix = [Writing::AsDerived, Writing::Expanded]
+            .into_iter()
+            .filter_map(|writing| quadratic::entries(&mut graph, energy, &entries, writing));
+        let mut written: Vec<Vec<Entry>> = by_matrix.collect();
+        written.extend(entries_by_squares(&mut graph, form, energy, &entries));
+        Self {
+            graph,
+            entries,
+            written,
+            structure,
+            sensitivities,
+        }
+    }
+
+    /// The program of a kernel.
+    pub fn program(&self, request: Request) -> Program {
+        self.program_of(|array| array.is_wanted(request))
+    }
+
+    /// The program of ∂/∂q and of the forces alone: what the equations M q̈ = f ask for.
+    pub fn forces(&self) -> Program {
+        self.program_of(|array| matches!(array, Array::ByQ | Array::Force))
+    }
+
+    /// The program of H as declared, as the value of the energy function, of a model with a time transformation; the time is its last
+    /// coordinate.
+    ///
+    /// Nothing for models without one.
+    ///
+    /// ```
+    /// use tfe_symbolic::compile::declare;
+    /// use tfe_symbolic::syntax::context::Context;
+    /// use tfe_symbolic::derive::derivation::Derivation;
+    /// use tfe_symbolic::program::Request;
+    ///
+    /// let text = "coordinates(q), momenta(p), hamiltonian = p^2 - q*t, time_transformation = 2 + q";
+    /// let declared = declare(text, &Context::default()).expect("no mistakes in it");
+    /// let hamiltonian = Derivation::hamiltonian(&declared).expect("a time transformation");
+    /// assert_eq!(
+    ///     hamiltonian.to_string(),
+    ///     "t0 = q[0] * q[1]\n\
+    ///      t1 = p[0] * p[0]\n\
+    ///      t2 = t1 - t0\n\
+    ///      E = t2\n"
+    /// );
+    /// ```
+    pub fn hamiltonian(declared: &Declared) -> Option<Program> {
+        let transformation = declared.time_transformation?;
+        let entry = Entry {
+            nest: Vec::new(),
+            place: Place::scalar(Array::Value),
+            value: transformation.hamiltonian,
+        };
+        let draft = Draft::of(declared.graph.clone(), vec![entry]);
+        Some(Draft::best(vec![draft]))
+    }
+
+    fn program_of(&self, is_wanted: impl Fn(Array) -> bool) -> Program {
+        let draft = |entries: &Vec<Entry>| {
+            let wanted = entries.iter().filter(|entry| is_wanted(entry.place.array));
+            Draft::of(self.graph.clone(), wanted.cloned().collect())
+        };
+        let plain = std::iter::once(&self.entries);
+        Draft::best(plain.chain(&self.written).map(draft).collect())
+    }
+
+    /// The program of the first derivatives and forces differentiated once more, partially at fixed (q, z):
+    ///
+    /// ```text
+    /// ∂E_z/∂a, ∂E_q/∂a, ∂Q/∂a     in the places of E_z, E_q, Q;  a: a parameter of `sensitivity(…)`, or the time
+    /// ```
+    ///
+    /// Empty for the number of no such parameter.
+    ///
+    /// ```
+    /// use tfe_symbolic::compile::declare;
+    /// use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
+    /// use tfe_symbolic::derive::derivation::Derivation;
+    /// use tfe_symbolic::program::By;
+    ///
+    /// let k = Field { name: "k".to_owned(), kind: FieldKind::Scalar };
+    /// let context = Context { fields: vec![k], ..Context::default() };
+    /// let text = "coordinates(x), lagrangian = dot(x)^2/2 - k^2*x^2/2, force(x) = k*cos(t), sensitivity(k)";
+    /// let derivation = Derivation::of(&declare(text, &context).expect("no mistakes in it"));
+    /// assert_eq!(
+    ///     derivation.program_by(By::Parameter(0)).to_string(),
+    ///     "t0 = cos(t)\n\
+    ///      Q[0] = t0\n\
+    ///      t1 = 2 * q[0]\n\
+    ///      t2 = k * t1\n\
+    ///      t3 = -t2\n\
+    ///      E_q[0] = t3\n"
+    /// );
+    /// ```
+    pub fn program_by(&self, by: By) -> Program {
+        let leaf = match by {
+            By::Time => Leaf::Time,
+            By::Parameter(number) => match self.sensitivities.get(number) {
+                Some(parameter) => Leaf::Parameter(parameter),
+                None => return Program::default(),
+            },
+        };
+        let mut graph = self.graph.clone();
+        let entries = entries_by(&mut graph, &self.entries, leaf);
+        Draft::best(vec![Draft::of(graph, entries)])
+    }
+
+    /// Whether ∂/∂z of the energy function holds the time.
+    pub fn momenta_move(&self) -> bool {
+        let momenta = self
+            .entries
+            .iter()
+            .filter(|entry| entry.place.array == Array::ByZ);
+        let mut inputs = momenta.flat_map(|entry| self.graph.inputs_of(entry.value));
+        inputs.any(|input| input == Input::Time)
+    }
+
+    /// What is known about the model.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+
+    /// The operations of [`Derivation::program`].
+    pub fn counts(&self, request: Request) -> Counts {
+        Counts::of(&self.program(request))
+    }
+}
+
+/// The entries with the derivatives of the energy by squares; nothing where there are none, or other derivatives.
+fn entries_by_squares(
+    graph: &mut Graph,
+    form: Form,
+    energy: ExprId,
+    entries: &[Entry],
+) -> Option<Vec<Entry>> {
+    let small = graph.reachable(&[energy]).len() <= SQUARED;
+    if !small || entries.iter().any(|entry| !entry.nest.is_empty()) {
+        return None;
+    }
+    // With all sines and cosines that the derivatives need.
+    let values = entries.iter().map(|entry| entry.value);
+    let roots = std::iter::once(energy).chain(values).collect();
+    let energy = *expand_angles(graph, roots).first()?;
+    let energy = by_squares(graph, energy)?;
+    let mut deriver = Deriver {
+        form,
+        graph,
+        entries: Vec::new(),
+    };
+    deriver.energy(energy);
+    let mut values: BTreeMap<Place, ExprId> = BTreeMap::new();
+    for Entry { place, value, .. } in deriver.entries {
+        if quadratic::is_derivative(&place) && values.insert(place, value).is_some() {
+            return None;
+        }
+    }
+    let own = entries.iter().map(|entry| {
+        let value = match values.remove(&entry.place) {
+            Some(value) => value,
+            None if quadratic::is_derivative(&entry.place) => return None,
+            None => entry.value,
+        };
+        Some(Entry {
+            value,
+            ..entry.clone()
+        })
+    });
+    let own: Option<Vec<Entry>> = own.collect();
+    own.filter(|_| values.is_empty())
+}
+
+/// Collects the entries.
+struct Deriver<'a> {
+    form: Form,
+    graph: &'a mut Graph,
+    entries: Vec<Entry>,
+}
+
+/// A term of a sum over ranges: the body inside of its loops, outermost first.
+struct Term {
+    nest: Vec<SumRange>,
+    body: ExprId,
+}
+
+/// A leaf that derivatives are taken by.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Slot {
+    Z(Affine),
+    Q(Affine),
+}
+
+/// ∂/∂slot, to be added on every turn of a nest of loops.
+struct Contribution {
+    nest: Vec<SumRange>,
+    slot: Slot,
+    value: ExprId,
+}
+
+impl Deriver<'_> {
+    fn push(&mut self, nest: &[SumRange], place: Place, value: ExprId) {
+        if !self.graph.as_constant(value).is_some_and(Constant::is_zero) {
+            self.entries.push(Entry {
+                nest: nest.to_vec(),
+                place,
+                value,
+            });
+        }
+    }
+
+    fn energy(&mut self, energy: ExprId) {
+        let energy = self.graph.open_single_sums(&[energy])[0];
+        for Term { nest, body } in self.terms(&[], energy) {
+            self.push(&nest, Place::scalar(Array::Value), body);
+            if self.graph.contains_sum(body) {
+                self.coupled_energy(&nest, body);
+            } else {
+                self.plain_energy(&nest, body);
+            }
+        }
+    }
+
+    /// Derivatives of a body without sums: each pair of slots once.
+    fn plain_energy(&mut self, nest: &[SumRange], body: ExprId) {
+        let slots = self.slots(body);
+        let leaves: Vec<ExprId> = slots.iter().map(|(_, leaf)| *leaf).collect();
+        let slopes = gradient(self.graph, body, &leaves);
+        for ((slot, _), slope) in slots.iter().zip(&slopes) {
+            self.push(nest, first_place(slot), *slope);
+        }
+        for (at, (second, leaf)) in slots.iter().enumerate() {
+            let mut along = Forward::default();
+            for ((first, _), slope) in slots.iter().zip(&slopes).take(at + 1) {
+                let one = self.graph.constant(Constant::ONE);
+                let Node::Input(by) = self.graph.node(*leaf).clone() else {
+                    continue;
+                };
+                let value = along.derivative(self.graph, *slope, &mut |_, input| {
+                    (*input == by).then_some(one)
+                });
+                self.push_second(nest, first, second, value);
+                if first != second {
+                    self.push_second(nest, second, first, value);
+                }
+            }
+        }
+    }
+
+    fn push_second(&mut self, nest: &[SumRange], first: &Slot, second: &Slot, value: ExprId) {
+        let (array, row, column) = match (first, second) {
+            (Slot::Z(row), Slot::Z(column)) => (Array::ZZ, row, column),
+            (Slot::Z(row), Slot::Q(column)) => (Array::ZQ, row, column),
+            // The other order of the pair gives this entry.
+            (Slot::Q(_), Slot::Z(_)) => return,
+            (Slot::Q(row), Slot::Q(column)) => (Array::QQ, row, column),
+        };
+        let place = Place {
+            array,
+            row: row.clone(),
+            column: column.clone(),
+        };
+        self.push(nest, place, value);
+    }
+
+    /// Derivatives of a function of sums over ranges.
+    fn coupled_energy(&mut self, nest: &[SumRange], body: ExprId) {
+        for first in self.contributions(nest, body) {
+            self.push(&first.nest, first_place(&first.slot), first.value);
+            for second in self.contributions(&first.nest, first.value) {
+                self.push_second(&second.nest, &first.slot, &second.slot, second.value);
+            }
+        }
+    }
+
+    fn dissipation(&mut self, dissipation: ExprId) {
+        let dissipation = self.graph.open_single_sums(&[dissipation])[0];
+        for Contribution { nest, slot, value } in self.contributions(&[], dissipation) {
+            if let Slot::Z(target) = slot {
+                let force = self.graph.negate(value);
+                self.force(nest, target, force);
+            }
+        }
+    }
+
+    fn force(&mut self, nest: Vec<SumRange>, target: Affine, value: ExprId) {
+        let value = self.graph.open_single_sums(&[value])[0];
+        for term in self.terms(&nest, value) {
+            self.push(
+                &term.nest,
+                Place::vector(Array::Force, target.clone()),
+                term.body,
+            );
+        }
+        for Contribution { nest, slot, value } in self.contributions(&nest, value) {
+            let (array, column) = match slot {
+                Slot::Z(column) => (Array::ForceZ, column),
+                Slot::Q(column) => (Array::ForceQ, column),
+            };
+            self.push(
+                &nest,
+                Place {
+                    array,
+                    row: target.clone(),
+                    column,
+                },
+                value,
+            );
+        }
+    }
+
+    fn observables(&mut self, observables: &[Observable]) {
+        let by_site = observables.iter().any(|one| !one.ranges.is_empty());
+        for (number, one) in observables.iter().enumerate() {
+            let place = match by_site {
+                true => Place::vector(Array::SiteObservable, one.column.clone()),
+                false => Place::scalar(Array::Observable(number)),
+            };
+            self.push(&one.ranges, place, one.value);
+        }
+    }
+
+    /// The slots of a body and their leaves, not those inside of its sums.
+    fn slots(&mut self, body: ExprId) -> Vec<(Slot, ExprId)> {
+        let slot = |id: ExprId| match self.graph.node(id) {
+            Node::Input(Input::Coordinate(index)) => Some((Slot::Q(index.clone()), id)),
+            Node::Input(Input::Velocity(index)) if self.form == Form::Lagrangian => {
+                Some((Slot::Z(index.clone()), id))
+            }
+            Node::Input(Input::Momentum(index)) if self.form == Form::Hamiltonian => {
+                Some((Slot::Z(index.clone()), id))
+            }
+            _ => None,
+        };
+        let mut slots: Vec<_> = self
+            .graph
+            .reachable_outside_sums(&[body])
+            .into_iter()
+            .filter_map(slot)
+            .collect();
+        slots.sort();
+        slots
+    }
+
+    /// First derivatives of an expression inside a nest of loops, by all slots, also through its sums.
+    fn contributions(&mut self, nest: &[SumRange], expression: ExprId) -> Vec<Contribution> {
+        let mut done = Vec::new();
+        // (nest, weight, expression): the derivatives of the expression times the weight are still to come.
+        let one = self.graph.constant(Constant::ONE);
+        let mut waiting = vec![(nest.to_vec(), one, expression)];
+        while let Some((nest, weight, expression)) = waiting.pop() {
+            for Term { nest, body } in self.terms(&nest, expression) {
+                let slots = self.slots(body);
+                let sums: Vec<ExprId> = self
+                    .graph
+                    .reachable_outside_sums(&[body])
+                    .into_iter()
+                    .filter(|id| matches!(self.graph.node(*id), Node::Loop { .. }))
+                    .collect();
+                let leaves: Vec<ExprId> = slots
+                    .iter()
+                    .map(|(_, leaf)| *leaf)
+                    .chain(sums.iter().copied())
+                    .collect();
+                let slopes = gradient(self.graph, body, &leaves);
+                let (direct, through) = slopes.split_at(slots.len());
+                for ((slot, _), slope) in slots.into_iter().zip(direct) {
+                    let value = self.graph.multiply(weight, *slope);
+                    if !self.graph.as_constant(value).is_some_and(Constant::is_zero) {
+                        done.push(Contribution {
+                            nest: nest.clone(),
+                            slot,
+                            value,
+                        });
+                    }
+                }
+                for (sum, slope) in sums.into_iter().zip(through) {
+                    let weight = self.graph.multiply(weight, *slope);
+                    waiting.push((nest.clone(), weight, sum));
+                }
+            }
+        }
+        done
+    }
+
+    /// Splits an expression into terms, each a body inside its own loops; a body that is linear in no sum keeps its sums.
+    fn terms(&mut self, nest: &[SumRange], expression: ExprId) -> Vec<Term> {
+        let mut bodies: BTreeMap<Vec<SumRange>, Vec<(Constant, ExprId)>> = BTreeMap::new();
+        let mut waiting = vec![(nest.to_vec(), Constant::ONE, expression)];
+        while let Some((nest, factor, id)) = waiting.pop() {
+            if !self.graph.contains_sum(id) {
+                bodies.entry(nest).or_default().push((factor, id));
+                continue;
+            }
+            match self.graph.node(id).clone() {
+                Node::Sum { constant, terms } => {
+                    if !constant.is_zero() {
+                        let one = self.graph.constant(Constant::ONE);
+                        bodies
+                            .entry(nest.clone())
+                            .or_default()
+                            .push((factor * constant, one));
+                    }
+                    waiting.extend(
+                        terms
+                            .into_iter()
+                            .map(|(c, x)| (nest.clone(), factor * c, x)),
+                    );
+                }
+                Node::Loop { range, body } => {
+                    let (range, body) = self.inside(&nest, range, body);
+                    let mut nest = nest;
+                    nest.push(range);
+                    waiting.push((nest, factor, body));
+                }
+                Node::Product(factors) => {
+                    let mut with_sums = factors
+                        .iter()
+                        .enumerate()
+                        .filter(|(_, (x, _))| self.graph.contains_sum(*x));
+                    let only = with_sums
+                        .next()
+                        .filter(|(_, (_, n))| *n == 1 && with_sums.next().is_none());
+                    let inner = only.map(|(at, (x, _))| (at, self.graph.node(*x).clone()));
+                    match inner {
+                        Some((at, Node::Loop { range, body })) => {
+                            let (range, body) = self.inside(&nest, range, body);
+                            let mut rest = factors.clone();
+                            rest.remove(at);
+                            rest.push((body, 1));
+                            let body = self.graph.product(Constant::ONE, &rest);
+                            let mut nest = nest;
+                            nest.push(range);
+                            waiting.push((nest, factor, body));
+                        }
+                        Some((at, Node::Sum { constant, terms })) => {
+                            let mut rest = factors.clone();
+                            rest.remove(at);
+                            for (c, x) in terms {
+                                let mut factors = rest.clone();
+                                factors.push((x, 1));
+                                let product = self.graph.product(Constant::ONE, &factors);
+                                waiting.push((nest.clone(), factor * c, product));
+                            }
+                            if !constant.is_zero() {
+                                let product = self.graph.product(Constant::ONE, &rest);
+                                waiting.push((nest, factor * constant, product));
+                            }
+                        }
+                        _ => bodies.entry(nest).or_default().push((factor, id)),
+                    }
+                }
+                _ => bodies.entry(nest).or_default().push((factor, id)),
+            }
+        }
+        let mut terms = Vec::with_capacity(bodies.len());
+        for (nest, parts) in bodies {
+            terms.push(Term {
+                nest,
+                body: self.graph.linear(Constant::ZERO, &parts),
+            });
+        }
+        terms
+    }
+
+    /// A range and its body with an index that the nest does not use yet.
+    fn inside(&mut self, nest: &[SumRange], range: SumRange, body: ExprId) -> (SumRange, ExprId) {
+        if nest.iter().all(|outer| outer.variable != range.variable) {
+            return (range, body);
+        }
+        let bound =
+            self.graph
+                .reachable(&[body])
+                .into_iter()
+                .filter_map(|id| match self.graph.node(id) {
+                    Node::Loop { range, .. } => Some(range.variable.0),
+                    _ => None,
+                });
+        let used = nest
+            .iter()
+            .map(|outer| outer.variable.0)
+            .chain(bound)
+            .max()
+            .unwrap_or(0);
+        let variable = LoopVariable(used.saturating_add(1));
+        let symbol = Affine::symbol(IndexSymbol::Loop(variable));
+        let body = self.graph.substitute_loop(body, range.variable, &symbol);
+        (SumRange { variable, ..range }, body)
+    }
+}
+
+fn first_place(slot: &Slot) -> Place {
+    match slot {
+        Slot::Z(index) => Place::vector(Array::ByZ, index.clone()),
+        Slot::Q(index) => Place::vector(Array::ByQ, index.clone()),
+    }
+}

@@ -1,0 +1,494 @@
+//! Expressions as a hash-consed arena: equal expressions are one node, children come before their parents.
+//!
+//! Nodes are made only by the constructors of [`Graph`], which simplify locally; the rewrites are listed in `simplify.rs`. Every walk is a
+//! forward loop or an explicit stack, so a sum of a million terms cannot overflow the call stack.
+
+use std::fmt;
+
+use crate::expr::constant::Constant;
+use crate::expr::function::Function;
+use crate::expr::hash::{Map, Set};
+use crate::expr::input::{Affine, Input, LoopVariable};
+use crate::syntax::ast::Comparison;
+
+/// An expression of a [`Graph`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ExprId(u32);
+
+/// `variable in start..end`
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SumRange {
+    /// The index.
+    pub variable: LoopVariable,
+    /// Its first value.
+    pub start: Affine,
+    /// One past its last value.
+    pub end: Affine,
+}
+
+/// One node. Invariants are kept by the constructors in `simplify.rs`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Node {
+    Constant(Constant),
+    Input(Input),
+    /// `constant + Σ c x`: terms sorted, none constant. With several terms (counting the constant) the first coefficient is positive and
+    /// the coefficients are not all of one size other than 1; with one, it is a multiple `c x`, c ≠ 1.
+    Sum {
+        constant: Constant,
+        terms: Vec<(Constant, ExprId)>,
+    },
+    /// `Π x^n`: factors sorted, n ≠ 0, none a short product or a multiple; constant only where it is 0 to a negative power.
+    Product(Vec<(ExprId, i32)>),
+    Power {
+        base: ExprId,
+        exponent: ExprId,
+    },
+    Call {
+        function: Function,
+        arguments: Vec<ExprId>,
+    },
+    Select {
+        comparison: Comparison,
+        left: ExprId,
+        right: ExprId,
+        then: ExprId,
+        otherwise: ExprId,
+    },
+    /// `Σ body` over the range.
+    Loop {
+        range: SumRange,
+        body: ExprId,
+    },
+}
+
+/// What is known of a node without walking its children.
+#[derive(Clone, Copy, Debug, Default)]
+struct Facts {
+    /// Free loop variables, one bit a depth.
+    loops: u64,
+    /// Whether there is a [`Node::Loop`] in it.
+    contains_sum: bool,
+}
+
+/// Hash table without iteration, so that no order can come from it.
+#[derive(Clone, Debug, Default)]
+struct Interner(Map<Node, ExprId>);
+
+/// The arena.
+#[derive(Clone, Debug, Default)]
+pub struct Graph {
+    nodes: Vec<Node>,
+    facts: Vec<Facts>,
+    known: Interner,
+    /// Ranges whose bounds are the same on all turns of the loops around hold something: models of run-time length are checked for it.
+    pub(crate) ranges_are_checked: bool,
+}
+
+/// A sum is too long to be written out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooLong {
+    /// The number of terms it would need.
+    pub terms: u64,
+    /// The largest number that is allowed.
+    pub limit: u64,
+}
+
+impl ExprId {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl Node {
+    /// The children, in order, repeated as often as they are used.
+    pub(crate) fn children(&self) -> Vec<ExprId> {
+        match self {
+            Self::Constant(_) | Self::Input(_) => Vec::new(),
+            Self::Sum { terms, .. } => terms.iter().map(|(_, x)| *x).collect(),
+            Self::Product(factors) => factors.iter().map(|(x, _)| *x).collect(),
+            Self::Power { base, exponent } => vec![*base, *exponent],
+            Self::Call { arguments, .. } => arguments.clone(),
+            Self::Select {
+                left,
+                right,
+                then,
+                otherwise,
+                ..
+            } => vec![*left, *right, *then, *otherwise],
+            Self::Loop { body, .. } => vec![*body],
+        }
+    }
+}
+
+/// The bit of a loop variable in [`Graph::loops_of`]. Depths past 63 share the last bit, which only costs hoisting.
+pub(crate) fn loop_bit(variable: LoopVariable) -> u64 {
+    1 << variable.0.min(63)
+}
+
+/// The bits of all loop variables in an index.
+pub(crate) fn loops_in(affine: &Affine) -> u64 {
+    let variables = affine.variables().into_iter();
+    variables.fold(0, |mask, variable| mask | loop_bit(variable))
+}
+
+impl Graph {
+    /// The node itself; for identifiers of this graph only.
+    pub(crate) fn node(&self, id: ExprId) -> &Node {
+        &self.nodes[id.index()]
+    }
+
+    /// Free loop variables of an expression, one bit a depth.
+    pub(crate) fn loops_of(&self, id: ExprId) -> u64 {
+        self.facts[id.index()].loops
+    }
+
+    /// The number of nodes made so far.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether nothing has been made yet.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Finds or makes the node. Children must exist.
+    pub(crate) fn intern(&mut self, node: Node) -> ExprId {
+        if let Some(id) = self.known.0.get(&node) {
+            return *id;
+        }
+        let mut facts = node
+            .children()
+            .iter()
+            .fold(Facts::default(), |facts, child| {
+                let child = self.facts[child.index()];
+                Facts {
+                    loops: facts.loops | child.loops,
+                    contains_sum: facts.contains_sum | child.contains_sum,
+                }
+            });
+        match &node {
+            Node::Input(input) => facts.loops |= input.index().map_or(0, loops_in),
+            Node::Loop { range, .. } => {
+                facts.loops &= !loop_bit(range.variable);
+                facts.loops |= loops_in(&range.start) | loops_in(&range.end);
+                facts.contains_sum = true;
+            }
+            _ => {}
+        }
+        let id = ExprId(
+            u32::try_from(self.nodes.len()).expect("fewer than 2³² nodes: memory ends earlier"),
+        );
+        self.nodes.push(node.clone());
+        self.facts.push(facts);
+        self.known.0.insert(node, id);
+        id
+    }
+
+    /// The node if it has been made already.
+    pub(crate) fn find(&self, node: &Node) -> Option<ExprId> {
+        self.known.0.get(node).copied()
+    }
+
+    /// A number.
+    pub fn constant(&mut self, value: Constant) -> ExprId {
+        self.intern(Node::Constant(value))
+    }
+
+    /// A whole number.
+    pub fn integer(&mut self, value: i64) -> ExprId {
+        self.constant(Constant::integer(value))
+    }
+
+    /// A leaf. An [`Input::Integer`] without symbols is a number.
+    pub fn input(&mut self, input: Input) -> ExprId {
+        match &input {
+            Input::Integer(value) if value.terms.is_empty() => self.integer(value.constant),
+            _ => self.intern(Node::Input(input)),
+        }
+    }
+
+    /// Its value where it is a number.
+    pub fn as_constant(&self, id: ExprId) -> Option<Constant> {
+        match self.node(id) {
+            Node::Constant(value) => Some(*value),
+            _ => None,
+        }
+    }
+
+    /// Whether a sum over a range occurs in it.
+    pub fn contains_sum(&self, id: ExprId) -> bool {
+        self.facts[id.index()].contains_sum
+    }
+
+    /// The nodes that the roots are made of, children before parents, without repetition.
+    pub(crate) fn reachable(&self, roots: &[ExprId]) -> Vec<ExprId> {
+        let mut seen = vec![false; roots.iter().map(|root| root.index() + 1).max().unwrap_or(0)];
+        let mut stack = roots.to_vec();
+        let mut found = Vec::new();
+        while let Some(id) = stack.pop() {
+            if !std::mem::replace(&mut seen[id.index()], true) {
+                found.push(id);
+                stack.extend(self.node(id).children());
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// The same without the bodies of sums over ranges.
+    pub(crate) fn reachable_outside_sums(&self, roots: &[ExprId]) -> Vec<ExprId> {
+        let mut seen = vec![false; roots.iter().map(|root| root.index() + 1).max().unwrap_or(0)];
+        let mut stack = roots.to_vec();
+        let mut found = Vec::new();
+        while let Some(id) = stack.pop() {
+            if !std::mem::replace(&mut seen[id.index()], true) {
+                found.push(id);
+                if !matches!(self.node(id), Node::Loop { .. }) {
+                    stack.extend(self.node(id).children());
+                }
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// The nodes of the roots that are made of more than parameters and numbers.
+    pub(crate) fn moving(&self, roots: &[ExprId]) -> Set<ExprId> {
+        let is_parameter =
+            |input: &Input| matches!(input, Input::Parameter(_) | Input::ParameterElement(..));
+        self.containing(roots, |input| !is_parameter(input))
+    }
+
+    /// The nodes of the roots in which velocities or momenta stand.
+    pub(crate) fn containing_z(&self, roots: &[ExprId]) -> Set<ExprId> {
+        self.containing(roots, |input| {
+            matches!(input, Input::Velocity(_) | Input::Momentum(_))
+        })
+    }
+
+    fn containing(&self, roots: &[ExprId], wanted: impl Fn(&Input) -> bool) -> Set<ExprId> {
+        let mut found = Set::default();
+        for id in self.reachable(roots) {
+            let contains = match self.node(id) {
+                Node::Input(input) => wanted(input),
+                node => node.children().iter().any(|child| found.contains(child)),
+            };
+            if contains {
+                found.insert(id);
+            }
+        }
+        found
+    }
+
+    /// The distinct leaves of an expression, in order of first making; inside sums their indices mention the loop variable.
+    pub fn inputs_of(&self, id: ExprId) -> Vec<Input> {
+        let leaf = |id: ExprId| match self.node(id) {
+            Node::Input(input) => Some(input.clone()),
+            _ => None,
+        };
+        self.reachable(&[id]).into_iter().filter_map(leaf).collect()
+    }
+
+    /// `c` and `x` with `id` = c x, where x is no multiple.
+    pub(crate) fn as_multiple(&self, id: ExprId) -> (Constant, ExprId) {
+        match self.node(id) {
+            Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => terms[0],
+            _ => (Constant::ONE, id),
+        }
+    }
+
+    /// The terms of a sum of several terms.
+    pub(crate) fn as_sum(&self, id: ExprId) -> Option<(Constant, &[(Constant, ExprId)])> {
+        match self.node(id) {
+            Node::Sum { constant, terms } if !constant.is_zero() || terms.len() > 1 => {
+                Some((*constant, terms))
+            }
+            _ => None,
+        }
+    }
+
+    /// Prints an expression in the notation of the language.
+    pub fn display(&self, id: ExprId) -> Display<'_> {
+        Display { graph: self, id }
+    }
+}
+
+impl Input {
+    /// The index of an element, or the number itself.
+    pub(crate) fn index(&self) -> Option<&Affine> {
+        match self {
+            Self::Time | Self::Parameter(_) => None,
+            Self::Coordinate(index)
+            | Self::Velocity(index)
+            | Self::Momentum(index)
+            | Self::Multiplier(index)
+            | Self::ParameterElement(_, index)
+            | Self::Integer(index) => Some(index),
+        }
+    }
+
+    /// The same leaf with another index.
+    pub(crate) fn with_index(&self, index: Affine) -> Self {
+        match self {
+            Self::Time | Self::Parameter(_) => self.clone(),
+            Self::Coordinate(_) => Self::Coordinate(index),
+            Self::Velocity(_) => Self::Velocity(index),
+            Self::Momentum(_) => Self::Momentum(index),
+            Self::Multiplier(_) => Self::Multiplier(index),
+            Self::ParameterElement(name, _) => Self::ParameterElement(name.clone(), index),
+            Self::Integer(_) => Self::Integer(index),
+        }
+    }
+}
+
+/// An expression with its graph, for printing; made by [`Graph::display`].
+#[derive(Clone, Copy, Debug)]
+pub struct Display<'a> {
+    graph: &'a Graph,
+    id: ExprId,
+}
+
+/// Text still to be printed, innermost last.
+enum Piece {
+    Text(String),
+    Expression { id: ExprId, parenthesised: bool },
+}
+
+impl fmt::Display for Display<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut stack = vec![Piece::Expression {
+            id: self.id,
+            parenthesised: false,
+        }];
+        while let Some(piece) = stack.pop() {
+            match piece {
+                Piece::Text(text) => f.write_str(&text)?,
+                Piece::Expression { id, parenthesised } => {
+                    let mut pieces = pieces(self.graph.node(id), parenthesised);
+                    pieces.reverse();
+                    stack.append(&mut pieces);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn pieces(node: &Node, parenthesised: bool) -> Vec<Piece> {
+    let text = |text: &str| Piece::Text(text.to_owned());
+    let whole = |id: &ExprId| Piece::Expression {
+        id: *id,
+        parenthesised: false,
+    };
+    let tight = |id: &ExprId| Piece::Expression {
+        id: *id,
+        parenthesised: true,
+    };
+    let mut pieces = Vec::new();
+    match node {
+        Node::Constant(value) => {
+            let value = value.to_string();
+            pieces.push(if parenthesised && value.contains(['-', '/']) {
+                text(&format!("({value})"))
+            } else {
+                text(&value)
+            });
+            return pieces;
+        }
+        Node::Input(input) => pieces.push(text(&input.to_string())),
+        Node::Sum { constant, terms } => {
+            pieces.extend(parenthesised.then(|| text("(")));
+            for (at, (coefficient, x)) in terms.iter().enumerate() {
+                pieces.push(text(match (at, coefficient.is_negative()) {
+                    (0, false) => "",
+                    (0, true) => "-",
+                    (_, false) => " + ",
+                    (_, true) => " - ",
+                }));
+                if !coefficient.abs().is_one() {
+                    pieces.push(text(&format!("{}*", coefficient.abs())));
+                }
+                pieces.push(tight(x));
+            }
+            if !constant.is_zero() {
+                pieces.push(text(&format!(
+                    " {} {}",
+                    if constant.is_negative() { '-' } else { '+' },
+                    constant.abs()
+                )));
+            }
+            pieces.extend(parenthesised.then(|| text(")")));
+        }
+        Node::Product(factors) => {
+            pieces.extend(parenthesised.then(|| text("(")));
+            for (at, (x, exponent)) in factors.iter().enumerate() {
+                pieces.extend((at > 0).then(|| text("*")));
+                pieces.push(tight(x));
+                match exponent {
+                    1 => {}
+                    0.. => pieces.push(text(&format!("^{exponent}"))),
+                    _ => pieces.push(text(&format!("^({exponent})"))),
+                }
+            }
+            pieces.extend(parenthesised.then(|| text(")")));
+        }
+        Node::Power { base, exponent } => pieces.extend([
+            text("("),
+            tight(base),
+            text("^"),
+            tight(exponent),
+            text(")"),
+        ]),
+        Node::Call {
+            function,
+            arguments,
+        } => {
+            pieces.push(text(&format!("{function}(")));
+            for (at, argument) in arguments.iter().enumerate() {
+                pieces.extend((at > 0).then(|| text(", ")));
+                pieces.push(whole(argument));
+            }
+            pieces.push(text(")"));
+        }
+        Node::Select {
+            comparison,
+            left,
+            right,
+            then,
+            otherwise,
+        } => {
+            let sign = match comparison {
+                Comparison::Less => " < ",
+                Comparison::LessOrEqual => " <= ",
+                Comparison::Greater => " > ",
+                Comparison::GreaterOrEqual => " >= ",
+            };
+            pieces.extend([
+                text("select("),
+                whole(left),
+                text(sign),
+                whole(right),
+                text(", "),
+            ]);
+            pieces.extend([whole(then), text(", "), whole(otherwise), text(")")]);
+        }
+        Node::Loop { range, body } => {
+            let header = format!("sum({} in {}..{}, ", range.variable, range.start, range.end);
+            pieces.extend([text(&header), whole(body), text(")")]);
+        }
+    }
+    pieces
+}
+
+impl fmt::Display for TooLong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "a sum of {} terms cannot be written out (at most {})",
+            self.terms, self.limit
+        )
+    }
+}
+
+impl std::error::Error for TooLong {}

@@ -1,0 +1,236 @@
+//! Greedy sharing in sums and products: which two operands are worth computing once.
+//!
+//! Sums and products of many operands leave open what is added or multiplied first. The pair that saves most operations over all of them
+//! becomes an operand of its own, again and again, as long as one saves anything.
+
+use crate::expr::hash::Map;
+use std::collections::{BTreeMap, BinaryHeap};
+
+/// An operand: an index chosen by the caller, or of a pair made here.
+pub(crate) type Item = u32;
+
+/// What the numbers beside the operands mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Signs, ±1.
+    Sum,
+    /// Exponents, 1 or more.
+    Product,
+}
+
+/// Operands with their signs or exponents.
+pub(crate) type Operands = BTreeMap<Item, i32>;
+
+/// `first + sign · second`, or `first · second` (then `sign` is 1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct Pair {
+    pub(crate) first: Item,
+    pub(crate) second: Item,
+    pub(crate) sign: i32,
+}
+
+/// Longer sums and products are left alone: their pairs would be too many.
+const LONGEST: usize = 400;
+
+/// Rewrites the sets so that worthwhile pairs are operands; pair number k is the operand `first_pair + k`.
+pub(crate) fn extract(kind: Kind, sets: &mut [Operands], first_pair: Item) -> Vec<Pair> {
+    let mut search = Search {
+        kind,
+        sets,
+        places: Map::default(),
+        queue: BinaryHeap::new(),
+        made: Vec::new(),
+        first_pair,
+    };
+    search.run();
+    search.made
+}
+
+/// A candidate with the saving that it had when it was queued; the earliest pair first among equals.
+type Candidate = (i32, std::cmp::Reverse<Pair>);
+
+struct Search<'a> {
+    kind: Kind,
+    sets: &'a mut [Operands],
+    /// Where a pair may occur: complete, but not always up to date.
+    places: Map<Pair, Vec<usize>>,
+    queue: BinaryHeap<Candidate>,
+    made: Vec<Pair>,
+    first_pair: Item,
+}
+
+impl Search<'_> {
+    fn run(&mut self) {
+        let mut candidates = Vec::new();
+        for set in 0..self.sets.len() {
+            if self.sets[set].len() > LONGEST {
+                continue;
+            }
+            let items: Vec<Item> = self.sets[set].keys().copied().collect();
+            for (at, first) in items.iter().enumerate() {
+                for second in &items[at..] {
+                    candidates.extend(self.note(set, *first, *second));
+                }
+            }
+        }
+        self.enqueue(candidates);
+        while let Some((saving, std::cmp::Reverse(pair))) = self.queue.pop() {
+            let now = self.saving(pair);
+            if now < saving {
+                if now > 0 {
+                    self.queue.push((now, std::cmp::Reverse(pair)));
+                }
+                continue;
+            }
+            self.apply(pair);
+        }
+    }
+
+    fn note(&mut self, set: usize, first: Item, second: Item) -> Option<Pair> {
+        let (first, second) = (first.min(second), first.max(second));
+        let sign = match self.kind {
+            Kind::Product => 1,
+            Kind::Sum if first == second => return None,
+            Kind::Sum => self.sets[set].get(&first)? * self.sets[set].get(&second)?,
+        };
+        let pair = Pair {
+            first,
+            second,
+            sign,
+        };
+        let places = self.places.entry(pair).or_default();
+        if places.last() != Some(&set) {
+            places.push(set);
+        }
+        Some(pair)
+    }
+
+    fn enqueue(&mut self, mut candidates: Vec<Pair>) {
+        candidates.sort_unstable();
+        candidates.dedup();
+        for pair in candidates {
+            let saving = self.saving(pair);
+            if saving > 0 {
+                self.queue.push((saving, std::cmp::Reverse(pair)));
+            }
+        }
+    }
+
+    /// How often the pair can be taken out of a set.
+    fn occurrences(&self, set: usize, pair: Pair) -> i32 {
+        let of = |item| self.sets[set].get(&item).copied().unwrap_or(0);
+        let (first, second) = (of(pair.first), of(pair.second));
+        match self.kind {
+            Kind::Sum => i32::from(first * second == pair.sign),
+            Kind::Product if pair.first == pair.second => first / 2,
+            Kind::Product => first.min(second),
+        }
+    }
+
+    /// Twice the operations saved, plus one if the pair is wanted by itself anyway; 0 if nothing is saved.
+    fn saving(&self, pair: Pair) -> i32 {
+        let Some(places) = self.places.get(&pair) else {
+            return 0;
+        };
+        let (mut total, mut complete) = (-1, 0);
+        for set in places {
+            let count = self.occurrences(*set, pair);
+            total += count;
+            let rest: i32 = self.sets[*set]
+                .values()
+                .map(|exponent| exponent.abs())
+                .sum();
+            if count == 1 && rest == 2 {
+                complete = 1;
+            }
+        }
+        if total > 0 { 2 * total + complete } else { 0 }
+    }
+
+    fn apply(&mut self, pair: Pair) {
+        let item = self.first_pair + self.made.len() as Item;
+        self.made.push(pair);
+        let mut candidates = Vec::new();
+        for set in self.places.remove(&pair).unwrap_or_default() {
+            let count = self.occurrences(set, pair);
+            if count == 0 {
+                continue;
+            }
+            let operands = &mut self.sets[set];
+            match self.kind {
+                Kind::Sum => {
+                    let sign = operands.remove(&pair.first).unwrap_or(1);
+                    operands.remove(&pair.second);
+                    operands.insert(item, sign);
+                }
+                Kind::Product => {
+                    for part in [pair.first, pair.second] {
+                        if let Some(exponent) = operands.get_mut(&part) {
+                            *exponent -= count;
+                            if *exponent <= 0 {
+                                operands.remove(&part);
+                            }
+                        }
+                    }
+                    operands.insert(item, count);
+                }
+            }
+            let others: Vec<Item> = self.sets[set].keys().copied().collect();
+            for other in others {
+                candidates.extend(self.note(set, item, other));
+            }
+        }
+        self.enqueue(candidates);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(items: &[(Item, i32)]) -> Operands {
+        items.iter().copied().collect()
+    }
+
+    #[test]
+    fn a_wanted_product_is_reused_inside_longer_ones() {
+        // abc, ab, bc, abd, bd: with ab and bd shared, five products instead of eight.
+        let mut sets = [
+            set(&[(0, 1), (1, 1), (2, 1)]),
+            set(&[(0, 1), (1, 1)]),
+            set(&[(1, 1), (2, 1)]),
+            set(&[(0, 1), (1, 1), (3, 1)]),
+            set(&[(1, 1), (3, 1)]),
+        ];
+        let pairs = extract(Kind::Product, &mut sets, 10);
+        let rest: usize = sets.iter().map(|set| set.len() - 1).sum();
+        assert_eq!(pairs.len() + rest, 5);
+    }
+
+    #[test]
+    fn powers_are_squared() {
+        // x^8 in three products.
+        let mut sets = [set(&[(0, 8)])];
+        assert_eq!(extract(Kind::Product, &mut sets, 1).len(), 2);
+        assert_eq!(sets[0], set(&[(2, 2)]));
+    }
+
+    #[test]
+    fn differences_are_shared_up_to_their_sign() {
+        // a − b + c and b − a + d
+        let mut sets = [
+            set(&[(0, 1), (1, -1), (2, 1)]),
+            set(&[(0, -1), (1, 1), (3, 1)]),
+        ];
+        let pairs = extract(Kind::Sum, &mut sets, 10);
+        assert_eq!(
+            pairs,
+            [Pair {
+                first: 0,
+                second: 1,
+                sign: -1
+            }]
+        );
+        assert_eq!(sets, [set(&[(2, 1), (10, 1)]), set(&[(3, 1), (10, -1)])]);
+    }
+}

@@ -1,0 +1,215 @@
+//! Common factors in sums: a b + a c → a (b + c), where that makes the whole cheaper.
+//!
+//! Taking a factor out saves a product, but may cost one elsewhere that shared `a b`. So each change is kept only if the arranged whole
+//! costs less; how many changes are tried depends on the size, to keep compile times linear.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::expr::constant::Constant;
+use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::rewrite::{Mapping, Uses};
+use crate::optimise::binarize::{Grouping, arrange};
+
+/// Operations arranged over all trials of one kernel, in whichever ways it is written.
+pub(crate) const BUDGET: usize = 50_000;
+
+/// A sum and a factor of several of its terms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Candidate {
+    sum: ExprId,
+    factor: ExprId,
+    /// The sign of the exponent: a factor, or a divisor.
+    divides: bool,
+    terms: usize,
+}
+
+/// The roots with common factors taken out; no more operations than this are arranged on the way.
+pub(crate) fn take_out_factors(
+    graph: &mut Graph,
+    roots: Vec<ExprId>,
+    budget: usize,
+) -> Vec<ExprId> {
+    let mut best = Trial::of(graph, roots);
+    let mut budget = budget;
+    // All at once, as long as that helps: large models get no further.
+    while let Some(work) = budget.checked_sub(best.size) {
+        budget = work;
+        let mut all = candidates(graph, &best.roots);
+        all.sort_by_key(|candidate| (candidate.sum, std::cmp::Reverse(candidate.terms)));
+        all.dedup_by_key(|candidate| candidate.sum);
+        let trial = apply(graph, &best.roots, &all);
+        if all.is_empty() || trial.cost >= best.cost {
+            break;
+        }
+        best = trial;
+    }
+    // One by one, the most promising first. What does not help is not tried again: it hardly would where the sum is the same.
+    let mut tried = BTreeSet::new();
+    'again: loop {
+        let mut all = candidates(graph, &best.roots);
+        all.retain(|candidate| !tried.contains(candidate));
+        all.sort_by_key(|candidate| std::cmp::Reverse(candidate.terms));
+        for candidate in all {
+            match budget.checked_sub(best.size) {
+                Some(rest) => budget = rest,
+                None => return best.roots,
+            }
+            let trial = apply(graph, &best.roots, &[candidate]);
+            tried.insert(candidate);
+            if trial.cost < best.cost {
+                best = trial;
+                continue 'again;
+            }
+        }
+        return best.roots;
+    }
+}
+
+struct Trial {
+    roots: Vec<ExprId>,
+    cost: usize,
+    size: usize,
+}
+
+impl Trial {
+    fn of(graph: &Graph, roots: Vec<ExprId>) -> Self {
+        let plan = arrange(graph, &roots, Grouping::ByLoops);
+        Self {
+            roots,
+            cost: plan.cost(),
+            size: plan.len(),
+        }
+    }
+}
+
+/// Factors that several terms of a sum have, among the terms that nothing else uses.
+fn candidates(graph: &Graph, roots: &[ExprId]) -> Vec<Candidate> {
+    let nodes = graph.reachable(roots);
+    let uses = graph.uses(&nodes, roots);
+    let mut found = Vec::new();
+    for sum in nodes {
+        let Some((_, terms)) = graph.as_sum(sum) else {
+            continue;
+        };
+        let mut counts: BTreeMap<(ExprId, bool), usize> = BTreeMap::new();
+        for (_, x) in terms {
+            for (factor, exponent) in own_factors(graph, &uses, *x) {
+                *counts.entry((*factor, *exponent < 0)).or_default() += 1;
+            }
+        }
+        let several = counts.into_iter().filter(|(_, terms)| *terms > 1);
+        found.extend(several.map(|((factor, divides), terms)| Candidate {
+            sum,
+            factor,
+            divides,
+            terms,
+        }));
+    }
+    found
+}
+
+/// The factors of a term that nothing else uses.
+fn own_factors<'a>(graph: &'a Graph, uses: &Uses, x: ExprId) -> &'a [(ExprId, i32)] {
+    match graph.node(x) {
+        Node::Product(factors) if uses.of(x) == 1 => factors,
+        _ => &[],
+    }
+}
+
+fn apply(graph: &mut Graph, roots: &[ExprId], changes: &[Candidate]) -> Trial {
+    let nodes = graph.reachable(roots);
+    let uses = graph.uses(&nodes, roots);
+    let changes: BTreeMap<ExprId, Candidate> =
+        changes.iter().map(|change| (change.sum, *change)).collect();
+    let mut mapping = Mapping::default();
+    for old in nodes {
+        let node = graph.node(old).clone();
+        let new = match (&node, changes.get(&old)) {
+            (Node::Sum { constant, terms }, Some(change)) => {
+                let common = |graph: &Graph, x: ExprId| {
+                    let factors = own_factors(graph, &uses, x).iter();
+                    let matching =
+                        |(x, n): &&(ExprId, i32)| *x == change.factor && (*n < 0) == change.divides;
+                    factors.clone().find(matching).map(|(_, n)| *n)
+                };
+                let exponents = terms.iter().filter_map(|(_, x)| common(graph, *x));
+                let exponent = exponents.min_by_key(|n| n.unsigned_abs()).unwrap_or(0);
+                let factor = mapping.of(change.factor);
+                let (mut inside, mut outside) = (Vec::new(), Vec::new());
+                for (c, x) in terms {
+                    let mapped = mapping.of(*x);
+                    match common(graph, *x).and_then(|_| exponent.checked_neg()) {
+                        Some(inverse) => {
+                            inside.push((
+                                *c,
+                                graph.product(Constant::ONE, &[(mapped, 1), (factor, inverse)]),
+                            ));
+                        }
+                        None => outside.push((*c, mapped)),
+                    }
+                }
+                let inside = graph.linear(Constant::ZERO, &inside);
+                outside.push((
+                    Constant::ONE,
+                    graph.product(Constant::ONE, &[(factor, exponent), (inside, 1)]),
+                ));
+                graph.linear(*constant, &outside)
+            }
+            (node, _)
+                if node
+                    .children()
+                    .iter()
+                    .all(|child| mapping.of(*child) == *child) =>
+            {
+                old
+            }
+            (node, _) => graph.remake(node, &mapping),
+        };
+        mapping.set(old, new);
+    }
+    Trial::of(graph, roots.iter().map(|root| mapping.of(*root)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::expr::input::Input;
+
+    fn variables<const N: usize>(graph: &mut Graph) -> [ExprId; N] {
+        std::array::from_fn(|at| graph.input(Input::Parameter(format!("x{at}"))))
+    }
+
+    #[test]
+    fn a_factor_comes_out_where_it_saves() {
+        // a b + a c + d → a (b + c) + d
+        let mut g = Graph::default();
+        let [a, b, c, d] = variables(&mut g);
+        let (ab, ac) = (g.multiply(a, b), g.multiply(a, c));
+        let sum = g.linear(
+            Constant::ZERO,
+            &[(Constant::ONE, ab), (Constant::ONE, ac), (Constant::ONE, d)],
+        );
+        let out = take_out_factors(&mut g, vec![sum], BUDGET);
+        assert_eq!(g.display(out[0]).to_string(), "x3 + (x0*(x1 + x2))");
+    }
+
+    #[test]
+    fn a_factor_stays_where_its_products_are_needed_anyway() {
+        let mut g = Graph::default();
+        let [a, b, c] = variables(&mut g);
+        let (ab, ac) = (g.multiply(a, b), g.multiply(a, c));
+        let roots = vec![g.add(ab, ac), ab, ac];
+        assert_eq!(take_out_factors(&mut g, roots.clone(), BUDGET), roots);
+    }
+
+    #[test]
+    fn a_common_divisor_divides_once() {
+        let mut g = Graph::default();
+        let [a, b, c] = variables(&mut g);
+        let (ac, bc) = (g.divide(a, c), g.divide(b, c));
+        let sum = g.add(ac, bc);
+        let out = take_out_factors(&mut g, vec![sum], BUDGET);
+        let together = g.add(a, b);
+        assert_eq!(out[0], g.divide(together, c));
+    }
+}

@@ -1,0 +1,277 @@
+//! Tables of values, and for each operation what it could be replaced by.
+
+use std::collections::BTreeMap;
+
+use super::formulas::Found;
+use super::residue::{Residue, residues};
+use super::weight;
+use crate::expr::hash::Map;
+use crate::optimise::plan::{Op, OpId, Plan};
+use crate::optimise::rebuild::Formula;
+
+/// Sums and products of two are tabulated up to so many operations.
+const TABLED: usize = 160;
+
+/// Sums of two products are sought up to so many operations.
+const SEARCHED: usize = 130;
+
+/// How many formulas for one operation are kept.
+const KEPT: usize = 4;
+
+/// A replacement with an estimate of what it saves.
+pub(super) struct Candidate {
+    pub(super) saving: usize,
+    pub(super) target: OpId,
+    pub(super) formula: Formula,
+}
+
+/// Sums or products of two operations by their values, up to the sign.
+pub(super) struct Table {
+    pub(super) entries: Vec<(Residue, OpId, OpId)>,
+    /// One bit for each value that there is, and for some others: small enough to stay in the cache.
+    filter: Vec<u64>,
+    /// By some bits of the value, the first entry.
+    heads: Vec<u32>,
+    /// For each entry the next one with these bits.
+    next: Vec<u32>,
+}
+
+/// The number of heads and the bits of the filter, powers of two.
+const HEADS: u64 = 1 << 15;
+const FILTER: u64 = 1 << 18;
+
+/// No entry.
+const NONE: u32 = u32::MAX;
+
+/// The entries of a value, in their order.
+pub(super) struct Matches<'a> {
+    table: &'a Table,
+    size: Residue,
+    at: u32,
+}
+
+impl Table {
+    fn of(entries: Vec<(Residue, OpId, OpId)>) -> Self {
+        let mut heads = vec![NONE; HEADS as usize];
+        let mut filter = vec![0; (FILTER / 64) as usize];
+        let mut next = vec![NONE; entries.len()];
+        for (at, (value, ..)) in entries.iter().enumerate().rev() {
+            let head = &mut heads[value.bits(HEADS - 1) as usize];
+            next[at] = std::mem::replace(head, at as u32);
+            let bit = value.bits(FILTER - 1);
+            filter[(bit / 64) as usize] |= 1 << (bit % 64);
+        }
+        Self {
+            entries,
+            filter,
+            heads,
+            next,
+        }
+    }
+
+    /// Whether there may be one of this value.
+    pub(super) fn may_hold(&self, value: Residue) -> bool {
+        let bit = value.size().bits(FILTER - 1);
+        self.filter[(bit / 64) as usize] & (1 << (bit % 64)) != 0
+    }
+
+    /// All entries of a value, up to its sign.
+    pub(super) fn find(&self, value: Residue) -> Matches<'_> {
+        let size = value.size();
+        Matches {
+            table: self,
+            size,
+            at: self.heads[size.bits(HEADS - 1) as usize],
+        }
+    }
+}
+
+impl<'a> Iterator for Matches<'a> {
+    type Item = &'a (Residue, OpId, OpId);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while self.at != NONE {
+            let at = self.at as usize;
+            let entry = &self.table.entries[at];
+            self.at = self.table.next[at];
+            if entry.0 == self.size {
+                return Some(entry);
+            }
+        }
+        None
+    }
+}
+
+pub(super) struct Search<'a> {
+    pub(super) plan: &'a Plan,
+    /// Two independent values of each operation.
+    pub(super) values: Vec<Residue>,
+    pub(super) checks: Vec<Residue>,
+    pub(super) reciprocals: Vec<Residue>,
+    /// One bit for each operation that is not defined everywhere.
+    partial: Vec<u64>,
+    pub(super) singles: Map<Residue, Vec<OpId>>,
+    pub(super) products: Table,
+    /// x + y and x − y
+    pub(super) sums: Table,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn of(plan: &'a Plan) -> Self {
+        let values = residues(plan, 1);
+        let mut singles: Map<Residue, Vec<OpId>> = Map::default();
+        for id in plan.ids() {
+            let size = values[id.index()].size();
+            singles.entry(size).or_default().push(id);
+        }
+        let (mut products, mut sums) = (Vec::new(), Vec::new());
+        if plan.len() <= TABLED {
+            for a in plan.ids() {
+                for b in plan.ids().take(a.index() + 1) {
+                    let (x, y) = (values[a.index()], values[b.index()]);
+                    products.push((x.times(y).size(), a, b));
+                    sums.push((x.plus(y).size(), a, b));
+                    sums.push((x.minus(y).size(), a, b));
+                }
+            }
+        }
+        Self {
+            plan,
+            checks: residues(plan, 2),
+            reciprocals: values.iter().map(|value| value.reciprocal()).collect(),
+            partial: partial(plan),
+            values,
+            singles,
+            products: Table::of(products),
+            sums: Table::of(sums),
+        }
+    }
+
+    /// The replacements that seem to save most, the best first.
+    pub(super) fn candidates(&self) -> Vec<Candidate> {
+        let mut all: Vec<Candidate> = Vec::new();
+        let uses = self.uses();
+        for target in self.plan.ids() {
+            if self.plan.cost_of(target) == 0 || self.values[target.index()].is_zero() {
+                continue;
+            }
+            let mut own = self.formulas(target, &uses);
+            own.sort_by_key(|candidate| std::cmp::Reverse(candidate.saving));
+            own.truncate(KEPT);
+            all.append(&mut own);
+        }
+        all.sort_by_key(|candidate| std::cmp::Reverse(candidate.saving));
+        all
+    }
+
+    /// How often each operation is used.
+    fn uses(&self) -> Vec<u32> {
+        let mut uses = vec![0; self.plan.len()];
+        for id in self.plan.ids() {
+            for operand in self.plan.op(id).operands() {
+                uses[operand.index()] += 1;
+            }
+        }
+        for (_, value) in self.plan.values() {
+            uses[value.op.index()] += 1;
+        }
+        uses
+    }
+
+    /// The operations that only the target needs, itself with them, and what each costs together with those that only it needs.
+    fn alone(&self, target: OpId, uses: &[u32]) -> BTreeMap<OpId, usize> {
+        let mut left: BTreeMap<OpId, u32> = BTreeMap::new();
+        let mut alone = BTreeMap::from([(target, weight(self.plan, target))]);
+        let mut stack = vec![target];
+        while let Some(id) = stack.pop() {
+            for operand in self.plan.op(id).operands() {
+                let left = left.entry(operand).or_insert(uses[operand.index()]);
+                *left -= 1;
+                if *left == 0 {
+                    alone.insert(operand, weight(self.plan, operand));
+                    stack.push(operand);
+                }
+            }
+        }
+        alone
+    }
+
+    /// Formulas for one operation that may save something.
+    fn formulas(&self, target: OpId, uses: &[u32]) -> Vec<Candidate> {
+        let alone = self.alone(target, uses);
+        let total: usize = alone.values().sum();
+        let unit = 2 << (3 * self.plan.loops_of(target).count_ones());
+        let mut found = Found {
+            search: self,
+            target,
+            alone: &alone,
+            total,
+            unit,
+            usable: self.usable(target),
+            candidates: Vec::new(),
+        };
+        found.one();
+        if total > unit {
+            found.two();
+        }
+        if total > 2 * unit && self.plan.len() <= TABLED {
+            found.three();
+        }
+        if total > 3 * unit && self.plan.len() <= SEARCHED {
+            found.four();
+        }
+        found.candidates
+    }
+
+    /// The operations that may stand in a formula for the target: they do not need it, and are defined wherever it is.
+    fn usable(&self, target: OpId) -> Vec<bool> {
+        let mut needs = vec![false; self.plan.len()];
+        needs[target.index()] = true;
+        let (loops, partial) = (self.plan.loops_of(target), self.partial[target.index()]);
+        let mut usable = vec![false; self.plan.len()];
+        for id in self.plan.ids() {
+            let at = id.index();
+            let operands = self.plan.op(id).operands();
+            needs[at] |= operands.iter().any(|operand| needs[operand.index()]);
+            usable[at] = !needs[at]
+                && self.plan.loops_of(id) & !loops == 0
+                && self.partial[at] & !partial == 0
+                && !self.values[at].is_zero();
+        }
+        usable
+    }
+
+    pub(super) fn check(&self, formula: &Formula) -> Residue {
+        match formula {
+            Formula::Is(value) => {
+                let own = self.checks[value.op.index()];
+                if value.negative { own.opposite() } else { own }
+            }
+            Formula::Sum(parts) => self.check(&parts[0]).plus(self.check(&parts[1])),
+            Formula::Product(parts) => self.check(&parts[0]).times(self.check(&parts[1])),
+        }
+    }
+}
+
+/// Bits of what is not defined, or not smooth, everywhere; all past the sixty-third share one.
+fn partial(plan: &Plan) -> Vec<u64> {
+    let mut bits: Vec<u64> = Vec::with_capacity(plan.len());
+    let mut next = 0;
+    for id in plan.ids() {
+        let op = plan.op(id);
+        let operands = op.operands();
+        let mut own = operands.iter().fold(0, |all, x| all | bits[x.index()]);
+        let whole = match op {
+            Op::Divide(..) | Op::Power(..) | Op::Select { .. } | Op::Loop { .. } => false,
+            Op::IntegerPower(_, n) => *n >= 0,
+            Op::Call(function, _) => function.is_entire(),
+            _ => true,
+        };
+        if !whole {
+            own |= 1 << next;
+            next = (next + 1).min(63);
+        }
+        bits.push(own);
+    }
+    bits
+}

@@ -1,0 +1,176 @@
+//! Springs that become constraints, (T-106).
+//!
+//! ```text
+//! L = L₀ − k Σ c_j φ_j²  ⟶  L₀ ,  φ_j = 0          (of a Hamiltonian, H = H₀ + k Σ c_j φ_j²)
+//! ```
+
+use super::{Mistake, Reduction, Spring};
+use crate::derive::constraint::{holds_state, kind, normal};
+use crate::diagnostic::{Kind, Role};
+use crate::expr::constant::Constant;
+use crate::expr::differentiate::derivative;
+use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::input::{Affine, Input};
+use crate::model::declared::{Constraint, ConstraintKind, Declared, Form};
+
+impl Reduction {
+    pub(super) fn stiffen(&mut self, spring: &Spring) -> Result<(), Mistake> {
+        let stiffness = Input::Parameter(spring.stiffness.node.clone());
+        let at_stiffness = |kind| (spring.stiffness.span, kind);
+        let elongations = self.elongations(&stiffness).map_err(at_stiffness)?;
+        let names = names(&spring.constraint.to_string(), elongations.len());
+        for (name, elongation) in names.into_iter().zip(elongations) {
+            self.constrain(name, elongation)
+                .map_err(|kind| (spring.span, kind))?;
+        }
+        let model = &mut self.model;
+        let zero = model.graph.integer(0);
+        model.energy = model.graph.with_leaves(model.energy, &mut |_, input| {
+            (*input == stiffness).then_some(zero)
+        });
+        drop_outputs_of(model, &stiffness);
+        Ok(())
+    }
+
+    /// φ_j of the springs of this stiffness.
+    fn elongations(&mut self, stiffness: &Input) -> Result<Vec<ExprId>, Kind> {
+        let model = &mut self.model;
+        let wrong = |found: String| Kind::NotASpring {
+            field: stiffness.to_string(),
+            found,
+        };
+        if let Some(place) = elsewhere(model, stiffness) {
+            return Err(wrong(format!("it also stands in {place}")));
+        }
+        let (form, graph) = (model.form, &mut model.graph);
+        let slope = derivative(graph, model.energy, stiffness);
+        let long = Kind::PassOfLength { pass: "rigid" };
+        let slope = graph.unroll(slope).map_err(|_| long.clone())?;
+        if graph.contains_sum(slope) || model.dof.as_constant().is_none() {
+            return Err(long);
+        }
+        let (constant, terms) = graph.terms(slope);
+        let squares = terms
+            .iter()
+            .map(|term| elongation(graph, form, *term, stiffness));
+        let squares: Option<Vec<ExprId>> = squares.collect();
+        match squares {
+            Some(squares) if constant.is_zero() && !squares.is_empty() => Ok(squares),
+            _ => {
+                let slope = super::notation::text(&self.model, slope);
+                let slope = slope.unwrap_or_else(|| "no such square".to_owned());
+                let letter = form.letter();
+                Err(wrong(format!("∂{letter}/∂{stiffness} is {slope}")))
+            }
+        }
+    }
+
+    fn constrain(&mut self, name: String, value: ExprId) -> Result<(), Kind> {
+        let Declared {
+            graph,
+            constraints,
+            observables,
+            ..
+        } = &mut self.model;
+        let taken = if constraints.iter().any(|other| other.name == name) {
+            Some(Role::Constraint)
+        } else {
+            let mut observables = observables.iter();
+            observables
+                .any(|one| one.name == name)
+                .then_some(Role::Output)
+        };
+        if let Some(taken) = taken {
+            return Err(Kind::NameClash { name, taken });
+        }
+        let own = normal(graph, value);
+        if let Some(other) = constraints
+            .iter()
+            .find(|other| normal(graph, other.value) == own)
+        {
+            let other = other.name.clone();
+            return Err(Kind::RepeatedConstraint { name, other });
+        }
+        let quadratic = ConstraintKind::Holonomic { quadratic: false };
+        let kind = kind(graph, value).unwrap_or(quadratic);
+        constraints.push(Constraint {
+            name,
+            ranges: Vec::new(),
+            row: Affine::constant(constraints.len() as i64),
+            kind,
+            value,
+        });
+        Ok(())
+    }
+}
+
+/// `rod`, or `rod_1`, `rod_2`, …
+fn names(name: &str, count: usize) -> Vec<String> {
+    match count {
+        1 => vec![name.to_owned()],
+        _ => (1..=count)
+            .map(|number| format!("{name}_{number}"))
+            .collect(),
+    }
+}
+
+/// Where a parameter stands beside the energy and outputs.
+fn elsewhere(model: &Declared, parameter: &Input) -> Option<&'static str> {
+    let holds = |value: &ExprId| model.graph.inputs_of(*value).contains(parameter);
+    let mut forces = model.forces.iter().map(|force| force.value);
+    let mut constraints = model.constraints.iter().map(|constraint| constraint.value);
+    if forces.any(|value| holds(&value)) {
+        Some("a force")
+    } else if model.dissipation.as_ref().is_some_and(holds) {
+        Some("the dissipation")
+    } else {
+        let found = constraints.any(|value| holds(&value));
+        found.then_some("a constraint")
+    }
+}
+
+/// φ where the term is c φ^2n, with c of the sign of an elastic energy, and φ a function of positions.
+fn elongation(
+    graph: &mut Graph,
+    form: Form,
+    (coefficient, x): (Constant, ExprId),
+    stiffness: &Input,
+) -> Option<ExprId> {
+    if coefficient.is_negative() != (form == Form::Lagrangian) {
+        return None;
+    }
+    let Node::Product(factors) = graph.node(x).clone() else {
+        return None;
+    };
+    let common = factors
+        .iter()
+        .fold(0, |divisor, (_, n)| greatest_common_divisor(divisor, *n));
+    if common % 2 != 0 || factors.iter().any(|(_, n)| *n < 0) {
+        return None;
+    }
+    let roots: Vec<(ExprId, i32)> = factors.iter().map(|(x, n)| (*x, n / common)).collect();
+    let root = graph.product(Constant::ONE, &roots);
+    let moves = |input: &Input| matches!(input, Input::Velocity(_) | Input::Momentum(_));
+    let inputs = graph.inputs_of(root);
+    let is_position = !inputs.iter().any(moves) && !inputs.contains(stiffness);
+    (is_position && holds_state(graph, root)).then_some(root)
+}
+
+fn greatest_common_divisor(a: i32, b: i32) -> i32 {
+    let (mut a, mut b) = (a, b);
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    a.saturating_abs()
+}
+
+/// What shows a parameter that is gone cannot be shown; the others move up.
+fn drop_outputs_of(model: &mut Declared, parameter: &Input) {
+    let Declared {
+        graph, observables, ..
+    } = model;
+    observables.retain(|one| !graph.inputs_of(one.value).contains(parameter));
+    for (at, one) in (0..).zip(observables) {
+        one.column = Affine::constant(at);
+    }
+}

@@ -1,0 +1,211 @@
+//! Taylor polynomials of the energy about a point of the phase space, (T-104).
+//!
+//! ```text
+//! L_k(q, v, t) = Σ_{j ≤ k} 1/j! Dʲ L(q₀, v₀, t)[δ, …, δ] ,     δ = (q − q₀, v − v₀)
+//! ```
+//!
+//! The derivatives are directional ones, the direction is a leaf of its own that later derivatives hold fixed: that goes through sums over
+//! ranges as it does through anything else, whatever their length.
+
+use std::collections::BTreeMap;
+
+use super::removal::{holds_varying_index, written_out_forces};
+use super::target::Places;
+use super::{Assignment, Mistake, Reduction};
+use crate::diagnostic::Kind;
+use crate::expr::constant::Constant;
+use crate::expr::differentiate::directional;
+use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::input::{Affine, Input};
+use crate::model::declared::Form;
+
+/// Leaves that stand for q − q₀, v − v₀ and p − p₀ while derivatives are taken; no field has such a name.
+const DEVIATIONS: [&str; 3] = ["__tfe_q", "__tfe_v", "__tfe_p"];
+const PASS: &str = "truncated";
+
+/// The values of one half of the state.
+#[derive(Clone, Debug, Default)]
+struct Values {
+    /// Of all places that have none of their own; zero where nothing is said.
+    all: Option<ExprId>,
+    own: BTreeMap<i64, ExprId>,
+}
+
+impl Values {
+    fn at(&self, index: &Affine) -> Option<ExprId> {
+        let own = index.as_constant().and_then(|at| self.own.get(&at));
+        own.copied().or(self.all)
+    }
+
+    /// Whether something is said twice.
+    fn set(&mut self, places: Places, value: ExprId) -> bool {
+        match places {
+            Places::All => self.all.replace(value).is_some(),
+            Places::Numbers(places) => {
+                let mut twice = false;
+                for place in places {
+                    twice |= self.own.insert(place, value).is_some();
+                }
+                twice
+            }
+        }
+    }
+}
+
+/// q₀ and v₀ or p₀.
+#[derive(Clone, Debug, Default)]
+struct Point {
+    q: Values,
+    z: Values,
+}
+
+impl Point {
+    fn half<'a>(&'a self, input: &'a Input) -> Option<(&'a Values, &'a Affine, &'static str)> {
+        let [q, v, p] = DEVIATIONS;
+        match input {
+            Input::Coordinate(at) => Some((&self.q, at, q)),
+            Input::Velocity(at) => Some((&self.z, at, v)),
+            Input::Momentum(at) => Some((&self.z, at, p)),
+            _ => None,
+        }
+    }
+
+    /// Whether places differ, so that indices must be numbers.
+    fn is_by_place(&self) -> bool {
+        !(self.q.own.is_empty() && self.z.own.is_empty())
+    }
+}
+
+impl Reduction {
+    pub(super) fn truncate(
+        &mut self,
+        degree: u32,
+        point: &[Assignment],
+        place: impl Fn(Kind) -> Mistake,
+    ) -> Result<(), Mistake> {
+        if !self.model.constraints.is_empty() {
+            return Err(place(Kind::TruncationOfConstraints));
+        }
+        let point = self.point(point)?;
+        if point.is_by_place() {
+            self.model.forces = written_out_forces(&mut self.model, PASS).map_err(&place)?;
+        }
+        let energy = self.model.energy;
+        self.model.energy = self.polynomial(energy, degree, &point).map_err(&place)?;
+        if let Some(dissipation) = self.model.dissipation {
+            let truncated = self.polynomial(dissipation, degree, &point);
+            self.model.dissipation = Some(truncated.map_err(&place)?);
+        }
+        for at in 0..self.model.forces.len() {
+            let force = self.model.forces[at].value;
+            let truncated = self.polynomial(force, degree - 1, &point);
+            self.model.forces[at].value = truncated.map_err(&place)?;
+        }
+        Ok(())
+    }
+
+    fn point(&self, assignments: &[Assignment]) -> Result<Point, Mistake> {
+        let model = &self.model;
+        let mut point = Point::default();
+        for Assignment {
+            target,
+            span,
+            value,
+        } in assignments
+        {
+            let is_momentum = |name: &str| model.momenta.iter().any(|array| array.name == name);
+            let wrong = |kind| (*span, kind);
+            let (half, arrays) = match (target.rate, model.form) {
+                (true, Form::Hamiltonian) => {
+                    return Err(wrong(Kind::VelocityInHamiltonian { via: None }));
+                }
+                (true, Form::Lagrangian) => (&mut point.z, &model.coordinates),
+                (false, _) if is_momentum(&target.name) => (&mut point.z, &model.momenta),
+                (false, _) => (&mut point.q, &model.coordinates),
+            };
+            let places = target.places(arrays, PASS).map_err(wrong)?;
+            if half.set(places, *value) {
+                let name = target.to_string();
+                return Err(wrong(Kind::RepeatedEntry { name }));
+            }
+        }
+        Ok(point)
+    }
+
+    /// The Taylor polynomial of an expression.
+    fn polynomial(&mut self, of: ExprId, degree: u32, point: &Point) -> Result<ExprId, Kind> {
+        let graph = &mut self.model.graph;
+        let mut of = of;
+        if point.is_by_place() && holds_varying_index(graph, of) {
+            of = graph.unroll(of).unwrap_or(of);
+            if holds_varying_index(graph, of) {
+                return Err(Kind::PassOfLength { pass: PASS });
+            }
+        }
+        let sum = series(graph, of, degree, point);
+        let polynomial = graph.with_leaves(sum, &mut |graph, input| at_point(graph, input, point));
+        if is_singular(graph, polynomial) {
+            return Err(Kind::NoTaylorPolynomial);
+        }
+        // Derivatives of different order share terms.
+        let (constant, terms) = graph.terms(polynomial);
+        Ok(graph.linear(constant, &terms))
+    }
+}
+
+/// Σ 1/j! Dʲ f[δ, …, δ] with leaves for δ.
+fn series(graph: &mut Graph, of: ExprId, degree: u32, point: &Point) -> ExprId {
+    let mut terms = vec![(Constant::ONE, of)];
+    let mut derivative = of;
+    let mut factorial = 1;
+    for order in 1..=degree {
+        derivative = directional(graph, derivative, &mut |graph, input| {
+            let (_, at, leaf) = point.half(input)?;
+            Some(graph.input(Input::ParameterElement(leaf.to_owned(), at.clone())))
+        });
+        // 12! is far from the largest integer.
+        factorial *= i64::from(order);
+        let factor = Constant::integer(factorial).reciprocal();
+        terms.push((factor.unwrap_or(Constant::ZERO), derivative));
+    }
+    graph.linear(Constant::ZERO, &terms)
+}
+
+/// q₀ for q, and q − q₀ for the leaf of the deviation.
+fn at_point(graph: &mut Graph, input: &Input, point: &Point) -> Option<ExprId> {
+    if let Some((values, at, _)) = point.half(input) {
+        return Some(match values.at(at) {
+            Some(value) => value,
+            None => graph.integer(0),
+        });
+    }
+    let Input::ParameterElement(leaf, at) = input else {
+        return None;
+    };
+    let kinds = [Input::Coordinate, Input::Velocity, Input::Momentum];
+    let kind = DEVIATIONS.iter().position(|own| own == leaf)?;
+    let input = kinds[kind](at.clone());
+    let state = graph.input(input.clone());
+    Some(match point.half(&input)?.0.at(at) {
+        Some(value) => graph.subtract(state, value),
+        None => state,
+    })
+}
+
+/// Whether a part without leaves has no value: what has one is a number.
+fn is_singular(graph: &Graph, id: ExprId) -> bool {
+    let constant = |id: &ExprId| graph.as_constant(*id);
+    graph
+        .reachable(&[id])
+        .into_iter()
+        .any(|id| match graph.node(id) {
+            Node::Constant(value) => !value.to_f64().is_finite(),
+            Node::Input(_) | Node::Loop { .. } | Node::Sum { .. } => false,
+            // A number stays a factor only where it is zero to a negative power.
+            Node::Product(factors) => factors.iter().any(|(x, _)| constant(x).is_some()),
+            node => node
+                .children()
+                .iter()
+                .all(|child| constant(child).is_some()),
+        })
+}
