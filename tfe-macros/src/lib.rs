@@ -9,6 +9,8 @@ mod emit;
 mod expand;
 mod fallback;
 mod family;
+#[cfg(test)]
+mod fuzz;
 mod input;
 mod page;
 mod solver;

@@ -4,6 +4,8 @@
 //! cargo run --release -p tfe-symbolic --example fuzz_declarations -- COUNT [FIRST]
 //! ```
 //!
+//! With the path of a file of cases, written as in `tests/corpus`, in the place of `COUNT`, these are tried instead.
+//!
 //! With `CARGO_PROFILE_RELEASE_OVERFLOW_CHECKS=true` and `CARGO_PROFILE_RELEASE_DEBUG_ASSERTIONS=true` in the environment the engine is
 //! checked as it runs in a user's development profile.
 //!
@@ -15,6 +17,7 @@ mod declarations;
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
+use std::path::Path;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -39,18 +42,26 @@ const PROGRESS: u64 = 10_000;
 static CURRENT: AtomicU64 = AtomicU64::new(u64::MAX);
 
 fn main() {
-    let mut arguments = std::env::args()
-        .skip(1)
-        .map(|text| text.replace('_', "").parse());
-    let (Some(Ok(count)), first) = (arguments.next(), arguments.next()) else {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let Some(what) = arguments.first() else {
         eprintln!("how many declarations? fuzz_declarations COUNT [FIRST]");
         std::process::exit(2);
     };
-    let first: u64 = first.and_then(Result::ok).unwrap_or(0);
-    let corpus = corpus::all();
-    println!("{} declarations to mutate", corpus.len());
+    let number = |text: &String| text.replace('_', "").parse::<u64>();
     std::thread::spawn(watch);
     let mut report = Report::default();
+    let Ok(count) = number(what) else {
+        let cases = corpus::read(Path::new(what));
+        for (number, case) in (0..).zip(&cases) {
+            report.take(number, case);
+        }
+        report.finish(report.total.iter().sum());
+        return;
+    };
+    let first = arguments.get(1).and_then(|text| number(text).ok());
+    let first = first.unwrap_or(0);
+    let corpus = corpus::all();
+    println!("{} declarations to mutate", corpus.len());
     for number in first..first + count {
         if count == 1 {
             println!("{}", Declaration::random(SEED, number, &corpus));

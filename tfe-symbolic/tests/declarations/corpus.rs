@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tfe_symbolic::context::{Context, Field, FieldKind, Length};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
 use super::{Declaration, structs};
 
@@ -14,20 +14,26 @@ pub fn cases() -> Vec<Declaration> {
     let folder = workspace().join("tfe-symbolic/tests/corpus/accept");
     let mut declarations = Vec::new();
     for path in files(&folder, "txt") {
-        let text = std::fs::read_to_string(&path).unwrap_or_default();
-        for case in text.split("=== ").skip(1) {
-            let fields = case.split_once("struct:").map_or("", |(_, rest)| rest);
-            let fields = fields.lines().next().unwrap_or_default();
-            let arguments = case.split_once("--- declaration\n");
-            let arguments = arguments.map_or("", |(_, rest)| rest);
-            let arguments = arguments.split("\n--- result").next().unwrap_or_default();
-            declarations.push(Declaration {
-                context: structs::context(fields),
-                arguments: arguments.to_owned(),
-            });
-        }
+        declarations.extend(read(&path));
     }
     by_length(declarations)
+}
+
+/// The declarations of a file of the corpus; results are ignored.
+pub fn read(path: &Path) -> Vec<Declaration> {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let case = |case: &str| {
+        let fields = case.split_once("struct:").map_or("", |(_, rest)| rest);
+        let fields = fields.lines().next().unwrap_or_default();
+        let arguments = case.split_once("--- declaration\n");
+        let arguments = arguments.map_or("", |(_, rest)| rest);
+        let arguments = arguments.split("\n--- result").next().unwrap_or_default();
+        Declaration {
+            context: structs::context(fields),
+            arguments: arguments.trim_end().to_owned(),
+        }
+    };
+    text.split("=== ").skip(1).map(case).collect()
 }
 
 fn by_length(mut declarations: Vec<Declaration>) -> Vec<Declaration> {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tfe_symbolic::context::{FieldKind, Length};
+use tfe_symbolic::syntax::context::{FieldKind, Length};
 
 use super::mutation::{ONE, TWO};
 use super::names;

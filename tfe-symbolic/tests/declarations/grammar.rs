@@ -1,6 +1,6 @@
 //! Random declarations by the rules of the language: all its arguments, with formulas of all kinds.
 
-use tfe_symbolic::context::{Context, Field, FieldKind};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 use super::formula::{Binding, Coordinate, Holds, Size, Writer};
 use super::random::Random;
@@ -10,8 +10,8 @@ use super::{Declaration, names};
 pub fn declaration(random: &mut Random) -> Declaration {
     let is_hamiltonian = random.per_mille(330);
     let kind = random.weighted(&[70, 10, 20]);
-    let depths: &[usize] = match random.weighted(&[85, 13, 2]) {
-        0 => &[0, 0, 1, 1, 1, 2],
+    let depths: &[usize] = match random.weighted(&[975, 23, 2]) {
+        0 => &[0, 0, 0, 0, 1, 1, 1, 2],
         1 => &[1, 2, 2, 3],
         _ => &[2, 3, 3, 4],
     };
@@ -65,8 +65,8 @@ impl Draft<'_> {
     fn coordinates(&mut self, kind: usize) {
         let sizes = match kind {
             0 => {
-                let count = *self.writer.random.pick(&[1, 1, 1, 1, 1, 2, 2, 3]);
-                let size = |random: &mut Random| match random.weighted(&[80, 18, 2]) {
+                let count = *self.writer.random.pick(&[1, 1, 1, 1, 1, 1, 1, 2, 2, 3]);
+                let size = |random: &mut Random| match random.weighted(&[88, 11, 1]) {
                     0 => Size::One,
                     1 => Size::Literal(1 + random.below(4)),
                     _ => {
@@ -81,7 +81,7 @@ impl Draft<'_> {
                 vec![Size::Parameter(name)]
             }
             _ => {
-                let count = *self.writer.random.pick(&[1, 1, 1, 2, 2, 3]);
+                let count = *self.writer.random.pick(&[1, 1, 1, 1, 2, 3]);
                 let mut sizes = Vec::new();
                 for at in 0..count {
                     let name = self.writer.fresh(&["n", "w", "links"]);
@@ -197,7 +197,7 @@ impl Draft<'_> {
             let position = self.writer.scalar(positions, depth);
             terms.push(format!("(dot({position}))^2"));
         }
-        for _ in 0..self.writer.random.below(3) {
+        for _ in 0..*self.writer.random.pick(&[0, 1, 1, 1, 2]) {
             let depth = self.depth();
             let holds = Holds {
                 velocities: !self.is_hamiltonian && self.chance(100),

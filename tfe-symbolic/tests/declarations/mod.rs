@@ -16,10 +16,14 @@ pub mod names;
 pub mod pipeline;
 pub mod random;
 pub mod reduce;
+pub mod regressions;
 pub mod structs;
 
 use random::Random;
-use tfe_symbolic::context::Context;
+use tfe_symbolic::syntax::context::Context;
+
+/// How many in a thousand declarations by the grammar are changed in one place, too.
+const MISTAKEN: usize = 400;
 
 /// A struct and the arguments of its attribute.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +41,11 @@ impl Declaration {
         if number.is_multiple_of(2) {
             mutation::mutated(&mut random, corpus)
         } else {
-            grammar::declaration(&mut random)
+            let mut declaration = grammar::declaration(&mut random);
+            if random.per_mille(MISTAKEN) {
+                mutation::change(&mut random, &mut declaration, corpus);
+            }
+            declaration
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Small changes of declarations: tokens and arguments left out, repeated, exchanged, replaced.
 
-use tfe_symbolic::context::{FieldKind, Length};
+use tfe_symbolic::syntax::context::{FieldKind, Length};
 
 use super::random::Random;
 use super::{Declaration, names};
@@ -61,16 +61,17 @@ pub fn joined(tokens: &[String]) -> String {
 
 /// A declaration of the corpus with one to four changes; those at its beginning are taken more often.
 pub fn mutated(random: &mut Random, corpus: &[Declaration]) -> Declaration {
-    let at = (0..3).map(|_| random.below(corpus.len())).min();
+    let at = (0..8).map(|_| random.below(corpus.len())).min();
     let mut declaration = corpus[at.unwrap_or(0)].clone();
-    let changes = [1, 1, 1, 2, 2, 3, 4];
+    let changes = [1, 1, 2, 2, 2, 3, 4];
     for _ in 0..*random.pick(&changes) {
         change(random, &mut declaration, corpus);
     }
     declaration
 }
 
-fn change(random: &mut Random, declaration: &mut Declaration, corpus: &[Declaration]) {
+/// One small change.
+pub fn change(random: &mut Random, declaration: &mut Declaration, corpus: &[Declaration]) {
     let other = random.pick(corpus);
     if random.per_mille(60) {
         change_field(random, declaration, other);
@@ -196,7 +197,7 @@ fn wrap(random: &mut Random, words: &mut Vec<String>) {
 
 /// The arguments of a declaration.
 pub fn arguments(text: &str) -> Vec<String> {
-    let ranges = tfe_symbolic::parse::split_arguments(text);
+    let ranges = tfe_symbolic::syntax::parse::split_arguments(text);
     ranges
         .into_iter()
         .map(|range| text[range].trim().to_owned())

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use tfe_symbolic::compile::declare;
-use tfe_symbolic::context::{Context, FieldKind, Length};
-use tfe_symbolic::count::Counts;
-use tfe_symbolic::declared::{Declared, names};
-use tfe_symbolic::derivation::Derivation;
-use tfe_symbolic::interpret::{Environment, InterpretError, interpret};
+use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::model::declared::{Declared, names};
+use tfe_symbolic::program::count::Counts;
+use tfe_symbolic::program::interpret::{Environment, InterpretError, interpret};
 use tfe_symbolic::program::{By, Program, Request, Statement};
+use tfe_symbolic::syntax::context::{Context, FieldKind, Length};
 
 use super::Declaration;
 
@@ -64,7 +64,7 @@ fn derive(declared: &Declared, context: &Context) {
         let mut context = context.clone();
         for (name, _) in &variant.added {
             let (name, kind) = (name.clone(), FieldKind::Scalar);
-            let field = tfe_symbolic::context::Field { name, kind };
+            let field = tfe_symbolic::syntax::context::Field { name, kind };
             context.fields.push(field);
         }
         derive(&variant.model, &context);

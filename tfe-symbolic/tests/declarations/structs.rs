@@ -1,6 +1,6 @@
 //! Structs in the notation of the corpus and in Rust.
 
-use tfe_symbolic::context::{Context, Field, FieldKind, Length};
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
 /// `<N> m, k: [3], c: [N], w: Vec, n: usize, left: indices, label: String`
 pub fn context(text: &str) -> Context {
