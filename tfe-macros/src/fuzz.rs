@@ -64,7 +64,7 @@ fn random_declarations_expand_to_items() {
                 failures.push(panic.place);
             }
         }
-        if (number + 1) % 10_000 == 0 {
+        if (number + 1).is_multiple_of(10_000) {
             println!("{} declarations, {expanded} expanded", number + 1);
         }
     }

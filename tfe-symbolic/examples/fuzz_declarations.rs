@@ -68,7 +68,7 @@ fn main() {
         }
         CURRENT.store(number, Ordering::Relaxed);
         report.take(number, &Declaration::random(SEED, number, &corpus));
-        if (number + 1) % PROGRESS == 0 {
+        if (number + 1).is_multiple_of(PROGRESS) {
             report.progress(number + 1 - first);
         }
     }

@@ -8,12 +8,12 @@ impl Random {
     /// The source of this number among those of a seed.
     pub fn new(seed: u64, number: u64) -> Self {
         let mut random = Self(seed);
-        let start = random.next() ^ number.wrapping_mul(0xd129_0d3a_93fb_4a2d);
+        let start = random.bits() ^ number.wrapping_mul(0xd129_0d3a_93fb_4a2d);
         Self(start)
     }
 
     /// The next 64 bits.
-    pub fn next(&mut self) -> u64 {
+    pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -24,7 +24,7 @@ impl Random {
     /// A number below `end`; zero where `end` is zero.
     pub fn below(&mut self, end: usize) -> usize {
         let end = u64::try_from(end.max(1)).unwrap_or(u64::MAX);
-        usize::try_from(self.next() % end).unwrap_or(0)
+        usize::try_from(self.bits() % end).unwrap_or(0)
     }
 
     /// Whether an event of this probability in per mille happens.
