@@ -10,6 +10,8 @@ mod emit;
 mod expand;
 mod fallback;
 mod family;
+#[cfg(test)]
+mod fuzz;
 mod input;
 mod lengths;
 mod page;
