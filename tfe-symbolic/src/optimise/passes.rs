@@ -84,7 +84,7 @@ impl Passes {
 
     /// All but one.
     pub(crate) const fn without(pass: Pass) -> Self {
-        Self(u32::MAX & !(1 << pass as u32))
+        Self(!(1 << pass as u32))
     }
 
     /// Whether this one runs.

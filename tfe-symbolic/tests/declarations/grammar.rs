@@ -559,7 +559,7 @@ impl Draft<'_> {
                         format!("rigid({constraint} = {spring})")
                     }
                     (4, ..) => format!("frozen({target} = {value})"),
-                    (_, ..) => {
+                    (..) => {
                         let degree = *self.writer.random.pick(&[2, 2, 2, 3, 4, 5, 6, 1, 12]);
                         let value = self.writer.parameter();
                         match self.writer.random.below(3) {

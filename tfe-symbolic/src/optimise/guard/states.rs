@@ -72,7 +72,11 @@ impl Regime {
             offset: OFFSETS[number % OFFSETS.len()],
             spread: SPREADS[number % SPREADS.len()],
             opposite: number % 3 == 2,
-            decades: if number / 4 % 2 == 0 { 0.0 } else { DECADES },
+            decades: if (number / 4).is_multiple_of(2) {
+                0.0
+            } else {
+                DECADES
+            },
         }
     }
 
