@@ -85,7 +85,7 @@ fn vector(random: &mut Random, shape: Shape, length: usize, base: f64, exact: bo
             } else {
                 delta
             };
-            let sign = if at % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if at.is_multiple_of(2) { 1.0 } else { -1.0 };
             sign * center * (1.0 + delta * random.signed(0.5, 1.0))
         }
     };

@@ -73,7 +73,8 @@ impl Model {
         }
         let names = self.parameters.iter().zip(used);
         names
-            .filter_map(|(name, used)| used.then(|| name.clone()))
+            .filter(|(_, used)| *used)
+            .map(|(name, _)| name.clone())
             .collect()
     }
 }
