@@ -356,7 +356,7 @@ pub(crate) fn factor<V: Real, const N: usize>(like: V, matrix: &mut [[V; N]; N])
             let factor = matrix[row][column] * inverse;
             matrix[row][column] = factor;
             for j in column + 1..N {
-                matrix[row][j] = matrix[row][j] - factor * matrix[column][j];
+                matrix[row][j] -= factor * matrix[column][j];
             }
         }
     }
@@ -366,12 +366,12 @@ pub(crate) fn factor<V: Real, const N: usize>(like: V, matrix: &mut [[V; N]; N])
 fn solve<V: Four, const N: usize>(like: V, factors: &[Row<N>; N], vector: &mut [V; N]) {
     for row in 0..N {
         for j in 0..row {
-            vector[row] = vector[row] - like.with(factors[row][j]) * vector[j];
+            vector[row] -= like.with(factors[row][j]) * vector[j];
         }
     }
     for row in (0..N).rev() {
         for j in row + 1..N {
-            vector[row] = vector[row] - like.with(factors[row][j]) * vector[j];
+            vector[row] -= like.with(factors[row][j]) * vector[j];
         }
         vector[row] = vector[row] * like.with(factors[row][row]);
     }
