@@ -73,7 +73,7 @@ const _: () = {
                 let t5 = t2 * t4;
                 let t6 = t1 + t5;
                 let t7 = t4 * t6;
-                t0 = t0 - t7;
+                t0 -= t7;
             }
             for i in 0..N {
                 let t8 = t.like(0.5) * t.like(self.m[i]);

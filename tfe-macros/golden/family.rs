@@ -93,7 +93,7 @@ const _: () = {
                 let t13 = t11 / t.like(3.0);
                 let t14 = t9 - t13;
                 let t15 = t12 * t14;
-                t6 = t6 - t15;
+                t6 -= t15;
             }
             t6
         }

@@ -232,11 +232,11 @@ impl<'a> Emitter<'a> {
                 && self.reads.get(target) == Some(&1)
                 && written(next) == Some(&Operand::Temporary(*target))
             {
-                let taken_away = match operation {
+                let in_place = match operation {
                     Operation::Negate(a) => self.take_away(next, a),
-                    _ => None,
+                    operation => self.changed_in_place(next, operation),
                 };
-                tokens.extend(taken_away.unwrap_or_else(|| {
+                tokens.extend(in_place.unwrap_or_else(|| {
                     let value = self.operation(operation);
                     self.write(next, value)
                 }));
@@ -297,6 +297,26 @@ impl<'a> Emitter<'a> {
             Statement::Balance { output, length } => balance(&self.second, output, length, index),
             Statement::Clear { array } => self.clear(*array),
         }
+    }
+
+    /// `sum += value` or `sum -= value`, where a running sum becomes itself with something added or subtracted.
+    fn changed_in_place(
+        &mut self,
+        statement: &Statement,
+        operation: &Operation,
+    ) -> Option<TokenStream> {
+        let Statement::Assign { target, .. } = statement else {
+            return None;
+        };
+        let own = Operand::Temporary(*target);
+        let (operator, value) = match operation {
+            Operation::Add(a, b) if *a == own => (quote!(+=), b),
+            Operation::Add(a, b) if *b == own => (quote!(+=), a),
+            Operation::Subtract(a, b) if *a == own => (quote!(-=), b),
+            _ => return None,
+        };
+        let (sum, value) = (self.name(*target), self.operand(value));
+        Some(quote!(#sum #operator #value;))
     }
 
     /// `place -= value`, where the negative of `value` is added to a place.
