@@ -44,7 +44,7 @@ pub(crate) fn balance(
             for row in 0..#length {
                 for column in 0..#length {
                     if row != column {
-                        sums[column] = sums[column] - #off;
+                        sums[column] -= #off;
                     }
                 }
             }
@@ -59,7 +59,7 @@ pub(crate) fn balance(
                 for column in 0..#length {
                     let mut sum = t.like(0.0);
                     for row in (0..#length).filter(|row| *row != column) {
-                        sum = sum - #off;
+                        sum -= #off;
                     }
                     #on = sum;
                     #other
