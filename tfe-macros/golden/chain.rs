@@ -32,6 +32,7 @@ struct Chain<const N: usize> {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
+    #[allow(clippy::int_plus_one)]
     impl<const N: usize> Chain<N> {
         const __TFE_LENGTHS: () = {
             {

@@ -28,6 +28,8 @@ impl Lengths {
         Self {
             constant: quote! {
                 #[automatically_derived]
+                // Bounds stand as they follow from the declaration: `i + 1 <= n` beside others like it.
+                #[allow(clippy::int_plus_one)]
                 impl #impl_generics #name #type_generics #where_clause {
                     const __TFE_LENGTHS: () = {
                         #(#checks)*

@@ -29,7 +29,7 @@ impl ByHand<18> for Planets {
                 for k in 0..3 {
                     let component = pull * d[k];
                     force[6 * k + j] += component;
-                    force[6 * k + i] = force[6 * k + i] - component;
+                    force[6 * k + i] -= component;
                 }
             }
         }
