@@ -21,11 +21,10 @@ use crate::schedule::order::in_order;
 use crate::schedule::statements::schedule;
 use crate::schedule::store_or_add::settle;
 
-/// Of the drafts, those that cost at most so many fifths of the cheapest are followed: identities may change their order. Tuned on the models of
-/// `benches/kernels`; with twice the margin nothing gets cheaper and expansion takes a third longer.
+/// Of the drafts, those that cost at most so many fifths of the cheapest are followed: common factors and identities may change their order.
 const MAX_FIFTHS_OF_CHEAPEST: usize = 6;
 
-/// Identities are sought in the cheapest plans of so many operations altogether. Twice as many change no kernel of `benches/kernels`.
+/// Identities are sought in the cheapest plans of so many operations altogether: the search takes more than linear time.
 const MAX_OPERATIONS_FOR_IDENTITIES: usize = 240;
 
 /// Results in their loops, before common factors are sought.

@@ -6,7 +6,8 @@
 
 use crate::expr::input::Input;
 
-/// How many states there are. With half as many, one model in a thousand gets a formula that loses digits; twice as many found no more.
+/// How many states there are: each kind of cluster meets each offset and spread. With these, 1 of 605 models of the example `lost_digits` has an
+/// entry that loses more than eightfold; the time of the guard is proportional to their number.
 pub(crate) const STATES: usize = 96;
 
 /// The inputs that are close to each other.
