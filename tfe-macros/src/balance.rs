@@ -1,17 +1,13 @@
 //! The diagonals of blocks from what stands beside them, as Rust statements.
 
+use crate::indices::index;
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::program::{Array, Place};
 
-/// The sums of all columns at once where their number is known, else one by one; `index` writes an index as Rust.
-pub(crate) fn balance(
-    second: &TokenStream,
-    output: &Place,
-    length: &Affine,
-    index: fn(&Affine) -> TokenStream,
-) -> TokenStream {
+/// The sums of all columns at once where their number is known, else one by one.
+pub(crate) fn balance(second: &TokenStream, output: &Place, length: &Affine) -> TokenStream {
     let entry = |output: &Place, row: &TokenStream, column: &TokenStream| {
         let array = match output.array {
             Array::ZZ => quote!(#second zz),

@@ -1,6 +1,7 @@
 //! The constraints of a model: their names and kinds, and their kernels.
 
-use crate::emit::{self, Emitter};
+use crate::emit::Emitter;
+use crate::indices;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use tfe_symbolic::derive::derivation::Derivation;
@@ -19,7 +20,7 @@ pub(crate) fn members(
     let kernels = Kernels {
         derivation,
         coordinates,
-        dof: emit::index(&declared.dof),
+        dof: indices::index(&declared.dof),
         count: Literal::usize_unsuffixed(declared.constraints.len()),
     };
     let constraints = declared.constraints.iter().map(constant);

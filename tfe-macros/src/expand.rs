@@ -2,6 +2,7 @@
 
 use crate::docs::Docs;
 use crate::emit::{self, Emitter, Signature};
+use crate::indices;
 use crate::lengths::Lengths;
 use crate::source_map::SourceMap;
 use crate::{constraint, fallback, family, input, page, solver, state, variant};
@@ -125,7 +126,7 @@ impl<'a> Kernels<'a> {
             derivation,
             item,
             path,
-            dof: emit::index(&declared.dof),
+            dof: indices::index(&declared.dof),
             coordinates: names(&declared.coordinates),
         }
     }
@@ -464,7 +465,7 @@ impl<'a> Kernels<'a> {
 
     /// The value of a parameter; NaN where an array of any length is too short for it.
     fn parameter(&self, parameter: &Parameter) -> TokenStream {
-        let field = emit::identifier(&parameter.field);
+        let field = indices::identifier(&parameter.field);
         let Some(element) = parameter.element.map(Literal::usize_unsuffixed) else {
             return quote!(self.#field);
         };
@@ -535,7 +536,7 @@ impl<'a> Kernels<'a> {
         };
         let count = Literal::usize_unsuffixed(self.declared.observables.len());
         let observables = self.declared.observables.iter().enumerate().map(|(k, Observable { name, .. })| {
-            let (method, k) = (emit::identifier(name), Literal::usize_unsuffixed(k));
+            let (method, k) = (indices::identifier(name), Literal::usize_unsuffixed(k));
             let doc = format!(" The observable `{name}` at time `{time}`, coordinates `q` and {second_doc} `{second}`.");
             let own = docs.attributes("output", name);
             quote! {

@@ -3,7 +3,7 @@
 mod family;
 mod variant;
 
-use crate::emit::identifier;
+use crate::indices::identifier;
 use crate::source_map::SourceMap;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{quote, quote_spanned};

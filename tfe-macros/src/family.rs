@@ -6,7 +6,8 @@ mod sites;
 pub(crate) mod strides;
 
 use crate::docs::Docs;
-use crate::emit::{self, Body, Emitter};
+use crate::emit::{Body, Emitter};
+use crate::indices;
 use crate::page;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -290,7 +291,7 @@ impl Kernels<'_> {
                 .as_ref()
                 .filter(|length| length.is_of_run_time())?;
             let name = format!("{}[{length}]", array.name);
-            let length = emit::index(length);
+            let length = indices::index(length);
             Some(quote!(__tfe::checks::elements(#name, #length)?;))
         });
         let mut lengths: BTreeMap<&str, Vec<TokenStream>> = BTreeMap::new();
@@ -303,12 +304,12 @@ impl Kernels<'_> {
                     ranges,
                     length,
                 } => {
-                    let length = emit::signed(length);
+                    let length = indices::signed(length);
                     let one = quote!((#length, #text, #ranges));
                     lengths.entry(field).or_default().push(one);
                 }
                 Requirement::Turns { ranges, start, end } => {
-                    let (start, end) = (emit::signed(start), emit::signed(end));
+                    let (start, end) = (indices::signed(start), indices::signed(end));
                     rest.push(quote!(__tfe::checks::turns(#ranges, #start, #end)?;));
                 }
                 Requirement::Index {
@@ -320,11 +321,11 @@ impl Kernels<'_> {
                     length,
                 } => {
                     let entries: Vec<(&str, &Affine)> = place.entries().collect();
-                    let value = emit::signed(place);
+                    let value = indices::signed(place);
                     let length = match length {
-                        Extent::Known(length) => emit::index(length),
+                        Extent::Known(length) => indices::index(length),
                         Extent::OfField(field) => {
-                            let field = emit::identifier(field);
+                            let field = indices::identifier(field);
                             quote!(self.#field.len())
                         }
                     };
@@ -332,15 +333,16 @@ impl Kernels<'_> {
                     let one = match entries[..] {
                         // Of one entry the message names the list and the place.
                         [(list, at)] => {
-                            let (field, at) = (emit::identifier(list), emit::index(at));
+                            let (field, at) = (indices::identifier(list), indices::index(at));
                             let entry = quote!((#list, &self.#field, #at));
                             quote!(__tfe::checks::entry(#index, #entry, #value, #length)?;)
                         }
                         _ => quote!(__tfe::checks::index(#index, #value, #length)?;),
                     };
                     let nested = nest.iter().rev().fold(one, |inner, range| {
-                        let variable = emit::loop_name(range.variable);
-                        let (start, end) = (emit::index(&range.start), emit::index(&range.end));
+                        let variable = indices::loop_name(range.variable);
+                        let (start, end) =
+                            (indices::index(&range.start), indices::index(&range.end));
                         quote!(for #variable in #start..#end { #inner })
                     });
                     rest.push(nested);
@@ -348,7 +350,7 @@ impl Kernels<'_> {
             }
         }
         let lengths = lengths.iter().map(|(name, uses)| {
-            let field = emit::identifier(name);
+            let field = indices::identifier(name);
             quote!(__tfe::checks::field_length(#name, self.#field.len(), &[#(#uses),*])?;)
         });
         quote!(#(#elements)* #(#lengths)* #(#rest)*)
@@ -428,7 +430,7 @@ impl Kernels<'_> {
 /// A number of coordinates, which saturates rather than overflows.
 fn length(affine: &Affine) -> TokenStream {
     if affine.constant == 0 && affine.terms.len() == 1 {
-        return emit::index(affine);
+        return indices::index(affine);
     }
     let constant = Literal::usize_suffixed(usize::try_from(affine.constant).unwrap_or(0));
     // Each array brings its length once, so that a factor counts arrays of one length.
@@ -436,7 +438,7 @@ fn length(affine: &Affine) -> TokenStream {
         .terms
         .iter()
         .fold(quote!(#constant), |sum, (symbol, factor)| {
-            let symbol = emit::index(&Affine::symbol(symbol.clone()));
+            let symbol = indices::index(&Affine::symbol(symbol.clone()));
             if *factor == 1 {
                 return quote!(#sum.saturating_add(#symbol));
             }

@@ -1,6 +1,6 @@
 //! What must hold of const parameters: a constant that is evaluated where kernels are compiled for their values.
 
-use crate::emit;
+use crate::indices;
 use proc_macro2::TokenStream;
 use quote::quote;
 use syn::ItemStruct;
@@ -59,7 +59,7 @@ fn check(requirement: &Requirement) -> Option<TokenStream> {
         ranges => format!(" for `{ranges}`"),
     };
     let message = format!("index `{text}`{turns} is outside `{array}` of length {length}");
-    let (value, length) = (emit::signed(place), emit::signed(length));
+    let (value, length) = (indices::signed(place), indices::signed(length));
     let is_positive = place.as_constant().is_some_and(|place| place >= 0);
     let from_zero = (!is_positive).then(|| quote!(::core::assert!(0 <= #value, #message);));
     let assertion = quote! {
@@ -67,8 +67,8 @@ fn check(requirement: &Requirement) -> Option<TokenStream> {
         ::core::assert!(#value < #length, #message);
     };
     let nested = nest.iter().rev().fold(assertion, |inner, range| {
-        let variable = emit::loop_name(range.variable);
-        let (start, end) = (emit::index(&range.start), emit::index(&range.end));
+        let variable = indices::loop_name(range.variable);
+        let (start, end) = (indices::index(&range.start), indices::index(&range.end));
         quote! {
             let mut #variable: usize = #start;
             while #variable < #end {

@@ -12,6 +12,7 @@ mod fallback;
 mod family;
 #[cfg(test)]
 mod fuzz;
+mod indices;
 mod input;
 mod lengths;
 mod page;

@@ -1,7 +1,7 @@
 //! Steppers for one model and one element: `solver(Name, Mixed::<4>)`.
 
 use crate::docs::Docs;
-use crate::emit::{identifier, index};
+use crate::indices::{identifier, index};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;

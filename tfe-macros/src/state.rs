@@ -1,6 +1,7 @@
 //! The methods that make states: `state`, and `state_at` of models with a time transformation.
 
-use crate::emit::{Emitter, index};
+use crate::emit::Emitter;
+use crate::indices::index;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::Visibility;

@@ -1,7 +1,7 @@
 //! Models made from the declared one: `model(Name, truncated(2), frozen(r = l))`.
 
 use crate::docs::Docs;
-use crate::emit::identifier;
+use crate::indices::identifier;
 use crate::input::plain;
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};

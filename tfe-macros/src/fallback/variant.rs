@@ -1,6 +1,6 @@
 //! Stubs of models made from one whose declaration is wrong.
 
-use crate::emit::identifier;
+use crate::indices::identifier;
 use crate::input::plain;
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};

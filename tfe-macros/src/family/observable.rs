@@ -1,7 +1,7 @@
 //! The observables of a model of run-time length: their kernel, their names, and one method for each.
 
 use super::sites::{self, Sites};
-use crate::emit;
+use crate::indices;
 use proc_macro2::TokenStream;
 use quote::quote;
 use syn::Visibility;
@@ -53,11 +53,11 @@ pub(super) fn method(
     path: &TokenStream,
 ) -> TokenStream {
     let name = &one.name;
-    let method = emit::identifier(name);
+    let method = indices::identifier(name);
     let private = quote!(#path::__private);
     // What cannot be written as an index is no place of a result either.
     let first = one.first_column().unwrap_or_default();
-    let column = emit::index(&first);
+    let column = indices::index(&first);
     let sites = one.ranges.first();
     let doc = match sites {
         None => format!(

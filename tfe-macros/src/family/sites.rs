@@ -1,6 +1,6 @@
 //! What is declared by site: how many there are in all, and the name of each.
 
-use crate::emit;
+use crate::indices;
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::expr::graph::SumRange;
@@ -20,7 +20,7 @@ pub(super) fn count(all: &[Sites]) -> TokenStream {
 /// The number of sites of a range.
 pub(super) fn length(range: &SumRange) -> TokenStream {
     let length = range.end.plus_scaled(&range.start, -1);
-    emit::index(&length.unwrap_or_default())
+    indices::index(&length.unwrap_or_default())
 }
 
 /// The name of one of all, in order of declaration and of sites.
@@ -33,7 +33,7 @@ pub(super) fn name(all: &[Sites], number: &TokenStream) -> TokenStream {
             let #number = #number - 1;
         },
         Some(range) => {
-            let (start, length) = (emit::index(&range.start), length(range));
+            let (start, length) = (indices::index(&range.start), length(range));
             quote! {
                 let length = #length;
                 if #number < length {

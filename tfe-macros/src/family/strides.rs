@@ -1,6 +1,7 @@
 //! Which kernels run through their sites in one loop, so that they can say how far they have come.
 
-use crate::emit::{Emitter, index, less, loop_name};
+use crate::emit::Emitter;
+use crate::indices::{index, less, loop_name};
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::expr::input::{Affine, IndexSymbol, Input};
