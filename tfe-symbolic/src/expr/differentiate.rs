@@ -130,6 +130,9 @@ impl Forward {
 }
 
 /// Derivatives of an expression by some of its nodes, in one backward sweep. Sums over ranges are not entered: they count as leaves.
+///
+/// Choices are entered forward: what is chosen is a derivative of one branch. An adjoint that is zero in the other branch would be multiplied with
+/// its derivatives, and these may be infinite.
 pub(crate) fn gradient(graph: &mut Graph, of: ExprId, by: &[ExprId]) -> Vec<ExprId> {
     let order = graph.reachable_outside_sums(&[of]);
     let mut results: Map<ExprId, ExprId> = Map::default();
@@ -146,6 +149,7 @@ pub(crate) fn gradient(graph: &mut Graph, of: ExprId, by: &[ExprId]) -> Vec<Expr
     let mut contributions: Map<ExprId, Vec<(Constant, ExprId)>> = Map::default();
     let one = graph.constant(Constant::ONE);
     contributions.insert(of, vec![(Constant::ONE, one)]);
+    let mut choices: Vec<(ExprId, ExprId)> = Vec::new();
     for id in order.into_iter().rev().filter(|id| active.contains(id)) {
         let Some(terms) = contributions.remove(&id) else {
             continue;
@@ -153,6 +157,10 @@ pub(crate) fn gradient(graph: &mut Graph, of: ExprId, by: &[ExprId]) -> Vec<Expr
         let adjoint = graph.linear(Constant::ZERO, &terms);
         results.insert(id, adjoint);
         let node = graph.node(id).clone();
+        if chooses(&node) {
+            choices.push((adjoint, id));
+            continue;
+        }
         for (at, child) in outside_sums(&node).into_iter().enumerate() {
             if active.contains(&child) {
                 let (coefficient, slope) = partial(graph, id, &node, at);
@@ -165,9 +173,47 @@ pub(crate) fn gradient(graph: &mut Graph, of: ExprId, by: &[ExprId]) -> Vec<Expr
         }
     }
     let zero = graph.constant(Constant::ZERO);
-    by.iter()
-        .map(|id| results.get(id).copied().unwrap_or(zero))
-        .collect()
+    let mut by_leaf = Vec::with_capacity(by.len());
+    for leaf in by {
+        let outside = results.get(leaf).copied().unwrap_or(zero);
+        by_leaf.push(match choices.is_empty() {
+            true => outside,
+            false => {
+                let through = through_choices(graph, &choices, *leaf);
+                graph.add(outside, through)
+            }
+        });
+    }
+    by_leaf
+}
+
+/// Whether its value is that of one of its children.
+fn chooses(node: &Node) -> bool {
+    match node {
+        Node::Select { .. } => true,
+        Node::Call { function, .. } => matches!(function, Function::Min | Function::Max),
+        _ => false,
+    }
+}
+
+/// Σ adjoint · ∂choice/∂leaf
+fn through_choices(graph: &mut Graph, choices: &[(ExprId, ExprId)], leaf: ExprId) -> ExprId {
+    let one = graph.constant(Constant::ONE);
+    let mut known = Forward::default();
+    // A leaf may be a sum over a range; what is inside of other sums counts nowhere.
+    let ids: Vec<ExprId> = choices.iter().map(|(_, choice)| *choice).collect();
+    for id in graph.reachable_outside_sums(&ids) {
+        if matches!(graph.node(id), Node::Loop { .. }) {
+            known.0.insert(id, None);
+        }
+    }
+    known.0.insert(leaf, Some(one));
+    let mut terms = Vec::with_capacity(choices.len());
+    for (adjoint, choice) in choices {
+        let slope = known.derivative(graph, *choice, &mut |_, _| None);
+        terms.push((Constant::ONE, graph.multiply(*adjoint, slope)));
+    }
+    graph.linear(Constant::ZERO, &terms)
 }
 
 fn outside_sums(node: &Node) -> Vec<ExprId> {
@@ -235,11 +281,28 @@ fn partial(graph: &mut Graph, id: ExprId, node: &Node, at: usize) -> (Constant, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::expr::comparison::Comparison;
     use crate::expr::graph::SumRange;
     use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
 
     fn q(index: i64) -> Input {
         Input::Coordinate(Affine::constant(index))
+    }
+
+    #[test]
+    fn no_sweep_multiplies_the_branch_that_is_not_chosen() {
+        // f = y (√x if x > 0 else 0); ∂√x/∂x is infinite at x = 0
+        let mut g = Graph::default();
+        let (x, y, zero) = (g.input(q(0)), g.input(q(1)), g.constant(Constant::ZERO));
+        let root = g.call(Function::Sqrt, &[x]);
+        let chosen = g.select(Comparison::Less, zero, x, root, zero);
+        let f = g.multiply(y, chosen);
+        let forward = [0, 1].map(|at| derivative(&mut g, f, &q(at)));
+        assert_eq!(gradient(&mut g, f, &[x, y]), forward);
+        assert_eq!(
+            g.display(forward[0]).to_string(),
+            "q[1]*select(0 < q[0], 0.5*(sqrt(q[0])^(-1)), 0)"
+        );
     }
 
     #[test]
