@@ -76,13 +76,19 @@ impl Graph {
         let depth = depth.checked_sub(1)?;
         match self.node(id) {
             Node::Constant(value) => Some(Sign::Positive.times(*value)),
-            Node::Input(
-                Input::Placeholder(..)
-                | Input::Parameter(_)
-                | Input::ParameterElement(..)
-                | Input::Integer(_),
-            ) => Some(Sign::Positive),
+            Node::Input(Input::Parameter(_) | Input::ParameterElement(..) | Input::Integer(_)) => {
+                Some(Sign::Positive)
+            }
             Node::Input(_) => Some(Sign::Any),
+            // A sum of exact terms may be exact.
+            Node::Sum { constant, terms } => {
+                let number = (!constant.is_zero()).then_some(Some(Sign::Positive.times(*constant)));
+                let signs = terms.iter().map(|(c, x)| {
+                    let sign = self.sign_if_exact(*x, depth)?;
+                    c.is_power_of_two().then(|| sign.times(*c))
+                });
+                common(number.into_iter().chain(signs))
+            }
             Node::Call {
                 function: Function::Abs,
                 arguments,
@@ -102,12 +108,16 @@ impl Graph {
     }
 
     fn common_sign(&self, all: &[ExprId], depth: usize) -> Option<Sign> {
-        let mut signs = all.iter().map(|x| self.sign_if_exact(*x, depth));
-        let first = signs.next()??;
-        signs.try_fold(first, |known, sign| {
-            Some(if sign? == known { known } else { Sign::Any })
-        })
+        common(all.iter().map(|x| self.sign_if_exact(*x, depth)))
     }
+}
+
+/// The sign that all have.
+fn common(mut signs: impl Iterator<Item = Option<Sign>>) -> Option<Sign> {
+    let first = signs.next()??;
+    signs.try_fold(first, |known, sign| {
+        Some(if sign? == known { known } else { Sign::Any })
+    })
 }
 
 #[cfg(test)]

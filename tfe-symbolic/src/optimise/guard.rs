@@ -6,6 +6,9 @@
 //! * its results agree with those of the baseline within the rounding errors of both, so that a false identity is found out, and
 //! * the bound of its rounding error is at most [`MAX_LOSS`] times that of the baseline.
 //!
+//! Operations that are exact at the numbers of a state count as such on both sides: a formula that keeps differences of close numbers until they are
+//! exact is not replaced by one that rounds first. A result that is exact as a whole may be replaced by one that is rounded.
+//!
 //! **Angles.** The argument of a sine or cosine is known to half an ulp of each coordinate and parameter in it: the error of the baseline holds
 //! what such a change of the angles does. So the sine of a difference may be computed from the sines of the angles, as if these had been
 //! rounded before; a difference itself, or a power of it, may not.
@@ -141,7 +144,9 @@ fn is_no_worse(found: Bounded, wanted: Bounded) -> bool {
     // First-order bounds, and numbers below the smallest normal one.
     let apart = (found.value - wanted.value).abs();
     let near = apart <= 2.0 * UNIT * (found.error + wanted.error) + f64::MIN_POSITIVE;
-    near && found.error <= MAX_LOSS * wanted.error + f64::MIN_POSITIVE
+    // A result that is exact by chance is no better than a rounded one.
+    let allowed = wanted.error.max(wanted.value.abs());
+    near && found.error <= MAX_LOSS * allowed + f64::MIN_POSITIVE
 }
 
 fn integer_power(base: Bounded, exponent: i32) -> Bounded {

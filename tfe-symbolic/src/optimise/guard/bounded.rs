@@ -4,7 +4,8 @@
 //! |computed − exact| ≤ error · 2⁻⁵³ (1 + small)        fl(a + b): error_a + error_b + |a + b|
 //! ```
 //!
-//! Inputs and numbers are exact. Each operation adds half an ulp of its result, a function a whole one.
+//! Inputs and numbers are exact. Each operation adds half an ulp of its result, a function a whole one; an operation whose result is exact at the
+//! numbers at hand, such as the difference of two that are close, adds nothing.
 
 use crate::expr::comparison::Comparison;
 use crate::expr::function::Function;
@@ -14,55 +15,84 @@ use crate::expr::function::Function;
 pub(crate) struct Bounded {
     pub(crate) value: f64,
     pub(crate) error: f64,
+    /// The bound of the error of the square root, where that is smaller than what follows from `error`: √(a²) is |a| to the last digit.
+    root_error: Option<f64>,
 }
 
 impl Bounded {
     /// What is given.
     pub(crate) fn exact(value: f64) -> Self {
-        Self { value, error: 0.0 }
+        Self::new(value, 0.0)
+    }
+
+    fn new(value: f64, error: f64) -> Self {
+        Self {
+            value,
+            error,
+            root_error: None,
+        }
     }
 
     /// The result of an operation whose operands bring this error.
     fn rounded(value: f64, error: f64) -> Self {
-        Self {
-            value,
-            error: error + value.abs(),
+        Self::new(value, error + value.abs())
+    }
+
+    /// The result of an operation that is exact, or rounded.
+    fn rounded_unless(is_exact: bool, value: f64, error: f64) -> Self {
+        match is_exact {
+            true => Self::new(value, error),
+            false => Self::rounded(value, error),
         }
     }
 
     /// a + b
     pub(crate) fn plus(self, other: Self) -> Self {
-        let error = self.error + other.error;
-        // Nothing is rounded where one of both is zero.
-        if self.value == 0.0 || other.value == 0.0 {
-            return Self {
-                value: self.value + other.value,
-                error,
-            };
+        let (a, b) = (self.value, other.value);
+        let sum = a + b;
+        let part = sum - a;
+        let rest = (a - (sum - part)) + (b - part);
+        let result = Self::rounded_unless(rest == 0.0, sum, self.error + other.error);
+        let root_error = match (sum == a, sum == b) {
+            (true, _) => self.root_error_beside(other),
+            (_, true) => other.root_error_beside(self),
+            _ => None,
+        };
+        Self {
+            root_error,
+            ..result
         }
-        Self::rounded(self.value + other.value, error)
+    }
+
+    /// The bound of the error of the square root of a sum that is this number, with a term that is too small to change it.
+    fn root_error_beside(self, small: Self) -> Option<f64> {
+        let left_out = small.value.abs() * (2.0 / f64::EPSILON) + small.error;
+        Some(self.root_error? + left_out / (2.0 * self.value.sqrt()))
     }
 
     /// −a
     pub(crate) fn negated(self) -> Self {
-        Self {
-            value: -self.value,
-            ..self
-        }
+        Self::new(-self.value, self.error)
     }
 
     /// a b
     pub(crate) fn times(self, other: Self) -> Self {
-        let error = self.error * other.value.abs() + self.value.abs() * other.error;
-        Self::rounded(self.value * other.value, error)
+        let (a, b) = (self.value, other.value);
+        let error = self.error * b.abs() + a.abs() * other.error;
+        let product = a * b;
+        let is_square = a == b && self.error == other.error;
+        Self {
+            root_error: is_square.then_some(self.error),
+            ..Self::rounded_unless(a.mul_add(b, -product) == 0.0, product, error)
+        }
     }
 
     /// c a, without rounding where c is a power of two
     pub(crate) fn scaled(self, factor: f64, is_exact: bool) -> Self {
-        let product = Self {
-            value: factor * self.value,
-            error: factor.abs() * self.error,
-        };
+        if factor == 1.0 {
+            return self;
+        }
+        let product = Self::new(factor * self.value, factor.abs() * self.error);
         match is_exact {
             true => product,
             false => Self::rounded(product.value, product.error),
@@ -72,8 +102,9 @@ impl Bounded {
     /// a / b
     pub(crate) fn over(self, other: Self) -> Self {
         let (a, b) = (self.value, other.value);
-        let error = self.error / b.abs() + (a / b).abs() * other.error / b.abs();
-        Self::rounded(a / b, error)
+        let quotient = a / b;
+        let error = self.error / b.abs() + quotient.abs() * other.error / b.abs();
+        Self::rounded_unless(quotient.mul_add(b, -a) == 0.0, quotient, error)
     }
 
     /// aⁿ by products; n > 0
@@ -81,9 +112,10 @@ impl Bounded {
         let n = i32::try_from(exponent).unwrap_or(i32::MAX);
         let value = self.value.powi(n);
         let slope = f64::from(exponent) * self.value.powi(n - 1).abs();
+        let error = slope * self.error + f64::from(exponent - 1) * value.abs();
         Self {
-            value,
-            error: slope * self.error + f64::from(exponent - 1) * value.abs(),
+            root_error: (exponent == 2).then_some(self.error),
+            ..Self::new(value, error)
         }
     }
 
@@ -113,10 +145,7 @@ impl Bounded {
                 return if first { x } else { y };
             }
             Function::Abs => {
-                return Self {
-                    value,
-                    error: x.error,
-                };
+                return Self::new(value, x.error);
             }
             Function::Sign => return Self::exact(value),
             Function::Atan2 | Function::Hypot => {
@@ -148,11 +177,24 @@ impl Bounded {
             Function::Ln => v.recip(),
             Function::Sqrt => 0.5 / value,
         };
+        let is_exact = match function {
+            Function::Sqrt => value.mul_add(value, -v) == 0.0,
+            Function::Acos | Function::Acosh | Function::Ln => v == 1.0,
+            // The cosine of equal angles may follow from those of the angles.
+            Function::Cos => false,
+            _ => v == 0.0,
+        };
+        if let (Function::Sqrt, Some(error)) = (function, x.root_error) {
+            return Self::new(value, error);
+        }
         let error = match x.error > 0.0 {
             true => slope.abs() * x.error,
             false => 0.0,
         };
-        Self::rounded(value, error + value.abs())
+        match is_exact {
+            true => Self::new(value, error),
+            false => Self::rounded(value, error + value.abs()),
+        }
     }
 
     /// The branch of a choice.
@@ -174,13 +216,24 @@ mod tests {
 
     #[test]
     fn cancellation_shows_in_the_bound() {
-        let (x, y) = (Bounded::exact(1e6), Bounded::exact(1e6 + 0.5));
+        let (x, y) = (Bounded::exact(1e6 + 0.1), Bounded::exact(1e6 + 0.7));
         let difference = x.plus(y.negated());
-        assert_eq!(difference.error, 0.5);
+        assert_eq!(difference.error, 0.0, "close numbers");
+        assert!(x.plus(Bounded::exact(0.7)).error > 1e6);
         // x² − y² by squares and by the difference
         let squares = x.to_the(2).plus(y.to_the(2).negated());
         let product = difference.times(x.plus(y));
         assert!(squares.error > 1e5 * product.error);
+    }
+
+    #[test]
+    fn roots_of_squares_are_exact() {
+        let root = |square: Bounded| Bounded::call(Function::Sqrt, &[square]);
+        let (x, small) = (Bounded::exact(0.1), Bounded::exact(1e-12));
+        assert_eq!(root(x.to_the(2)).error, 0.0);
+        assert_eq!(root(x.times(x)).error, 0.0);
+        assert!(root(x.to_the(2).plus(small.times(small))).error < 1e-3 * x.value);
+        assert!(root(x.times(small)).error > 0.0);
     }
 
     #[test]
