@@ -7,3 +7,4 @@ pub(crate) mod entry;
 pub(crate) mod quadratic;
 pub(crate) mod sensitivity;
 pub mod structure;
+mod sweep;

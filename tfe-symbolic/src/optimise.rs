@@ -5,6 +5,7 @@ pub(crate) mod angles;
 pub(crate) mod binarize;
 pub(crate) mod canonical_order;
 mod cse;
+pub(crate) mod estimate;
 pub(crate) mod factor;
 pub(crate) mod guard;
 pub(crate) mod identities;

@@ -8,12 +8,13 @@
 //! the body, and the chain rule continues into it: ∂f/∂q = (∂f/∂S)(∂S/∂q), in one more loop.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::derive::constraint;
 use crate::derive::entry::Entry;
-use crate::derive::quadratic::{self, Writing};
+use crate::derive::quadratic;
 use crate::derive::structure::Structure;
+use crate::derive::sweep::{Sweep, along};
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::{Forward, gradient};
 use crate::expr::graph::{ExprId, Graph, Node, SumRange};
@@ -147,7 +148,6 @@ impl Derivation {
             false => constraint::entries,
         };
         entries.extend(constrain(&mut graph, &constraints));
-        let structure = Structure::of(&graph, form, &dof, &entries);
         let mut written: Vec<Vec<Entry>> = Vec::new();
         if Sweep::of(&graph, energy) == Sweep::Forward {
             let mut deriver = Deriver {
@@ -161,13 +161,13 @@ impl Derivation {
             written.push(deriver.entries);
         }
         if passes.run(Pass::QuadraticForm) {
-            let writings = [Writing::AsDerived, Writing::Expanded].into_iter();
-            written.extend(
-                writings.filter_map(|writing| {
-                    quadratic::entries(&mut graph, energy, &entries, writing)
-                }),
-            );
+            written.extend(quadratic::entries(&mut graph, energy, &entries));
         }
+        let vanishing = vanishing(&graph, &written);
+        for entries in std::iter::once(&mut entries).chain(&mut written) {
+            entries.retain(|entry| !vanishing.contains(&entry.place));
+        }
+        let structure = Structure::of(&graph, form, &dof, &entries);
         Self {
             graph,
             entries,
@@ -195,34 +195,13 @@ impl Derivation {
     }
 }
 
-/// In which direction the chain rule is followed.
-///
-/// ```text
-/// T = m (x² + y²)/2, x = l φ̇ cos φ, y = l φ̇ sin φ        ∂T/∂φ = m (x ∂x/∂φ + y ∂y/∂φ) = m (y x − x y) = 0
-/// ```
-///
-/// Forward, terms that cancel meet as the user would write them. Backward, each sine has its own sum of terms, in which they do not meet: fewer
-/// operations, where nothing cancels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sweep {
-    Forward,
-    Backward,
-}
-
-/// Energies of more expressions times inputs are derived backward alone: forward, each input has derivatives of all expressions of its own, and
-/// second derivatives have those of all these. The models of `benches/kernels` stay below; the largest, six planets, has 2739.
-const MAX_FORWARD: usize = 4000;
-
-impl Sweep {
-    fn of(graph: &Graph, energy: ExprId) -> Self {
-        let nodes = graph.reachable(&[energy]);
-        let is_leaf = |id: &&ExprId| matches!(graph.node(**id), Node::Input(_));
-        let leaves = nodes.iter().filter(is_leaf).count();
-        match nodes.len().saturating_mul(leaves) <= MAX_FORWARD {
-            true => Self::Forward,
-            false => Self::Backward,
-        }
-    }
+/// The places where some way of writing is zero: the others are zero there, too, but for rounding errors.
+fn vanishing(graph: &Graph, written: &[Vec<Entry>]) -> BTreeSet<Place> {
+    let is_zero = |value: ExprId| graph.as_constant(value).is_some_and(Constant::is_zero);
+    let all = written.iter().flatten();
+    all.filter(|entry| is_zero(entry.value))
+        .map(|entry| entry.place.clone())
+        .collect()
 }
 
 /// Collects the entries.
@@ -280,39 +259,20 @@ impl Deriver<'_> {
     fn plain_energy(&mut self, nest: &[SumRange], body: ExprId) {
         let slots = self.slots(body);
         let leaves: Vec<ExprId> = slots.iter().map(|(_, leaf)| *leaf).collect();
-        let slopes = match self.sweep {
-            Sweep::Backward => gradient(self.graph, body, &leaves),
-            Sweep::Forward => leaves.iter().map(|leaf| self.along(body, *leaf)).collect(),
-        };
+        let slopes = self.sweep.slopes(self.graph, body, &leaves);
         for ((slot, _), slope) in slots.iter().zip(&slopes) {
             self.push(nest, first_place(slot), *slope);
         }
         for (at, (second, leaf)) in slots.iter().enumerate() {
-            let mut along = Forward::default();
+            let mut known = Forward::default();
             for ((first, _), slope) in slots.iter().zip(&slopes).take(at + 1) {
-                let one = self.graph.constant(Constant::ONE);
-                let Node::Input(by) = self.graph.node(*leaf).clone() else {
-                    continue;
-                };
-                let value = along.derivative(self.graph, *slope, &mut |_, input| {
-                    (*input == by).then_some(one)
-                });
+                let value = along(&mut known, self.graph, *slope, *leaf);
                 self.push_second(nest, first, second, value);
                 if first != second {
                     self.push_second(nest, second, first, value);
                 }
             }
         }
-    }
-
-    /// The derivative by one leaf, forward.
-    fn along(&mut self, of: ExprId, leaf: ExprId) -> ExprId {
-        let one = self.graph.constant(Constant::ONE);
-        let by = self.graph.node(leaf).clone();
-        let seed = &mut |_: &mut Graph, input: &Input| {
-            matches!(&by, Node::Input(own) if own == input).then_some(one)
-        };
-        Forward::default().derivative(self.graph, of, seed)
     }
 
     fn push_second(&mut self, nest: &[SumRange], first: &Slot, second: &Slot, value: ExprId) {

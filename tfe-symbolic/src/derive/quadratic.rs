@@ -1,64 +1,160 @@
 //! Energies quadratic in velocities or momenta, by their matrix.
 //!
 //! ```text
-//! E = zᵀ M z / 2 + bᵀ z + U        E_z = M z + b        E_q = zᵀ M_q z / 2 + b_qᵀ z + U_q        M, b, U: of q and t alone
+//! E = uᵀ M u / 2 + bᵀ u + U        u = A z        M, b, U: of q and t alone        A: numbers
+//! E_u = M u + b        E_z = Aᵀ E_u        E_zz = Aᵀ M A        E_q = uᵀ M_q u / 2 + b_qᵀ u + U_q
 //! ```
 //!
 //! An energy declared by positions, or by angular velocities about axes that turn, leads to first derivatives that do not share their factors
 //! with the second ones: that E_z is E_zz z cannot be seen from the products. Written by M, b and U, all derivatives are made of the same few
 //! expressions. Which form costs less is decided where programs are made.
+//!
+//! The *rates* u are z, or z and the sums of velocities that stand in the energy: in m (v₁ + v₂)²/2, m v₁ + m v₂ would lose the digits that
+//! v₁ + v₂ has where both are nearly opposite.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::derive::entry::Entry;
+use crate::derive::sweep::Sweep;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::gradient;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input};
+use crate::expr::rewrite::Mapping;
+use crate::optimise::estimate::{estimate, is_worth_following};
 use crate::program::{Array, Place};
 
-/// M, b, U and the variables.
+/// What the energy is quadratic in: a velocity or momentum, or a sum of them.
+#[derive(Clone)]
+struct Rate {
+    value: ExprId,
+    /// What stands for it while derivatives are taken.
+    leaf: ExprId,
+    /// ∂value/∂z
+    shares: BTreeMap<Affine, Constant>,
+}
+
+/// M, b, U and u.
 struct Parts {
-    mass: BTreeMap<(Affine, Affine), ExprId>,
-    linear: BTreeMap<Affine, ExprId>,
+    rates: Vec<Rate>,
+    /// Of the upper triangle, where it is not zero.
+    mass: BTreeMap<(usize, usize), ExprId>,
+    linear: Vec<ExprId>,
     rest: ExprId,
-    z: BTreeMap<Affine, ExprId>,
 }
 
 /// How M, b and U are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Writing {
+enum Writing {
     /// As they follow from the energy.
     AsDerived,
     /// Multiplied out: squares of sines and cosines meet.
     Expanded,
 }
 
-/// The entries with the derivatives of the energy by M, b and U; nothing if it is not quadratic or sums over ranges.
-pub(crate) fn entries(
-    graph: &mut Graph,
-    energy: ExprId,
-    entries: &[Entry],
-    writing: Writing,
-) -> Option<Vec<Entry>> {
-    let mut of: BTreeMap<&Place, ExprId> = BTreeMap::new();
+/// The derivatives of the energy by M, b and U in place of those among the entries, in the ways that may cost less; none if the energy is not
+/// quadratic or sums over ranges.
+pub(crate) fn entries(graph: &mut Graph, energy: ExprId, entries: &[Entry]) -> Vec<Vec<Entry>> {
+    let mut places: BTreeSet<&Place> = BTreeSet::new();
     for entry in entries.iter().filter(|entry| is_derivative(&entry.place)) {
-        let doubled = of.insert(&entry.place, entry.value).is_some();
-        if doubled || !entry.nest.is_empty() {
-            return None;
+        if !places.insert(&entry.place) || !entry.nest.is_empty() {
+            return Vec::new();
         }
     }
-    let parts = Parts::of(graph, energy, &of, writing)?;
-    let mut values = parts.derivatives(graph, &of);
-    let by_parts = |entry: &Entry| match values.remove(&entry.place) {
-        Some(value) => Entry {
-            value,
-            ..entry.clone()
-        },
-        None => entry.clone(),
+    if graph.contains_sum(energy) || !is_polynomial(graph, energy) {
+        return Vec::new();
+    }
+    let is_first = |place: &&Place| matches!(place.array, Array::ByZ | Array::ByQ);
+    let first = |entry: &&Entry| is_first(&&entry.place);
+    let declared: Vec<ExprId> = entries
+        .iter()
+        .filter(first)
+        .map(|entry| entry.value)
+        .collect();
+    let declared = estimate(graph, &declared);
+    let (firsts, seconds): (BTreeSet<&Place>, BTreeSet<&Place>) =
+        places.into_iter().partition(is_first);
+    let velocities = velocities(graph, energy);
+    let sums = sums_of_velocities(graph, energy);
+    let mut rates = vec![velocities];
+    if !sums.is_empty() {
+        rates.push(rates[0].iter().cloned().chain(sums).collect());
+    }
+    let mut found: Vec<Vec<Entry>> = Vec::new();
+    for rates in rates {
+        let Some(derived) = Parts::of(graph, energy, rates) else {
+            return found;
+        };
+        for writing in [Writing::AsDerived, Writing::Expanded] {
+            let Some(parts) = derived.written(graph, writing) else {
+                continue;
+            };
+            let mut slopes = Slopes::by(graph, &firsts);
+            let mut values = parts.derivatives(graph, &firsts, &mut slopes);
+            let values_of_first: Vec<ExprId> = values.values().copied().collect();
+            if !is_worth_following(estimate(graph, &values_of_first), declared) {
+                continue;
+            }
+            values.extend(parts.derivatives(graph, &seconds, &mut slopes));
+            let by_parts = |entry: &Entry| Entry {
+                value: values.get(&entry.place).copied().unwrap_or(entry.value),
+                ..entry.clone()
+            };
+            found.push(entries.iter().map(by_parts).collect());
+        }
+    }
+    found
+}
+
+/// The velocities, or momenta, in an energy.
+fn velocities(graph: &Graph, energy: ExprId) -> Vec<Rate> {
+    let nodes = graph.reachable(&[energy]).into_iter();
+    let mut found: Vec<(Affine, ExprId)> = nodes
+        .filter_map(|id| Some((velocity(graph, id)?.clone(), id)))
+        .collect();
+    found.sort();
+    let rate = |(index, id)| Rate {
+        value: id,
+        leaf: id,
+        shares: BTreeMap::from([(index, Constant::ONE)]),
     };
-    Some(entries.iter().map(by_parts).collect())
+    found.into_iter().map(rate).collect()
+}
+
+/// The sums of velocities, or of momenta, in an energy, each with a leaf that stands for it.
+fn sums_of_velocities(graph: &mut Graph, energy: ExprId) -> Vec<Rate> {
+    let mut found: Vec<(ExprId, BTreeMap<Affine, Constant>)> = Vec::new();
+    for id in graph.reachable(&[energy]) {
+        let Some((constant, terms)) = graph.as_sum(id).filter(|(_, terms)| terms.len() > 1) else {
+            continue;
+        };
+        let share = |(c, x): &(Constant, ExprId)| Some((velocity(graph, *x)?.clone(), *c));
+        let shares: Option<BTreeMap<Affine, Constant>> = terms.iter().map(share).collect();
+        if let Some(shares) = shares.filter(|_| constant.is_zero()) {
+            found.push((id, shares));
+        }
+    }
+    let rate = |(number, (value, shares)): (usize, (ExprId, BTreeMap<Affine, Constant>))| {
+        let place = Affine::constant(number as i64);
+        Rate {
+            value,
+            leaf: graph.input(Input::Placeholder(RATES, place)),
+            shares,
+        }
+    };
+    found.into_iter().enumerate().map(rate).collect()
+}
+
+/// The list of the placeholders of sums of velocities.
+const RATES: u32 = 0;
+
+/// The index of a velocity or a momentum.
+fn velocity(graph: &Graph, id: ExprId) -> Option<&Affine> {
+    match graph.node(id) {
+        Node::Input(Input::Velocity(index) | Input::Momentum(index)) => Some(index),
+        _ => None,
+    }
 }
 
 /// Derivatives by coordinates: those of an expression by all of them are taken together, once.
@@ -69,8 +165,9 @@ struct Slopes {
 }
 
 impl Slopes {
-    fn by(graph: &mut Graph, indices: impl Iterator<Item = Affine>) -> Self {
-        let indices: Vec<Affine> = indices.collect();
+    fn by(graph: &mut Graph, places: &BTreeSet<&Place>) -> Self {
+        let by_q = places.iter().filter(|place| place.array == Array::ByQ);
+        let indices: Vec<Affine> = by_q.map(|place| place.row.clone()).collect();
         let leaf = |index: &Affine| graph.input(Input::Coordinate(index.clone()));
         Self {
             leaves: indices.iter().map(leaf).collect(),
@@ -92,11 +189,14 @@ impl Slopes {
     }
 }
 
-/// The expression at z = 0.
+/// The expression at u = 0.
 fn at_rest(graph: &mut Graph, x: ExprId) -> ExprId {
     graph.with_leaves(x, &mut |graph, input| {
-        matches!(input, Input::Velocity(_) | Input::Momentum(_))
-            .then(|| graph.constant(Constant::ZERO))
+        matches!(
+            input,
+            Input::Velocity(_) | Input::Momentum(_) | Input::Placeholder(RATES, _)
+        )
+        .then(|| graph.constant(Constant::ZERO))
     })
 }
 
@@ -114,19 +214,11 @@ fn is_polynomial(graph: &Graph, energy: ExprId) -> bool {
         if !polynomial {
             return false;
         }
-        if is_z(graph, id) || node.children().iter().any(moves) {
+        if velocity(graph, id).is_some() || node.children().iter().any(moves) {
             moving.insert(id);
         }
     }
     true
-}
-
-/// Whether it is a velocity or a momentum.
-fn is_z(graph: &Graph, id: ExprId) -> bool {
-    matches!(
-        graph.node(id),
-        Node::Input(Input::Velocity(_) | Input::Momentum(_))
-    )
 }
 
 /// Whether it is a derivative of the energy.
@@ -136,48 +228,56 @@ pub(crate) fn is_derivative(place: &Place) -> bool {
 }
 
 impl Parts {
-    /// The parts of a polynomial of z whose second derivatives are free of z.
-    fn of(
-        graph: &mut Graph,
-        energy: ExprId,
-        of: &BTreeMap<&Place, ExprId>,
-        writing: Writing,
-    ) -> Option<Self> {
-        if graph.contains_sum(energy) || !is_polynomial(graph, energy) {
-            return None;
-        }
-        let written = |graph: &mut Graph, x: ExprId| match writing {
-            Writing::AsDerived => Some(x),
-            Writing::Expanded => graph.expanded(x),
-        };
+    /// The parts of a polynomial of the rates, if its second derivatives are free of them.
+    fn of(graph: &mut Graph, energy: ExprId, rates: Vec<Rate>) -> Option<Self> {
+        let sweep = Sweep::of(graph, energy);
+        let energy = with_leaves_for(graph, energy, &rates);
+        let leaves: Vec<ExprId> = rates.iter().map(|rate| rate.leaf).collect();
+        let slopes = sweep.slopes(graph, energy, &leaves);
         let mut mass = BTreeMap::new();
-        for (place, value) in of.iter().filter(|(place, _)| place.array == Array::ZZ) {
-            let value = written(graph, *value)?;
-            mass.insert((place.row.clone(), place.column.clone()), value);
+        for (row, slope) in slopes.iter().enumerate() {
+            for (at, value) in sweep
+                .slopes(graph, *slope, &leaves[row..])
+                .into_iter()
+                .enumerate()
+            {
+                if !is_zero(graph, value) {
+                    mass.insert((row, row + at), value);
+                }
+            }
         }
         let masses: Vec<ExprId> = mass.values().copied().collect();
         let reachable = graph.reachable(&masses);
-        if mass.is_empty() || reachable.into_iter().any(|id| is_z(graph, id)) {
+        if mass.is_empty() || reachable.iter().any(|id| leaves.contains(id)) {
             return None;
         }
-        let mut z = BTreeMap::new();
-        for id in graph.reachable(&[energy]) {
-            if let Node::Input(Input::Velocity(index) | Input::Momentum(index)) = graph.node(id) {
-                z.insert(index.clone(), id);
-            }
-        }
-        let mut linear = BTreeMap::new();
-        for (place, value) in of.iter().filter(|(place, _)| place.array == Array::ByZ) {
-            let b = at_rest(graph, *value);
-            linear.insert(place.row.clone(), written(graph, b)?);
-        }
+        let linear = slopes.into_iter().map(|slope| at_rest(graph, slope));
+        let linear = linear.collect();
         let rest = at_rest(graph, energy);
-        let rest = written(graph, rest)?;
         Some(Self {
+            rates,
             mass,
             linear,
             rest,
-            z,
+        })
+    }
+
+    /// The same, written in another way.
+    fn written(&self, graph: &mut Graph, writing: Writing) -> Option<Self> {
+        let mut written = |x: ExprId| match writing {
+            Writing::AsDerived => Some(x),
+            Writing::Expanded => graph.expanded(x),
+        };
+        let mass = self.mass.iter().map(|(at, x)| Some((*at, written(*x)?)));
+        Some(Self {
+            mass: mass.collect::<Option<_>>()?,
+            linear: self
+                .linear
+                .iter()
+                .map(|x| written(*x))
+                .collect::<Option<_>>()?,
+            rest: written(self.rest)?,
+            rates: self.rates.clone(),
         })
     }
 
@@ -185,32 +285,44 @@ impl Parts {
     fn derivatives(
         &self,
         graph: &mut Graph,
-        of: &BTreeMap<&Place, ExprId>,
+        places: &BTreeSet<&Place>,
+        slopes: &mut Slopes,
     ) -> BTreeMap<Place, ExprId> {
-        let by = of.keys().filter(|place| place.array == Array::ByQ);
-        let mut slopes = Slopes::by(graph, by.map(|place| place.row.clone()));
         let mut slope = |graph: &mut Graph, x, by: &Affine| slopes.slope(graph, x, by);
         let mut values = BTreeMap::new();
-        for place in of.keys() {
+        for place in places {
             let (row, column) = (&place.row, &place.column);
             let value = match place.array {
-                Array::ZZ => self.mass.get(&(row.clone(), column.clone())).copied(),
-                Array::ByZ => Some(self.row(graph, row, &mut |_, x| x)),
-                Array::ZQ => Some(self.row(graph, row, &mut |graph, x| slope(graph, x, column))),
-                Array::ByQ => Some(self.whole(graph, &mut |graph, x| slope(graph, x, row))),
-                _ => Some(self.whole(graph, &mut |graph, x| {
+                Array::ZZ => self.matrix(graph, row, column),
+                Array::ByZ => self.row(graph, row, &mut |_, x| x),
+                Array::ZQ => self.row(graph, row, &mut |graph, x| slope(graph, x, column)),
+                Array::ByQ => self.whole(graph, &mut |graph, x| slope(graph, x, row)),
+                _ => self.whole(graph, &mut |graph, x| {
                     let first = slope(graph, x, row.max(column));
                     slope(graph, first, row.min(column))
-                })),
+                }),
             };
-            if let Some(value) = value {
-                values.insert((*place).clone(), value);
-            }
+            values.insert((*place).clone(), value);
         }
         values
     }
 
-    /// Σ M z + b of one row, with M and b differentiated.
+    /// Aᵀ M A at one place.
+    fn matrix(&self, graph: &mut Graph, row: &Affine, column: &Affine) -> ExprId {
+        let mut terms = Vec::new();
+        for (k, l, m) in self.both_triangles() {
+            let shares = (
+                self.rates[k].shares.get(row),
+                self.rates[l].shares.get(column),
+            );
+            if let (Some(a), Some(b)) = shares {
+                terms.push((*a * *b, m));
+            }
+        }
+        graph.linear(Constant::ZERO, &terms)
+    }
+
+    /// Aᵀ (M u + b) of one row, with M and b differentiated.
     fn row(
         &self,
         graph: &mut Graph,
@@ -218,19 +330,21 @@ impl Parts {
         slope: &mut dyn FnMut(&mut Graph, ExprId) -> ExprId,
     ) -> ExprId {
         let mut terms = Vec::new();
-        for ((_, column), m) in self.mass.iter().filter(|((known, _), _)| known == row) {
-            if let Some(z) = self.z.get(column) {
-                let slope = slope(graph, *m);
-                terms.push((Constant::ONE, graph.multiply(slope, *z)));
+        for (k, l, m) in self.both_triangles() {
+            if let Some(share) = self.rates[k].shares.get(row) {
+                let slope = slope(graph, m);
+                terms.push((*share, graph.multiply(slope, self.rates[l].value)));
             }
         }
-        if let Some(b) = self.linear.get(row) {
-            terms.push((Constant::ONE, slope(graph, *b)));
+        for (rate, b) in self.rates.iter().zip(&self.linear) {
+            if let Some(share) = rate.shares.get(row) {
+                terms.push((*share, slope(graph, *b)));
+            }
         }
         graph.linear(Constant::ZERO, &terms)
     }
 
-    /// Σ M z z / 2 + Σ b z + U, with M, b and U differentiated; entries of M off the diagonal stand twice.
+    /// uᵀ M u / 2 + bᵀ u + U, with M, b and U differentiated; entries of M off the diagonal stand twice.
     fn whole(
         &self,
         graph: &mut Graph,
@@ -238,22 +352,49 @@ impl Parts {
     ) -> ExprId {
         let half = Constant::rational(1, 2).unwrap_or(Constant::ONE);
         let mut terms = vec![(Constant::ONE, slope(graph, self.rest))];
-        for ((row, column), m) in self.mass.iter().filter(|((row, column), _)| row <= column) {
-            if let (Some(a), Some(b)) = (self.z.get(row), self.z.get(column)) {
-                let factor = if row == column { half } else { Constant::ONE };
-                let both = graph.multiply(*a, *b);
-                let slope = slope(graph, *m);
-                terms.push((factor, graph.multiply(slope, both)));
-            }
+        for ((row, column), m) in &self.mass {
+            let factor = if row == column { half } else { Constant::ONE };
+            let both = graph.multiply(self.rates[*row].value, self.rates[*column].value);
+            let slope = slope(graph, *m);
+            terms.push((factor, graph.multiply(slope, both)));
         }
-        for (row, b) in &self.linear {
-            if let Some(z) = self.z.get(row) {
-                let slope = slope(graph, *b);
-                terms.push((Constant::ONE, graph.multiply(slope, *z)));
-            }
+        for (rate, b) in self.rates.iter().zip(&self.linear) {
+            let slope = slope(graph, *b);
+            terms.push((Constant::ONE, graph.multiply(slope, rate.value)));
         }
         graph.linear(Constant::ZERO, &terms)
     }
+
+    /// The entries of M with their rows and columns.
+    fn both_triangles(&self) -> impl Iterator<Item = (usize, usize, ExprId)> {
+        self.mass.iter().flat_map(|((row, column), m)| {
+            let mirrored = (row != column).then_some((*column, *row, *m));
+            [(*row, *column, *m)].into_iter().chain(mirrored)
+        })
+    }
+}
+
+fn is_zero(graph: &Graph, x: ExprId) -> bool {
+    graph.as_constant(x).is_some_and(Constant::is_zero)
+}
+
+/// The energy with the leaves of rates in place of their values.
+fn with_leaves_for(graph: &mut Graph, energy: ExprId, rates: &[Rate]) -> ExprId {
+    let mut mapping = Mapping::default();
+    for rate in rates {
+        mapping.set(rate.value, rate.leaf);
+    }
+    for old in graph.reachable(&[energy]) {
+        if mapping.of(old) != old {
+            continue;
+        }
+        let node = graph.node(old).clone();
+        if node.children().iter().any(|x| mapping.of(*x) != *x) {
+            let new = graph.remake(&node, &mapping);
+            mapping.set(old, new);
+        }
+    }
+    mapping.of(energy)
 }
 
 #[cfg(test)]
@@ -317,8 +458,7 @@ mod tests {
         let mut declared = declare(text, &Context::default()).expect("a model of the test");
         let (graph, energy) = (&mut declared.graph, declared.energy);
         let all = derivatives(graph, energy);
-        for writing in [Writing::AsDerived, Writing::Expanded] {
-            let written = entries(graph, energy, &all, writing).expect("it is quadratic");
+        for written in entries(graph, energy, &all) {
             assert_eq!(written.len(), all.len());
             for (entry, own) in written.iter().zip(&all) {
                 let difference = graph.subtract(entry.value, own.value);

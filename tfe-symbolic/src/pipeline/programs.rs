@@ -54,17 +54,17 @@ impl Derivation {
             place: Place::scalar(Array::Value),
             value: transformation.hamiltonian,
         };
-        let draft = Draft::of(declared.graph.clone(), vec![entry], Passes::ALL);
-        Some(Draft::best(vec![draft]))
+        Some(Draft::best(&declared.graph, vec![vec![entry]], Passes::ALL))
     }
 
     fn program_of(&self, is_wanted: impl Fn(Array) -> bool) -> Program {
-        let draft = |entries: &Vec<Entry>| {
+        let wanted = |entries: &Vec<Entry>| {
             let wanted = entries.iter().filter(|entry| is_wanted(entry.place.array));
-            Draft::of(self.graph.clone(), wanted.cloned().collect(), self.passes)
+            wanted.cloned().collect()
         };
         let plain = std::iter::once(&self.entries);
-        Draft::best(plain.chain(&self.written).map(draft).collect())
+        let written = plain.chain(&self.written).map(wanted).collect();
+        Draft::best(&self.graph, written, self.passes)
     }
 
     /// The program of the first derivatives and forces differentiated once more, partially at fixed (q, z):
@@ -105,7 +105,7 @@ impl Derivation {
         };
         let mut graph = self.graph.clone();
         let entries = entries_by(&mut graph, &self.entries, leaf);
-        Draft::best(vec![Draft::of(graph, entries, self.passes)])
+        Draft::best(&graph, vec![entries], self.passes)
     }
 
     /// The operations of [`Derivation::program`].

@@ -8,6 +8,7 @@ use crate::expr::graph::{ExprId, Graph};
 use crate::optimise::angles::expand_angles;
 use crate::optimise::binarize::arrange;
 use crate::optimise::canonical_order::with_like_operations_alike;
+use crate::optimise::estimate::{estimate, is_worth_following};
 use crate::optimise::factor::{BUDGET, take_out_factors};
 use crate::optimise::guard::Guard;
 use crate::optimise::identities::by_identities;
@@ -27,6 +28,27 @@ const MAX_FIFTHS_OF_CHEAPEST: usize = 6;
 /// Identities are sought in the cheapest plans of so many operations altogether: the search takes more than linear time.
 const MAX_OPERATIONS_FOR_IDENTITIES: usize = 240;
 
+/// A way of writing the results.
+struct Way {
+    entries: Vec<Entry>,
+    estimate: usize,
+}
+
+impl Way {
+    fn of(graph: &Graph, entries: Vec<Entry>) -> Self {
+        let values: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
+        let estimate = estimate(graph, &values);
+        Self { entries, estimate }
+    }
+
+    /// Whether all results are the same expressions.
+    fn is_the_same(&self, other: &Self) -> bool {
+        let mut both = self.entries.iter().zip(&other.entries);
+        self.entries.len() == other.entries.len()
+            && both.all(|(own, other)| own.value == other.value && own.place == other.place)
+    }
+}
+
 /// Results in their loops, before common factors are sought.
 pub(crate) struct Draft {
     passes: Passes,
@@ -38,7 +60,7 @@ pub(crate) struct Draft {
     plain: Vec<ExprId>,
     /// The results with sines of sums expanded.
     values: Vec<ExprId>,
-    /// The values, their operations put in order.
+    /// The values, their operations put in order, once the draft is followed.
     plan: Plan,
 }
 
@@ -51,7 +73,7 @@ struct Candidate<'a> {
 
 impl Draft {
     /// Puts entries into loops and expands sines of sums.
-    pub(crate) fn of(mut graph: Graph, mut entries: Vec<Entry>, passes: Passes) -> Self {
+    fn of(mut graph: Graph, mut entries: Vec<Entry>, passes: Passes) -> Self {
         let balances = match passes.run(Pass::Balance) {
             true => balances(&mut graph, &mut entries),
             false => Vec::new(),
@@ -74,7 +96,6 @@ impl Draft {
             true => expand_angles(&mut graph, plain.clone()),
             false => plain.clone(),
         };
-        let plan = arrange(&graph, &values);
         Self {
             passes,
             graph,
@@ -83,19 +104,30 @@ impl Draft {
             balances,
             plain,
             values,
-            plan,
+            plan: Plan::default(),
         }
     }
 
-    /// The program of the cheapest of these drafts of the same results that loses no digits; of equal ones the first.
+    /// The cheapest program of the same results, written in several ways, that loses no digits; of equal ones the first.
     ///
-    /// The first draft is the one as declared: the others are compared with it, and it is taken where no other is good enough.
-    pub(crate) fn best(drafts: Vec<Self>) -> Program {
-        let Some(declared) = drafts.first() else {
+    /// The first way is the one as declared: the others are compared with it, and it is taken where no other is good enough.
+    pub(crate) fn best(graph: &Graph, written: Vec<Vec<Entry>>, passes: Passes) -> Program {
+        let mut written = written.into_iter();
+        let Some(entries) = written.next() else {
             return Program::default();
         };
+        let own = Way::of(graph, entries);
+        let mut ways = vec![&own];
+        let others: Vec<Way> = written.map(|entries| Way::of(graph, entries)).collect();
+        for other in &others {
+            if !ways.iter().any(|way| way.is_the_same(other)) {
+                ways.push(other);
+            }
+        }
+        ways.sort_by_key(|way| way.estimate);
+        let declared = Self::of(graph.clone(), own.entries.clone(), passes);
         let guard = Guard::of(&declared.graph, &declared.plain);
-        let mut drafts = Self::accepted(drafts, &guard);
+        let mut drafts = Self::followed(&ways, &own, declared, &guard);
         drafts.sort_by_key(|draft| draft.plan.cost());
         let least = drafts.first().map_or(0, |draft| draft.plan.cost());
         drafts.retain(|draft| 5 * draft.plan.cost() <= MAX_FIFTHS_OF_CHEAPEST * least);
@@ -119,28 +151,52 @@ impl Draft {
         best.map_or_else(Program::default, |best| best.program(&guard))
     }
 
-    /// The drafts that lose no digits when their operations are put in order, without expanded sines where these lose some. The first one is
-    /// always among them.
-    fn accepted(drafts: Vec<Self>, guard: &Guard) -> Vec<Self> {
-        let mut accepted: Vec<Self> = Vec::with_capacity(drafts.len());
-        for mut draft in drafts {
-            let same_results = |first: &Self| {
-                first.cleared == draft.cleared && first.block.has_the_results_of(&draft.block)
+    /// The drafts of the ways, cheapest first, that lose no digits and that seem to cost little more than the cheapest of them; the declared one
+    /// where no other is left.
+    fn followed(ways: &[&Way], own: &Way, mut declared: Self, guard: &Guard) -> Vec<Self> {
+        let mut drafts = Vec::with_capacity(ways.len());
+        let (mut least, mut follow_declared) = (None, false);
+        for way in ways {
+            if least.is_some_and(|least| !is_worth_following(way.estimate, least)) {
+                break;
+            }
+            let is_good = if std::ptr::eq(*way, own) {
+                follow_declared = true;
+                true
+            } else {
+                let mut draft =
+                    Self::of(declared.graph.clone(), way.entries.clone(), declared.passes);
+                let same_results = draft.cleared == declared.cleared
+                    && declared.block.has_the_results_of(&draft.block);
+                let is_good = same_results && draft.arrange(guard);
+                if is_good {
+                    drafts.push(draft);
+                }
+                is_good
             };
-            if !accepted.first().is_none_or(same_results) {
-                continue;
-            }
-            let mut good = guard.accepts(&draft.plan, &draft.values);
-            if !good && draft.values != draft.plain {
-                draft.values.clone_from(&draft.plain);
-                draft.plan = arrange(&draft.graph, &draft.values);
-                good = guard.accepts(&draft.plan, &draft.values);
-            }
-            if good || accepted.is_empty() {
-                accepted.push(draft);
+            if is_good {
+                least.get_or_insert(way.estimate);
             }
         }
-        accepted
+        if follow_declared {
+            declared.arrange(guard);
+            drafts.insert(0, declared);
+        }
+        drafts
+    }
+
+    /// Puts the operations in order, without expanded sines where these lose digits; whether none are lost.
+    fn arrange(&mut self, guard: &Guard) -> bool {
+        self.plan = arrange(&self.graph, &self.values);
+        if guard.accepts(&self.plan, &self.values) {
+            return true;
+        }
+        if self.values == self.plain {
+            return false;
+        }
+        self.values.clone_from(&self.plain);
+        self.plan = arrange(&self.graph, &self.values);
+        guard.accepts(&self.plan, &self.values)
     }
 
     /// The draft with common factors taken out, if that loses no digits.
