@@ -47,13 +47,13 @@ const _: () = {
             let l = t.like(self.l);
             let m = t.like(self.m);
             let cos_theta = q[0].cos();
-            let t0 = l * z[0];
-            let t1 = g * l;
-            let t2 = cos_theta * t1;
-            let t3 = t0 * t0;
-            let t4 = t.like(0.5) * t3;
-            let t5 = t4 + t2;
-            m * t5
+            let t0 = g * cos_theta;
+            let t1 = l * m;
+            let t2 = t.like(0.5) * l;
+            let t3 = z[0] * z[0];
+            let t4 = t2 * t3;
+            let t5 = t0 + t4;
+            t1 * t5
         }
         const LANES: bool = true;
         /// L_v and L_q: 5 ×, 1 sin/cos

@@ -6,7 +6,7 @@
 /// Q(q) = −c p
 /// coordinates: q, t      momenta: p, p_t      parameters: a, ω, c
 /// operations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other
-/// operations, gradient: 6 +−, 16 ×, 1 ÷, 2 sin/cos, 0 other
+/// operations, gradient: 6 +−, 15 ×, 1 ÷, 2 sin/cos, 0 other
 /// operations, gradient and second derivatives: 9 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other
 /// declared by             Hamiltonian, 2 coordinates
 /// depends on time         no
@@ -60,7 +60,7 @@ const _: () = {
             t8 / t10
         }
         const LANES: bool = true;
-        /// H_p, H_q and Q: 6 +−, 16 ×, 1 ÷, 2 sin/cos
+        /// H_p, H_q and Q: 6 +−, 15 ×, 1 ÷, 2 sin/cos
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -78,30 +78,29 @@ const _: () = {
             let t3 = a * t2;
             let t4 = a * omega;
             let t5 = t1 * t4;
-            let t6 = sin_q - t3;
+            let t6 = t3 - sin_q;
             let t7 = q[0] * t3;
-            let t8 = q[0] * q[0];
-            let t9 = t.like(1.0) + t8;
-            let t10 = t.like(1.0) / t9;
-            first.z[1] = t10;
-            let t11 = q[0] * t10;
-            first.q[1] = t11 * t5;
-            let t12 = z[0] * t10;
-            first.z[0] = t12;
-            let t13 = c * t12;
-            let t14 = z[0] * z[0];
-            let t15 = t.like(0.5) * t14;
-            let t16 = cos_q - t15;
-            let t17 = t7 + t16;
-            let t18 = t17 - z[1];
-            let t19 = t.like(2.0) * t18;
-            let t20 = t19 * t11;
-            let t21 = t20 + t6;
-            first.q[0] = t21 * t10;
-            first.force[1] = z[0] * t13;
-            first.force[0] = -t13;
+            let t8 = cos_q + t7;
+            let t9 = t8 - z[1];
+            let t10 = t.like(2.0) * t9;
+            let t11 = q[0] * q[0];
+            let t12 = t.like(1.0) + t11;
+            let t13 = t.like(1.0) / t12;
+            first.z[1] = t13;
+            let t14 = q[0] * t13;
+            first.q[1] = t14 * t5;
+            let t15 = z[0] * t13;
+            first.z[0] = t15;
+            let t16 = c * t15;
+            let t17 = z[0] * z[0];
+            let t18 = t10 - t17;
+            let t19 = t14 * t18;
+            let t20 = t19 - t6;
+            first.q[0] = t20 * t13;
+            first.force[1] = z[0] * t16;
+            first.force[0] = -t16;
         }
-        /// H_p, H_q and Q, and H_pp: 6 +−, 16 ×, 1 ÷, 2 sin/cos
+        /// H_p, H_q and Q, and H_pp: 6 +−, 15 ×, 1 ÷, 2 sin/cos
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -120,29 +119,28 @@ const _: () = {
             let t3 = a * t2;
             let t4 = a * omega;
             let t5 = t1 * t4;
-            let t6 = sin_q - t3;
+            let t6 = t3 - sin_q;
             let t7 = q[0] * t3;
-            let t8 = q[0] * q[0];
-            let t9 = t.like(1.0) + t8;
-            let t10 = t.like(1.0) / t9;
-            first.z[1] = t10;
-            zz[0][0] = t10;
-            let t11 = q[0] * t10;
-            first.q[1] = t11 * t5;
-            let t12 = z[0] * t10;
-            first.z[0] = t12;
-            let t13 = c * t12;
-            let t14 = z[0] * z[0];
-            let t15 = t.like(0.5) * t14;
-            let t16 = cos_q - t15;
-            let t17 = t7 + t16;
-            let t18 = t17 - z[1];
-            let t19 = t.like(2.0) * t18;
-            let t20 = t19 * t11;
-            let t21 = t20 + t6;
-            first.q[0] = t21 * t10;
-            first.force[1] = z[0] * t13;
-            first.force[0] = -t13;
+            let t8 = cos_q + t7;
+            let t9 = t8 - z[1];
+            let t10 = t.like(2.0) * t9;
+            let t11 = q[0] * q[0];
+            let t12 = t.like(1.0) + t11;
+            let t13 = t.like(1.0) / t12;
+            first.z[1] = t13;
+            zz[0][0] = t13;
+            let t14 = q[0] * t13;
+            first.q[1] = t14 * t5;
+            let t15 = z[0] * t13;
+            first.z[0] = t15;
+            let t16 = c * t15;
+            let t17 = z[0] * z[0];
+            let t18 = t10 - t17;
+            let t19 = t14 * t18;
+            let t20 = t19 - t6;
+            first.q[0] = t20 * t13;
+            first.force[1] = z[0] * t16;
+            first.force[0] = -t16;
         }
         fn first<R: __tfe::Real>(
             &self,
@@ -316,7 +314,7 @@ impl Forced {
             },
             first: ::tfe::__private::Operations {
                 additions: 6,
-                multiplications: 16,
+                multiplications: 15,
                 divisions: 1,
                 sines: 2,
                 functions: 0,
@@ -328,7 +326,7 @@ impl Forced {
                 sines: 2,
                 functions: 0,
             },
-            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 16 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 9 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no, diagonal\nseparable (H_pq = 0)    no\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
+            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 15 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 9 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no, diagonal\nseparable (H_pq = 0)    no\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
         }
     }
     /// The observable `energy` at time `tau`, coordinates `q` and momenta `p`.

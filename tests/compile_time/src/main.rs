@@ -9,7 +9,7 @@
 //! A row with the number zero is a crate with the same `main` for a pendulum: what is left when the model costs next to nothing.
 //!
 //! ```text
-//! tests/compile_time/run                     1 to 8 and 12 links, dev and release
+//! tests/compile_time/run                     1 to 8 and 12 links; dev, dev with the engine optimised (`tuned`), and release
 //! tests/compile_time/run dev 6 8             6 and 8 links, dev
 //! ```
 
@@ -28,11 +28,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         match argument.as_str() {
             "dev" => profiles.push(Profile::Dev),
             "release" => profiles.push(Profile::Release),
+            "tuned" => profiles.push(Profile::Tuned),
             number => links.push(number.parse()?),
         }
     }
     if profiles.is_empty() {
-        profiles = vec![Profile::Dev, Profile::Release];
+        profiles = vec![Profile::Dev, Profile::Tuned, Profile::Release];
     }
     if links.is_empty() {
         links = LINKS.to_vec();

@@ -13,6 +13,8 @@ pub enum Profile {
     Dev,
     /// Of `cargo build --release`.
     Release,
+    /// Of `cargo build`, with the two lines of the README in the manifest: the engine is optimised.
+    Tuned,
 }
 
 impl fmt::Display for Profile {
@@ -20,6 +22,7 @@ impl fmt::Display for Profile {
         f.write_str(match self {
             Self::Dev => "dev",
             Self::Release => "release",
+            Self::Tuned => "tuned",
         })
     }
 }
@@ -59,8 +62,12 @@ impl User {
         let root = tests.join("..").canonicalize()?;
         let folder = root.join("target/compile_time/user");
         fs::create_dir_all(folder.join("src"))?;
+        let lines = match profile {
+            Profile::Tuned => "\n[profile.dev.build-override]\nopt-level = 2\n",
+            Profile::Dev | Profile::Release => "",
+        };
         let manifest = format!(
-            "[package]\nname = \"user\"\nedition = \"2024\"\n\n[workspace]\n\n[dependencies]\ntfe = {{ path = {root:?} }}\n"
+            "[package]\nname = \"user\"\nedition = \"2024\"\n\n[workspace]\n\n[dependencies]\ntfe = {{ path = {root:?} }}\n{lines}"
         );
         fs::write(folder.join("Cargo.toml"), manifest)?;
         // The versions that the other crate outside of the workspace has.

@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
-use crate::expr::hash::Map;
+use crate::expr::hash::{Map, Set};
 use crate::expr::input::Input;
 use crate::optimise::plan::{Op, Plan};
 use bounded::Bounded;
@@ -56,9 +56,14 @@ impl Guard {
             .enumerate()
             .map(|(position, input)| (input.clone(), position))
             .collect();
+        let in_order: Set<ExprId> = order
+            .iter()
+            .copied()
+            .filter(|id| graph.keeps_order(*id))
+            .collect();
         let states = (0..STATES).map(|number| {
             let numbers = state(&inputs, number);
-            let known = baseline(graph, &order, &positions, &numbers);
+            let known = baseline(graph, &order, &in_order, &positions, &numbers);
             let at = |id: &ExprId| known[id.index()];
             (numbers, results.iter().map(at).collect())
         });
@@ -161,10 +166,11 @@ fn integer_power(base: Bounded, exponent: i32) -> Bounded {
     }
 }
 
-/// The values of all nodes, in the order in which they stand.
+/// The values of all nodes, in the order in which they stand; `in_order`: the sums that keep it.
 fn baseline(
     graph: &Graph,
     order: &[ExprId],
+    in_order: &Set<ExprId>,
     positions: &Map<Input, usize>,
     numbers: &[f64],
 ) -> Vec<Bounded> {
@@ -179,11 +185,17 @@ fn baseline(
                 Bounded::exact(number.unwrap_or(f64::NAN))
             }
             Node::Sum { constant, terms } => {
-                let group = |x: ExprId| match graph.keeps_order(*id) {
-                    true => graph.group_of_term(x),
-                    false => 0,
+                let terms = terms.iter();
+                let term = |(c, x): &(Constant, ExprId)| {
+                    (*x, of(*x).scaled(c.to_f64(), c.is_power_of_two()))
                 };
-                sum(*constant, terms, &of, &group)
+                let total = match in_order.contains(id) {
+                    true => by_groups(graph, terms.map(term)),
+                    false => terms.map(|one| term(one).1).reduce(Bounded::plus),
+                };
+                let number = (!constant.is_zero()).then(|| Bounded::exact(constant.to_f64()));
+                let all = total.into_iter().chain(number).reduce(Bounded::plus);
+                all.unwrap_or(Bounded::exact(0.0))
             }
             Node::Product(factors) => product(factors, &of),
             Node::Power { base, exponent } => of(*base).power(of(*exponent)),
@@ -219,32 +231,22 @@ fn baseline(
 }
 
 /// A sum in the order in which it stands, groups of terms first.
-fn sum(
-    constant: Constant,
-    terms: &[(Constant, ExprId)],
-    of: &dyn Fn(ExprId) -> Bounded,
-    group: &dyn Fn(ExprId) -> usize,
-) -> Bounded {
+fn by_groups(graph: &Graph, terms: impl Iterator<Item = (ExprId, Bounded)>) -> Option<Bounded> {
     let mut sums: BTreeMap<usize, Bounded> = BTreeMap::new();
-    for (c, x) in terms {
-        let term = of(*x).scaled(c.to_f64(), c.is_power_of_two());
-        sums.entry(group(*x))
-            .and_modify(|sum| *sum = sum.plus(term))
-            .or_insert(term);
+    for (x, term) in terms {
+        let sum = sums.entry(graph.group_of_term(x));
+        sum.and_modify(|sum| *sum = sum.plus(term)).or_insert(term);
     }
-    let total = sums.into_values().reduce(Bounded::plus);
-    let total = total.unwrap_or(Bounded::exact(0.0));
-    match constant.is_zero() {
-        true => total,
-        false => total.plus(Bounded::exact(constant.to_f64())),
-    }
+    sums.into_values().reduce(Bounded::plus)
 }
 
 fn product(factors: &[(ExprId, i32)], of: &dyn Fn(ExprId) -> Bounded) -> Bounded {
-    let power = |(x, n): &(ExprId, i32)| of(*x).to_the(n.unsigned_abs());
-    let (above, below): (Vec<_>, Vec<_>) = factors.iter().partition(|(_, n)| *n > 0);
-    let all = |factors: &[(ExprId, i32)]| factors.iter().map(power).reduce(Bounded::times);
-    match (all(&above), all(&below)) {
+    let all = |above: bool| {
+        let side = factors.iter().filter(|(_, n)| (*n > 0) == above);
+        side.map(|(x, n)| of(*x).to_the(n.unsigned_abs()))
+            .reduce(Bounded::times)
+    };
+    match (all(true), all(false)) {
         (Some(above), Some(below)) => above.over(below),
         (Some(above), None) => above,
         (None, Some(below)) => Bounded::exact(1.0).over(below),

@@ -54,7 +54,9 @@ impl Pass {
             Self::QuadraticForm => "linear in the derivatives",
             Self::Balance | Self::OpenSums | Self::Signs => "linear",
             Self::AngleSums => "angles of up to 8 parts; 64 known angles tried for each",
-            Self::CommonFactors => "50 000 operations arranged over all trials",
+            Self::CommonFactors => {
+                "8 rounds over all sums, and 20 000 operations arranged in trials"
+            }
             Self::Identities => "plans up to 130 operations, 240 altogether; 4 rounds of 32 trials",
             Self::CanonicalOrder | Self::StatementOrder => "near-linear",
         }

@@ -14,7 +14,7 @@ use crate::optimise::rebuild::{Changes, rebuild};
 const LONGEST: usize = 4;
 
 /// How many sets of them are tried, times the size of the plan.
-const WORK: usize = 1_000_000;
+const WORK: usize = 300_000;
 
 /// The plan with differences turned round; `plain`: the roots that are wanted without a sign beside them.
 pub(crate) fn with_fewer_negations(plan: Plan, plain: &BTreeSet<ExprId>) -> Plan {
