@@ -44,6 +44,9 @@ struct Parts {
     rest: ExprId,
 }
 
+/// Entries of M, b and U are multiplied out to so many terms.
+const MAX_TERMS: usize = 64;
+
 /// How M, b and U are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Writing {
@@ -266,7 +269,7 @@ impl Parts {
     fn written(&self, graph: &mut Graph, writing: Writing) -> Option<Self> {
         let mut written = |x: ExprId| match writing {
             Writing::AsDerived => Some(x),
-            Writing::Expanded => graph.expanded(x),
+            Writing::Expanded => graph.expanded_within(x, MAX_TERMS),
         };
         let mass = self.mass.iter().map(|(at, x)| Some((*at, written(*x)?)));
         Some(Self {

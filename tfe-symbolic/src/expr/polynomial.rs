@@ -18,6 +18,11 @@ impl Graph {
     ///
     /// Functions and their arguments, quotients by sums and sums over ranges are atoms.
     pub(crate) fn expanded(&mut self, root: ExprId) -> Option<ExprId> {
+        self.expanded_within(root, MOST_TERMS)
+    }
+
+    /// The same, with the largest number of terms on the way.
+    pub(crate) fn expanded_within(&mut self, root: ExprId, most_terms: usize) -> Option<ExprId> {
         let mut done: BTreeMap<ExprId, Polynomial> = BTreeMap::new();
         for id in self.reachable_outside_sums(&[root]) {
             let polynomial = match self.node(id).clone() {
@@ -47,10 +52,10 @@ impl Graph {
                             let power = self.product(Constant::ONE, &[(x, exponent)]);
                             let (factor, power) = self.as_multiple(power);
                             let power = Polynomial::from([(power, factor)]);
-                            product = self.times(&product, &power)?;
+                            product = self.times(&product, &power, most_terms)?;
                         } else {
                             for _ in 0..exponent {
-                                product = self.times(&product, base)?;
+                                product = self.times(&product, base, most_terms)?;
                             }
                         }
                     }
@@ -58,7 +63,7 @@ impl Graph {
                 }
                 _ => Polynomial::from([(id, Constant::ONE)]),
             };
-            if polynomial.len() > MOST_TERMS {
+            if polynomial.len() > most_terms {
                 return None;
             }
             done.insert(id, polynomial);
@@ -71,8 +76,8 @@ impl Graph {
         Some(self.linear(Constant::ZERO, &terms))
     }
 
-    fn times(&mut self, a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
-        if a.len().saturating_mul(b.len()) > MOST_TERMS {
+    fn times(&mut self, a: &Polynomial, b: &Polynomial, most_terms: usize) -> Option<Polynomial> {
+        if a.len().saturating_mul(b.len()) > most_terms {
             return None;
         }
         let mut product = Polynomial::new();

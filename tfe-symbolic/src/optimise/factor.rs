@@ -11,6 +11,7 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::rewrite::{Mapping, Uses};
 use crate::optimise::binarize::arrange;
 use crate::optimise::estimate::estimate;
+use crate::optimise::plan::Plan;
 
 /// Operations arranged over all single trials of one kernel, in whichever ways it is written. With 50 000, 3 of 3190 operations of the models of
 /// `benches/kernels` go.
@@ -30,12 +31,15 @@ struct Candidate {
 }
 
 /// The roots with common factors taken out; no more operations than this are arranged for single trials.
+///
+/// The plan is that of the roots, given as they are and returned as they have become.
 pub(crate) fn take_out_factors(
     graph: &mut Graph,
     roots: Vec<ExprId>,
+    plan: Plan,
     budget: usize,
-) -> Vec<ExprId> {
-    let declared = Trial::of(graph, roots);
+) -> (Vec<ExprId>, Plan) {
+    let declared = Trial::of(roots, plan);
     let mut roots = declared.roots.clone();
     let mut least = estimate(graph, &roots);
     // All at once, as long as that seems to help: large models get no further.
@@ -48,12 +52,19 @@ pub(crate) fn take_out_factors(
         if all.is_empty() || cost >= least {
             break;
         }
-        least = cost;
         roots = trial;
+        // What is left to gain is less than the next round costs.
+        if 100 * (least - cost) < least {
+            break;
+        }
+        least = cost;
     }
-    let mut best = Trial::of(graph, roots);
-    if best.cost >= declared.cost {
-        best = declared;
+    let mut best = declared;
+    if best.roots != roots {
+        let trial = Trial::arranged(graph, roots);
+        if trial.cost < best.cost {
+            best = trial;
+        }
     }
     let mut budget = budget;
     // One by one, the most promising first. What does not help is not tried again: it hardly would where the sum is the same.
@@ -63,36 +74,40 @@ pub(crate) fn take_out_factors(
         all.retain(|candidate| !tried.contains(candidate));
         all.sort_by_key(|candidate| std::cmp::Reverse(candidate.terms));
         for candidate in all {
-            match budget.checked_sub(best.size) {
+            match budget.checked_sub(best.plan.len()) {
                 Some(rest) => budget = rest,
-                None => return best.roots,
+                None => return (best.roots, best.plan),
             }
             let roots = apply(graph, &best.roots, &[candidate]);
-            let trial = Trial::of(graph, roots);
+            let trial = Trial::arranged(graph, roots);
             tried.insert(candidate);
             if trial.cost < best.cost {
                 best = trial;
                 continue 'again;
             }
         }
-        return best.roots;
+        return (best.roots, best.plan);
     }
 }
 
 struct Trial {
     roots: Vec<ExprId>,
+    plan: Plan,
     cost: usize,
-    size: usize,
 }
 
 impl Trial {
-    fn of(graph: &Graph, roots: Vec<ExprId>) -> Self {
-        let plan = arrange(graph, &roots);
+    fn of(roots: Vec<ExprId>, plan: Plan) -> Self {
         Self {
             roots,
             cost: plan.cost(),
-            size: plan.len(),
+            plan,
         }
+    }
+
+    fn arranged(graph: &Graph, roots: Vec<ExprId>) -> Self {
+        let plan = arrange(graph, &roots);
+        Self::of(roots, plan)
     }
 }
 
@@ -189,6 +204,11 @@ mod tests {
     use super::*;
     use crate::expr::input::Input;
 
+    fn factored(graph: &mut Graph, roots: Vec<ExprId>) -> Vec<ExprId> {
+        let plan = arrange(graph, &roots);
+        take_out_factors(graph, roots, plan, BUDGET).0
+    }
+
     fn variables<const N: usize>(graph: &mut Graph) -> [ExprId; N] {
         std::array::from_fn(|at| graph.input(Input::Parameter(format!("x{at}"))))
     }
@@ -203,7 +223,7 @@ mod tests {
             Constant::ZERO,
             &[(Constant::ONE, ab), (Constant::ONE, ac), (Constant::ONE, d)],
         );
-        let out = take_out_factors(&mut g, vec![sum], BUDGET);
+        let out = factored(&mut g, vec![sum]);
         assert_eq!(g.display(out[0]).to_string(), "x3 + (x0*(x1 + x2))");
     }
 
@@ -213,7 +233,7 @@ mod tests {
         let [a, b, c] = variables(&mut g);
         let (ab, ac) = (g.multiply(a, b), g.multiply(a, c));
         let roots = vec![g.add(ab, ac), ab, ac];
-        assert_eq!(take_out_factors(&mut g, roots.clone(), BUDGET), roots);
+        assert_eq!(factored(&mut g, roots.clone()), roots);
     }
 
     #[test]
@@ -222,7 +242,7 @@ mod tests {
         let [a, b, c] = variables(&mut g);
         let (ac, bc) = (g.divide(a, c), g.divide(b, c));
         let sum = g.add(ac, bc);
-        let out = take_out_factors(&mut g, vec![sum], BUDGET);
+        let out = factored(&mut g, vec![sum]);
         let together = g.add(a, b);
         assert_eq!(out[0], g.divide(together, c));
     }

@@ -28,6 +28,9 @@ const MAX_FIFTHS_OF_CHEAPEST: usize = 6;
 /// Identities are sought in the cheapest plans of so many operations altogether: the search takes more than linear time.
 const MAX_OPERATIONS_FOR_IDENTITIES: usize = 240;
 
+/// Longer plans keep their order: by then registers, and not operations, are what a kernel waits for.
+const MAX_OPERATIONS_FOR_CANONICAL_ORDER: usize = 1000;
+
 /// A way of writing the results.
 struct Way {
     entries: Vec<Entry>,
@@ -203,9 +206,9 @@ impl Draft {
     fn candidate(&mut self, budget: usize, guard: &Guard) -> Candidate<'_> {
         let (mut values, mut plan) = (self.values.clone(), self.plan.clone());
         if self.passes.run(Pass::CommonFactors) {
-            let factored = take_out_factors(&mut self.graph, values.clone(), budget);
-            let trial = arrange(&self.graph, &factored);
-            if guard.accepts(&trial, &factored) {
+            let (factored, trial) =
+                take_out_factors(&mut self.graph, values.clone(), plan.clone(), budget);
+            if factored != values && guard.accepts(&trial, &factored) {
                 (values, plan) = (factored, trial);
             }
         }
@@ -236,7 +239,7 @@ impl Candidate<'_> {
         let mut block = self.draft.block.clone();
         block.for_each_value(&mut |value| *value = *next.next().unwrap_or(value));
         let mut plan = self.plan;
-        if passes.run(Pass::CanonicalOrder) {
+        if passes.run(Pass::CanonicalOrder) && plan.len() <= MAX_OPERATIONS_FOR_CANONICAL_ORDER {
             let alike = with_like_operations_alike(plan.clone());
             if guard.accepts(&alike, &self.values) {
                 plan = alike;
