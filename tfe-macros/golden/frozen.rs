@@ -7,7 +7,7 @@
 /// coordinates: r, θ      parameters: m, l, g, k
 /// operations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other
 /// operations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other
-/// operations, gradient and second derivatives: 4 +−, 16 ×, 0 ÷, 1 sin/cos, 0 other
+/// operations, gradient and second derivatives: 4 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other
 /// declared by             Lagrangian, 2 coordinates
 /// depends on time         no
 /// forces                  no
@@ -82,19 +82,19 @@ const _: () = {
             let m = t.like(self.m);
             let (sin_theta, cos_theta) = q[1].sin_cos();
             first.z[0] = m * z[0];
-            let t0 = l - q[0];
-            let t1 = k * t0;
-            let t2 = g * sin_theta;
-            let t3 = g * m;
-            let t4 = cos_theta * t3;
-            let t5 = t1 + t4;
-            let t6 = m * q[0];
-            let t7 = t6 * t2;
-            let t8 = z[1] * t6;
-            first.z[1] = q[0] * t8;
-            let t9 = z[1] * t8;
-            first.q[0] = t9 + t5;
-            first.q[1] = -t7;
+            let t0 = g * m;
+            let t1 = m * q[0];
+            let t2 = z[1] * t1;
+            let t3 = cos_theta * t0;
+            let t4 = sin_theta * t0;
+            let t5 = l - q[0];
+            let t6 = k * t5;
+            let t7 = z[1] * t2;
+            let t8 = t6 + t7;
+            first.q[0] = t3 + t8;
+            first.z[1] = q[0] * t2;
+            let t9 = q[0] * t4;
+            first.q[1] = -t9;
         }
         /// L_v and L_q, and L_vv: 3 +−, 11 ×, 1 sin/cos
         #[inline(always)]
@@ -148,7 +148,7 @@ const _: () = {
         ) {
             self.first_and_mass_inline(t, q, z, first, zz);
         }
-        /// L_v and L_q, L_vv, L_vq and L_qq: 4 +−, 16 ×, 1 sin/cos
+        /// L_v and L_q, L_vv, L_vq and L_qq: 4 +−, 15 ×, 1 sin/cos
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -164,30 +164,29 @@ const _: () = {
             let (sin_theta, cos_theta) = q[1].sin_cos();
             second.zz[0][0] = m;
             first.z[0] = m * z[0];
-            let t0 = l - q[0];
-            let t1 = k * t0;
-            let t2 = m * q[0];
-            let t3 = z[1] * t2;
-            first.z[1] = q[0] * t3;
-            second.zz[1][1] = q[0] * t2;
-            let t4 = g * t2;
-            let t5 = g * m;
-            let t6 = z[1] * t3;
-            second.zq[1][0] = t.like(2.0) * t3;
-            let t7 = z[1] * z[1];
-            let t8 = m * t7;
-            second.qq[0][0] = t8 - k;
-            let t9 = cos_theta * t5;
-            let t10 = t1 + t9;
-            first.q[0] = t6 + t10;
-            let t11 = sin_theta * t5;
-            let t12 = sin_theta * t4;
-            let t13 = cos_theta * t4;
+            let t0 = g * m;
+            let t1 = cos_theta * t0;
+            let t2 = sin_theta * t0;
+            let t3 = l - q[0];
+            let t4 = k * t3;
+            let t5 = m * q[0];
+            let t6 = z[1] * t5;
+            second.zz[1][1] = q[0] * t5;
+            first.z[1] = q[0] * t6;
+            let t7 = z[1] * t6;
+            let t8 = t4 + t7;
+            first.q[0] = t1 + t8;
+            second.zq[1][0] = t.like(2.0) * t6;
+            let t9 = z[1] * z[1];
+            let t10 = m * t9;
+            second.qq[0][0] = t10 - k;
+            let t11 = q[0] * t1;
+            let t12 = q[0] * t2;
             first.q[1] = -t12;
-            let t14 = -t11;
-            second.qq[0][1] = t14;
-            second.qq[1][0] = t14;
-            second.qq[1][1] = -t13;
+            let t13 = -t2;
+            second.qq[0][1] = t13;
+            second.qq[1][0] = t13;
+            second.qq[1][1] = -t11;
         }
         fn coordinate_name(index: usize) -> __tfe::CoordinateName {
             match index {
@@ -251,12 +250,12 @@ impl SpringPendulum {
             },
             second: ::tfe::__private::Operations {
                 additions: 4,
-                multiplications: 16,
+                multiplications: 15,
                 divisions: 0,
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m (r\u{307}² + r² θ\u{307}²) + m g r cos θ − ½ k (r − l)²\ncoordinates: r, θ      parameters: m, l, g, k\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 16 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           no, diagonal\nseparable (L_vq = 0)    no\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            (1,0)\npattern L_qq            (0,0) (0,1) (1,0) (1,1)",
+            page: "L = ½ m (r\u{307}² + r² θ\u{307}²) + m g r cos θ − ½ k (r − l)²\ncoordinates: r, θ      parameters: m, l, g, k\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           no, diagonal\nseparable (L_vq = 0)    no\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            (1,0)\npattern L_qq            (0,0) (0,1) (1,0) (1,1)",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.

@@ -196,8 +196,8 @@ const _: () = {
                     let omega = t.like(self.omega);
                     let t0 = t * omega;
                     let t1 = t0.sin();
-                    let t2 = t * amplitude;
-                    let t3 = t1 * t2;
+                    let t2 = amplitude * t1;
+                    let t3 = t * t2;
                     first.force[0] = -t3;
                 }
                 __tfe::By::Parameter(1) => {

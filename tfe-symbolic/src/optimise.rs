@@ -12,4 +12,5 @@ pub(crate) mod identities;
 pub mod passes;
 pub(crate) mod plan;
 mod rebuild;
+pub(crate) mod scaled_trig;
 pub(crate) mod signs;

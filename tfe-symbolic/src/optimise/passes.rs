@@ -11,6 +11,8 @@ pub enum Pass {
     OpenSums,
     /// Sines and cosines of sums from those of their parts.
     AngleSums,
+    /// l sin θ and l cos θ as variables.
+    ScaledTrig,
     /// a b + a c as a (b + c).
     CommonFactors,
     /// Results from sums and products of other results.
@@ -25,11 +27,12 @@ pub enum Pass {
 
 impl Pass {
     /// All of them, in the order in which they run.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::QuadraticForm,
         Self::Balance,
         Self::OpenSums,
         Self::AngleSums,
+        Self::ScaledTrig,
         Self::CommonFactors,
         Self::Identities,
         Self::CanonicalOrder,
@@ -42,7 +45,9 @@ impl Pass {
         match self {
             Self::QuadraticForm => "derivatives to derivatives",
             Self::Balance => "derivatives to fewer derivatives and a rule for the others",
-            Self::OpenSums | Self::AngleSums | Self::CommonFactors => "expressions to expressions",
+            Self::OpenSums | Self::AngleSums | Self::ScaledTrig | Self::CommonFactors => {
+                "expressions to expressions"
+            }
             Self::Identities | Self::CanonicalOrder | Self::Signs => "plan to plan",
             Self::StatementOrder => "statements to statements",
         }
@@ -54,11 +59,13 @@ impl Pass {
             Self::QuadraticForm => "linear in the derivatives",
             Self::Balance | Self::OpenSums | Self::Signs => "linear",
             Self::AngleSums => "angles of up to 8 parts; 64 known angles tried for each",
+            Self::ScaledTrig => "linear; drafts without loops up to a cost of 300",
             Self::CommonFactors => {
                 "8 rounds over all sums, and 20 000 operations arranged in trials"
             }
             Self::Identities => "plans up to 130 operations, 240 altogether; 4 rounds of 32 trials",
-            Self::CanonicalOrder | Self::StatementOrder => "near-linear",
+            Self::CanonicalOrder => "near-linear; plans up to 1000 operations",
+            Self::StatementOrder => "near-linear",
         }
     }
 
@@ -69,6 +76,7 @@ impl Pass {
             Self::Balance => "all entries off the diagonal",
             Self::OpenSums => "sums whose exact terms may cancel",
             Self::AngleSums => "arguments that are no sums of angles with small whole coefficients",
+            Self::ScaledTrig => "sines without a length beside each of them",
             Self::CommonFactors => "terms that something else uses",
             Self::Identities => "operations that something else needs",
             Self::CanonicalOrder | Self::Signs | Self::StatementOrder => "the number of operations",

@@ -152,6 +152,11 @@ impl Plan {
         self.values.insert(root, value);
     }
 
+    /// Forgets other roots.
+    pub(crate) fn retain_values(&mut self, wanted: impl Fn(ExprId) -> bool) {
+        self.values.retain(|root, _| wanted(*root));
+    }
+
     /// All roots and what they have become, in no order.
     pub(crate) fn values(&self) -> impl Iterator<Item = (ExprId, Value)> + '_ {
         self.values.iter().map(|(root, value)| (*root, *value))

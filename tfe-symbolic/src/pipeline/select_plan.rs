@@ -14,6 +14,7 @@ use crate::optimise::guard::Guard;
 use crate::optimise::identities::by_identities;
 use crate::optimise::passes::{Pass, Passes};
 use crate::optimise::plan::Plan;
+use crate::optimise::scaled_trig::ScaledTrig;
 use crate::optimise::signs::with_fewer_negations;
 use crate::program::{Array, Program};
 use crate::schedule::balance::{Balance, balances};
@@ -27,6 +28,9 @@ const MAX_FIFTHS_OF_CHEAPEST: usize = 6;
 
 /// Identities are sought in the cheapest plans of so many operations altogether: the search takes more than linear time.
 const MAX_OPERATIONS_FOR_IDENTITIES: usize = 240;
+
+/// Lengths go beside their sines in drafts up to this cost.
+const MAX_COST_FOR_SCALED_TRIG: usize = 300;
 
 /// Longer plans keep their order: by then registers, and not operations, are what a kernel waits for.
 const MAX_OPERATIONS_FOR_CANONICAL_ORDER: usize = 1000;
@@ -138,7 +142,7 @@ impl Draft {
         let share = BUDGET / drafts.len().max(1);
         let mut candidates: Vec<Candidate> = drafts
             .iter_mut()
-            .map(|draft| draft.candidate(share, &guard))
+            .flat_map(|draft| draft.candidates(share, &guard))
             .collect();
         candidates.sort_by_key(|candidate| candidate.plan.cost());
         let mut left = MAX_OPERATIONS_FOR_IDENTITIES;
@@ -202,8 +206,27 @@ impl Draft {
         guard.accepts(&self.plan, &self.values)
     }
 
-    /// The draft with common factors taken out, if that loses no digits.
-    fn candidate(&mut self, budget: usize, guard: &Guard) -> Candidate<'_> {
+    /// The draft with common factors taken out and, of small ones, with lengths beside their sines, where these lose no digits.
+    fn candidates(&mut self, budget: usize, guard: &Guard) -> Vec<Candidate<'_>> {
+        let mut found = Vec::with_capacity(2);
+        if self.passes.run(Pass::ScaledTrig)
+            && self.plan.cost() <= MAX_COST_FOR_SCALED_TRIG
+            && self.block.inner.is_empty()
+            && let Some((arms, values)) = ScaledTrig::of(&mut self.graph, &self.values)
+        {
+            let factored = match self.passes.run(Pass::CommonFactors) {
+                true => {
+                    let plan = arrange(&self.graph, &values);
+                    take_out_factors(&mut self.graph, values, plan, budget).0
+                }
+                false => values,
+            };
+            let roots: Vec<ExprId> = factored.iter().copied().chain(arms.parts()).collect();
+            let plan = arms.written_out(arrange(&self.graph, &roots), &factored);
+            if guard.accepts(&plan, &factored) {
+                found.push((factored, plan));
+            }
+        }
         let (mut values, mut plan) = (self.values.clone(), self.plan.clone());
         if self.passes.run(Pass::CommonFactors) {
             let (factored, trial) =
@@ -212,11 +235,14 @@ impl Draft {
                 (values, plan) = (factored, trial);
             }
         }
-        Candidate {
-            draft: self,
+        found.insert(0, (values, plan));
+        let draft: &Self = self;
+        let candidate = |(values, plan)| Candidate {
+            draft,
             values,
             plan,
-        }
+        };
+        found.into_iter().map(candidate).collect()
     }
 }
 
