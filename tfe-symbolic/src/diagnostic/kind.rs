@@ -375,6 +375,11 @@ kinds! {
     TruncationOfConstraints,
     /// An energy without derivatives at the point of a truncation.
     NoTaylorPolynomial,
+    /// A truncation whose derivatives become too long.
+    LongTaylorPolynomial {
+        /// The first degree that is too long.
+        degree: u32,
+    },
     /// A frozen coordinate of a Hamiltonian.
     FrozenHamiltonian,
     /// A coordinate to be ignored that formulas hold.

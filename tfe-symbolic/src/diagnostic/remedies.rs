@@ -237,6 +237,9 @@ impl Kind {
                     .into()
             }
             Self::NoTaylorPolynomial => "give another point, such as `truncated(2, r = l)`".into(),
+            Self::LongTaylorPolynomial { .. } => {
+                "truncate at a lower degree, or freeze coordinates first".into()
+            }
             Self::NotCyclic { .. } => {
                 "ignore coordinates only that appear by their velocities; `structure()` lists the cyclic ones".into()
             }

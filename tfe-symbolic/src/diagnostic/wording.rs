@@ -164,6 +164,9 @@ impl Kind {
             Self::NoTaylorPolynomial => {
                 "the model has no Taylor polynomial at the point of the truncation".into()
             }
+            Self::LongTaylorPolynomial { degree } => {
+                format!("the Taylor polynomial of this model is too long at degree {degree}")
+            }
             Self::FrozenHamiltonian => "coordinates of a Hamiltonian cannot be frozen".into(),
             Self::NotCyclic { name } => {
                 format!("`{name}` is not cyclic: the energy or a force depends on it")

@@ -142,10 +142,14 @@ impl Reduction {
                 return Err(Kind::PassOfLength { pass: PASS });
             }
         }
-        let sum = series(graph, of, degree, point);
+        let sum = series(graph, of, degree, point)?;
         let polynomial = graph.with_leaves(sum, &mut |graph, input| at_point(graph, input, point));
         if is_singular(graph, polynomial) {
             return Err(Kind::NoTaylorPolynomial);
+        }
+        let is_long = || graph.reachable(&[polynomial]).len() > MAX_OF_HIGH_DEGREE;
+        if degree > MAX_FREE_DEGREE && is_long() {
+            return Err(Kind::LongTaylorPolynomial { degree });
         }
         // Derivatives of different order share terms.
         let (constant, terms) = graph.terms(polynomial);
@@ -153,8 +157,16 @@ impl Reduction {
     }
 }
 
+/// Derivatives of third and higher order may be made of so many expressions. Of 10 000, the next order takes half a minute.
+const MAX_EXPRESSIONS: usize = 3000;
+
+/// Above this degree, polynomials may be made of so many expressions: that of a double pendulum to degree 12 has 237, and of 1200 the kernels take
+/// more than a second.
+const MAX_FREE_DEGREE: u32 = 6;
+const MAX_OF_HIGH_DEGREE: usize = 800;
+
 /// Σ 1/j! Dʲ f[δ, …, δ] with placeholders for δ.
-fn series(graph: &mut Graph, of: ExprId, degree: u32, point: &Point) -> ExprId {
+fn series(graph: &mut Graph, of: ExprId, degree: u32, point: &Point) -> Result<ExprId, Kind> {
     let mut terms = vec![(Constant::ONE, of)];
     let mut derivative = of;
     let mut factorial = 1;
@@ -163,12 +175,15 @@ fn series(graph: &mut Graph, of: ExprId, degree: u32, point: &Point) -> ExprId {
             let (_, at, part) = point.half(input)?;
             Some(graph.input(Input::Placeholder(part, at.clone())))
         });
+        if order > 2 && graph.reachable(&[derivative]).len() > MAX_EXPRESSIONS {
+            return Err(Kind::LongTaylorPolynomial { degree: order });
+        }
         // 12! is far from the largest integer.
         factorial *= i64::from(order);
         let factor = Constant::integer(factorial).reciprocal();
         terms.push((factor.unwrap_or(Constant::ZERO), derivative));
     }
-    graph.linear(Constant::ZERO, &terms)
+    Ok(graph.linear(Constant::ZERO, &terms))
 }
 
 /// q₀ for q, and q − q₀ for its placeholder.
