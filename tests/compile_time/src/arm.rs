@@ -94,8 +94,14 @@ mod tests {
     #[test]
     fn neighbouring_joints_turn_about_perpendicular_axes() {
         let text = program(2);
-        assert!(text.contains("let a0y = cos(q0)*(0) + sin(q0)*(1),"), "{text}");
-        assert!(text.contains("let a1z = cos(q1)*(a0z) - sin(q1)*(1),"), "{text}");
+        assert!(
+            text.contains("let a0y = cos(q0)*(0) + sin(q0)*(1),"),
+            "{text}"
+        );
+        assert!(
+            text.contains("let a1z = cos(q1)*(a0z) - sin(q1)*(1),"),
+            "{text}"
+        );
         assert!(
             text.contains("let p1x = p0x + l[0]/2*a0x + l[1]/2*a1x,"),
             "{text}"
