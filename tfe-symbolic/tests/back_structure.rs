@@ -61,6 +61,16 @@ fn a_spherical_pendulum() {
 }
 
 #[test]
+fn coordinates_that_cancel_are_cyclic() {
+    // ẋ² + ẏ² = ṙ² + r² α̇²: α is in x and y and in no derivative.
+    let text = "coordinates(r, alpha), let x = r*cos(alpha), let y = r*sin(alpha), \
+        lagrangian = (dot(x)^2 + dot(y)^2)/2 + 1/r";
+    let derivation = derivation(text);
+    assert_eq!(derivation.structure().cyclic, [1]);
+    assert!(!first(text).contains("E_q[1]"), "{}", first(text));
+}
+
+#[test]
 fn a_hamiltonian_that_is_not_quadratic() {
     let derivation = derivation("coordinates(x), momenta(p), hamiltonian = sqrt(1 + p^2) + x^4");
     let structure = derivation.structure();

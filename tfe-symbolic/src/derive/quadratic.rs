@@ -454,21 +454,56 @@ mod tests {
         all
     }
 
-    #[test]
-    fn the_parts_give_the_same_derivatives() {
-        // With terms linear in velocities and terms free of them.
-        let text = "coordinates(x, y), lagrangian = (dot(x) + t*y)^2/2 + (dot(y) - x)^2*(1 + x^2)/2 + x*y*dot(x)*dot(y) - x^4*y";
+    /// In how many ways derivatives are written, all of them equal to those of the energy.
+    fn ways(text: &str) -> usize {
         let mut declared = declare(text, &Context::default()).expect("a model of the test");
         let (graph, energy) = (&mut declared.graph, declared.energy);
         let all = derivatives(graph, energy);
-        for written in entries(graph, energy, &all) {
+        let ways = entries(graph, energy, &all);
+        for written in &ways {
             assert_eq!(written.len(), all.len());
             for (entry, own) in written.iter().zip(&all) {
                 let difference = graph.subtract(entry.value, own.value);
                 let difference = graph.expanded(difference).expect("few terms");
-                let zero = graph.as_constant(difference).is_some_and(Constant::is_zero);
-                assert!(zero, "{:?}: {}", own.place, graph.display(difference));
+                assert!(
+                    is_zero(graph, difference),
+                    "{:?}: {}",
+                    own.place,
+                    graph.display(difference)
+                );
             }
         }
+        ways.len()
+    }
+
+    #[test]
+    fn the_parts_give_the_same_derivatives() {
+        // With terms linear in velocities and terms free of them.
+        let text = "coordinates(x, y), lagrangian = (dot(x) + t*y)^2/2 + (dot(y) - x)^2*(1 + x^2)/2 + x*y*dot(x)*dot(y) - x^4*y";
+        assert!(ways(text) > 0);
+    }
+
+    #[test]
+    fn sums_of_velocities_are_rates() {
+        let text = "coordinates(x, y), lagrangian = dot(x)^2*(1 + x^2)/2 + (dot(x) + 2*dot(y))^2*(3 + y^2)/2 + x*(dot(x) + 2*dot(y))";
+        assert!(ways(text) > 0);
+        let mut declared = declare(text, &Context::default()).expect("a model of the test");
+        let (graph, energy) = (&mut declared.graph, declared.energy);
+        let sums = sums_of_velocities(graph, energy);
+        let all = derivatives(graph, energy);
+        let ways = entries(graph, energy, &all);
+        let keeps_the_sum = |entry: &Entry| {
+            entry.place.array == Array::ByZ
+                && graph.reachable(&[entry.value]).contains(&sums[0].value)
+        };
+        assert!(ways.iter().any(|way| way.iter().any(keeps_the_sum)));
+    }
+
+    #[test]
+    fn long_ways_are_not_followed() {
+        assert_eq!(
+            ways("coordinates(x, y), lagrangian = (1 + x + y)^9*(dot(x) + (2 + x*y)^5*dot(y))^2"),
+            0
+        );
     }
 }
