@@ -119,22 +119,19 @@ impl Draft {
     ///
     /// The first way is the one as declared: the others are compared with it, and it is taken where no other is good enough.
     pub(crate) fn best(graph: &Graph, written: Vec<Vec<Entry>>, passes: Passes) -> Program {
-        let mut written = written.into_iter();
-        let Some(entries) = written.next() else {
-            return Program::default();
-        };
-        let own = Way::of(graph, entries);
-        let mut ways = vec![&own];
-        let others: Vec<Way> = written.map(|entries| Way::of(graph, entries)).collect();
-        for other in &others {
-            if !ways.iter().any(|way| way.is_the_same(other)) {
-                ways.push(other);
+        let mut ways: Vec<Way> = Vec::with_capacity(written.len());
+        for entries in written {
+            let way = Way::of(graph, entries);
+            if !ways.iter().any(|known| known.is_the_same(&way)) {
+                ways.push(way);
             }
         }
-        ways.sort_by_key(|way| way.estimate);
-        let declared = Self::of(graph.clone(), own.entries.clone(), passes);
+        let Some(way) = ways.first() else {
+            return Program::default();
+        };
+        let declared = Self::of(graph.clone(), way.entries.clone(), passes);
         let guard = Guard::of(&declared.graph, &declared.plain);
-        let mut drafts = Self::followed(&ways, &own, declared, &guard);
+        let mut drafts = Self::followed(declared, &ways, &guard);
         drafts.sort_by_key(|draft| draft.plan.cost());
         let least = drafts.first().map_or(0, |draft| draft.plan.cost());
         drafts.retain(|draft| 5 * draft.plan.cost() <= MAX_FIFTHS_OF_CHEAPEST * least);
@@ -158,38 +155,39 @@ impl Draft {
         best.map_or_else(Program::default, |best| best.program(&guard))
     }
 
-    /// The drafts of the ways, cheapest first, that lose no digits and that seem to cost little more than the cheapest of them; the declared one
-    /// where no other is left.
-    fn followed(ways: &[&Way], own: &Way, mut declared: Self, guard: &Guard) -> Vec<Self> {
+    /// The drafts that lose no digits and seem to cost little more than the cheapest of these; the declared one, of the first way, where no other
+    /// is left.
+    fn followed(mut declared: Self, ways: &[Way], guard: &Guard) -> Vec<Self> {
+        let mut cheapest_first: Vec<(usize, &Way)> = ways.iter().enumerate().collect();
+        cheapest_first.sort_by_key(|(_, way)| way.estimate);
         let mut drafts = Vec::with_capacity(ways.len());
         let (mut least, mut follow_declared) = (None, false);
-        for way in ways {
+        for (number, way) in cheapest_first {
             if least.is_some_and(|least| !is_worth_following(way.estimate, least)) {
                 break;
             }
-            let is_good = if std::ptr::eq(*way, own) {
+            if number == 0 {
                 follow_declared = true;
-                true
             } else {
-                let mut draft =
-                    Self::of(declared.graph.clone(), way.entries.clone(), declared.passes);
-                let same_results = draft.cleared == declared.cleared
-                    && declared.block.has_the_results_of(&draft.block);
-                let is_good = same_results && draft.arrange(guard);
-                if is_good {
-                    drafts.push(draft);
+                let entries = way.entries.clone();
+                let mut draft = Self::of(declared.graph.clone(), entries, declared.passes);
+                if !declared.has_the_results_of(&draft) || !draft.arrange(guard) {
+                    continue;
                 }
-                is_good
-            };
-            if is_good {
-                least.get_or_insert(way.estimate);
+                drafts.push(draft);
             }
+            least.get_or_insert(way.estimate);
         }
         if follow_declared {
             declared.arrange(guard);
             drafts.insert(0, declared);
         }
         drafts
+    }
+
+    /// Whether both write to the same places, in the same way.
+    fn has_the_results_of(&self, other: &Self) -> bool {
+        self.cleared == other.cleared && self.block.has_the_results_of(&other.block)
     }
 
     /// Puts the operations in order, without expanded sines where these lose digits; whether none are lost.
