@@ -173,8 +173,9 @@ fn check(program: &Program, declared: &Declared, context: &Context) {
     environment.arrays = arrays;
     match interpret(program, &environment) {
         Ok(_) => {}
-        // Of a length that is known at run time only.
-        Err(InterpretError::OutOfRange { array, .. }) if context.field(&array).is_some() => {}
+        // Of a length that is known at run time only, or an index that is checked when the kernel is compiled for its parameters.
+        Err(InterpretError::OutOfRange { array, .. })
+            if context.field(&array).is_some() || !context.const_parameters.is_empty() => {}
         Err(error) => panic!("a program that cannot run: {error}\n{program}"),
     }
 }
