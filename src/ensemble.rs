@@ -368,7 +368,7 @@ impl<const N: usize> Plan<N> {
             *failure = check_start(start).err();
         }
         for (element, (time, _, step)) in self.mesh.elements().enumerate() {
-            if !bundle.advance(time, step) {
+            if !bundle.advance(self.mesh.begin(time, step), step) {
                 continue;
             }
             for (lane, failure) in failures.iter_mut().enumerate().take(starts.len()) {
@@ -425,7 +425,8 @@ impl<const N: usize> Plan<N> {
         };
         let mut state = *start;
         for (element, (time, _, step)) in self.mesh.elements().enumerate() {
-            if let Err(source) = stepper.advance(time, step, &mut state, &[]) {
+            if let Err(source) = stepper.advance(self.mesh.begin(time, step), step, &mut state, &[])
+            {
                 let kind = RunErrorKind::Solve {
                     element,
                     time,

@@ -50,6 +50,15 @@ pub enum RunErrorKind {
         /// The step asked for.
         step: f64,
     },
+    /// The step is so short beside the time itself that nodes would share times: the time has 53 bits.
+    StepUnresolved {
+        /// The largest time of the span.
+        time: f64,
+        /// The step asked for.
+        step: f64,
+        /// The least step at that time.
+        least: f64,
+    },
     /// A node is not finite or does not lie beyond the one before it, in the direction of the run.
     NodeOrder {
         /// Which node, the first one 0.
@@ -178,6 +187,12 @@ impl fmt::Display for RunErrorKind {
             Self::TooManySteps { span, step } => {
                 write!(f, "a span of {span} holds too many steps of {step}")
             }
+            Self::StepUnresolved { time, step, least } => {
+                write!(
+                    f,
+                    "a step of {step} is not resolved at t = {time}, where the least is {least:.1e}: count time from an origin near the motion"
+                )
+            }
             Self::NodeOrder { node, time } => {
                 write!(
                     f,
@@ -260,11 +275,11 @@ impl<const N: usize> fmt::Display for RunError<N> {
             }
             _ => {}
         }
-        // The likely reason of the failure.
-        match self.partial.warnings().last() {
-            Some(warning) => write!(f, "; {warning}"),
-            None => Ok(()),
+        // The likely reasons of the failure.
+        for warning in self.partial.warnings() {
+            write!(f, "; {warning}")?;
         }
+        Ok(())
     }
 }
 

@@ -277,13 +277,17 @@ fn ignored_angles_cost_no_accuracy_and_save_operations() {
         assert!(least.fold(1.0, f64::min) < 1e-10, "{rung:?}");
         assert_eq!(rung.model_error(), None);
     }
-    // Found 16796 of 28876 for 1e-6 and 17888 of 35048 for the others; the whole solves for three unknowns besides.
-    for accuracy in [1e-6, 1e-8, 1e-10] {
+    // Found 16900 of 23120 for 1e-6, where the full model is right by now with so long a step that some of its steps are cut, and 17888 of 35048 for the others; the whole
+    // solves for three unknowns besides.
+    for (accuracy, most) in [(1e-6, 0.75), (1e-8, 2.0 / 3.0), (1e-10, 2.0 / 3.0)] {
         let [reduced, full] = [
             operations(reduced, &Nutation::structure(), accuracy),
             operations(full, &Top::structure(), accuracy),
         ];
-        assert!(3 * reduced < 2 * full, "{accuracy:e}: {reduced} of {full}");
+        assert!(
+            (reduced as f64) < most * full as f64,
+            "{accuracy:e}: {reduced} of {full}"
+        );
     }
 }
 

@@ -443,3 +443,13 @@ impl<S> Accurate<S> {
         self
     }
 }
+
+/// Runs that are compared with better ones need no other evidence: a step with another root is told by the comparison, and one that was cut on one side alone would
+/// spoil it.
+fn trusting(control: Control) -> Control {
+    let solve = match control.solve {
+        Solve::Auto => Solve::Trusting,
+        solve => solve,
+    };
+    Control { solve, ..control }
+}

@@ -234,7 +234,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         let mut failure = None;
         let mut state = start.clone();
         for (element, (t, next, h)) in mesh.elements().enumerate() {
-            if let Err(source) = stepper.advance(t, h, &mut state) {
+            if let Err(source) = stepper.advance(mesh.begin(t, h), h, &mut state) {
                 if motion.last().t != t {
                     motion.record(self.model, t, &state, stepper.velocity(t, &state));
                 }

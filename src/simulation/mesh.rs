@@ -14,6 +14,8 @@ struct Segment {
     steps: usize,
     /// Whether the last step is as long as the others.
     whole: bool,
+    /// Whether it begins and ends at a break.
+    at_break: (bool, bool),
 }
 
 /// All elements of a span.
@@ -23,6 +25,7 @@ pub(crate) struct Mesh<const N: usize> {
     /// In the order in which the run meets them.
     impulses: Vec<Impulse<N>>,
     direction: f64,
+    has_breaks: bool,
 }
 
 impl<const N: usize> Mesh<N> {
@@ -45,13 +48,10 @@ impl<const N: usize> Mesh<N> {
             direction * start <= direction * time && direction * time <= direction * end
         };
 
-        let mut cuts: Vec<f64> = breaks
-            .iter()
-            .copied()
-            .filter(|&time| within(time) && time != start && time != end)
-            .collect();
+        let is_inside = |&time: &f64| within(time) && !is_same(time, start) && !is_same(time, end);
+        let mut cuts: Vec<f64> = breaks.iter().copied().filter(is_inside).collect();
         sort(&mut cuts, direction);
-        cuts.dedup();
+        cuts.dedup_by(|a, b| is_same(*a, *b));
         for impulse in impulses {
             if !(within(impulse.time) && impulse.value.iter().all(|value| value.is_finite())) {
                 return Err(RunErrorKind::Impulse { time: impulse.time });
@@ -67,14 +67,24 @@ impl<const N: usize> Mesh<N> {
         let mut from = start;
         for to in cuts.into_iter().chain([end]) {
             if to != from {
-                segments.push(Segment::new(from, to, direction * step.abs())?);
+                let mut segment = Segment::new(from, to, direction * step.abs())?;
+                segment.at_break = (from != start, to != end);
+                segments.push(segment);
             }
             from = to;
+        }
+        let is_at = |time: f64| breaks.iter().any(|one| is_same(*one, time));
+        if let Some(first) = segments.first_mut() {
+            first.at_break.0 = is_at(start);
+        }
+        if let Some(last) = segments.last_mut() {
+            last.at_break.1 = is_at(end);
         }
         Ok(Self {
             segments,
             impulses,
             direction,
+            has_breaks: !breaks.is_empty(),
         })
     }
 
@@ -98,11 +108,14 @@ impl<const N: usize> Mesh<N> {
         let (start, end) = ends(cuts);
         let impulses = acting(start, end, impulses);
         let mut mesh = Self::new(&(start..end), end - start, &[], &impulses)?;
+        mesh.has_breaks = cuts.len() > 2;
         let parts = cuts.windows(2);
         mesh.segments = parts
             .map(|pair| {
                 let steps = ((pair[1] - pair[0]).abs() / step).ceil().max(1.0);
-                Segment::new(pair[0], pair[1], (pair[1] - pair[0]) / steps)
+                let mut segment = Segment::new(pair[0], pair[1], (pair[1] - pair[0]) / steps)?;
+                segment.at_break = (pair[0] != start, pair[1] != end);
+                Ok(segment)
             })
             .collect::<Result<_, _>>()?;
         Ok(mesh)
@@ -118,19 +131,28 @@ impl<const N: usize> Mesh<N> {
         let Range { start, end } = *span;
         // Of span, breaks and impulses.
         let mut mesh = Self::new(span, end - start, &[], impulses)?;
+        mesh.has_breaks = !breaks.is_empty();
         check_nodes(span, nodes, mesh.direction)?;
         let direction = mesh.direction;
         let mut nodes = nodes.to_vec();
         let ahead =
             |time: &f64| direction * start < direction * time && direction * time < direction * end;
-        nodes.extend(breaks.iter().copied().filter(ahead));
+        let mut breaks: Vec<f64> = breaks.iter().copied().filter(ahead).collect();
+        sort(&mut breaks, direction);
+        breaks.dedup_by(|a, b| is_same(*a, *b));
+        let is_new = |time: &&f64| !is_among(&nodes, **time, direction);
+        let new: Vec<f64> = breaks.iter().filter(is_new).copied().collect();
+        nodes.extend(new);
         sort(&mut nodes, direction);
         nodes.dedup();
         mesh.segments = single_steps(&nodes);
         for segment in &mut mesh.segments {
-            if breaks.contains(&segment.end) {
-                segment.step = up_to_break(segment.start, segment.end);
-            }
+            let Segment { start, end, .. } = *segment;
+            segment.at_break = (
+                is_among(&breaks, start, direction),
+                is_among(&breaks, end, direction),
+            );
+            segment.check_resolution()?;
         }
         Ok(mesh)
     }
@@ -151,6 +173,20 @@ impl<const N: usize> Mesh<N> {
         self.segments.iter().flat_map(|segment| {
             (0..segment.steps).map(|k| (segment.node(k), segment.node(k + 1), segment.length(k)))
         })
+    }
+
+    /// Where the force is first felt in the element that begins at `t` and has the length `h`: at `t`, or beyond it by roundings where that is a break, so that an
+    /// element with a point at its start finds the force after the break there.
+    pub(crate) fn begin(&self, t: f64, h: f64) -> f64 {
+        if !self.has_breaks {
+            return t;
+        }
+        let is_before = |segment: &Segment| self.direction * segment.start < self.direction * t;
+        let segment = self.segments.get(self.segments.partition_point(is_before));
+        match segment {
+            Some(segment) if segment.start == t && segment.at_break.0 => t + rounding(t, h),
+            _ => t,
+        }
     }
 
     /// The impulses that act in the element from `t` to `next`: one at a node belongs to the element that it starts, at the end of the span to the last.
@@ -187,7 +223,24 @@ fn acting<const N: usize>(start: f64, end: f64, impulses: &[Impulse<N>]) -> Vec<
 
 /// The length of an element that ends at a break: shorter by roundings, so that an element with a point at its end finds the force before the break there.
 pub(crate) fn up_to_break(start: f64, end: f64) -> f64 {
-    (end - start) - (end - start).signum() * 4.0 * f64::EPSILON * end.abs()
+    (end - start) - rounding(end, end - start)
+}
+
+/// Whether two times are one but for rounding.
+fn is_same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 8.0 * f64::EPSILON * a.abs().max(b.abs())
+}
+
+/// Whether a time is one of some in the order of a run, but for rounding.
+fn is_among(times: &[f64], time: f64, direction: f64) -> bool {
+    let after = times.partition_point(|one| direction * one < direction * time);
+    let near = &times[after.saturating_sub(1)..times.len().min(after + 1)];
+    near.iter().any(|one| is_same(*one, time))
+}
+
+/// Some roundings of the time, in the direction of the run.
+fn rounding(t: f64, h: f64) -> f64 {
+    h.signum() * 4.0 * f64::EPSILON * t.abs().max(h.abs())
 }
 
 /// Refuses nodes that are not those of a run over the span.
@@ -230,6 +283,7 @@ fn single_steps(nodes: &[f64]) -> Vec<Segment> {
             step,
             steps: 1,
             whole: true,
+            at_break: (false, false),
         }));
         from += count;
     }
@@ -249,6 +303,9 @@ impl Segment {
     /// A count of steps beyond this is a mistake in units rather than a run: it would take years.
     const MOST_STEPS: f64 = 1e15;
 
+    /// A step of fewer roundings of the time has points that share times.
+    const LEAST_ROUNDINGS: f64 = 64.0;
+
     fn new(start: f64, end: f64, step: f64) -> Result<Self, RunErrorKind> {
         let ratio = (end - start) / step;
         if !(ratio <= Self::MOST_STEPS) {
@@ -261,23 +318,54 @@ impl Segment {
         let nearest = ratio.round();
         let whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0);
         let steps = if whole { nearest } else { ratio.ceil() }.max(1.0);
-        let step = if whole { (end - start) / steps } else { step };
-        Ok(Self {
+        // A step that leads to the end but for rounding stays as it was given, so that runs to different ends have the same nodes.
+        let rounding = 4.0 * f64::EPSILON * start.abs().max(end.abs());
+        let is_exact = ((end - start) - steps * step).abs() <= rounding;
+        let step = if whole && !is_exact {
+            (end - start) / steps
+        } else {
+            step
+        };
+        let segment = Self {
             start,
             end,
             step,
             steps: steps as usize,
             whole,
-        })
+            at_break: (false, false),
+        };
+        segment.check_resolution()?;
+        Ok(segment)
+    }
+
+    /// Refuses steps that are roundings of the time: nodes would share times, and points of an element, too.
+    fn check_resolution(&self) -> Result<(), RunErrorKind> {
+        let time = self.start.abs().max(self.end.abs());
+        let least = Self::LEAST_ROUNDINGS * f64::EPSILON * time;
+        if self.step.abs() < least {
+            return Err(RunErrorKind::StepUnresolved {
+                time,
+                step: self.step,
+                least,
+            });
+        }
+        Ok(())
     }
 
     /// The length of the k-th element.
     fn length(&self, k: usize) -> f64 {
-        if self.whole || k + 1 < self.steps {
+        let mut length = if self.whole || k + 1 < self.steps {
             self.step
         } else {
             self.end - self.node(k)
+        };
+        if self.at_break.0 && k == 0 {
+            length -= rounding(self.start, length);
         }
+        if self.at_break.1 && k + 1 == self.steps {
+            length -= rounding(self.end, length);
+        }
+        length
     }
 
     /// The k-th node: a product, not a sum, and the end of the segment exactly.

@@ -2,6 +2,7 @@
 
 use alloc::boxed::Box;
 use alloc::vec;
+use alloc::vec::Vec;
 
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
 use crate::model::State;
@@ -19,6 +20,8 @@ pub struct DenseElement<const N: usize> {
     end: State<N>,
     /// Legendre coefficients of h dq/dt, then those of h dp/dt.
     rates: Box<[[f64; N]]>,
+    /// Of an element that was cut: its pieces; else nothing.
+    pieces: Box<[Self]>,
 }
 
 impl<const N: usize> DenseElement<N> {
@@ -29,6 +32,34 @@ impl<const N: usize> DenseElement<N> {
             start: state,
             end: state,
             rates: Box::new([]),
+            pieces: Box::new([]),
+        }
+    }
+
+    /// An element that was cut (T-116), from time `start` to time `end`.
+    pub(crate) fn of_pieces((start, end): (f64, f64), mut pieces: Vec<Self>) -> Option<Self> {
+        let last = pieces.last_mut()?;
+        // Nodes of a run are what its mesh says, to the bit.
+        last.times.1 = end;
+        let after = last.end;
+        let before = pieces[0].start;
+        pieces[0].times.0 = start;
+        Some(Self {
+            times: (start, end),
+            start: before,
+            end: after,
+            rates: Box::new([]),
+            pieces: pieces.into_boxed_slice(),
+        })
+    }
+
+    /// Its pieces: the element itself, unless the step was [cut](crate::Statistics::cuts).
+    #[must_use]
+    pub fn pieces(&self) -> &[Self] {
+        if self.pieces.is_empty() {
+            core::slice::from_ref(self)
+        } else {
+            &self.pieces
         }
     }
 
@@ -61,6 +92,7 @@ impl<const N: usize> DenseElement<N> {
             start: last.start,
             end: last.end,
             rates: coefficients,
+            pieces: Box::new([]),
         }
     }
 
@@ -113,13 +145,14 @@ impl<const N: usize> DenseElement<N> {
             start: *start,
             end: *end,
             rates: coefficients,
+            pieces: Box::new([]),
         }
     }
 
     /// The degree of its polynomials: the number of points at which an element of collocation meets the equations of motion.
     #[must_use]
     pub fn degree(&self) -> usize {
-        self.rates.len() / 2
+        self.pieces()[0].rates.len() / 2
     }
 
     /// Time at the start.
@@ -140,6 +173,9 @@ impl<const N: usize> DenseElement<N> {
         if tau == 1.0 {
             return self.end;
         }
+        if !self.pieces.is_empty() {
+            return self.at_time(self.times.0 + tau * (self.times.1 - self.times.0));
+        }
         let mut integrals = [0.0; MAX_NODES];
         legendre_integrals(tau, &mut integrals);
         let mut state = self.start;
@@ -158,6 +194,11 @@ impl<const N: usize> DenseElement<N> {
     pub fn at_time(&self, time: f64) -> State<N> {
         if time == self.times.1 {
             return self.end;
+        }
+        let ahead = self.times.1 >= self.times.0;
+        let begun = |piece: &Self| (piece.times.0 <= time) == ahead || piece.times.0 == time;
+        if let Some(after) = (self.pieces.partition_point(begun)).checked_sub(1) {
+            return self.pieces[after].at_time(time);
         }
         self.at((time - self.times.0) / (self.times.1 - self.times.0))
     }

@@ -175,6 +175,18 @@ pub enum StepError {
         /// What was asked for.
         tolerance: f64,
     },
+    /// Newton's method converged, but not by contracting from its first iteration on: what it found may be another root of the equations of a long step.
+    Unproven {
+        /// The largest ratio of an increment to the one before.
+        ratio: f64,
+    },
+    /// Newton's method converged to an end whose energy is another one, although the model conserves it: the root of another motion, or a step over a singular point.
+    EnergyJump {
+        /// The energy at the start of the step.
+        before: f64,
+        /// The energy at its end.
+        after: f64,
+    },
     /// The change between velocities and momenta failed at a point of the element.
     Legendre(LegendreError),
     /// Something about the constraints.
@@ -229,6 +241,16 @@ impl fmt::Display for StepError {
                 f,
                 "the fixed-point iteration stalled: increment {residual:.1e} after {iterations} \
                  iterations, tolerance {tolerance:.1e}"
+            ),
+            Self::Unproven { ratio } => write!(
+                f,
+                "Newton's method wandered (an increment was {ratio:.1e} times the one before) and may have found another root of a long step: take a \
+                 shorter one, or `Solve::Trusting`"
+            ),
+            Self::EnergyJump { before, after } => write!(
+                f,
+                "the energy, which the model conserves, jumps from {before:.6e} to {after:.6e}: another root of a long step, or a singular point of the model; \
+                 take a shorter step, or `Solve::Trusting`"
             ),
             Self::Legendre(source) => source.fmt(f),
             Self::Constraint(source) => source.fmt(f),

@@ -22,6 +22,8 @@ mod condense;
 pub mod condenser;
 pub mod constrained;
 #[cfg(feature = "alloc")]
+mod cut;
+#[cfg(feature = "alloc")]
 mod dense;
 mod double_double;
 #[cfg(feature = "alloc")]
@@ -29,6 +31,7 @@ mod dual;
 pub mod element;
 mod equations;
 pub mod error;
+mod evidence;
 #[cfg(feature = "alloc")]
 pub mod family;
 pub mod legendre;

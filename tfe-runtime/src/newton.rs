@@ -2,6 +2,7 @@
 
 use crate::equations::{Equations, Increment};
 use crate::error::StepError;
+use crate::evidence::Evidence;
 use crate::lu;
 use crate::real::integer_power;
 use crate::statistics::Contraction;
@@ -17,6 +18,9 @@ pub enum Solve {
     FixedPoint,
     /// Newton only.
     Newton,
+    /// As [`Auto`](Self::Auto), but whatever an iteration converges to is taken. Elsewhere Newton's method has to contract from its first iteration on, so that
+    /// what it finds lies near where it began; a step in which it does not is cut (`docs/theory.md` §10.6).
+    Trusting,
 }
 
 /// What the iterations are allowed, and what is asked of them.
@@ -138,6 +142,9 @@ pub(crate) enum Verdict {
 /// So many iterations without a smaller increment are noise, if the coordinates do not move any more.
 pub(crate) const IDLE: u32 = 6;
 
+/// So many iterations without a smaller increment are a cycle: a contraction by 0.999 halves increments in fewer.
+pub(crate) const MAX_IDLE: u32 = 1000;
+
 impl Monitor {
     pub(crate) fn new(tolerance: f64) -> Self {
         Self {
@@ -219,6 +226,11 @@ impl Monitor {
         fresh && self.idle >= IDLE && self.last <= ROUGH_ROUND_OFF
     }
 
+    /// Whether the increments have not been halved for so long that they never will be: they go to and fro between some values.
+    pub(crate) fn is_stuck(&self) -> bool {
+        self.idle >= MAX_IDLE
+    }
+
     /// Whether so many more iterations would not do, at the present rate.
     #[inline(always)]
     pub(crate) fn is_hopeless(&self, remaining: u32) -> bool {
@@ -243,12 +255,13 @@ where
     E: Equations,
 {
     let mut monitor = Monitor::new(control.tolerance);
+    let mut evidence = Evidence::of_fixed_point();
     let most = if yielding {
         control.max_iterations.min(PATIENCE)
     } else {
         control.max_iterations
     };
-    let mut refresh = true;
+    let (mut refresh, mut iterations) = (true, most);
     for iteration in 0..most {
         let Scratch { unknowns, step, .. } = scratch;
         equations.sweep(unknowns, step, refresh)?;
@@ -259,19 +272,23 @@ where
         statistics.iterations += 1;
         statistics.fixed_point_iterations += 1;
         let increment = equations.measure(unknowns, step);
+        evidence.see(increment.relative, true);
         let verdict = monitor.judge(increment)?;
         equations.statistics().contraction = Contraction::of(monitor.rate());
         if let Verdict::Converged = verdict {
-            return Ok(());
+            return evidence.check(control.solve);
         }
         // The start is good to a few digits, so one evaluation of mass matrices mostly serves.
         refresh = monitor.rate() > 0.1;
-        if yielding && iteration >= 2 && monitor.is_hopeless(most - iteration) {
+        if (yielding && iteration >= 2 && monitor.is_hopeless(most - iteration))
+            || monitor.is_stuck()
+        {
+            iterations = iteration + 1;
             break;
         }
     }
     Err(StepError::FixedPointStalled {
-        iterations: most,
+        iterations,
         residual: monitor.last(),
         tolerance: control.tolerance,
     })
@@ -279,14 +296,14 @@ where
 
 /// Newton's method; the matrix is kept while it serves, also from step to step.
 ///
-/// `known` says that the scratch holds the factors of the last step; those of linear equations are kept throughout.
+/// Says what speaks for the root. `known` says that the scratch holds the factors of the last step; those of linear equations are kept throughout.
 pub(crate) fn newton<E>(
     equations: &mut E,
     control: &Control,
     scratch: &mut Scratch<'_>,
     known: bool,
     linear: bool,
-) -> Result<(), StepError>
+) -> Result<Evidence, StepError>
 where
     E: Equations,
 {
@@ -294,12 +311,14 @@ where
     // A small matrix is cheaper than the iterations that an old one would take more.
     let known = known && (linear || scratch.unknowns.len() >= SMALL);
     let mut fresh = !known;
+    let (mut evidence, mut own) = (Evidence::of_newton(), false);
     // A large matrix costs as much as many iterations with an old one.
     let good_enough = if scratch.unknowns.len() < LARGE {
         0.05
     } else {
         0.3
     };
+    let mut iterations = control.max_iterations;
     for iteration in 0..control.max_iterations {
         let Scratch {
             unknowns,
@@ -331,18 +350,25 @@ where
         statistics.iterations += 1;
         statistics.newton_iterations += 1;
         let increment = equations.measure(unknowns, step);
+        own |= fresh;
+        evidence.see(increment.relative, own);
         let verdict = monitor.judge(increment)?;
         // Equations that are linear are solved once; a second solution takes away the rounding.
         let refined = linear && iteration > 0 && increment.relative <= ROUND_OFF;
         if refined || matches!(verdict, Verdict::Converged) || monitor.is_rounding(fresh) {
-            return equations.finish(unknowns, step);
+            equations.finish(unknowns, step)?;
+            return Ok(evidence);
         }
         // The first increment alone tells no rate: an old matrix may show a second one.
         let untried = known && iteration == 0;
         fresh = !linear && !untried && monitor.rate() > good_enough;
+        if monitor.is_stuck() {
+            iterations = iteration + 1;
+            break;
+        }
     }
     Err(StepError::NewtonStalled {
-        iterations: control.max_iterations,
+        iterations,
         residual: monitor.last(),
         tolerance: control.tolerance,
     })

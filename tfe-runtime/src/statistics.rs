@@ -21,6 +21,8 @@ pub struct Statistics {
     pub factorizations: u64,
     /// Steps at which the fixed-point iteration was given up for Newton's.
     pub fallbacks: u64,
+    /// Steps that were cut into pieces, because Newton's method did not prove the root of the whole step to be the one that continues the motion.
+    pub cuts: u64,
     /// Steps of a linear model by one product with its matrix.
     pub products: u64,
     /// By how much the fixed-point iteration contracted when it was last judged.
@@ -83,6 +85,7 @@ impl Statistics {
         tangent_evaluations: 0,
         factorizations: 0,
         fallbacks: 0,
+        cuts: 0,
         products: 0,
         contraction: Contraction::NONE,
     };
@@ -97,6 +100,7 @@ impl Statistics {
         self.tangent_evaluations += other.tangent_evaluations;
         self.factorizations += other.factorizations;
         self.fallbacks += other.fallbacks;
+        self.cuts += other.cuts;
         self.products += other.products;
         self.contraction = self.contraction.max(other.contraction);
     }
@@ -129,7 +133,7 @@ impl fmt::Display for Statistics {
         write!(
             f,
             "{} steps, {} iterations ({} fixed-point, {} Newton), {} residual and {} tangent \
-             evaluations, {} factorisations, {} fallbacks",
+             evaluations, {} factorisations, {} fallbacks, {} cuts",
             self.steps,
             self.iterations,
             self.fixed_point_iterations,
@@ -137,7 +141,8 @@ impl fmt::Display for Statistics {
             self.residual_evaluations,
             self.tangent_evaluations,
             self.factorizations,
-            self.fallbacks
+            self.fallbacks,
+            self.cuts
         )
     }
 }

@@ -4,6 +4,7 @@ use crate::basis::{MAX_NODES, legendre};
 use crate::double_double::DoubleDouble;
 use crate::equations::{Equations, Span};
 use crate::error::StepError;
+use crate::evidence::{Energy, Evidence, conserves_energy};
 use crate::legendre::{largest, velocity};
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
@@ -18,7 +19,7 @@ use crate::workspace::{Parts, Scratch, Workspace};
 pub use crate::dense::DenseElement;
 pub use crate::newton::{Control, Solve};
 #[cfg(feature = "alloc")]
-pub use crate::stepper::Stepper;
+pub use crate::stepper::{Stepper, Suspended};
 
 /// A generalized force of the given time integral that acts at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -200,6 +201,7 @@ where
             linear: M::FACTS.linear,
             preference: &mut memory.preference,
             has_factors: false,
+            evidence: None,
         };
         let scratch = Scratch {
             unknowns: parts.unknowns,
@@ -251,6 +253,15 @@ where
         if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
             return Err(StepError::NonFinite);
         }
+        // A fixed point that contracts has proven enough, and a step of it is not to cost more.
+        if let Some(evidence) = &driver.evidence
+            && !M::FACTS.linear
+        {
+            let energy = (impulses.is_empty() && conserves_energy::<M, N>())
+                .then(|| Energy::of(self.model, (t, h), [state, &end]))
+                .flatten();
+            evidence.check_with(self.control.solve, energy, scheme.element)?;
+        }
         if driver.has_factors && !(M::FACTS.linear && M::FACTS.time_dependent) {
             memory.factored = Some(h);
         }
@@ -287,10 +298,7 @@ where
             parts.unknowns.fill(0.0);
             return Ok(false);
         };
-        let ratio = h / last.h;
-        // Far outside the last element its polynomial says nothing; backwards it may be reused.
-        let near = (-1.5..=3.0).contains(&ratio);
-        let fraction = if near { ratio } else { 0.0 };
+        let fraction = continued_ratio(h / last.h);
         if memory.ratio != Some(fraction) {
             set_extrapolation(&scheme, fraction, parts.extrapolation);
             memory.ratio = Some(fraction);
@@ -358,6 +366,15 @@ pub(crate) fn total<const N: usize>(impulses: &[Impulse<N>]) -> [f64; N] {
         }
     }
     sum
+}
+
+/// The ratio of steps by which the polynomial of the last element is continued: far outside of it that says nothing, and its end is; backwards it may be reused.
+pub(crate) fn continued_ratio(ratio: f64) -> f64 {
+    if (-1.5..=3.0).contains(&ratio) {
+        ratio
+    } else {
+        0.0
+    }
 }
 
 /// Old unknown rates to new ones: the polynomial of the last element, continued (T-65).
@@ -506,6 +523,8 @@ struct Driver<'a> {
     preference: &'a mut Preference,
     /// Whether the tangent holds factors that may serve the next step.
     has_factors: bool,
+    /// What Newton's method has to say for its root.
+    evidence: Option<Evidence>,
 }
 
 impl Driver<'_> {
@@ -527,7 +546,7 @@ impl Driver<'_> {
                 fixed_point(equations, self.control, &mut scratch, false)?;
                 return Ok(scratch);
             }
-            Solve::Auto if !self.linear && self.preference.is_fixed_point() => {
+            Solve::Auto | Solve::Trusting if !self.linear && self.preference.is_fixed_point() => {
                 if fixed_point(equations, self.control, &mut scratch, true).is_ok() {
                     self.preference.confirm_fixed_point();
                     return Ok(scratch);
@@ -536,7 +555,7 @@ impl Driver<'_> {
                 equations.statistics().fallbacks += 1;
                 scratch.unknowns.copy_from_slice(self.origin);
             }
-            Solve::Auto | Solve::Newton => {}
+            Solve::Auto | Solve::Trusting | Solve::Newton => {}
         }
         self.preference.count_newton();
         self.has_factors = true;
@@ -547,14 +566,15 @@ impl Driver<'_> {
             self.known,
             self.linear,
         );
-        if let Err(error) = first {
-            if !self.warm {
-                return Err(error);
+        self.evidence = Some(match first {
+            Ok(evidence) => evidence,
+            Err(error) if !self.warm => return Err(error),
+            Err(_) => {
+                // The continued polynomial may be a worse start than none.
+                cold(scratch.unknowns);
+                newton(equations, self.control, &mut scratch, false, self.linear)?
             }
-            // The continued polynomial may be a worse start than none.
-            cold(scratch.unknowns);
-            newton(equations, self.control, &mut scratch, false, self.linear)?;
-        }
+        });
         Ok(scratch)
     }
 }

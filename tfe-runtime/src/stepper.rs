@@ -3,6 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use crate::cut::{Halving, Instant, in_halves, may_be_cut};
 use crate::dense::DenseElement;
 use crate::element::{Element, ElementError};
 use crate::error::StepError;
@@ -78,6 +79,19 @@ pub struct Stepper<'m, M, const N: usize> {
     alike: (f64, usize),
     /// The workspace does not hold the last step.
     skipped: bool,
+    /// Of a last step that was cut.
+    pieces: Vec<Piece<N>>,
+}
+
+/// A part of a step that was cut.
+#[derive(Clone, Debug)]
+struct Piece<const N: usize> {
+    last: Last<N>,
+    impulses: Vec<Impulse<N>>,
+    dense: DenseElement<N>,
+    /// The workspace after it.
+    numbers: Vec<f64>,
+    pivots: Vec<usize>,
 }
 
 // Not derived: the model is borrowed, it need not be `Clone`.
@@ -96,7 +110,32 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             points: self.points.clone(),
             alike: self.alike,
             skipped: self.skipped,
+            pieces: self.pieces.clone(),
         }
+    }
+}
+
+/// All that a stepper carries from step to step, without its model: with it the next step is the same to the last bit.
+#[derive(Clone, Debug)]
+pub struct Suspended<const N: usize> {
+    element: Element,
+    memory: Memory<N>,
+    numbers: Vec<f64>,
+    pivots: Vec<usize>,
+    impulses: Vec<Impulse<N>>,
+    ends_only: bool,
+    propagator: Option<Propagator<N>>,
+    points: Option<Points<N>>,
+    alike: (f64, usize),
+    skipped: bool,
+    pieces: Vec<Piece<N>>,
+}
+
+impl<const N: usize> Suspended<N> {
+    /// The element of the stepper.
+    #[must_use]
+    pub fn element(&self) -> Element {
+        self.element
     }
 }
 
@@ -104,6 +143,52 @@ impl<'m, M, const N: usize> Stepper<'m, M, N>
 where
     M: Model<N>,
 {
+    /// Leaves the model.
+    #[must_use]
+    pub fn suspend(self) -> Suspended<N> {
+        Suspended {
+            element: self.table.view().element,
+            memory: self.memory,
+            numbers: self.numbers,
+            pivots: self.pivots,
+            impulses: self.impulses,
+            ends_only: self.ends_only,
+            propagator: self.propagator,
+            points: self.points,
+            alike: self.alike,
+            skipped: self.skipped,
+            pieces: self.pieces,
+        }
+    }
+
+    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn resume(
+        model: &'m M,
+        control: Control,
+        suspended: Suspended<N>,
+    ) -> Result<Self, ElementError> {
+        let mut memory = suspended.memory;
+        memory.statistics = Statistics::NONE;
+        Ok(Self {
+            model,
+            table: SchemeTable::new(suspended.element)?,
+            control,
+            memory,
+            numbers: suspended.numbers,
+            pivots: suspended.pivots,
+            impulses: suspended.impulses,
+            ends_only: suspended.ends_only,
+            propagator: suspended.propagator,
+            points: suspended.points,
+            alike: suspended.alike,
+            skipped: suspended.skipped,
+            pieces: suspended.pieces,
+        })
+    }
+
     /// A constant, so that nothing is compiled for models that never step like this.
     const MAY_HAVE_POINTS: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
 
@@ -135,6 +220,7 @@ where
             points,
             alike: (0.0, 0),
             skipped: false,
+            pieces: Vec::new(),
         };
         if stepper.points.is_none() {
             stepper.make_room();
@@ -176,6 +262,9 @@ where
     /// Moves `state` from t to t + h. The first iterate continues the last step if `state` is
     /// where that ended; a state of one's own is as welcome.
     ///
+    /// A step whose iteration fails, or does not prove that it found the root that continues the motion (T-115), is cut into halves, and these again, up to 1024
+    /// pieces; [`Statistics::cuts`] counts such steps, and [`dense`](Self::dense) and [`transition`](Self::transition) are those of all pieces together.
+    ///
     /// # Errors
     /// [`StepError`]; `state` is unchanged then.
     pub fn advance(
@@ -185,39 +274,22 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        self.impulses.clear();
-        self.impulses.extend_from_slice(impulses);
-        if Self::MAY_BE_PROPAGATED
-            && self.is_propagated()
-            && impulses.is_empty()
-            && self.propagate(t, h, state)
-        {
-            return Ok(());
+        self.pieces.clear();
+        let error = match self.whole(t, h, state, impulses) {
+            Err(error) if may_be_cut(&error, M::FACTS.linear, self.control.solve) => error,
+            outcome => return outcome,
+        };
+        let (start, low, steps) = (*state, self.memory.low, self.memory.statistics.steps);
+        let arrived = in_halves(self, (t, h), state, impulses, 1);
+        self.memory.statistics.steps = steps;
+        if !arrived {
+            (*state, self.memory.low, self.memory.last) = (start, low, None);
+            self.pieces.clear();
+            return Err(error);
         }
-        if Self::MAY_HAVE_POINTS && impulses.is_empty() && h.is_finite() && h != 0.0 {
-            match self.together(t, h, state) {
-                Together::Arrived => return Ok(()),
-                Together::Stalled(error) => return Err(error),
-                Together::LeftToOthers => {}
-            }
-        }
-        self.skipped = false;
-        self.make_room();
-        let interval = Interval {
-            start: t,
-            length: h,
-            impulses,
-        };
-        let workspace = Workspace {
-            numbers: &mut self.numbers,
-            pivots: &mut self.pivots,
-        };
-        let method = Method {
-            model: self.model,
-            tables: &self.table,
-            control: self.control,
-        };
-        method.advance(&mut self.memory, workspace, interval, state)
+        self.memory.statistics.steps += 1;
+        self.memory.statistics.cuts += 1;
+        Ok(())
     }
 
     /// Whether a matrix is asked for.
@@ -369,6 +441,7 @@ where
         Ok(end)
     }
 
+    /// A step that was done before, or that nothing can mislead.
     fn ordinary(
         &self,
         memory: &mut Memory<N>,
@@ -379,7 +452,10 @@ where
         let method = Method {
             model: self.model,
             tables: &self.table,
-            control: self.control,
+            control: Control {
+                solve: Solve::Trusting,
+                ..self.control
+            },
         };
         let interval = Interval {
             start,
@@ -405,6 +481,12 @@ where
     /// Before the first step, and after a failed one, it is the constant zero.
     #[must_use]
     pub fn dense(&self, start: f64, end: f64) -> DenseElement<N> {
+        let pieces = self.pieces.iter().map(|piece| piece.dense.clone());
+        DenseElement::of_pieces((start, end), pieces.collect())
+            .unwrap_or_else(|| self.dense_of_last(start, end))
+    }
+
+    fn dense_of_last(&self, start: f64, end: f64) -> DenseElement<N> {
         let scheme = self.table.view();
         let Some(last) = self.memory.last else {
             return DenseElement::constant(start, end, State::ZERO);
@@ -447,6 +529,49 @@ where
     /// [`TransitionError`] if there is no last step, its tangent
     /// is singular, or `matrix` is too short.
     pub fn transition(&mut self, matrix: &mut [f64]) -> Result<(), TransitionError> {
+        if self.pieces.is_empty() {
+            return self.transition_of_last(matrix);
+        }
+        let width = 2 * N;
+        let needed = width * width;
+        if matrix.len() < needed {
+            let given = matrix.len();
+            return Err(TransitionError::Shape { needed, given });
+        }
+        let mut product = vec![0.0; needed];
+        for row in 0..width {
+            product[row * width + row] = 1.0;
+        }
+        let (mut factor, mut next) = (vec![0.0; needed], vec![0.0; needed]);
+        // The last one leaves the stepper as the step has left it.
+        for piece in 0..self.pieces.len() {
+            self.recall(piece);
+            self.transition_of_last(&mut factor)?;
+            for row in 0..width {
+                for column in 0..width {
+                    next[row * width + column] = (0..width)
+                        .map(|k| factor[row * width + k] * product[k * width + column])
+                        .sum();
+                }
+            }
+            core::mem::swap(&mut product, &mut next);
+        }
+        matrix[..needed].copy_from_slice(&product);
+        Ok(())
+    }
+
+    /// Goes back to where a piece of the last step has ended.
+    fn recall(&mut self, piece: usize) {
+        let piece = &self.pieces[piece];
+        self.memory.last = Some(piece.last);
+        self.memory.forget_factors();
+        self.numbers.clone_from(&piece.numbers);
+        self.pivots.clone_from(&piece.pivots);
+        self.impulses.clone_from(&piece.impulses);
+        self.skipped = false;
+    }
+
+    fn transition_of_last(&mut self, matrix: &mut [f64]) -> Result<(), TransitionError> {
         let element = self.table.view().element;
         let length = transition_len(element, M::FORM, N, M::CONSTRAINTS.len());
         let mut extra = vec![0.0; length];
@@ -482,6 +607,79 @@ where
     /// The same since the last call.
     pub(crate) fn take_statistics(&mut self) -> Statistics {
         core::mem::take(&mut self.memory.statistics)
+    }
+}
+
+impl<M, const N: usize> Halving for Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    type State = State<N>;
+    type Kick = Impulse<N>;
+
+    fn whole(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+        impulses: &[Impulse<N>],
+    ) -> Result<(), StepError> {
+        self.impulses.clear();
+        self.impulses.extend_from_slice(impulses);
+        if Self::MAY_BE_PROPAGATED
+            && self.is_propagated()
+            && impulses.is_empty()
+            && self.propagate(t, h, state)
+        {
+            return Ok(());
+        }
+        if Self::MAY_HAVE_POINTS && impulses.is_empty() && h.is_finite() && h != 0.0 {
+            match self.together(t, h, state) {
+                Together::Arrived => return Ok(()),
+                Together::Stalled(error) => return Err(error),
+                Together::LeftToOthers => {}
+            }
+        }
+        self.skipped = false;
+        self.make_room();
+        let interval = Interval {
+            start: t,
+            length: h,
+            impulses,
+        };
+        let workspace = Workspace {
+            numbers: &mut self.numbers,
+            pivots: &mut self.pivots,
+        };
+        let method = Method {
+            model: self.model,
+            tables: &self.table,
+            control: self.control,
+        };
+        method.advance(&mut self.memory, workspace, interval, state)
+    }
+
+    fn passed(&mut self, t: f64, h: f64, kicks: Vec<Impulse<N>>) {
+        if let Some(numbers) = self.retrace() {
+            self.numbers = numbers;
+            self.skipped = false;
+        }
+        let dense = self.dense_of_last(t, t + h);
+        if let Some(last) = self.memory.last {
+            self.pieces.push(Piece {
+                last,
+                impulses: kicks,
+                dense,
+                numbers: self.numbers.clone(),
+                pivots: self.pivots.clone(),
+            });
+        }
+    }
+}
+
+impl<const N: usize> Instant for Impulse<N> {
+    fn time(&self) -> f64 {
+        self.time
     }
 }
 

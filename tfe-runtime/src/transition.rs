@@ -171,6 +171,15 @@ where
             sides,
         };
         if const { !M::CONSTRAINTS.is_empty() } {
+            let place = (last.t, &last.start.q);
+            let mut rows = Rows::at_start_again(parts.rows, self.model, place, parts.active);
+            let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
+            let is_combined = rows.is_combined();
+            if is_combined {
+                for place in layout.multipliers() {
+                    rows.combine_multipliers(&mut parts.unknowns[place]);
+                }
+            }
             let mut form = ConstrainedForm {
                 inner: VelocityForm {
                     model: self.model,
@@ -183,19 +192,25 @@ where
                     constant_mass: &mut memory.mass,
                     statistics: &mut memory.statistics,
                 },
-                layout: Layout::new(&scheme.element, N, M::CONSTRAINTS.len()),
-                rows: Rows::at_start(parts.rows, self.model, last.t, &last.start.q),
+                layout,
+                rows,
                 active: parts.active,
                 impulse: total(impulses),
             };
-            return Ok(linearise(
+            let linearised = linearise(
                 &mut form,
                 parts.unknowns,
                 &[],
                 false,
                 system,
                 &mut matrix[..4 * N * N],
-            )?);
+            );
+            if is_combined {
+                for place in layout.multipliers() {
+                    form.rows.declared_multipliers(&mut parts.unknowns[place]);
+                }
+            }
+            return Ok(linearised?);
         }
         if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
             let mut equations = PhaseForm {

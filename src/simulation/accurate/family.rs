@@ -1,7 +1,9 @@
 //! Runs of models of run-time length with an estimate of their error.
 
 use super::super::family::{FamilyRunError, FamilySimulation};
-use super::{Accurate, Broken, Passing, Repeatable, Steps, accurate, check_accuracy, estimated};
+use super::{
+    Accurate, Broken, Passing, Repeatable, Steps, accurate, check_accuracy, estimated, trusting,
+};
 use crate::accuracy::{Asked, Estimated};
 use crate::error::RunErrorKind;
 use crate::motion::family::FamilyMotion;
@@ -138,17 +140,17 @@ impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
         control: Control,
         _: bool,
     ) -> Result<FamilyStepper<'m, M>, RunErrorKind> {
-        FamilyStepper::new(self.model, element, control).map_err(RunErrorKind::Family)
+        FamilyStepper::new(self.model, element, trusting(control)).map_err(RunErrorKind::Family)
     }
 
     fn advance(
         &self,
         stepper: &mut FamilyStepper<'m, M>,
         (t, _, h): (f64, f64, f64),
-        _: &Mesh<0>,
+        mesh: &Mesh<0>,
         state: &mut FamilyState,
     ) -> Result<(), StepError> {
-        stepper.advance(t, h, state)
+        stepper.advance(mesh.begin(t, h), h, state)
     }
 
     fn set_tolerance(stepper: &mut FamilyStepper<'m, M>, tolerance: f64) {

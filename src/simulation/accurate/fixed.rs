@@ -2,7 +2,9 @@
 
 use super::super::mesh::Mesh;
 use super::super::{Simulation, check_constraints, check_start};
-use super::{Accurate, Broken, Passing, Repeatable, Steps, accurate, check_accuracy, estimated};
+use super::{
+    Accurate, Broken, Passing, Repeatable, Steps, accurate, check_accuracy, estimated, trusting,
+};
 use crate::accuracy::{Asked, Estimated};
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
@@ -182,6 +184,7 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         control: Control,
         is_recorded: bool,
     ) -> Result<Stepper<'m, M, N>, RunErrorKind> {
+        let control = trusting(control);
         let stepper = Stepper::new(self.model, element, control).map_err(RunErrorKind::Element)?;
         Ok(if is_recorded && self.record_every == 1 {
             stepper
@@ -198,7 +201,7 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         state: &mut State<N>,
     ) -> Result<(), StepError> {
         let impulses = mesh.impulses_in(t, next, mesh.end() == Some(next));
-        stepper.advance(t, h, state, impulses)
+        stepper.advance(mesh.begin(t, h), h, state, impulses)
     }
 
     fn set_tolerance(stepper: &mut Stepper<'m, M, N>, tolerance: f64) {

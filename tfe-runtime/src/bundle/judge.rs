@@ -1,6 +1,7 @@
 //! The stopping rule of single trajectories for several at once, without branches.
 
-use crate::newton::{IDLE, ROUGH_ROUND_OFF, ROUND_OFF};
+use crate::evidence::Evidence;
+use crate::newton::{IDLE, MAX_IDLE, ROUGH_ROUND_OFF, ROUND_OFF, Solve};
 use crate::real::Real;
 
 /// Judges the increments of several trajectories as [`Monitor`](crate::newton::Monitor) judges those of one. Truth values are one and zero.
@@ -12,6 +13,9 @@ pub(super) struct Judge<V> {
     risen: V,
     best: V,
     idle: V,
+    /// The largest ratio of increments far from round-off: [`Evidence`].
+    worst: V,
+    proven: V,
 }
 
 /// Increments, relative to the state.
@@ -56,8 +60,14 @@ impl<V: Real> Increments<V> {
 
 impl<V: Real> Judge<V> {
     #[inline(always)]
-    pub(super) fn new(like: V, tolerance: f64) -> Self {
+    pub(super) fn new(like: V, tolerance: f64, solve: Solve) -> Self {
         Self {
+            worst: like.like(0.0),
+            proven: like.like(if solve == Solve::Trusting {
+                f64::INFINITY
+            } else {
+                Evidence::CONTRACTS
+            }),
             tolerance: like.like(tolerance),
             last: like.like(f64::INFINITY),
             rate: like.like(1.0),
@@ -87,6 +97,8 @@ impl<V: Real> Judge<V> {
         let beyond = larger(by_rate, by_memory);
         let beyond = V::select(self.last.less_or_equal(size), size - self.tolerance, beyond);
         let beyond = V::select(is_first, size - self.tolerance, beyond);
+        let seen = V::select(size.like(Evidence::FAR).less(size), rate, zero);
+        self.worst = V::select(self.worst.less(seen), seen, self.worst);
         self.risen = V::select(self.last.less_or_equal(size), self.risen + one, zero);
         let is_better = size.less(size.like(0.5) * self.best);
         self.best = V::select(is_better, size, self.best);
@@ -94,10 +106,12 @@ impl<V: Real> Judge<V> {
         self.last = size;
         self.rate = V::select(is_first, one, rate);
         // Comparisons with a NaN are false.
+        let is_stuck = size.like(f64::from(MAX_IDLE)).less_or_equal(self.idle);
         let finite = V::select(size.less(infinity), active, zero);
         let done = V::select(beyond.less_or_equal(zero), finite, zero);
         let done = V::select(zero.less(self.stalled(increments)), finite, done);
-        (done, finite - done)
+        let proven = V::select(self.worst.less_or_equal(self.proven), done, zero);
+        (proven, V::select(is_stuck, zero, finite - done))
     }
 
     /// Which are at round-off and no longer fall.
@@ -166,8 +180,9 @@ mod tests {
         for seed in 0..4000 {
             let lanes = [0, 1, 2, 3].map(|lane| sequence(4 * seed + lane));
             let like = Lanes([0.0; 4]);
-            let mut judge = Judge::new(like, 1e-17);
+            let mut judge = Judge::new(like, 1e-17, Solve::Auto);
             let mut monitors = [(); 4].map(|()| Monitor::new(1e-17));
+            let mut evidence = [(); 4].map(|()| Evidence::of_fixed_point());
             let mut active = [true; 4];
             for step in 0..24 {
                 let increments = Increments::new(
@@ -184,8 +199,10 @@ mod tests {
                     }
                     let (relative, position) = lanes[lane][step];
                     let monitor = &mut monitors[lane];
+                    evidence[lane].see(relative, true);
+                    let proven = evidence[lane].check(Solve::Auto).is_ok();
                     let expected = match monitor.judge(Increment { relative, position }) {
-                        Ok(Verdict::Converged) => (1.0, 0.0),
+                        Ok(Verdict::Converged) => (f64::from(u8::from(proven)), 0.0),
                         Ok(Verdict::GoOn) => (0.0, 1.0),
                         Err(_) => (0.0, 0.0),
                     };

@@ -145,14 +145,14 @@ where
         statistics: &mut Statistics,
     ) -> V {
         // Where Newton's method may follow, the iteration gives up early.
-        let yielding = self.control.solve == Solve::Auto;
+        let yielding = self.control.solve != Solve::FixedPoint;
         let most = if yielding {
             self.control.max_iterations.min(PATIENCE)
         } else {
             self.control.max_iterations
         };
         let zero = like.like(0.0);
-        let mut judge = Judge::new(like, self.control.tolerance);
+        let mut judge = Judge::new(like, self.control.tolerance, self.control.solve);
         let (mut active, mut arrived, mut count, mut rates) = (wanted, zero, zero, zero);
         let mut iteration = 0;
         while iteration < most {

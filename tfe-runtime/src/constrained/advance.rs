@@ -7,6 +7,7 @@ use crate::constrained::rows::Rows;
 use crate::constrained::{START_TOLERANCE, refused, relative_residual};
 use crate::equations::Span;
 use crate::error::{ConstraintError, StepError};
+use crate::evidence::{Energy, conserves_energy};
 use crate::legendre::largest;
 use crate::model::{CoordinateName, Model, State};
 use crate::newton::{Solve, newton};
@@ -55,6 +56,20 @@ where
         parts.active.fill(0);
     }
     rows.choose::<M>(parts.active);
+    let mean = mean_rate(&scheme, parts.unknowns[..layout.rates()].as_chunks().0);
+    combine(
+        method.model,
+        &mut rows,
+        (t, h),
+        &state.q,
+        &mean,
+        parts.active,
+    );
+    if warm && rows.is_combined() {
+        for place in layout.multipliers() {
+            rows.combine_multipliers(&mut parts.unknowns[place]);
+        }
+    }
     // A failure leaves nothing to continue from.
     memory.last = None;
     let low = if warm { memory.low } else { State::ZERO };
@@ -62,29 +77,26 @@ where
                 tangent: &mut [f64],
                 step: &mut [f64],
                 pivots: &mut [usize],
-                rows: &Rows<'_, N>| {
+                rows: &Rows<'_, N>,
+                active: &[usize]| {
         let mut bordered = Bordered {
             matrix: tangent,
             vector: step,
             pivots,
         };
         let at = (&state.q, &state.p);
-        let v = solve_velocity(
-            method.model,
-            t,
-            at,
-            &[0.0; N],
-            rows,
-            parts.active,
-            &mut bordered,
-        )?;
+        let v = solve_velocity(method.model, t, at, &[0.0; N], rows, active, &mut bordered)?;
         constant(&layout, &v, unknowns);
         Ok::<_, StepError>(v)
     };
+    let mut start_velocity = [0.0; N];
+    let end_places = layout.end(0)..layout.node(0);
     if warm {
+        // The last element has left it.
+        start_velocity.copy_from_slice(&parts.unknowns[end_places.clone()]);
         let rates = layout.rates();
         let end: [f64; N] = end_velocity(&scheme, parts.unknowns[..rates].as_chunks().0);
-        parts.unknowns[layout.end(0)..layout.node(0)].copy_from_slice(&end);
+        parts.unknowns[end_places].copy_from_slice(&end);
     } else {
         let v = cold(
             parts.unknowns,
@@ -92,8 +104,11 @@ where
             parts.step,
             parts.tangent_pivots,
             &rows,
+            parts.active,
         )?;
         check_start(method.model, t, h, state, &v, &rows)?;
+        start_velocity = v;
+        combine(method.model, &mut rows, (t, h), &state.q, &v, parts.active);
     }
     let mut scratch = Scratch {
         unknowns: parts.unknowns,
@@ -126,26 +141,43 @@ where
         impulse: total(impulses),
     };
     let first = newton(&mut form, &method.control, &mut scratch, false, false);
-    if let Err(error) = first {
-        if !warm {
-            return Err(error);
+    let evidence = match first {
+        Ok(evidence) => evidence,
+        Err(error) if !warm => return Err(error),
+        Err(_) => {
+            // The continued polynomial may be a worse start than none.
+            form.rows.evaluate(method.model, t, &state.q);
+            cold(
+                scratch.unknowns,
+                scratch.tangent,
+                scratch.step,
+                scratch.pivots,
+                &form.rows,
+                form.active,
+            )?;
+            newton(&mut form, &method.control, &mut scratch, false, false)?
         }
-        // The continued polynomial may be a worse start than none.
-        form.rows.evaluate(method.model, t, &state.q);
-        cold(
-            scratch.unknowns,
-            scratch.tangent,
-            scratch.step,
-            scratch.pivots,
-            &form.rows,
-        )?;
-        newton(&mut form, &method.control, &mut scratch, false, false)?;
-    }
+    };
     let (end, end_low) = form.end_state(scratch.unknowns)?;
     if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
         return Err(StepError::NonFinite);
     }
     form.check_end(scratch.unknowns)?;
+    // Constraints that move do work.
+    let is_conserved = conserves_energy::<M, N>()
+        && impulses.is_empty()
+        && form.rows.drift.iter().all(|a| *a == 0.0);
+    let energy = is_conserved.then(|| {
+        let velocities = [start_velocity, form.end_place(scratch.unknowns).2];
+        Energy::with(method.model, (t, h), [state, &end], &velocities)
+    });
+    evidence.check_with(method.control.solve, energy, element)?;
+    // Between steps they are those of the constraints as declared.
+    if form.rows.is_combined() {
+        for place in layout.multipliers() {
+            form.rows.declared_multipliers(&mut scratch.unknowns[place]);
+        }
+    }
     memory.last = Some(Last {
         t,
         h,
@@ -164,6 +196,35 @@ fn constant<const N: usize>(layout: &Layout, v: &[f64; N], unknowns: &mut [f64])
     unknowns.fill(0.0);
     unknowns[..layout.rates()].as_chunks_mut().0.fill(*v);
     unknowns[layout.end(0)..layout.node(0)].copy_from_slice(v);
+}
+
+/// The mean of the rates: those that continue the last element, or none yet.
+fn mean_rate<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [f64; N] {
+    let mut mean = [0.0; N];
+    for (weight, rate) in scheme.advance.iter().zip(rates) {
+        for a in 0..N {
+            mean[a] += weight * rate[a];
+        }
+    }
+    mean
+}
+
+/// Combines rows that depend on one another, for an element with that mean rate.
+fn combine<M, const N: usize>(
+    model: &M,
+    rows: &mut Rows<'_, N>,
+    (t, h): (f64, f64),
+    start: &[f64; N],
+    rate: &[f64; N],
+    active: &mut [usize],
+) where
+    M: Model<N>,
+{
+    let mut middle = *start;
+    for a in 0..N {
+        middle[a] += 0.5 * h * rate[a];
+    }
+    rows.combine(model, [(t, start), (t + 0.5 * h, &middle)], active);
 }
 
 /// The polynomial of the rates at the end of the element.

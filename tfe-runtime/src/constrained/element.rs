@@ -8,7 +8,7 @@
 //! ```
 //!
 //! with μ̇_l = Σ_j m_j P_j′(2c_l − 1). The element itself is that of [`VelocityForm`]; constraints only add to momenta and forces at its points.
-//! Rows that depend on others are replaced by μ = 0.
+//! Holonomic rows that depend on one another are combined ([`Rows::combine`], T-118); velocity rows that depend on others are replaced by μ = 0.
 
 use crate::constrained::layout::Layout;
 use crate::constrained::rows::Rows;
@@ -186,7 +186,7 @@ where
     /// Whether all constraints hold at the end, those that were left out as dependent too.
     pub(crate) fn check_end(&mut self, x: &[f64]) -> Result<(), StepError> {
         let (t, q, v) = self.end_place(x);
-        self.rows.evaluate(self.inner.model, t, &q);
+        self.rows.evaluate_declared(self.inner.model, t, &q);
         for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
             let (position, velocity) = relative_residual(&self.rows, c, &q, &v, self.inner.span.h);
             for residual in [position, velocity] {

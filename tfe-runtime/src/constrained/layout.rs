@@ -52,6 +52,16 @@ impl Layout {
         self.end(self.coordinates) + constraint
     }
 
+    /// Where the multipliers are, one for each constraint.
+    pub(crate) fn multipliers(&self) -> impl Iterator<Item = core::ops::Range<usize>> + use<> {
+        let Self { constraints, .. } = *self;
+        let starts = (0..self.degree).map({
+            let layout = *self;
+            move |j| layout.inside(j, 0)
+        });
+        (starts.chain([self.node(0)])).map(move |start| start..start + constraints)
+    }
+
     /// Sets the multipliers to those of constant reactions λ, μ = −λ t: zero where these are not known.
     #[cfg(feature = "alloc")]
     pub(crate) fn guess<M, const N: usize>(

@@ -4,14 +4,22 @@ use crate::model::{ConstraintSecond, Model};
 
 /// The numbers that [`Rows`] need.
 pub(crate) const fn rows_len(coordinates: usize, constraints: usize) -> usize {
-    constraints * (5 * coordinates + 3)
+    constraints * (5 * coordinates + 3) + weights_len(constraints)
 }
+
+/// Of these, what is kept from step to step.
+const fn weights_len(constraints: usize) -> usize {
+    constraints * (constraints + 1)
+}
+
+/// The mark of a row that is a combination of all holonomic ones.
+const COMBINED: usize = 3;
 
 /// What is left of a row beside the independent ones, relative to the row: below it the row is dependent.
 const DEPENDENT: f64 = 1e-10;
 
 /// A row that was chosen before stays chosen while it has so much of its own.
-const KEPT: f64 = 1e-3;
+const KEPT: f64 = 0.1;
 
 /// The constraints at the point that was evaluated last; a row, or a number, for each.
 pub(crate) struct Rows<'a, const N: usize> {
@@ -30,6 +38,11 @@ pub(crate) struct Rows<'a, const N: usize> {
     pub(crate) values: &'a mut [f64],
     /// Multipliers to differentiate with.
     pub(crate) mu: &'a mut [f64],
+    /// The weights of constraints in combined rows, a row for each.
+    weights: &'a mut [f64],
+    /// The squared lengths of the rows of A where they were combined.
+    squares: &'a mut [f64],
+    is_combined: bool,
 }
 
 /// What multipliers bend: the derivatives of Aᵀμ and of Ȧᵀμ.
@@ -46,7 +59,9 @@ pub(crate) struct Bend<const N: usize> {
 impl<'a, const N: usize> Rows<'a, N> {
     /// In memory of [`rows_len`] numbers. Kernels write only what can be non-zero: the rest is cleared here once.
     pub(crate) fn of(memory: &'a mut [f64], constraints: usize) -> Self {
+        let (memory, kept) = memory.split_at_mut(constraints * (5 * N + 3));
         memory.fill(0.0);
+        let (weights, squares) = kept.split_at_mut(constraints * constraints);
         let matrix = constraints * N;
         let (start, rest) = memory.split_at_mut(matrix);
         let (rows, rest) = rest.split_at_mut(matrix);
@@ -65,6 +80,9 @@ impl<'a, const N: usize> Rows<'a, N> {
             drift,
             values,
             mu,
+            weights,
+            squares,
+            is_combined: false,
         }
     }
 
@@ -81,10 +99,168 @@ impl<'a, const N: usize> Rows<'a, N> {
         rows
     }
 
+    /// The same for an element whose rows were [combined](Self::combine) before, as the marks tell.
+    pub(crate) fn at_start_again<M: Model<N>>(
+        memory: &'a mut [f64],
+        model: &M,
+        (t, q): (f64, &[f64; N]),
+        active: &[usize],
+    ) -> Self {
+        let mut rows = Self::at_start(memory, model, t, q);
+        if active.contains(&COMBINED) {
+            rows.is_combined = true;
+            rows.evaluate(model, t, q);
+            rows.start.copy_from_slice(rows.rows);
+        }
+        rows
+    }
+
     /// Evaluates A, a and φ.
     pub(crate) fn evaluate<M: Model<N>>(&mut self, model: &M, t: f64, q: &[f64; N]) {
+        if !self.is_combined {
+            return self.evaluate_declared(model, t, q);
+        }
+        self.evaluate_declared(model, t, q);
+        combine(self.weights, self.rows, self.spare);
+        for numbers in [&mut *self.drift, &mut *self.values] {
+            for (spare, weights) in self
+                .spare
+                .iter_mut()
+                .zip(self.weights.chunks_exact(numbers.len()))
+            {
+                spare[0] = weights.iter().zip(&*numbers).map(|(w, x)| w * x).sum();
+            }
+            for (number, spare) in numbers.iter_mut().zip(&*self.spare) {
+                *number = spare[0];
+            }
+        }
+    }
+
+    /// The same of the constraints as they were declared.
+    pub(crate) fn evaluate_declared<M: Model<N>>(&mut self, model: &M, t: f64, q: &[f64; N]) {
+        if self.is_combined {
+            // Kernels write only what can be non-zero.
+            self.rows.fill([0.0; N]);
+            self.drift.fill(0.0);
+            self.values.fill(0.0);
+        }
         model.constraint_rows(t, q, self.rows, self.drift);
         model.constraint_values(t, q, self.values);
+    }
+
+    /// Whether rows are combinations.
+    pub(crate) fn is_combined(&self) -> bool {
+        self.is_combined
+    }
+
+    /// Replaces the rows of holonomic constraints that depend on one another by as many combinations as are independent, functions W φ with W constant in the element
+    /// (T-118): vectors that span what the columns of A span in the middle of the element, with the rows of A scaled to the length one. Those combinations are left out
+    /// whose gradients vanish there, so that the others stay independent for as long as can be, and rows that were permuted or scaled give the same motion.
+    ///
+    /// `places` are time and position at the start and in the middle, as far as that is known.
+    pub(crate) fn combine<M: Model<N>>(
+        &mut self,
+        model: &M,
+        places: [(f64, &[f64; N]); 2],
+        active: &mut [usize],
+    ) {
+        let count = M::CONSTRAINTS.len();
+        let holonomic = || (0..count).filter(|&c| M::CONSTRAINTS[c].kind.is_holonomic());
+        if holonomic().all(|c| active[c] != 0) {
+            return;
+        }
+        // The middle is known but to the order h², and off the constraints there may be more independent rows.
+        let rank = holonomic().filter(|&c| active[c] != 0).count();
+        let [start, middle] = places;
+        self.evaluate_declared(model, middle.0, middle.1);
+        self.weights.fill(0.0);
+        for c in 0..count {
+            let length = norm(&self.rows[c]);
+            self.squares[c] = length * length;
+            self.spare[c] = [0.0; N];
+        }
+        for c in holonomic().filter(|&c| self.squares[c] > 0.0) {
+            self.spare[c] = scaled(&self.rows[c], self.squares[c]);
+        }
+        for c in holonomic() {
+            active[c] = 0;
+        }
+        for place in holonomic().take(rank) {
+            if !self.add_basis(place) {
+                break;
+            }
+            active[place] = COMBINED;
+        }
+        for c in 0..count {
+            if !M::CONSTRAINTS[c].kind.is_holonomic() {
+                self.weights[c * count + c] = 1.0;
+                self.squares[c] = 1.0;
+                continue;
+            }
+            let length = crate::real::Real::sqrt(self.squares[c]);
+            for place in 0..count {
+                let weight = &mut self.weights[place * count + c];
+                *weight = if length > 0.0 { *weight / length } else { 0.0 };
+            }
+        }
+        self.is_combined = true;
+        self.evaluate(model, start.0, start.1);
+        self.start.copy_from_slice(self.rows);
+    }
+
+    /// Gram–Schmidt on the columns of `spare`: the one that has most of its own becomes a row of the basis. False where none has anything.
+    fn add_basis(&mut self, place: usize) -> bool {
+        let count = self.spare.len();
+        let (mut best, mut column) = (DEPENDENT, None);
+        for a in 0..N {
+            let own: f64 = self.spare.iter().map(|row| row[a] * row[a]).sum();
+            let own = crate::real::Real::sqrt(own);
+            if own > best {
+                (best, column) = (own, Some(a));
+            }
+        }
+        let Some(column) = column else { return false };
+        let basis = &mut self.weights[place * count..(place + 1) * count];
+        for (entry, row) in basis.iter_mut().zip(&*self.spare) {
+            *entry = row[column] / best;
+        }
+        // Twice is enough for orthogonality to rounding.
+        for _ in 0..2 {
+            for a in 0..N {
+                let part: f64 = (basis.iter().zip(&*self.spare))
+                    .map(|(entry, row)| entry * row[a])
+                    .sum();
+                for (entry, row) in basis.iter().zip(self.spare.iter_mut()) {
+                    row[a] -= part * entry;
+                }
+            }
+        }
+        true
+    }
+
+    /// Multipliers of the constraints as declared to those of combined rows, one number for each.
+    pub(crate) fn combine_multipliers(&mut self, multipliers: &mut [f64]) {
+        let count = multipliers.len();
+        for place in 0..count {
+            let weights = &self.weights[place * count..(place + 1) * count];
+            let mut sum = 0.0;
+            for c in 0..count {
+                sum += weights[c] * self.squares[c] * multipliers[c];
+            }
+            self.mu[place] = sum;
+        }
+        multipliers.copy_from_slice(self.mu);
+    }
+
+    /// Back again.
+    pub(crate) fn declared_multipliers(&mut self, multipliers: &mut [f64]) {
+        let count = multipliers.len();
+        for c in 0..count {
+            self.mu[c] = (0..count)
+                .map(|place| self.weights[place * count + c] * multipliers[place])
+                .sum();
+        }
+        multipliers.copy_from_slice(self.mu);
     }
 
     /// Evaluates ψ_q and Ȧ, and what the multipliers `mu` bend.
@@ -96,6 +272,19 @@ impl<'a, const N: usize> Rows<'a, N> {
         v: &[f64; N],
     ) -> Bend<N> {
         let zero = [[0.0; N]; N];
+        if self.is_combined {
+            self.psi_q.fill([0.0; N]);
+            self.rates.fill([0.0; N]);
+            let count = self.mu.len();
+            for (c, spare) in self.spare.iter_mut().enumerate() {
+                spare[0] = (0..count)
+                    .map(|place| self.weights[place * count + c] * self.mu[place])
+                    .sum();
+            }
+            for (mu, spare) in self.mu.iter_mut().zip(self.spare.iter_mut()) {
+                core::mem::swap(mu, &mut spare[0]);
+            }
+        }
         let mut second = ConstraintSecond {
             psi_q: self.psi_q,
             row_rates: self.rates,
@@ -104,11 +293,19 @@ impl<'a, const N: usize> Rows<'a, N> {
             rate_v: zero,
         };
         model.constraint_second(t, q, v, self.mu, &mut second);
-        Bend {
+        let bend = Bend {
             bend: second.bend,
             rate_q: second.rate_q,
             rate_v: second.rate_v,
+        };
+        if self.is_combined {
+            for (mu, spare) in self.mu.iter_mut().zip(self.spare.iter_mut()) {
+                core::mem::swap(mu, &mut spare[0]);
+            }
+            combine(self.weights, self.psi_q, self.spare);
+            combine(self.weights, self.rates, self.spare);
         }
+        bend
     }
 
     /// ψ = A v + a of one constraint.
@@ -128,6 +325,9 @@ impl<'a, const N: usize> Rows<'a, N> {
                 // A row of zeros constrains nothing.
                 spare[a] = if length > 0.0 { row[a] / length } else { 0.0 };
             }
+        }
+        for mark in active.iter_mut() {
+            *mark = usize::from(*mark == 1);
         }
         let mut rank = 0;
         for (holonomic, least) in [
@@ -170,6 +370,29 @@ impl<'a, const N: usize> Rows<'a, N> {
         }
         rank
     }
+}
+
+/// A row over the root of `square`.
+fn scaled<const N: usize>(row: &[f64; N], square: f64) -> [f64; N] {
+    let length = crate::real::Real::sqrt(square);
+    let mut scaled = *row;
+    for entry in &mut scaled {
+        *entry /= length;
+    }
+    scaled
+}
+
+/// weights · rows, with memory for as many.
+fn combine<const N: usize>(weights: &[f64], rows: &mut [[f64; N]], spare: &mut [[f64; N]]) {
+    for (sum, weights) in spare.iter_mut().zip(weights.chunks_exact(rows.len())) {
+        *sum = [0.0; N];
+        for (weight, row) in weights.iter().zip(&*rows) {
+            for a in 0..N {
+                sum[a] += weight * row[a];
+            }
+        }
+    }
+    rows.copy_from_slice(spare);
 }
 
 pub(crate) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {

@@ -17,6 +17,8 @@ pub struct FamilyDense {
     /// Legendre coefficients of h dq/dt, a row of n each.
     rates: Vec<f64>,
     momenta: Momenta,
+    /// Of an element that was cut: its pieces; else nothing.
+    pieces: Vec<Self>,
 }
 
 /// Legendre coefficients, a row of n each.
@@ -38,7 +40,24 @@ impl FamilyDense {
             end: state,
             rates: Vec::new(),
             momenta: Momenta::Rates(Vec::new()),
+            pieces: Vec::new(),
         }
+    }
+
+    /// An element that was cut (T-116), from time `start` to time `end`.
+    pub(super) fn of_pieces((start, end): (f64, f64), mut pieces: Vec<Self>) -> Option<Self> {
+        pieces.first_mut()?.times.0 = start;
+        pieces.last_mut()?.times.1 = end;
+        let before = pieces.first()?.start.clone();
+        let after = pieces.last()?.end.clone();
+        Some(Self {
+            times: (start, end),
+            start: before,
+            end: after,
+            rates: Vec::new(),
+            momenta: Momenta::Rates(Vec::new()),
+            pieces,
+        })
     }
 
     /// From rates of coordinates at the unknowns and of momenta at the points, as functions of unknown (point) and coordinate.
@@ -58,6 +77,7 @@ impl FamilyDense {
             end,
             rates: coefficients(scheme.rate, scheme.unknowns(), (h, n), rate),
             momenta: Momenta::Rates(force_rates),
+            pieces: Vec::new(),
         }
     }
 
@@ -90,6 +110,7 @@ impl FamilyDense {
             end,
             rates: coefficients(scheme.rate, scheme.unknowns(), (h, n), rate),
             momenta: Momenta::Values(values),
+            pieces: Vec::new(),
         }
     }
 
@@ -110,6 +131,11 @@ impl FamilyDense {
     pub fn at_time(&self, time: f64) -> FamilyState {
         if time == self.times.1 {
             return self.end.clone();
+        }
+        let ahead = self.times.1 >= self.times.0;
+        let begun = |piece: &Self| (piece.times.0 <= time) == ahead || piece.times.0 == time;
+        if let Some(after) = (self.pieces.partition_point(begun)).checked_sub(1) {
+            return self.pieces[after].at_time(time);
         }
         let tau = (time - self.times.0) / (self.times.1 - self.times.0);
         let mut integrals = [0.0; MAX_NODES];

@@ -9,6 +9,8 @@ use super::registers::{Outcome, Registers};
 use super::space::{Kind, Leg, Problem};
 use super::{FamilyDense, FamilyError, FamilyModel, FamilyState};
 use crate::error::StepError;
+#[cfg(feature = "sparse")]
+use crate::evidence::Evidence;
 use crate::newton::{Control, Preference, Solve};
 #[cfg(feature = "sparse")]
 use crate::newton::{Monitor, SERVES, Verdict};
@@ -118,7 +120,7 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
     /// The equations of one element: the fixed point while it contracts well, else Newton's method.
     fn solve(&mut self, t: f64, h: f64, is_warm: bool) -> Result<(), StepError> {
         let solve = self.control.solve;
-        let yielding = cfg!(feature = "sparse") && solve == Solve::Auto;
+        let yielding = cfg!(feature = "sparse") && solve != Solve::FixedPoint;
         self.prepare(t, h, is_warm);
         if solve != Solve::Newton && (!yielding || self.preference.is_fixed_point()) {
             let leg = Leg {
@@ -190,6 +192,7 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
         let mut monitor = Monitor::new(self.control.tolerance);
         let known = tangent.serves(h);
         let mut fresh = !known;
+        let (mut evidence, mut own) = (Evidence::of_newton(), false);
         let scheme = self.table.view();
         let points = scheme.points();
         let mut outcome = Outcome {
@@ -222,6 +225,8 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
             outcome.iterations += 1;
             self.statistics.iterations += 1;
             self.statistics.newton_iterations += 1;
+            own |= fresh;
+            evidence.see(increment.relative, own);
             let verdict = monitor.judge(increment);
             outcome.residual = monitor.last();
             outcome.contraction = monitor.rate();
@@ -234,11 +239,15 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
                 }
             }
             if outcome.converged {
+                evidence.check(self.control.solve)?;
                 return Ok(outcome);
             }
             // The first increment alone tells no rate: an old matrix may show a second one.
             let untried = known && outcome.iterations == 1;
             fresh = !untried && monitor.rate() > SERVES;
+            if monitor.is_stuck() {
+                break;
+            }
         }
         tangent.forget();
         Ok(outcome)

@@ -18,10 +18,11 @@ use crate::constrained::{START_TOLERANCE, element::slopes};
 use crate::double_double::DoubleDouble;
 use crate::equations::{Increment, relative};
 use crate::error::{ConstraintError, StepError};
+use crate::evidence::Evidence;
 use crate::newton::{Control, Monitor, SERVES, Solve, Verdict};
 use crate::scheme::{MAX_RATES, SchemeTable, Tables as _};
 use crate::statistics::Statistics;
-use crate::step::set_extrapolation;
+use crate::step::{continued_ratio, set_extrapolation};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -192,7 +193,7 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
         let scheme = self.table.view();
         let count = scheme.unknowns();
         let mut extrapolation = vec![0.0; count * count];
-        set_extrapolation(&scheme, ratio, &mut extrapolation);
+        set_extrapolation(&scheme, continued_ratio(ratio), &mut extrapolation);
         let rates = self.start.q.len() * count;
         let mut new = vec![0.0; count];
         for old in self.unknowns[..rates].chunks_exact_mut(count) {
@@ -264,6 +265,8 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
         let mut monitor = Monitor::new(self.control.tolerance);
         let known = self.matrix.is_factored() && self.factored == h;
         let mut fresh = !known;
+        let (mut evidence, mut own) = (Evidence::of_newton(), false);
+        let mut iterations = self.control.max_iterations;
         for iteration in 0..self.control.max_iterations {
             self.evaluate(t, h);
             if fresh {
@@ -289,8 +292,11 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
             }
             self.statistics.iterations += 1;
             self.statistics.newton_iterations += 1;
-            match monitor.judge(self.measure(h)) {
-                Ok(Verdict::Converged) => return Ok(()),
+            let increment = self.measure(h);
+            own |= fresh;
+            evidence.see(increment.relative, own);
+            match monitor.judge(increment) {
+                Ok(Verdict::Converged) => return evidence.check(self.control.solve),
                 Ok(Verdict::GoOn) if monitor.is_noise(fresh) => return Ok(()),
                 Ok(Verdict::GoOn) => {}
                 Err(error) => {
@@ -301,10 +307,14 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
             // The first increment alone tells no rate: an old matrix may show a second one.
             let untried = known && iteration == 0;
             fresh = !untried && monitor.rate() > SERVES;
+            if monitor.is_stuck() {
+                iterations = iteration + 1;
+                break;
+            }
         }
         self.matrix.forget();
         Err(StepError::NewtonStalled {
-            iterations: self.control.max_iterations,
+            iterations,
             residual: monitor.last(),
             tolerance: self.control.tolerance,
         })

@@ -4,6 +4,7 @@ use super::kernel::Kernel;
 use super::lanes::Scale;
 use super::space::{Kind, Leg, Pass, Problem, Sizes, Space};
 use super::{FamilyState, Gradient, Sweep};
+use crate::evidence::Evidence;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 use crate::points::four::Four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -65,6 +66,7 @@ impl Registers {
         yielding: bool,
     ) -> Outcome {
         let mut monitor = Monitor::new(control.tolerance);
+        let mut evidence = Evidence::of_fixed_point();
         let (mut iterations, mut converged) = (0, false);
         let most = if yielding {
             control.max_iterations.min(PATIENCE)
@@ -78,15 +80,19 @@ impl Registers {
                 sizes = sizes.and(self.evaluate(kernel, problem, leg, group, true));
             }
             iterations += 1;
-            match monitor.judge(scale.increment(sizes)) {
+            let increment = scale.increment(sizes);
+            evidence.see(increment.relative, true);
+            match monitor.judge(increment) {
                 Ok(Verdict::Converged) => {
-                    converged = true;
+                    converged = evidence.check(control.solve).is_ok();
                     break;
                 }
                 Ok(Verdict::GoOn) => {}
                 Err(_) => break,
             }
-            if yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1) {
+            let is_hopeless =
+                yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1);
+            if is_hopeless || monitor.is_stuck() {
                 break;
             }
         }

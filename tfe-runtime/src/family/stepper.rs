@@ -6,6 +6,7 @@ use super::lanes::largest;
 #[cfg(feature = "sparse")]
 use super::rates::Rates;
 use super::{FamilyDense, FamilyError, FamilyModel, FamilyState};
+use crate::cut::{Halving, in_halves, may_be_cut};
 use crate::element::Element;
 use crate::error::StepError;
 use crate::model::Form;
@@ -15,6 +16,7 @@ use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::Statistics;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use core::convert::Infallible;
 
 /// Steps a model of run-time length with one element, on memory of its own.
 ///
@@ -30,6 +32,9 @@ pub struct FamilyStepper<'m, M> {
     length: usize,
     way: Way<'m, M>,
     legendre: Legendre,
+    control: Control,
+    /// Of a last step that was cut.
+    pieces: Vec<FamilyDense>,
 }
 
 /// What is solved for.
@@ -55,6 +60,8 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
             length,
             way,
             legendre: Legendre::default(),
+            control,
+            pieces: Vec::new(),
         })
     }
 
@@ -97,6 +104,34 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
     /// # Errors
     /// [`StepError`]; `state` is unchanged then. A state of another length than the model's counts as one that is not finite.
     pub fn advance(&mut self, t: f64, h: f64, state: &mut FamilyState) -> Result<(), StepError> {
+        self.pieces.clear();
+        let error = match self.whole(t, h, state, &[]) {
+            Err(error) if may_be_cut(&error, M::FACTS.linear, self.control.solve) => error,
+            outcome => return outcome,
+        };
+        let (start, steps) = (state.clone(), self.statistics().steps);
+        let arrived = in_halves(self, (t, h), state, &[], 1);
+        let statistics = self.statistics_mut();
+        statistics.steps = steps;
+        if !arrived {
+            *state = start;
+            self.pieces.clear();
+            return Err(error);
+        }
+        statistics.steps += 1;
+        statistics.cuts += 1;
+        Ok(())
+    }
+
+    fn statistics_mut(&mut self) -> &mut Statistics {
+        match &mut self.way {
+            Way::Forces(forces) => &mut forces.statistics,
+            #[cfg(feature = "sparse")]
+            Way::Rates(rates) => &mut rates.statistics,
+        }
+    }
+
+    fn advance_whole(&mut self, t: f64, h: f64, state: &mut FamilyState) -> Result<(), StepError> {
         if !(h.is_finite() && h != 0.0) {
             return Err(StepError::InvalidStep { step: h });
         }
@@ -122,6 +157,11 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
     /// The polynomial of the last step, from time `start` to time `end`; before the first step, and after a failed one, a constant.
     #[must_use]
     pub fn dense(&self, start: f64, end: f64) -> FamilyDense {
+        FamilyDense::of_pieces((start, end), self.pieces.clone())
+            .unwrap_or_else(|| self.dense_of_last(start, end))
+    }
+
+    fn dense_of_last(&self, start: f64, end: f64) -> FamilyDense {
         match &self.way {
             Way::Forces(forces) => forces.dense(start, end),
             #[cfg(feature = "sparse")]
@@ -154,6 +194,26 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
             #[cfg(feature = "sparse")]
             Way::Rates(rates) => &rates.statistics,
         }
+    }
+}
+
+impl<M: FamilyModel> Halving for FamilyStepper<'_, M> {
+    type State = FamilyState;
+    type Kick = Infallible;
+
+    fn whole(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut FamilyState,
+        _: &[Infallible],
+    ) -> Result<(), StepError> {
+        self.advance_whole(t, h, state)
+    }
+
+    fn passed(&mut self, t: f64, h: f64, _: Vec<Infallible>) {
+        let dense = self.dense_of_last(t, t + h);
+        self.pieces.push(dense);
     }
 }
 

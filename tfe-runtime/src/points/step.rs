@@ -2,6 +2,7 @@
 
 use super::four::Four;
 use super::{Leg, Outcome, Points, is_finite, is_phase, is_second_order, largest};
+use crate::evidence::Evidence;
 use crate::model::Model;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 
@@ -42,6 +43,7 @@ where
         points.begin::<V, M>(like, &leg);
         let is_rough = control.is_rough();
         let mut monitor = Monitor::new(control.tolerance);
+        let mut evidence = Evidence::of_fixed_point();
         let most = if yielding {
             control.max_iterations.min(PATIENCE)
         } else {
@@ -71,6 +73,7 @@ where
                 }
             };
             iterations += 1;
+            evidence.see(increment.relative, true);
             match monitor.judge(increment) {
                 Ok(Verdict::Converged) => {
                     converged = true;
@@ -81,13 +84,15 @@ where
             }
             // The start is good to a few digits, so one evaluation of mass matrices mostly serves.
             refresh = monitor.rate() > 0.1;
-            if yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1) {
+            let is_hopeless =
+                yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1);
+            if is_hopeless || monitor.is_stuck() {
                 break;
             }
         }
         // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
         let mut arrived = false;
-        if converged {
+        if converged && evidence.check(control.solve).is_ok() {
             if const { is_second_order::<M, N>() } {
                 if is_rough {
                     points.finish_second_order::<V, false>(like, &leg);

@@ -4,7 +4,7 @@ use super::Row;
 use super::four::Four;
 use crate::double_double::DoubleDouble;
 use crate::scheme::{SchemeRef, SchemeTable, Tables as _};
-use crate::step::set_extrapolation;
+use crate::step::{continued_ratio, set_extrapolation};
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -329,8 +329,7 @@ impl Tables {
     /// Makes `continued` that of steps of this ratio.
     pub(crate) fn set_ratio(&mut self, table: &SchemeTable, ratio: f64) {
         // Far outside the last element its polynomial says nothing; backwards it may be reused.
-        let near = (-1.5..=3.0).contains(&ratio);
-        let ratio = if near { ratio } else { 0.0 };
+        let ratio = continued_ratio(ratio);
         if self.ratio != ratio {
             self.continue_by(&table.view(), ratio);
         }

@@ -1,0 +1,90 @@
+//! Steps in halves, where the whole one fails (T-116).
+
+use crate::error::StepError;
+use crate::newton::Solve;
+use alloc::vec::Vec;
+
+/// A step is halved so many times before it fails.
+const MAX_HALVINGS: u32 = 10;
+
+/// Something that acts at one instant of a step.
+pub(crate) trait Instant: Clone {
+    fn time(&self) -> f64;
+}
+
+/// Nothing acts.
+impl Instant for core::convert::Infallible {
+    fn time(&self) -> f64 {
+        match *self {}
+    }
+}
+
+/// What moves a state over one element.
+pub(crate) trait Halving {
+    type State;
+    type Kick: Instant;
+
+    /// Moves `state` from t to t + h by one element; leaves it where it is if that fails.
+    fn whole(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut Self::State,
+        kicks: &[Self::Kick],
+    ) -> Result<(), StepError>;
+
+    /// A piece that went well.
+    fn passed(&mut self, t: f64, h: f64, kicks: Vec<Self::Kick>);
+}
+
+/// Whether a shorter step may go well where one has failed with `error`.
+pub(crate) fn may_be_cut(error: &StepError, linear: bool, solve: Solve) -> bool {
+    let is_of_the_iteration = matches!(
+        error,
+        StepError::Unproven { .. }
+            | StepError::EnergyJump { .. }
+            | StepError::NonFinite
+            | StepError::SingularTangent { .. }
+            | StepError::NewtonStalled { .. }
+            | StepError::Legendre(_)
+    );
+    is_of_the_iteration && !linear && matches!(solve, Solve::Auto | Solve::Newton)
+}
+
+/// Moves `state` from t to t + h in two halves, and these in halves where they need it; false where the shortest pieces fail, too.
+#[cold]
+pub(crate) fn in_halves<S: Halving>(
+    stepper: &mut S,
+    (t, h): (f64, f64),
+    state: &mut S::State,
+    kicks: &[S::Kick],
+    depth: u32,
+) -> bool {
+    let half = 0.5 * h;
+    let middle = t + half;
+    if middle == t || middle == t + h {
+        return false;
+    }
+    let is_late = |kick: &S::Kick| {
+        if h > 0.0 {
+            kick.time() >= middle
+        } else {
+            kick.time() <= middle
+        }
+    };
+    let (late, early): (Vec<_>, Vec<_>) = kicks.iter().cloned().partition(is_late);
+    for (start, kicks) in [(t, early), (middle, late)] {
+        let done = match stepper.whole(start, half, state, &kicks) {
+            Ok(()) => {
+                stepper.passed(start, half, kicks);
+                true
+            }
+            Err(_) if depth == MAX_HALVINGS => false,
+            Err(_) => in_halves(stepper, (start, half), state, &kicks, depth + 1),
+        };
+        if !done {
+            return false;
+        }
+    }
+    true
+}

@@ -1,0 +1,185 @@
+//! What speaks for the solution of an element (T-115, T-117).
+
+use crate::element::{Element, Family};
+use crate::error::StepError;
+use crate::legendre::energy_at;
+use crate::model::{Model, State};
+use crate::newton::Solve;
+
+/// Whether what an iteration has found is near where it began: increments that shrink by a factor from the first one on stay in a ball around the start, and the
+/// root in that ball is the only one (T-115). An iteration that wandered before it contracted may have found any root.
+pub(crate) struct Evidence {
+    /// The largest ratio of an increment to the one before.
+    ratio: f64,
+    last: f64,
+    /// Increments that tell something.
+    count: u32,
+    /// The largest ratio that is a proof.
+    limit: f64,
+    /// How large the second increment may be, relative to the state.
+    reach: f64,
+}
+
+impl Evidence {
+    /// The largest ratio that counts as a proof, for Newton's method: half of what the theorem of Newton and Kantorovich allows, because the ratios that are seen are no
+    /// bounds of those that are not.
+    const PROVEN: f64 = 0.25;
+
+    /// The same for the fixed point, whose ratios differ less from one another.
+    pub(crate) const CONTRACTS: f64 = 0.5;
+
+    /// Smaller increments, relative to the state, cannot reach another root.
+    pub(crate) const FAR: f64 = 1e-3;
+
+    /// The second increment of Newton's method is what the linear model at the start is wrong by.
+    const CURVED: f64 = 0.03;
+
+    pub(crate) fn of_fixed_point() -> Self {
+        Self {
+            ratio: 0.0,
+            last: f64::INFINITY,
+            count: 0,
+            limit: Self::CONTRACTS,
+            reach: f64::INFINITY,
+        }
+    }
+
+    pub(crate) fn of_newton() -> Self {
+        Self {
+            limit: Self::PROVEN,
+            reach: Self::CURVED,
+            ..Self::of_fixed_point()
+        }
+    }
+
+    /// The next increment; `own` says that its matrix was made in this step. What the matrix of another step does is no evidence.
+    #[inline(always)]
+    pub(crate) fn see(&mut self, size: f64, own: bool) {
+        if size > Self::FAR {
+            let curved = self.count == 1 && size > self.reach;
+            let ratio = if curved { 1.0 } else { size / self.last };
+            self.ratio = self.ratio.max(ratio);
+        }
+        self.last = if own { size } else { f64::INFINITY };
+        self.count += u32::from(own);
+    }
+
+    /// # Errors
+    /// [`StepError::Unproven`]; [`StepError::EnergyJump`] where the energies of start and end, which the model conserves, are too far apart even for a proven root.
+    pub(crate) fn check_with(
+        &self,
+        solve: Solve,
+        energy: Option<Energy>,
+        element: Element,
+    ) -> Result<(), StepError> {
+        if solve == Solve::Trusting {
+            return Ok(());
+        }
+        let Some(energy) = energy else {
+            return self.check(solve);
+        };
+        let is_proven = self.check(solve);
+        let most = if is_proven.is_ok() {
+            Energy::MAX_OF_PROVEN
+        } else {
+            Energy::MAX_OF_OTHERS
+        };
+        if energy.is_kept(most, element) {
+            return Ok(());
+        }
+        is_proven?;
+        let Energy { before, after, .. } = energy;
+        Err(StepError::EnergyJump { before, after })
+    }
+
+    /// # Errors
+    /// [`StepError::Unproven`].
+    pub(crate) fn check(&self, solve: Solve) -> Result<(), StepError> {
+        if self.ratio > self.limit && solve != Solve::Trusting {
+            return Err(StepError::Unproven { ratio: self.ratio });
+        }
+        Ok(())
+    }
+}
+
+/// The energies at both ends of a step of a model that conserves them.
+#[derive(Clone, Copy)]
+pub(crate) struct Energy {
+    before: f64,
+    after: f64,
+    /// How much of it is kinetic at the start, or has become so: half of p·v stands for the kinetic energy.
+    turned: f64,
+    is_forward: bool,
+}
+
+/// Whether energies tell anything of a model: those that conserve them. Constraints are told by their drift.
+pub(crate) const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
+    !(M::FACTS.time_dependent || M::FACTS.forced)
+}
+
+impl Energy {
+    /// The largest change, relative to what is turned from one kind into the other, of a root that is proven otherwise: steps that are too long, not wrong roots.
+    const MAX_OF_PROVEN: f64 = 0.5;
+
+    /// The same of other roots.
+    const MAX_OF_OTHERS: f64 = 0.1;
+
+    /// Nothing where a state has no velocity, which may yet be right.
+    pub(crate) fn of<M, const N: usize>(
+        model: &M,
+        (t, h): (f64, f64),
+        [start, end]: [&State<N>; 2],
+    ) -> Option<Self>
+    where
+        M: Model<N>,
+    {
+        let velocity = |t: f64, state: &State<N>| {
+            crate::legendre::velocity(model, t, &state.q, &state.p, &[0.0; N]).ok()
+        };
+        let velocities = [velocity(t, start)?, velocity(t + h, end)?];
+        Some(Self::with(model, (t, h), [start, end], &velocities))
+    }
+
+    /// The same with velocities that are known.
+    pub(crate) fn with<M, const N: usize>(
+        model: &M,
+        (t, h): (f64, f64),
+        [start, end]: [&State<N>; 2],
+        [first, last]: &[[f64; N]; 2],
+    ) -> Self
+    where
+        M: Model<N>,
+    {
+        let (before, kinetic) = energies(model, t, start, first);
+        let (after, moving) = energies(model, t + h, end, last);
+        let potential = (after - moving) - (before - kinetic);
+        Self {
+            before,
+            after,
+            turned: kinetic.abs() + potential.abs(),
+            is_forward: h > 0.0,
+        }
+    }
+
+    /// Whether the energy has changed by no more than so much of what was turned. Elements that damp may lose some.
+    fn is_kept(&self, most: f64, element: Element) -> bool {
+        let change = self.after - self.before;
+        let rounding = 1e-9 * self.before.abs().max(self.after.abs());
+        let allowed = most * self.turned + rounding;
+        let is_damped = element.family() as u8 == Family::Radau as u8 && self.is_forward;
+        // NaN is not kept.
+        change <= allowed && (is_damped || -change <= allowed)
+    }
+}
+
+/// The energy, and half of p·v.
+fn energies<M, const N: usize>(model: &M, t: f64, state: &State<N>, v: &[f64; N]) -> (f64, f64)
+where
+    M: Model<N>,
+{
+    let mut kinetic = 0.0;
+    for (p, v) in state.p.iter().zip(v) {
+        kinetic += 0.5 * p * v;
+    }
+    (energy_at(model, t, &state.q, &state.p, v), kinetic)
+}
