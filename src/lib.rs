@@ -36,7 +36,7 @@ pub use linearised::Linearised;
 pub use modal::Modal;
 pub use motion::{Motion, Node, Outputs};
 pub use periodic::{Orbit, PeriodicOrbit};
-pub use simulation::{Simulation, Steps, Warning};
+pub use simulation::{Checkpoint, Simulation, Steps, Warning};
 pub use tfe_macros::dynamics;
 /// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
 pub use tfe_runtime as runtime;

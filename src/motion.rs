@@ -5,7 +5,7 @@ pub(crate) mod family;
 use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv;
 use crate::error::AtError;
-use crate::simulation::Warning;
+use crate::simulation::{Checkpoint, Warning};
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -84,6 +84,7 @@ pub struct Motion<const N: usize> {
     statistics: Statistics,
     warnings: Vec<Warning>,
     names: Vec<CoordinateName>,
+    checkpoint: Option<Box<Checkpoint<N>>>,
 }
 
 impl<const N: usize> Motion<N> {
@@ -112,9 +113,33 @@ impl<const N: usize> Motion<N> {
             statistics: Statistics::default(),
             warnings: Vec::new(),
             names: (0..N).map(M::coordinate_name).collect(),
+            checkpoint: None,
         };
         motion.record(model, t, start);
         motion
+    }
+
+    /// The same of a run that goes on, whose velocity at the start is known.
+    pub(crate) fn from_checkpoint<M: Model<N>>(model: &M, checkpoint: &Checkpoint<N>) -> Self {
+        let (t, start) = (checkpoint.time, &checkpoint.state);
+        let mut motion = Self::from_start(model, t, start);
+        motion.nodes.clear();
+        motion.velocities.clear();
+        motion.energies.clear();
+        motion.outputs.values.clear();
+        motion.reactions.values.clear();
+        motion.record_with(model, t, start, checkpoint.velocity);
+        motion
+    }
+
+    pub(crate) fn set_checkpoint(&mut self, checkpoint: Checkpoint<N>) {
+        self.checkpoint = Some(Box::new(checkpoint));
+    }
+
+    /// Where the run ended, with all that [`Simulation::resume`](crate::Simulation::resume) needs to go on as if it had never stopped; `None` where the run failed, or
+    /// was made of several ([`accuracy`](crate::Simulation::accuracy)).
+    pub fn checkpoint(&self) -> Option<&Checkpoint<N>> {
+        self.checkpoint.as_deref()
     }
 
     /// Appends a node, with its velocity, energy and observables. Where the Legendre transform has no solution at the node they are
@@ -123,6 +148,17 @@ impl<const N: usize> Motion<N> {
         let guess = self.velocities.last().copied().unwrap_or([0.0; N]);
         let velocity =
             constrained::velocity_of(model, t, &state.q, &state.p, &guess).unwrap_or([f64::NAN; N]);
+        self.record_with(model, t, state, velocity);
+    }
+
+    /// The same where the velocity is known.
+    fn record_with<M: Model<N>>(
+        &mut self,
+        model: &M,
+        t: f64,
+        state: &State<N>,
+        velocity: [f64; N],
+    ) {
         let energy = legendre::energy_at(model, t, &state.q, &state.p, &velocity);
         self.nodes.push(Node {
             t,
@@ -192,6 +228,20 @@ impl<const N: usize> Motion<N> {
     /// The velocities dq/dt at the recorded nodes.
     pub fn velocities(&self) -> &[[f64; N]] {
         &self.velocities
+    }
+
+    /// Energy and p·v at the last recorded node.
+    pub(crate) fn last_energy(&self) -> (f64, f64) {
+        let (node, velocity) = (self.last(), self.velocities.last());
+        let products = velocity
+            .into_iter()
+            .flatten()
+            .zip(&node.p)
+            .map(|(v, p)| v * p);
+        (
+            self.energies.last().copied().unwrap_or(f64::NAN),
+            products.sum(),
+        )
     }
 
     /// The energy H = p·v − L at the recorded nodes.
@@ -293,20 +343,23 @@ impl<const N: usize> Motion<N> {
             if rule.len() != element.degree().max(1) {
                 rule = Quadrature::gauss(element.degree());
             }
-            for point in 0..rule.len() {
-                let (node, weight) = (rule.node(point), rule.weight(point));
-                let (t, state) = (from + node * (to - from), element.at(node));
-                let z = match M::FORM {
-                    Form::Hamiltonian => state.p,
-                    Form::Lagrangian => {
-                        let found =
-                            constrained::velocity_of(model, t, &state.q, &state.p, &velocity);
-                        velocity = found.map_err(|_| AtError::NoVelocity { time: t })?;
-                        velocity
-                    }
-                };
-                model.observables(t, &state.q, &z, &mut values);
-                sum += weight * (to - from) * values[column];
+            for piece in element.pieces() {
+                let (from, length) = (piece.start(), piece.end() - piece.start());
+                for point in 0..rule.len() {
+                    let (node, weight) = (rule.node(point), rule.weight(point));
+                    let (t, state) = (from + node * length, piece.at(node));
+                    let z = match M::FORM {
+                        Form::Hamiltonian => state.p,
+                        Form::Lagrangian => {
+                            let found =
+                                constrained::velocity_of(model, t, &state.q, &state.p, &velocity);
+                            velocity = found.map_err(|_| AtError::NoVelocity { time: t })?;
+                            velocity
+                        }
+                    };
+                    model.observables(t, &state.q, &z, &mut values);
+                    sum += weight * length * values[column];
+                }
             }
             integrals.push(sum);
         }

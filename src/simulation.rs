@@ -1,6 +1,7 @@
 //! Runs: a model, an element, a step, a span.
 
 mod accurate;
+mod checkpoint;
 pub(crate) mod family;
 pub(crate) mod mesh;
 mod watch;
@@ -17,9 +18,10 @@ use tfe_runtime::length::Declared;
 use tfe_runtime::step::{Control, Impulse, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
-use watch::Watch;
+use watch::{Recorded, Watch};
 
 pub use accurate::Accurate;
+pub use checkpoint::Checkpoint;
 pub use watch::Warning;
 
 /// A run to be: which model, with which element and step.
@@ -153,7 +155,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         self
     }
 
-    /// How the element's equations are solved; `Solve::Auto` by default.
+    /// How the element's equations are solved; `Solve::Auto` by default, which cuts steps whose solution is not proven to continue the motion ([`Solve::Trusting`] does
+    /// not; `docs/theory.md` §10.6).
     #[must_use]
     pub fn solver(mut self, solve: Solve) -> Self {
         self.control.solve = solve;
@@ -265,7 +268,33 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         if ends_only {
             stepper = stepper.ends_only();
         }
-        self.drive_over(start, span.start, &mesh, &mut stepper, finished)
+        let motion = Motion::from_start(self.model, span.start, &start);
+        self.drive_on(motion, &start, (&mesh, 0, span.start), stepper, finished)
+    }
+
+    /// Goes on from the only node of `motion` over a mesh of which some elements are done, and leaves a checkpoint.
+    fn drive_on(
+        &self,
+        motion: Motion<N>,
+        start: &State<N>,
+        (mesh, done, origin): (&Mesh<N>, usize, f64),
+        mut stepper: Stepper<'m, M, N>,
+        finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
+    ) -> Result<Motion<N>, RunError<N>> {
+        let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, finished)?;
+        let last = *motion.last();
+        motion.set_checkpoint(Checkpoint {
+            origin,
+            step: self
+                .step
+                .or_else(|| mesh.elements().next().map(|(.., h)| h.abs())),
+            elements: mesh.steps(),
+            time: last.t,
+            state: last.state(),
+            velocity: motion.velocities().last().copied().unwrap_or([0.0; N]),
+            stepper: stepper.suspend(),
+        });
+        Ok(motion)
     }
 
     /// Runs over a mesh with a stepper at rest.
@@ -275,18 +304,35 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         t0: f64,
         mesh: &Mesh<N>,
         stepper: &mut Stepper<'m, M, N>,
+        finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
+    ) -> Result<Motion<N>, RunError<N>> {
+        let motion = Motion::from_start(self.model, t0, &start);
+        self.drive_from(motion, &start, (mesh, 0), stepper, finished)
+    }
+
+    /// The same from the only node of `motion`, after the elements that are done.
+    fn drive_from(
+        &self,
+        mut motion: Motion<N>,
+        start: &State<N>,
+        (mesh, done): (&Mesh<N>, usize),
+        stepper: &mut Stepper<'m, M, N>,
         mut finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
     ) -> Result<Motion<N>, RunError<N>> {
-        let mut motion = Motion::from_start(self.model, t0, &start);
         let mut watch = Watch::new(self.chosen_element());
-        let mut state = start;
-        let mut bar = progress::Bar::new(self.progress, mesh.steps());
+        let conserves = const { conserves_energy::<M, N>() };
+        let mut is_conserved = conserves;
+        watch.pass(recorded(&motion, false));
+        let mut state = *start;
+        let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
         let mut failure = None;
-        for (element, (t, next, h)) in mesh.elements().enumerate() {
+        for (element, (t, next, h)) in mesh.elements().enumerate().skip(done) {
             let last = element + 1 == mesh.steps();
             let before = state;
             watch.look(self.model, element, (t, h), &before);
-            let step = stepper.advance(t, h, &mut state, mesh.impulses_in(t, next, last));
+            let impulses = mesh.impulses_in(t, next, last);
+            is_conserved &= impulses.is_empty();
+            let step = stepper.advance(mesh.begin(t, h), h, &mut state, impulses);
             let step = step.map_err(|source| RunErrorKind::Solve {
                 element,
                 time: t,
@@ -322,6 +368,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             }
             if last || (element + 1) % self.record_every == 0 {
                 motion.record(self.model, next, &state);
+                watch.pass(recorded(&motion, is_conserved));
+                is_conserved = conserves;
             }
             bar.advance();
         }
@@ -410,6 +458,22 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
         Mesh::new(span, step, &self.breaks, &self.impulses)
+    }
+}
+
+/// Whether the energy of a model is known to be conserved, and a jump tells of a step that is too long: linear models have steps of their own kind of error.
+const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
+    let facts = M::FACTS;
+    !(facts.time_dependent || facts.forced || facts.linear) && M::CONSTRAINTS.is_empty()
+}
+
+fn recorded<const N: usize>(motion: &Motion<N>, is_conserved: bool) -> Recorded {
+    let (energy, action) = motion.last_energy();
+    Recorded {
+        time: motion.last().t,
+        energy,
+        action,
+        is_conserved,
     }
 }
 

@@ -29,6 +29,25 @@ pub enum Warning {
         /// The factor |e^{λh}| by which the linear model amplifies it.
         exact: f64,
     },
+    /// The energy at a node is not finite: the momentum belongs to no velocity there (the mass matrix is singular), or the model has a singular point.
+    EnergyNotFinite {
+        /// The first such node.
+        time: f64,
+    },
+    /// The energy of a model that conserves it changes between two nodes by more than a tenth of the kinetic energy that the motion has had: the step is too long for
+    /// the motion, or the motion has passed a singular point.
+    ///
+    /// Looked for at every recorded node, unless the model is linear, forced, damped, depends on time or has constraints; not across impulses.
+    EnergyJump {
+        /// The node after the largest jump.
+        time: f64,
+        /// The energy before it.
+        before: f64,
+        /// The energy after it.
+        after: f64,
+        /// How many such jumps there are.
+        count: usize,
+    },
 }
 
 impl fmt::Display for Warning {
@@ -48,6 +67,27 @@ impl fmt::Display for Warning {
                 Element::mixed(element.nodes()),
                 element.reduced(),
             ),
+            Self::EnergyNotFinite { time } => write!(
+                f,
+                "the energy at t = {time} is not finite: the mass matrix is singular there, or the model has a singular point"
+            ),
+            Self::EnergyJump {
+                time,
+                before,
+                after,
+                count,
+            } => {
+                write!(
+                    f,
+                    "the energy, which the model conserves, jumps from {before:.6e} to {after:.6e} at t = {time}"
+                )?;
+                match count {
+                    0 | 1 => {}
+                    2 => f.write_str(" and once more")?,
+                    _ => write!(f, " and at {} other nodes", count - 1)?,
+                }
+                f.write_str(": take a shorter step, or look for a singular point of the model")
+            }
         }
     }
 }
@@ -63,6 +103,7 @@ pub(super) struct Watch {
     last: Option<usize>,
     /// Whether that one was unstable: the next unstable one belongs to the same warning.
     is_unstable: bool,
+    energy: Energy,
     warnings: Vec<Warning>,
 }
 
@@ -73,6 +114,7 @@ impl Watch {
             next: 0,
             last: None,
             is_unstable: false,
+            energy: Energy::default(),
             warnings: Vec::new(),
         }
     }
@@ -110,13 +152,14 @@ impl Watch {
         let continued = self.is_unstable;
         self.is_unstable = growth.is_some();
         let Some(growth) = growth else { return };
+        let is_one = |warning: &&mut Warning| matches!(warning, Warning::UnstableStep { .. });
         if continued
             && let Some(Warning::UnstableStep {
                 step,
                 radius,
                 exact,
                 ..
-            }) = self.warnings.last_mut()
+            }) = self.warnings.iter_mut().rev().find(is_one)
         {
             if growth.radius > *radius {
                 (*step, *radius, *exact) = (h, growth.radius, growth.exact);
@@ -132,7 +175,78 @@ impl Watch {
         });
     }
 
+    /// Looks at the energy of a recorded node, whose momentum has the product p·v with its velocity.
+    pub(super) fn pass(&mut self, node: Recorded) {
+        let Recorded {
+            time,
+            energy,
+            action,
+            is_conserved,
+        } = node;
+        if !energy.is_finite() {
+            if !self.energy.is_lost {
+                self.warnings.push(Warning::EnergyNotFinite { time });
+            }
+            self.energy.is_lost = true;
+            self.energy.last = None;
+            return;
+        }
+        // Twice the kinetic energy of velocities, half of it for Hamiltonians of any kind: no more than a scale.
+        self.energy.scale = self.energy.scale.max(0.5 * action.abs());
+        let last = self.energy.last.replace(energy);
+        let (Some(before), true) = (last, is_conserved) else {
+            return;
+        };
+        let jump = (energy - before).abs();
+        let rounding = 1e-9 * energy.abs().max(before.abs());
+        if jump <= (0.1 * self.energy.scale).max(rounding) {
+            return;
+        }
+        let place = self.energy.jump.get_or_insert_with(|| {
+            self.warnings.push(Warning::EnergyJump {
+                time,
+                before,
+                after: energy,
+                count: 0,
+            });
+            self.warnings.len() - 1
+        });
+        if let Some(Warning::EnergyJump {
+            time: at,
+            before: from,
+            after,
+            count,
+        }) = self.warnings.get_mut(*place)
+        {
+            *count += 1;
+            if jump > (*after - *from).abs() {
+                (*at, *from, *after) = (time, before, energy);
+            }
+        }
+    }
+
     pub(super) fn into_warnings(self) -> Vec<Warning> {
         self.warnings
     }
+}
+
+/// What the energy of the nodes has been.
+#[derive(Clone, Debug, Default)]
+struct Energy {
+    last: Option<f64>,
+    /// The largest kinetic energy so far.
+    scale: f64,
+    is_lost: bool,
+    /// Which of the warnings is that of jumps.
+    jump: Option<usize>,
+}
+
+/// What is looked at in a recorded node.
+pub(super) struct Recorded {
+    pub(super) time: f64,
+    pub(super) energy: f64,
+    /// p·v
+    pub(super) action: f64,
+    /// Whether the energy has to be that of the node before.
+    pub(super) is_conserved: bool,
 }

@@ -1,0 +1,115 @@
+//! Runs that go on where others ended.
+
+use super::{Simulation, check_start};
+use crate::error::{RunError, RunErrorKind};
+use crate::motion::Motion;
+use tfe_runtime::step::{Stepper, Suspended};
+use tfe_runtime::{Model, State};
+
+/// The end of a run, with all that the next step depends on: the state to more than its rounded numbers, the polynomial of the last element, factors of its matrix, the grid.
+///
+/// One run and two halves of it are the same to the last bit: [`Simulation::resume`]. It belongs to the model, with the same parameters, and holds the memory of a
+/// stepper, some kilobytes for a few coordinates.
+#[derive(Clone, Debug)]
+pub struct Checkpoint<const N: usize> {
+    /// Where the run began.
+    pub(super) origin: f64,
+    pub(super) step: Option<f64>,
+    /// How many elements were done.
+    pub(super) elements: usize,
+    pub(crate) time: f64,
+    pub(crate) state: State<N>,
+    pub(crate) velocity: [f64; N],
+    pub(super) stepper: Suspended<N>,
+}
+
+impl<const N: usize> Checkpoint<N> {
+    /// The time that the run has reached.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// The state there.
+    pub fn state(&self) -> &State<N> {
+        &self.state
+    }
+}
+
+impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
+    /// Goes on where a run ended, up to the time `end`.
+    ///
+    /// Where that run ended on the grid of this one (its start, and the same steps and breaks), the motion is to the last bit what one run would have been from there on; else the grid
+    /// begins at the checkpoint. Impulses at the very time of the checkpoint have acted already. Another element begins anew.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + cos(x))]
+    /// struct Pendulum;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let simulation = Simulation::new(&Pendulum).element(Mixed::<4>).step(0.1);
+    /// let start = Pendulum.state([2.0], [0.0]);
+    /// let whole = simulation.run(start, 0.0..20.0)?;
+    /// let first = simulation.run(start, 0.0..8.0)?;
+    /// let checkpoint = first.checkpoint().ok_or("the run is complete")?;
+    /// let second = simulation.resume(checkpoint, 20.0)?;
+    /// assert_eq!(second.states(), &whole.states()[80..]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`RunError`], as from [`run`](Self::run).
+    pub fn resume(&self, checkpoint: &Checkpoint<N>, end: f64) -> Result<Motion<N>, RunError<N>> {
+        let motion = Motion::from_checkpoint(self.model, checkpoint);
+        let prepared = check_start(&checkpoint.state).and_then(|()| {
+            let step = self.step.or(checkpoint.step);
+            let mut run = Self {
+                step,
+                nodes: None,
+                ..self.clone()
+            };
+            // The last element of a run takes those at its end.
+            run.impulses
+                .retain(|impulse| impulse.time != checkpoint.time);
+            let element = self.chosen_element();
+            let suspended = checkpoint.stepper.clone();
+            let stepper = if suspended.element() == element {
+                Stepper::resume(self.model, self.control, suspended)
+            } else {
+                Stepper::new(self.model, element, self.control)
+            };
+            let stepper = stepper.map_err(RunErrorKind::Element)?;
+            let (time, origin) = (checkpoint.time, checkpoint.origin);
+            if let Some(nodes) = &self.nodes {
+                let is_ahead = |node: &&f64| (end - time) * (**node - time) > 0.0;
+                let ahead = nodes.iter().filter(is_ahead).copied();
+                let nodes = std::iter::once(time).chain(ahead).collect();
+                let run = Self {
+                    nodes: Some(nodes),
+                    ..self.clone()
+                };
+                return Ok((run.mesh(&(time..end))?, stepper, 0, time));
+            }
+            let on_grid = run.mesh(&(origin..end)).ok().filter(|mesh| {
+                let next = mesh.elements().nth(checkpoint.elements);
+                next.is_some_and(|(start, ..)| start == time)
+            });
+            match on_grid {
+                Some(mesh) => Ok((mesh, stepper, checkpoint.elements, origin)),
+                None => Ok((run.mesh(&(time..end))?, stepper, 0, time)),
+            }
+        });
+        match prepared {
+            Ok((mesh, stepper, done, origin)) => self.drive_on(
+                motion,
+                &checkpoint.state,
+                (&mesh, done, origin),
+                stepper,
+                |_, _| Ok(()),
+            ),
+            Err(kind) => Err(RunError::new(kind, motion)),
+        }
+    }
+}

@@ -1,0 +1,365 @@
+//! Runs where it hurts: what ends `Ok` is right, or says that it is doubtful.
+
+use tfe::prelude::*;
+use tfe::runtime::step::{Control, Stepper};
+use tfe::{RunErrorKind, Warning};
+
+/// Two rods' ends of equal masses, lengths one.
+#[dynamics(
+    coordinates(a, b),
+    lagrangian = dot(a)^2 + dot(b)^2/2 + cos(a - b)*dot(a)*dot(b) + 2*g*cos(a) + g*cos(b)
+)]
+struct DoublePendulum {
+    g: f64,
+}
+
+const PENDULUM: DoublePendulum = DoublePendulum { g: 9.81 };
+
+/// H of the double pendulum.
+fn energy(state: &State<2>) -> f64 {
+    let ([a, b], [p, r]) = (state.q, state.p);
+    let c = (a - b).cos();
+    let kinetic = (p * p / 2.0 - c * p * r + r * r) / (2.0 - c * c);
+    kinetic - 2.0 * PENDULUM.g * a.cos() - PENDULUM.g * b.cos()
+}
+
+fn starts() -> Vec<State<2>> {
+    let start = |k: u32| {
+        let (a, b) = (f64::from(k) / 50.0, f64::from(k * 7 % 50) / 50.0);
+        PENDULUM.state([0.5 + 2.4 * a, -1.0 + 3.9 * b], [0.0, 0.0])
+    };
+    (0..50).map(start).collect()
+}
+
+/// Six states along each of fifty motions.
+fn visited() -> Vec<State<2>> {
+    let simulation = Simulation::new(&PENDULUM).element(Mixed::<6>).step(0.01);
+    let mut states = Vec::new();
+    for start in starts() {
+        let motion = simulation.run(start, 0.0..6.0).expect("a run");
+        let every = motion.states().iter().skip(100).step_by(100);
+        states.extend(every.map(tfe::Node::state));
+    }
+    states
+}
+
+#[test]
+fn a_long_step_continues_the_motion() {
+    let states = visited();
+    assert_eq!(states.len(), 300);
+    // (step, largest change of the energy of one of 300 steps, whose kinetic energies reach 59): before, up to 2e8 at 0.2 and 1e12 at 0.4.
+    for (h, most) in [
+        (0.1, 2.0),
+        (0.15, 4.0),
+        (0.2, 6.0),
+        (0.3, 6.0),
+        (0.4, 6.0),
+        (0.5, 6.0),
+    ] {
+        let mut cuts = 0;
+        for state in &states {
+            let mut stepper =
+                Stepper::new(&PENDULUM, Mixed::<4>.into(), Control::default()).expect("a stepper");
+            let mut end = *state;
+            stepper.advance(0.0, h, &mut end, &[]).expect("a step");
+            let change = (energy(&end) - energy(state)).abs();
+            assert!(
+                change < most,
+                "h = {h}: energy off by {change:.1e} from {state:?}"
+            );
+            cuts += stepper.statistics().cuts;
+        }
+        assert!(cuts < 150 || h > 0.2, "h = {h}: {cuts} of 300 cut");
+    }
+}
+
+#[test]
+fn steps_that_are_cut_stay_on_the_grid() {
+    let simulation = Simulation::new(&PENDULUM).element(Mixed::<4>).step(0.5);
+    let (mut cuts, mut doubtful) = (0, 0);
+    for start in starts() {
+        let motion = simulation.run_linearised(start, 0.0..10.0).expect("a run");
+        let run = motion.motion();
+        assert_eq!((run.states().len(), run.statistics().steps), (21, 20));
+        cuts += run.statistics().cuts;
+        doubtful += usize::from(!run.warnings().is_empty());
+        // Dense output goes through all nodes, and its pieces are those of one curve.
+        for (k, node) in run.states().iter().enumerate() {
+            let near = run.at((node.t + 1e-9).min(10.0)).expect("inside");
+            let apart = (near.q[0] - node.q[0]).abs() + (near.q[1] - node.q[1]).abs();
+            assert!(apart < 1e-6, "node {k}: {apart:.1e}");
+        }
+        // The product of the matrices of the pieces is symplectic, as each of them.
+        for matrix in motion.transitions() {
+            let determinant = matrix.determinant();
+            assert!((determinant - 1.0).abs() < 1e-6, "{determinant}");
+        }
+        let back = run.last().state();
+        let ended = energy(&back) - energy(&start);
+        let is_warned = run
+            .warnings()
+            .iter()
+            .any(|one| matches!(one, Warning::EnergyJump { .. }));
+        assert!(
+            ended.abs() < 30.0 || is_warned,
+            "energy off by {ended:.1e} without a warning"
+        );
+    }
+    assert!(
+        cuts > 100 && doubtful > 0,
+        "{cuts} cuts, {doubtful} with warnings"
+    );
+}
+
+#[test]
+fn ensembles_cut_the_same_steps() {
+    let starts = starts();
+    let ends = Ensemble::new(&PENDULUM)
+        .element(Mixed::<4>)
+        .step(0.2)
+        .run(&starts, 0.0..2.0)
+        .expect("an ensemble");
+    let simulation = Simulation::new(&PENDULUM).element(Mixed::<4>).step(0.2);
+    for (start, end) in starts.iter().zip(ends.iter()) {
+        let alone = simulation.run(*start, 0.0..2.0).expect("a run");
+        let end = end.as_ref().expect("an end");
+        let apart = (alone.last().q[0] - end.q[0]).abs() + (alone.last().q[1] - end.q[1]).abs();
+        // A lane begins a step that it leaves to Newton's method anew, a run continues its last element, so not the same steps are cut: they differ by the error of
+        // the step, where roots that differ were 10⁶ apart.
+        assert!(apart < 1.0, "{apart:.1e} apart");
+    }
+}
+
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + 1/sqrt(x^2 + y^2))]
+struct Kepler;
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - ln(x))]
+struct Logarithm;
+
+#[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - x^2/2 - x^4)]
+struct Anharmonic {
+    m: f64,
+}
+
+/// Either an error, or a warning, or the energy kept.
+fn is_told<const N: usize>(run: Result<tfe::Motion<N>, tfe::RunError<N>>) -> bool {
+    match run {
+        Err(_) => true,
+        Ok(motion) => !motion.warnings().is_empty() || motion.energy_error() < 0.2,
+    }
+}
+
+#[test]
+fn singular_points_are_told() {
+    for nodes in 2..=8 {
+        for step in [0.003, 0.01, 0.02, 0.05, 0.11] {
+            let element = Element::mixed(nodes);
+            let fall = Simulation::new(&Kepler).element(element).step(step);
+            let run = fall.run(Kepler.state([1.0, 0.0], [0.0, 0.0]), 0.0..4.0);
+            assert!(
+                is_told(run),
+                "falling into the centre, {element}, h = {step}"
+            );
+            let log = Simulation::new(&Logarithm).element(element).step(step);
+            let run = log.run(Logarithm.state([-1.0], [0.5]), 0.0..4.0);
+            assert!(is_told(run), "ln(-1), {element}, h = {step}");
+        }
+    }
+}
+
+#[test]
+fn a_mass_of_zero_is_told() {
+    let model = Anharmonic { m: 0.0 };
+    let start = State { q: [0.5], p: [0.0] };
+    let run = Simulation::new(&model).step(0.1).run(start, 0.0..1.0);
+    let told = match &run {
+        Err(_) => true,
+        Ok(motion) => motion
+            .warnings()
+            .iter()
+            .any(|one| matches!(one, Warning::EnergyNotFinite { time } if *time == 0.0)),
+    };
+    assert!(told, "{run:?}");
+}
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2,
+    force(x) = late*select(t < 0.5, 1, 0) + (1 - late)*select(t <= 0.5, 1, 0)
+)]
+struct Switched {
+    /// One: the force counts as after the break at the break itself; zero: as before it.
+    late: f64,
+}
+
+/// Force 1 before t = 0.5, none after: x(1) = 3/8, whichever side the model counts the break to, and back again.
+#[test]
+fn forces_at_breaks_are_those_of_the_element() {
+    for (h, late) in [
+        (0.1, 0.0),
+        (0.1, 1.0),
+        (0.07, 0.0),
+        (0.07, 1.0),
+        (0.25, 0.0),
+        (0.25, 1.0),
+    ] {
+        let model = Switched { late };
+        for nodes in 2..=6 {
+            for element in [
+                Element::radau(nodes.max(3)),
+                Element::mixed(nodes),
+                Element::mixed(nodes).lobatto(),
+                Element::primal(nodes).lobatto(),
+            ] {
+                let simulation = Simulation::new(&model)
+                    .element(element)
+                    .step(h)
+                    .break_at(0.5);
+                let there = simulation.run(model.state([0.0], [0.0]), 0.0..1.0);
+                let Ok(there) = there else { continue };
+                let end = there.last();
+                let off = (end.q[0] - 0.375).abs();
+                assert!(off < 1e-14, "{element}, h = {h}, {late}: {}", end.q[0]);
+                let back = simulation.run(end.state(), 1.0..0.0).expect("a run");
+                let off = back.last().q[0].abs() + back.last().p[0].abs();
+                assert!(
+                    off < 1e-14,
+                    "{element}, h = {h}, {late}: back to {:?}",
+                    back.last()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn an_iteration_that_cycles_ends() {
+    let model = Anharmonic { m: 1.0 };
+    for h in [0.1, 0.5, 1.0, 2.0, 5.0] {
+        let simulation = Simulation::new(&model)
+            .solver(Solve::FixedPoint)
+            .max_iterations(u32::MAX)
+            .tolerance(0.0)
+            .step(h);
+        // It ends: with a motion, or an error.
+        let _ = simulation.run(model.state([1.0], [0.3]), 0.0..10.0 * h);
+    }
+}
+
+#[test]
+fn steps_below_the_resolution_of_the_time_are_refused() {
+    let model = Anharmonic { m: 1.0 };
+    let start = model.state([1.0], [0.0]);
+    let simulation = Simulation::new(&model).step(0.01);
+    let run = simulation.run(start, 1e15..1e15 + 10.0);
+    let error = run.expect_err("nodes share times");
+    assert!(
+        matches!(error.kind(), RunErrorKind::StepUnresolved { .. }),
+        "{error}"
+    );
+    // Where the time has digits enough, its origin does not matter.
+    let far = simulation.run(start, 1e9..1e9 + 10.0).expect("a run");
+    let near = simulation.run(start, 0.0..10.0).expect("a run");
+    assert!((far.last().q[0] - near.last().q[0]).abs() < 1e-12);
+}
+
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - 1)]
+struct Rod {
+    g: f64,
+}
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = -0.1*dot(x))]
+struct Damped;
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - 1e6*(x - cos(t))^2/2, force(x) = -1e3*dot(x))]
+struct Stiff;
+
+/// One run, and two of it that are cut anywhere: all states, velocities and energies are the same numbers.
+#[test]
+fn two_halves_are_one_run_to_the_bit() {
+    fn check<M: tfe::Model<N>, const N: usize>(
+        simulation: &Simulation<'_, M, N>,
+        start: State<N>,
+        (steps, h): (u32, f64),
+        cuts: u32,
+        seed: &mut u64,
+    ) {
+        let end = f64::from(steps) * h;
+        let whole = simulation.run(start, 0.0..end).expect("a run");
+        for _ in 0..cuts {
+            *seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let cut = 1 + (*seed >> 33) as u32 % (steps - 1);
+            let first = simulation
+                .run(start, 0.0..f64::from(cut) * h)
+                .expect("a run");
+            let checkpoint = first.checkpoint().expect("complete");
+            let second = simulation.resume(checkpoint, end).expect("a run");
+            let at = cut as usize;
+            assert_eq!(first.states(), &whole.states()[..=at], "cut at {cut}");
+            assert_eq!(second.states(), &whole.states()[at..], "cut at {cut}");
+            assert_eq!(
+                second.velocities(),
+                &whole.velocities()[at..],
+                "cut at {cut}"
+            );
+            assert_eq!(second.energies(), &whole.energies()[at..], "cut at {cut}");
+        }
+    }
+    let mut seed = 1;
+    let kepler = Kepler.state([1.0, 0.0], [0.0, 1.2]);
+    for element in [
+        Element::mixed(4),
+        Element::mixed(8),
+        Element::primal(3),
+        Element::radau(4),
+    ] {
+        let h = 0.1;
+        check(
+            &Simulation::new(&Kepler).element(element).step(h),
+            kepler,
+            (200, h),
+            50,
+            &mut seed,
+        );
+        let stiff = Simulation::new(&Stiff).element(element).step(h);
+        check(
+            &stiff,
+            State { q: [2.0], p: [0.0] },
+            (100, h),
+            50,
+            &mut seed,
+        );
+        let damped = Simulation::new(&Damped).element(element).step(0.07);
+        check(
+            &damped,
+            State { q: [2.0], p: [0.0] },
+            (100, 0.07),
+            50,
+            &mut seed,
+        );
+        // Steps that are cut into pieces, too.
+        let double = Simulation::new(&PENDULUM).element(element).step(0.15);
+        check(
+            &double,
+            PENDULUM.state([1.0, 2.0], [0.0, 0.0]),
+            (50, 0.15),
+            50,
+            &mut seed,
+        );
+    }
+    let rod = Rod { g: 9.81 };
+    for nodes in [2, 3, 4, 5] {
+        let simulation = Simulation::new(&rod)
+            .element(Element::mixed(nodes))
+            .step(0.02);
+        check(
+            &simulation,
+            rod.state([1.0, 0.0], [0.0, 0.0]),
+            (150, 0.02),
+            50,
+            &mut seed,
+        );
+    }
+}
