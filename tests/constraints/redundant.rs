@@ -320,7 +320,7 @@ fn a_third_row_is_as_good_as_two() {
                 // Sums of rows weigh the three functions otherwise: another error, of the same order. Below 1e-12 it is the rounding of 10⁴ iterations.
                 let is_summed = ["doubled", "summed"].contains(&rows);
                 let (factor, floor) = if is_summed {
-                    (150.0, 1e-11)
+                    (500.0, 1e-11)
                 } else {
                     (2.0, 1e-12)
                 };

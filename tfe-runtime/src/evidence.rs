@@ -25,8 +25,11 @@ impl Evidence {
     /// bounds of those that are not.
     const PROVEN: f64 = 0.25;
 
-    /// The same for the fixed point, whose ratios differ less from one another.
+    /// The same for the fixed point, whose ratios differ less from one another, where Newton's method may follow.
     pub(crate) const CONTRACTS: f64 = 0.5;
+
+    /// The same where nothing else is there: by Banach's theorem any contraction will do.
+    pub(crate) const CONTRACTS_ALONE: f64 = 1.0;
 
     /// Smaller increments, relative to the state, cannot reach another root.
     pub(crate) const FAR: f64 = 1e-3;
@@ -34,12 +37,17 @@ impl Evidence {
     /// The second increment of Newton's method is what the linear model at the start is wrong by.
     const CURVED: f64 = 0.03;
 
-    pub(crate) fn of_fixed_point() -> Self {
+    /// `yielding` says that Newton's method may follow.
+    pub(crate) fn of_fixed_point(yielding: bool) -> Self {
         Self {
             ratio: 0.0,
             last: f64::INFINITY,
             count: 0,
-            limit: Self::CONTRACTS,
+            limit: if yielding {
+                Self::CONTRACTS
+            } else {
+                Self::CONTRACTS_ALONE
+            },
             reach: f64::INFINITY,
         }
     }
@@ -48,7 +56,7 @@ impl Evidence {
         Self {
             limit: Self::PROVEN,
             reach: Self::CURVED,
-            ..Self::of_fixed_point()
+            ..Self::of_fixed_point(true)
         }
     }
 

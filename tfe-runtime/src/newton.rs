@@ -255,7 +255,7 @@ where
     E: Equations,
 {
     let mut monitor = Monitor::new(control.tolerance);
-    let mut evidence = Evidence::of_fixed_point();
+    let mut evidence = Evidence::of_fixed_point(yielding);
     let most = if yielding {
         control.max_iterations.min(PATIENCE)
     } else {

@@ -63,10 +63,10 @@ impl<V: Real> Judge<V> {
     pub(super) fn new(like: V, tolerance: f64, solve: Solve) -> Self {
         Self {
             worst: like.like(0.0),
-            proven: like.like(if solve == Solve::Trusting {
-                f64::INFINITY
-            } else {
-                Evidence::CONTRACTS
+            proven: like.like(match solve {
+                Solve::Trusting => f64::INFINITY,
+                Solve::FixedPoint => Evidence::CONTRACTS_ALONE,
+                Solve::Auto | Solve::Newton => Evidence::CONTRACTS,
             }),
             tolerance: like.like(tolerance),
             last: like.like(f64::INFINITY),
@@ -182,7 +182,7 @@ mod tests {
             let like = Lanes([0.0; 4]);
             let mut judge = Judge::new(like, 1e-17, Solve::Auto);
             let mut monitors = [(); 4].map(|()| Monitor::new(1e-17));
-            let mut evidence = [(); 4].map(|()| Evidence::of_fixed_point());
+            let mut evidence = [(); 4].map(|()| Evidence::of_fixed_point(true));
             let mut active = [true; 4];
             for step in 0..24 {
                 let increments = Increments::new(

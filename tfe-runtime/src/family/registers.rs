@@ -66,7 +66,7 @@ impl Registers {
         yielding: bool,
     ) -> Outcome {
         let mut monitor = Monitor::new(control.tolerance);
-        let mut evidence = Evidence::of_fixed_point();
+        let mut evidence = Evidence::of_fixed_point(true);
         let (mut iterations, mut converged) = (0, false);
         let most = if yielding {
             control.max_iterations.min(PATIENCE)
@@ -84,7 +84,8 @@ impl Registers {
             evidence.see(increment.relative, true);
             match monitor.judge(increment) {
                 Ok(Verdict::Converged) => {
-                    converged = evidence.check(control.solve).is_ok();
+                    // Without Newton's method there is nothing else that could be tried.
+                    converged = !yielding || evidence.check(control.solve).is_ok();
                     break;
                 }
                 Ok(Verdict::GoOn) => {}

@@ -43,7 +43,7 @@ where
         points.begin::<V, M>(like, &leg);
         let is_rough = control.is_rough();
         let mut monitor = Monitor::new(control.tolerance);
-        let mut evidence = Evidence::of_fixed_point();
+        let mut evidence = Evidence::of_fixed_point(yielding);
         let most = if yielding {
             control.max_iterations.min(PATIENCE)
         } else {
