@@ -566,10 +566,12 @@ impl Driver<'_> {
             self.known,
             self.linear,
         );
+        let proves =
+            |evidence: &Evidence| self.linear || evidence.check(self.control.solve).is_ok();
         self.evidence = Some(match first {
-            Ok(evidence) => evidence,
+            Ok(evidence) if !self.warm || proves(&evidence) => evidence,
             Err(error) if !self.warm => return Err(error),
-            Err(_) => {
+            Ok(_) | Err(_) => {
                 // The continued polynomial may be a worse start than none.
                 cold(scratch.unknowns);
                 newton(equations, self.control, &mut scratch, false, self.linear)?

@@ -146,10 +146,16 @@ impl<'m, M: FamilyModel> Forces<'m, M> {
             }
             self.preference.leave_fixed_point();
             self.statistics.fallbacks += 1;
-            self.prepare(t, h, false);
         } else {
             self.preference.count_newton();
+            if is_warm && self.newton(t, h).is_ok() {
+                return Ok(());
+            }
         }
+        // The continued polynomial may be a worse start than none.
+        self.prepare(t, h, false);
+        #[cfg(feature = "sparse")]
+        self.registers.release();
         self.newton(t, h)
     }
 

@@ -140,6 +140,16 @@ impl Registers {
         }
     }
 
+    /// Begins without forces: uniform motion. Those at the start, at all points of a long step, may lead far from where any motion goes.
+    #[cfg(feature = "sparse")]
+    pub(super) fn release(&mut self) {
+        match self {
+            #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+            Self::Quads(space, _) => space.release(),
+            Self::Lanes(space) => space.release(),
+        }
+    }
+
     /// Adds to the forces.
     #[cfg(feature = "sparse")]
     pub(super) fn correct(&mut self, problem: &Problem, steps: &[f64]) -> Sizes {

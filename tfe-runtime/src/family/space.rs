@@ -244,6 +244,12 @@ impl<V: Four> Space<V> {
         }
     }
 
+    /// No forces.
+    #[cfg(feature = "sparse")]
+    pub(super) fn release(&mut self) {
+        self.forces.fill(self.like.like(0.0));
+    }
+
     /// Adds to the forces.
     #[cfg(feature = "sparse")]
     pub(super) fn correct(&mut self, problem: &Problem, steps: &[f64]) -> Sizes {
