@@ -12,6 +12,7 @@ use crate::motion::{Motion, Node};
 use family::Runs;
 use mesh::Mesh;
 use nalgebra::DMatrix;
+use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::length::Declared;
@@ -55,6 +56,8 @@ pub struct Simulation<'m, M, const N: usize> {
     record_every: usize,
     impulses: Vec<Impulse<N>>,
     breaks: Vec<f64>,
+    /// What was asked for.
+    at_kinks: Option<bool>,
     progress: bool,
 }
 
@@ -95,6 +98,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             record_every: 1,
             impulses: Vec::new(),
             breaks: Vec::new(),
+            at_kinks: None,
             progress: false,
         }
     }
@@ -189,6 +193,36 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         self
     }
 
+    /// Whether steps are cut where a force has a kink or a jump: where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the arguments
+    /// of a `min` or `max` changes its sign, in the state or in time (`docs/theory.md` §10.7). Elements keep their order then, and the run stays on the grid asked for;
+    /// [`Statistics::kinks`] counts the crossings. A motion that would slide along a jump is an error, [`StepError::Slides`](crate::runtime::StepError::Slides).
+    ///
+    /// [`run`](Self::run), [`steps`](Self::steps) and [`run_estimated`](Self::run_estimated) do so only if asked, runs with an [`accuracy`](Self::accuracy) unless forbidden;
+    /// [`run_linearised`](Self::run_linearised) never does.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// /// A mass that falls onto a spring.
+    /// #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y - k/2*min(y, 0)^2)]
+    /// struct Landing { g: f64, k: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let landing = Landing { g: 10.0, k: 1e4 };
+    /// let simulation = Simulation::new(&landing).element(Mixed::<6>).step(0.02).at_kinks(true);
+    /// let motion = simulation.run(landing.state([0.05], [0.0]), 0.0..1.0)?;
+    /// assert!(motion.statistics().kinks > 5);
+    /// let energies = motion.energies();
+    /// assert!(energies.iter().all(|energy| (energy - 0.5).abs() < 1e-12));
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn at_kinks(mut self, are_cut: bool) -> Self {
+        self.at_kinks = Some(are_cut);
+        self
+    }
+
     /// Shows the progress of long runs on standard error, once a second.
     #[must_use]
     pub fn progress(mut self) -> Self {
@@ -220,7 +254,25 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # }
     /// ```
     pub fn run(&self, start: State<N>, span: Range<f64>) -> Result<Motion<N>, RunError<N>> {
-        self.drive(start, &span, self.record_every != 1, |_, _| Ok(()))
+        let ends_only = self.record_every != 1;
+        let ready = |stepper: Stepper<'m, M, N>| {
+            let stepper = self.cutting(stepper);
+            if ends_only {
+                stepper.ends_only()
+            } else {
+                stepper
+            }
+        };
+        self.drive(start, &span, ready, |_, _| Ok(()))
+    }
+
+    /// A stepper that cuts steps at kinks, if that was asked for.
+    fn cutting(&self, stepper: Stepper<'m, M, N>) -> Stepper<'m, M, N> {
+        if self.at_kinks == Some(true) {
+            stepper.at_kinks()
+        } else {
+            stepper
+        }
     }
 
     /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion.
@@ -239,7 +291,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let mut transitions = Vec::new();
         let mut entries = vec![0.0; 4 * N * N];
         let mut starts = Vec::new();
-        let motion = self.drive(start, &span, false, |stepper, passed| {
+        let motion = self.drive(start, &span, identity, |stepper, passed| {
             stepper.transition(&mut entries)?;
             transitions.push(DMatrix::from_row_slice(2 * N, 2 * N, &entries));
             if const { !M::CONSTRAINTS.is_empty() } {
@@ -255,21 +307,19 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         &self,
         start: State<N>,
         span: &Range<f64>,
-        ends_only: bool,
+        ready: impl FnOnce(Stepper<'m, M, N>) -> Stepper<'m, M, N>,
         finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
     ) -> Result<Motion<N>, RunError<N>> {
-        let (mesh, mut stepper) = match self.prepare(&start, span) {
+        let (mesh, stepper) = match self.prepare(&start, span) {
             Ok(prepared) => prepared,
             Err(kind) => {
                 let motion = Motion::from_start(self.model, span.start, &start);
                 return Err(RunError::new(kind, motion));
             }
         };
-        if ends_only {
-            stepper = stepper.ends_only();
-        }
         let motion = Motion::from_start(self.model, span.start, &start);
-        self.drive_on(motion, &start, (&mesh, 0, span.start), stepper, finished)
+        let place = (&mesh, 0, span.start);
+        self.drive_on(motion, &start, place, ready(stepper), finished)
     }
 
     /// Goes on from the only node of `motion` over a mesh of which some elements are done, and leaves a checkpoint.
@@ -430,7 +480,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 });
             }
             Stepper::new(self.model, self.chosen_element(), self.control)
-                .map(Stepper::ends_only)
+                .map(|stepper| self.cutting(stepper).ends_only())
                 .map_err(RunErrorKind::Element)
         });
         let (stepper, failure) = match stepper {

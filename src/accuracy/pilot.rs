@@ -7,6 +7,10 @@ use std::ops::Range;
 pub(crate) trait Pair {
     /// Makes a step of both from where the motion is; false where one of them fails.
     fn attempt(&mut self, t: f64, h: f64) -> bool;
+    /// Whether shorter steps would fail as well.
+    fn is_stopped(&self) -> bool {
+        false
+    }
     /// How far both are apart after that step, of each kind.
     fn apart(&self) -> &[f64];
     /// The largest number of each kind, so far and after that step.
@@ -81,6 +85,9 @@ pub(crate) fn explore(course: &Course, pair: &mut impl Pair) -> Option<Grading> 
             } else {
                 f64::NAN
             };
+            if pair.is_stopped() {
+                return None;
+            }
             if !off.is_finite() {
                 wanted = FAILED * h;
                 continue;

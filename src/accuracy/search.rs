@@ -12,7 +12,7 @@ use cuts::cuts;
 use ladder::{Ladder, Verdict};
 use probe::probe;
 use std::ops::Range;
-use tfe_runtime::{Element, Solve};
+use tfe_runtime::{Element, Solve, StepError};
 
 /// What is asked of a run.
 #[derive(Clone, Debug)]
@@ -329,6 +329,7 @@ fn climb(
                 }
                 Verdict::Floor => break,
             },
+            Err(kind) if slides(&kind) => return Err(kind),
             Err(kind) => {
                 ladder.fail(taken);
                 failure = Some(kind);
@@ -365,6 +366,12 @@ fn climb(
         times: cuts[1..].to_vec(),
         errors,
     }))
+}
+
+/// Whether steps of any length fail.
+fn slides(kind: &RunErrorKind) -> bool {
+    let source = StepError::Slides;
+    matches!(kind, RunErrorKind::Solve { source: found, .. } if *found == source)
 }
 
 fn largest(errors: &[Vec<f64>]) -> f64 {

@@ -80,7 +80,7 @@ impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
             } else {
                 Stepper::new(self.model, element, self.control)
             };
-            let stepper = stepper.map_err(RunErrorKind::Element)?;
+            let stepper = self.cutting(stepper.map_err(RunErrorKind::Element)?);
             let (time, origin) = (checkpoint.time, checkpoint.origin);
             if let Some(nodes) = &self.nodes {
                 let is_ahead = |node: &&f64| (end - time) * (**node - time) > 0.0;

@@ -187,6 +187,8 @@ pub enum StepError {
         /// The energy at its end.
         after: f64,
     },
+    /// The motion comes back at once to a jump of a force that it has crossed: it would slide along it (Filippov), which the equations as declared do not describe.
+    Slides,
     /// The change between velocities and momenta failed at a point of the element.
     Legendre(LegendreError),
     /// Something about the constraints.
@@ -251,6 +253,10 @@ impl fmt::Display for StepError {
                 f,
                 "the energy, which the model conserves, jumps from {before:.6e} to {after:.6e}: another root of a long step, or a singular point of the model; \
                  take a shorter step, or `Solve::Trusting`"
+            ),
+            Self::Slides => f.write_str(
+                "the motion slides along a jump of a force: on either side of where a `sign`, `select` or the like changes, it is driven back to the other side; \
+                 take a law without the jump, such as tanh(v/w) for sign(v)",
             ),
             Self::Legendre(source) => source.fmt(f),
             Self::Constraint(source) => source.fmt(f),

@@ -34,6 +34,8 @@ pub mod error;
 mod evidence;
 #[cfg(feature = "alloc")]
 pub mod family;
+#[cfg(feature = "alloc")]
+mod kinks;
 pub mod legendre;
 pub mod length;
 pub mod lu;

@@ -23,6 +23,8 @@ pub struct Statistics {
     pub fallbacks: u64,
     /// Steps that were cut into pieces, because Newton's method did not prove the root of the whole step to be the one that continues the motion.
     pub cuts: u64,
+    /// Crossings of a kink or a jump of a force at which a step was cut: sign changes of what an `abs`, `sign`, `min`, `max` or `select` chooses by.
+    pub kinks: u64,
     /// Steps of a linear model by one product with its matrix.
     pub products: u64,
     /// By how much the fixed-point iteration contracted when it was last judged.
@@ -86,6 +88,7 @@ impl Statistics {
         factorizations: 0,
         fallbacks: 0,
         cuts: 0,
+        kinks: 0,
         products: 0,
         contraction: Contraction::NONE,
     };
@@ -101,6 +104,7 @@ impl Statistics {
         self.factorizations += other.factorizations;
         self.fallbacks += other.fallbacks;
         self.cuts += other.cuts;
+        self.kinks += other.kinks;
         self.products += other.products;
         self.contraction = self.contraction.max(other.contraction);
     }

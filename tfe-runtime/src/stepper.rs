@@ -7,6 +7,7 @@ use crate::cut::{Halving, Instant, in_halves, may_be_cut};
 use crate::dense::DenseElement;
 use crate::element::{Element, ElementError};
 use crate::error::StepError;
+use crate::kinks::{Kinked, in_arcs, switches};
 use crate::model::{Model, State};
 use crate::newton::{Control, Solve};
 use crate::points::{Leg, Points};
@@ -81,6 +82,10 @@ pub struct Stepper<'m, M, const N: usize> {
     skipped: bool,
     /// Of a last step that was cut.
     pieces: Vec<Piece<N>>,
+    /// Steps are cut at kinks, if there are any.
+    at_kinks: bool,
+    /// What was asked for; what is in use may trust more.
+    solve: Solve,
 }
 
 /// A part of a step that was cut.
@@ -111,6 +116,8 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             alike: self.alike,
             skipped: self.skipped,
             pieces: self.pieces.clone(),
+            at_kinks: self.at_kinks,
+            solve: self.solve,
         }
     }
 }
@@ -186,6 +193,8 @@ where
             alike: suspended.alike,
             skipped: suspended.skipped,
             pieces: suspended.pieces,
+            at_kinks: false,
+            solve: control.solve,
         })
     }
 
@@ -221,6 +230,8 @@ where
             alike: (0.0, 0),
             skipped: false,
             pieces: Vec::new(),
+            at_kinks: false,
+            solve: control.solve,
         };
         if stepper.points.is_none() {
             stepper.make_room();
@@ -259,6 +270,16 @@ where
         }
     }
 
+    /// Cuts steps where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the arguments of a `min` or `max` changes its sign, so that
+    /// elements keep their order (T-119); [`Statistics::kinks`] counts the crossings. Models without such functions step as before.
+    #[must_use]
+    pub fn at_kinks(self) -> Self {
+        Self {
+            at_kinks: true,
+            ..self
+        }
+    }
+
     /// Moves `state` from t to t + h. The first iterate continues the last step if `state` is
     /// where that ended; a state of one's own is as welcome.
     ///
@@ -275,6 +296,9 @@ where
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
         self.pieces.clear();
+        if self.at_kinks && self.has_kinks(t, state) {
+            return self.advance_in_arcs(t, h, state, impulses);
+        }
         let error = match self.whole(t, h, state, impulses) {
             Err(error) if may_be_cut(&error, M::FACTS.linear, self.control.solve) => error,
             outcome => return outcome,
@@ -290,6 +314,35 @@ where
         self.memory.statistics.steps += 1;
         self.memory.statistics.cuts += 1;
         Ok(())
+    }
+
+    /// Whether kernels choose by the sign of anything; where they do not nobody asks again.
+    fn has_kinks(&mut self, t: f64, state: &State<N>) -> bool {
+        let mut switches = Vec::new();
+        self.switches(t, state, &mut switches);
+        self.at_kinks = !switches.is_empty();
+        // The inside of every step is looked at.
+        self.ends_only &= !self.at_kinks;
+        self.at_kinks
+    }
+
+    #[cold]
+    fn advance_in_arcs(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+        impulses: &[Impulse<N>],
+    ) -> Result<(), StepError> {
+        let (start, low, steps) = (*state, self.memory.low, self.memory.statistics.steps);
+        let outcome = in_arcs(self, (t, h), state, impulses);
+        self.trust(false);
+        self.memory.statistics.steps = steps + u64::from(outcome.is_ok());
+        if outcome.is_err() {
+            (*state, self.memory.low, self.memory.last) = (start, low, None);
+            self.pieces.clear();
+        }
+        outcome
     }
 
     /// Whether a matrix is asked for.
@@ -674,6 +727,46 @@ where
                 pivots: self.pivots.clone(),
             });
         }
+    }
+}
+
+impl<M, const N: usize> Kinked for Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    type Inside = DenseElement<N>;
+
+    fn inside(&self) -> DenseElement<N> {
+        self.dense_of_last(0.0, 1.0)
+    }
+
+    fn at(inside: &DenseElement<N>, tau: f64) -> State<N> {
+        inside.at(tau)
+    }
+
+    fn forget(&mut self) {
+        self.memory.last = None;
+    }
+
+    fn switches(&self, t: f64, state: &State<N>, values: &mut Vec<f64>) {
+        switches(self.model, t, state, values);
+    }
+
+    fn points(&self) -> (usize, bool) {
+        let scheme = self.table.view();
+        let has_ends = scheme.nodes.first() == Some(&0.0) || scheme.nodes.last() == Some(&1.0);
+        (scheme.points(), has_ends)
+    }
+
+    fn crossed(&mut self) {
+        self.memory.statistics.kinks += 1;
+    }
+
+    fn trust(&mut self, all: bool) {
+        self.control.solve = match (self.solve, all) {
+            (Solve::Auto, true) => Solve::Trusting,
+            (solve, _) => solve,
+        };
     }
 }
 

@@ -4,7 +4,7 @@ use super::super::mesh::{Mesh, up_to_break};
 use super::{MOST_ITERATIONS, Repeatable};
 use crate::accuracy::{Course, Pair, Trace};
 use crate::error::RunErrorKind;
-use tfe_runtime::{Element, Statistics};
+use tfe_runtime::{Element, Statistics, StepError};
 
 /// What iterations may leave of what a step may be off by, so that it does not show in differences that count.
 const TOLERANCE: f64 = 1e-3;
@@ -27,6 +27,8 @@ pub(super) struct Beside<'r, R: Repeatable<N>, const N: usize> {
     /// Newton iterations of the last attempt, and steps that were kept: with some of them and all.
     newton: u64,
     kept: (usize, usize),
+    /// The last attempt failed because the motion slides along a jump.
+    slides: bool,
 }
 
 impl<'r, R: Repeatable<N>, const N: usize> Beside<'r, R, N> {
@@ -57,6 +59,7 @@ impl<'r, R: Repeatable<N>, const N: usize> Beside<'r, R, N> {
             end: span.end,
             newton: 0,
             kept: (0, 0),
+            slides: false,
             steppers,
         };
         let [_, row] = &mut pair.rows;
@@ -110,7 +113,8 @@ impl<R: Repeatable<N>, const N: usize> Pair for Beside<'_, R, N> {
             let step = self
                 .run
                 .advance(stepper, (t, next, h), &self.mesh, &mut self.ends[k]);
-            if step.is_err() {
+            if let Err(error) = step {
+                self.slides = error == StepError::Slides;
                 return false;
             }
             self.run
@@ -121,6 +125,10 @@ impl<R: Repeatable<N>, const N: usize> Pair for Beside<'_, R, N> {
         self.trace.apart(row, better, &mut self.apart);
         self.trace.sizes_with(better, &mut self.sizes);
         true
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.slides
     }
 
     fn apart(&self) -> &[f64] {

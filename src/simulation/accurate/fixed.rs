@@ -100,6 +100,7 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
         span: Range<f64>,
     ) -> Result<Estimated<Motion<N>>, RunError<N>> {
         let run = &self.simulation;
+        let run = &run.clone().at_kinks(run.at_kinks.unwrap_or(true));
         if span.start == span.end {
             let motion = run.run(start, span)?;
             let outputs = run.outputs();
@@ -186,6 +187,7 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
     ) -> Result<Stepper<'m, M, N>, RunErrorKind> {
         let control = trusting(control);
         let stepper = Stepper::new(self.model, element, control).map_err(RunErrorKind::Element)?;
+        let stepper = self.cutting(stepper);
         Ok(if is_recorded && self.record_every == 1 {
             stepper
         } else {

@@ -1,0 +1,407 @@
+//! Forces with kinks and jumps: elements keep their order, and an accuracy that is asked for is met or refused.
+
+use tfe::RunErrorKind;
+use tfe::prelude::*;
+use tfe::runtime::length::{Declared, FixedLength};
+use tfe::runtime::{Model, StepError};
+
+/// Bounces on a spring.
+#[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y - k/2*min(y, 0)^2)]
+struct Bounce {
+    g: f64,
+    k: f64,
+}
+
+/// A mass driven against friction that jumps with the direction.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - x^4/4, force(x) = -c*sign(dot(x)) + a*sin(w*t))]
+struct Coulomb {
+    c: f64,
+    a: f64,
+    w: f64,
+}
+
+/// The same, smoothed.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - x^4/4, force(x) = -c*tanh(dot(x)/w) + a*sin(t))]
+struct Smoothed {
+    c: f64,
+    a: f64,
+    w: f64,
+}
+
+/// A gap on both sides.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k/2*max(abs(x) - gap, 0)^2, force(x) = a*cos(t) - 0.1*dot(x))]
+struct Backlash {
+    k: f64,
+    gap: f64,
+    a: f64,
+}
+
+/// Thrust for some time.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - cos(x), force(x) = select(t < until, thrust, 0))]
+struct ThrustInTime {
+    until: f64,
+    thrust: f64,
+}
+
+/// Thrust in a place.
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + 1/sqrt(x^2 + y^2), force(x) = select(x > y + 0.1, thrust, 0))]
+struct ThrustInPlace {
+    thrust: f64,
+}
+
+/// A pendulum held upright by a limited torque.
+#[dynamics(coordinates(a), lagrangian = dot(a)^2/2 - cos(a), force(a) = max(-m, min(m, -3*a - 2*dot(a))))]
+struct Saturated {
+    m: f64,
+}
+
+/// A charge on one of two capacitors, chosen by its sign.
+#[dynamics(coordinates(q), lagrangian = dot(q)^2/2 - q^2/(2*select(q > 0, c, 3*c)), force(q) = -0.05*dot(q) + sin(t))]
+struct Capacitors {
+    c: f64,
+}
+
+/// Driven against a stiff wall.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - k/2*max(x - wall, 0)^2, force(x) = a*cos(w*t) - 0.05*dot(x))]
+struct Impact {
+    k: f64,
+    wall: f64,
+    a: f64,
+    w: f64,
+}
+
+/// A potential like a roof.
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*abs(x) - y^2/2 - x^2*y/4)]
+struct Roof {
+    g: f64,
+}
+
+/// By momenta: a magnet on one side.
+#[dynamics(coordinates(q[2]), momenta(p[2]), hamiltonian = (p[0]^2 + p[1]^2)/2 + q[0]^2*q[1]^2/2 + b*max(q[0], 0)*q[0] + (q[0]^2 + q[1]^2)/2)]
+struct HalfSpring {
+    b: f64,
+}
+
+/// Quadratic drag changes its sign with the velocity: a kink in the second derivative of the force.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + cos(x), force(x) = -c*abs(dot(x))*dot(x) + 0.5*sin(1.3*t))]
+struct Drag {
+    c: f64,
+}
+
+/// A scene as it is run here.
+struct Scene<'a> {
+    name: &'static str,
+    /// A step with which elements show their order.
+    step: f64,
+    run: Box<dyn Fn(Element, f64, bool) -> Ended + 'a>,
+    /// With a requested accuracy: the end and the estimate, or the error.
+    accurate: Box<dyn Fn(f64) -> Result<Estimate, String> + 'a>,
+}
+
+/// An end and its estimated error.
+type Estimate = (Vec<f64>, f64);
+
+struct Ended {
+    end: Vec<f64>,
+    kinks: u64,
+}
+
+fn numbers<const N: usize>(state: &State<N>) -> Vec<f64> {
+    state.q.iter().chain(&state.p).copied().collect()
+}
+
+fn scene<'a, M, const N: usize>(
+    (name, step): (&'static str, f64),
+    model: &'a M,
+    start: State<N>,
+    end: f64,
+) -> Scene<'a>
+where
+    M: Model<N> + Declared<N, Length = FixedLength>,
+{
+    let run = move |element: Element, step: f64, at_kinks: bool| {
+        let simulation: Simulation<'_, M, N> = Simulation::new(model);
+        let motion = simulation
+            .element(element)
+            .step(step)
+            .at_kinks(at_kinks)
+            .run(start, 0.0..end);
+        let motion = motion.unwrap_or_else(|error| panic!("{name} {element} {step}: {error}"));
+        Ended {
+            end: numbers(&motion.last().state()),
+            kinks: motion.statistics().kinks,
+        }
+    };
+    let accurate = move |accuracy: f64| {
+        let simulation: Simulation<'_, M, N> = Simulation::new(model);
+        match simulation.accuracy(accuracy).run(start, 0.0..end) {
+            Ok(motion) => Ok((numbers(&motion.last().state()), motion.error_estimate())),
+            Err(error) => Err(error.to_string()),
+        }
+    };
+    Scene {
+        name,
+        step,
+        run: Box::new(run),
+        accurate: Box::new(accurate),
+    }
+}
+
+const BOUNCE: Bounce = Bounce { g: 10.0, k: 1e4 };
+const COULOMB: Coulomb = Coulomb {
+    c: 0.3,
+    a: 2.0,
+    w: 1.3,
+};
+const SMOOTHED: Smoothed = Smoothed {
+    c: 0.3,
+    a: 2.0,
+    w: 0.05,
+};
+const BACKLASH: Backlash = Backlash {
+    k: 50.0,
+    gap: 0.3,
+    a: 1.0,
+};
+const IN_TIME: ThrustInTime = ThrustInTime {
+    until: 0.777,
+    thrust: 3.0,
+};
+const IN_PLACE: ThrustInPlace = ThrustInPlace { thrust: 0.02 };
+const SATURATED: Saturated = Saturated { m: 1.2 };
+const CAPACITORS: Capacitors = Capacitors { c: 0.7 };
+const IMPACT: Impact = Impact {
+    k: 1e3,
+    wall: 0.5,
+    a: 1.0,
+    w: 1.7,
+};
+const ROOF: Roof = Roof { g: 1.0 };
+const HALF: HalfSpring = HalfSpring { b: 2.0 };
+const DRAG: Drag = Drag { c: 0.4 };
+
+fn scenes() -> Vec<Scene<'static>> {
+    vec![
+        scene(("bounce", 0.004), &BOUNCE, BOUNCE.state([0.3], [0.0]), 2.0),
+        scene(
+            ("dry friction", 0.1),
+            &COULOMB,
+            COULOMB.state([1.0], [0.0]),
+            6.0,
+        ),
+        scene(
+            ("smoothed friction", 0.01),
+            &SMOOTHED,
+            SMOOTHED.state([1.0], [0.0]),
+            6.0,
+        ),
+        scene(
+            ("backlash", 0.1),
+            &BACKLASH,
+            BACKLASH.state([0.0], [0.5]),
+            8.0,
+        ),
+        scene(
+            ("thrust in time", 0.2),
+            &IN_TIME,
+            IN_TIME.state([0.5], [0.1]),
+            3.0,
+        ),
+        scene(
+            ("thrust in place", 0.2),
+            &IN_PLACE,
+            IN_PLACE.state([1.0, 0.0], [0.0, 1.0]),
+            10.0,
+        ),
+        scene(
+            ("saturated", 0.2),
+            &SATURATED,
+            SATURATED.state([0.8], [0.0]),
+            6.0,
+        ),
+        scene(
+            ("capacitors", 0.2),
+            &CAPACITORS,
+            CAPACITORS.state([0.4], [0.0]),
+            8.0,
+        ),
+        scene(("impact", 0.01), &IMPACT, IMPACT.state([0.0], [0.8]), 8.0),
+        scene(
+            ("roof", 0.1),
+            &ROOF,
+            ROOF.state([0.6, 0.2], [0.1, 0.0]),
+            8.0,
+        ),
+        scene(
+            ("half spring", 0.1),
+            &HALF,
+            State {
+                q: [0.5, -0.3],
+                p: [0.2, 0.4],
+            },
+            6.0,
+        ),
+        scene(("drag", 0.2), &DRAG, DRAG.state([0.3], [1.0]), 8.0),
+    ]
+}
+
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()))
+}
+
+/// Cut at kinks, elements keep their order; across them all have the first or second.
+#[test]
+fn elements_keep_their_order() {
+    for scene in scenes() {
+        let fine = (scene.run)(Element::mixed(8), scene.step / 10.0, true);
+        for (element, order) in [
+            (Element::mixed(4), 6.0),
+            (Element::primal(4), 6.0),
+            (Element::radau(4), 5.0),
+            (Primal::<4>.lobatto(), 6.0),
+        ] {
+            // A jump by the velocity: points at the ends of an element see that of the polynomial, which is on either side.
+            if scene.name == "dry friction" && element == Primal::<4>.lobatto() {
+                continue;
+            }
+            let steps = [1.0, 0.5, 0.25, 0.125].map(|part| part * scene.step);
+            let runs = steps.map(|step| (scene.run)(element, step, true));
+            let errors = runs.each_ref().map(|run| apart(&run.end, &fine.end));
+            let name = scene.name;
+            // Over two halvings; the last errors may be roundings, which crossings let grow.
+            let measured = (0..2).map(|k| (errors[k] / errors[k + 2]).log2() / 2.0);
+            let most = measured.fold(0.0, f64::max);
+            assert!(
+                most > order - 0.6 || errors[3] < 1e-11,
+                "{name} {element}: order {most:.2}, {errors:?}"
+            );
+            assert_eq!(runs[3].kinks, fine.kinks, "{name} {element}");
+            let across = (scene.run)(element, steps[3], false);
+            assert_eq!(across.kinks, 0);
+            // The smooth scene is the same run; elsewhere an element across a kink has the first or second order.
+            let ratio = apart(&across.end, &fine.end) / errors[3].max(1e-13);
+            assert!(
+                fine.kinks == 0 || ratio > 3.0,
+                "{name} {element}: {ratio:.1}"
+            );
+        }
+    }
+}
+
+/// What is asked for is met.
+#[test]
+fn an_accuracy_is_met() {
+    for scene in scenes() {
+        let fine = (scene.run)(Element::mixed(8), scene.step / 10.0, true);
+        let largest = fine.end.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        for accuracy in [1e-5, 1e-7, 1e-9, 1e-11] {
+            let (end, estimate) = (scene.accurate)(accuracy)
+                .unwrap_or_else(|error| panic!("{} {accuracy:e}: {error}", scene.name));
+            let error = apart(&end, &fine.end);
+            // The estimate is of the whole span, relative to the largest coordinate and momentum there.
+            assert!(
+                error < accuracy * (1.0 + largest),
+                "{} {accuracy:e}: {error:.1e}",
+                scene.name
+            );
+            assert!(estimate <= accuracy);
+        }
+    }
+}
+
+/// Where friction holds, the motion slides along v = 0: the equations as declared do not say how.
+#[test]
+fn sliding_is_told() {
+    let held = Coulomb {
+        c: 3.0,
+        a: 0.5,
+        w: 1.3,
+    };
+    for element in [Element::mixed(4), Element::mixed(6), Element::radau(3)] {
+        let run = Simulation::new(&held)
+            .element(element)
+            .step(0.1)
+            .at_kinks(true);
+        let error = run
+            .run(held.state([1.0], [1.0]), 0.0..10.0)
+            .expect_err("slides");
+        let RunErrorKind::Solve { time, source, .. } = *error.kind() else {
+            panic!("{element}: {error}");
+        };
+        assert_eq!(source, StepError::Slides, "{element}");
+        // x'' = −x − x³ − 3 + 0.5 sin 1.3t from (1, 1): it stops after 0.2.
+        assert!((0.1..0.3).contains(&time), "{element}: {time}");
+        assert!(error.partial().last().t > 0.05);
+    }
+    let error = Simulation::new(&held)
+        .accuracy(1e-6)
+        .run(held.state([1.0], [1.0]), 0.0..10.0)
+        .expect_err("slides");
+    assert!(error.to_string().contains("slides"), "{error}");
+}
+
+/// A force that is switched off at a time.
+#[test]
+fn jumps_in_time_are_found() {
+    let free = Free { until: 0.55 };
+    for element in [
+        Element::mixed(2),
+        Element::mixed(5),
+        Element::radau(4),
+        Primal::<3>.lobatto(),
+    ] {
+        for (from, to) in [(0.0, 1.0), (1.0, 0.0)] {
+            let run = Simulation::new(&free)
+                .element(element)
+                .step(0.1)
+                .at_kinks(true);
+            let start = if from < to {
+                State { q: [0.0], p: [0.0] }
+            } else {
+                State {
+                    q: [0.55 * 0.45 + 0.55 * 0.55 / 2.0],
+                    p: [0.55],
+                }
+            };
+            let motion = run.run(start, from..to).expect("a run");
+            let end = motion.last();
+            let exact = if from < to {
+                [0.55 * 0.45 + 0.55 * 0.55 / 2.0, 0.55]
+            } else {
+                [0.0, 0.0]
+            };
+            assert!(
+                (end.q[0] - exact[0]).abs() < 1e-14 && (end.p[0] - exact[1]).abs() < 1e-14,
+                "{element} {from}: {end:?}"
+            );
+            assert_eq!((motion.statistics().kinks, motion.states().len()), (1, 11));
+            // Between the nodes, too.
+            let inside = motion.at(0.5625).expect("inside");
+            assert!((inside.p[0] - 0.55).abs() < 1e-14, "{inside:?}");
+            let steps = run.steps(start, from);
+            let last = steps.take(5).last().expect("steps").expect("a step");
+            assert!(last.p[0] > 0.4);
+        }
+    }
+}
+
+/// Force for some time.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2, force(x) = select(t < until, 1, 0))]
+struct Free {
+    until: f64,
+}
+
+/// Models without kinks step as ever, to the bit.
+#[test]
+fn smooth_models_are_not_touched() {
+    #[dynamics(coordinates(a), lagrangian = dot(a)^2/2 + cos(a), force(a) = sin(t))]
+    struct Pendulum;
+    let run = Simulation::new(&Pendulum).step(0.1);
+    let start = Pendulum.state([1.0], [0.0]);
+    let plain = run.clone().run(start, 0.0..10.0).expect("a run");
+    let asked = run.at_kinks(true).run(start, 0.0..10.0).expect("a run");
+    assert_eq!(plain.states(), asked.states());
+    assert_eq!(plain.statistics(), asked.statistics());
+}

@@ -1,0 +1,189 @@
+//! The first root of switching functions along a step.
+
+use alloc::vec::Vec;
+use core::ops::Range;
+
+/// A switching function changes its sign.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crossing {
+    /// Which one.
+    pub(super) switch: usize,
+    /// Where in the step.
+    pub(super) tau: f64,
+}
+
+/// Values that are smaller, relative to the largest one of the step, are roundings.
+const ROUNDING: f64 = 1e-13;
+
+/// Evaluations that a root may cost.
+const MAX_EVALUATIONS: u32 = 80;
+
+/// Finds the first change of sign of any of the functions that `values` gives at τ; the signs are looked at in `samples` equal parts of the range, and where a function
+/// comes close to zero between two of them. Roots are known to `resolution`; one that is as near to the start as that has been passed before.
+pub(super) fn first_crossing(
+    range: Range<f64>,
+    samples: usize,
+    resolution: f64,
+    values: &mut dyn FnMut(f64, &mut Vec<f64>),
+) -> Option<Crossing> {
+    let part = (range.end - range.start) / samples as f64;
+    let mut rows = Vec::with_capacity(samples + 1);
+    let mut times = Vec::with_capacity(samples + 1);
+    for k in 0..=samples {
+        let tau = if k == samples {
+            range.end
+        } else {
+            range.start + k as f64 * part
+        };
+        let mut row = Vec::new();
+        values(tau, &mut row);
+        rows.push(row);
+        times.push(tau);
+    }
+    // What a function may do within the resolution of the start, relative to what it does in the first part.
+    let passed = (16.0 * resolution / part).max(ROUNDING);
+    let count = rows.iter().map(Vec::len).min()?;
+    let mut first: Option<Crossing> = None;
+    for switch in 0..count {
+        let column: Vec<f64> = rows.iter().map(|row| row[switch]).collect();
+        let mut value = |tau: f64| {
+            let mut row = Vec::new();
+            values(tau, &mut row);
+            row.get(switch).copied().unwrap_or(f64::NAN)
+        };
+        let Some((from, to)) = bracket(&times, &column, passed, &mut value) else {
+            continue;
+        };
+        if first.is_some_and(|first| first.tau <= from) {
+            continue;
+        }
+        let tau = root(from, to, resolution, &mut value);
+        if first.is_none_or(|first| tau < first.tau) {
+            first = Some(Crossing { switch, tau });
+        }
+    }
+    first
+}
+
+/// The first part of the step in which the function goes to the other side of zero.
+fn bracket(
+    times: &[f64],
+    column: &[f64],
+    passed: f64,
+    value: &mut dyn FnMut(f64) -> f64,
+) -> Option<(f64, f64)> {
+    let largest = (column.iter()).fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    let moved = (column[1] - column[0]).abs();
+    let on_surface = (passed * moved).max(ROUNDING * largest);
+    let begins = if column[0].abs() > on_surface { 0 } else { 1 };
+    let begins = begins + (column[begins..].iter()).position(|value| value.abs() > 0.0)?;
+    let side = column[begins].signum();
+    for k in begins + 1..column.len() {
+        let here = side * column[k];
+        if here < 0.0 {
+            return Some((times[k - 1], times[k]));
+        }
+        // Down and up again between the samples.
+        if k + 1 == column.len() {
+            break;
+        }
+        let (before, after) = (side * column[k - 1], side * column[k + 1]);
+        if here < before && here <= after && after >= 0.0 {
+            let bend = before - 2.0 * here + after;
+            let vertex = (0.5 * (before - after) / bend).clamp(-1.0, 1.0);
+            let tau = times[k] + vertex * (times[k + 1] - times[k]);
+            if side * value(tau) < 0.0 {
+                return Some((times[k - 1], tau));
+            }
+        }
+    }
+    None
+}
+
+/// The root in a bracket, by false position with halved weights (Illinois) and bisection where that is slow.
+fn root(mut from: f64, mut to: f64, resolution: f64, value: &mut dyn FnMut(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (value(from), value(to));
+    let side = -high.signum();
+    // Weights of false position; the signs above are never changed.
+    let mut kept = 0_i32;
+    for evaluation in 0..MAX_EVALUATIONS {
+        if to - from <= resolution {
+            break;
+        }
+        let guess = from + (to - from) * (low / (low - high));
+        let is_slow = evaluation % 8 == 7;
+        let tau = if is_slow || !(guess > from && guess < to) {
+            0.5 * (from + to)
+        } else {
+            guess
+        };
+        if tau == from || tau == to {
+            break;
+        }
+        let here = value(tau);
+        if here == 0.0 {
+            return tau;
+        }
+        if side * here > 0.0 {
+            (from, low) = (tau, here);
+            if kept > 0 {
+                high *= 0.5;
+            }
+            kept = 1;
+        } else {
+            (to, high) = (tau, here);
+            if kept < 0 {
+                low *= 0.5;
+            }
+            kept = -1;
+        }
+    }
+    to
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn crossing(f: impl Fn(f64) -> f64) -> Option<f64> {
+        let mut values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
+        first_crossing(0.0..1.0, 8, 1e-15, &mut values).map(|crossing| crossing.tau)
+    }
+
+    #[test]
+    fn roots_are_found_to_round_off() {
+        let found = crossing(|tau| (3.0 * tau).cos() - 0.1).expect("a root");
+        assert!((found - 0.1_f64.acos() / 3.0).abs() < 1e-15, "{found}");
+        let steep = crossing(|tau| (200.0 * (tau - 0.777)).tanh()).expect("a root");
+        assert!((steep - 0.777).abs() < 1e-14, "{steep}");
+    }
+
+    #[test]
+    fn pairs_between_samples_are_found() {
+        let found = crossing(|tau| (tau - 0.5).powi(2) - 1e-4).expect("a root");
+        assert!((found - 0.49).abs() < 1e-14, "{found}");
+    }
+
+    #[test]
+    fn a_root_at_the_start_is_none() {
+        assert_eq!(crossing(|tau| tau), None);
+        assert_eq!(crossing(|tau| tau - 1e-15), None);
+        assert!(crossing(|tau| tau - 1e-12).is_some());
+        let second = crossing(|tau| tau * (tau - 0.6)).expect("the other root");
+        assert!((second - 0.6).abs() < 1e-14);
+    }
+
+    #[test]
+    fn the_first_of_several_is_taken() {
+        let mut values = |tau: f64, row: &mut Vec<f64>| row.extend([tau - 0.7, 0.3 - tau, 1.0]);
+        let found = first_crossing(0.0..1.0, 8, 1e-15, &mut values).expect("a root");
+        assert_eq!(found.switch, 1);
+        assert!((found.tau - 0.3).abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_has_no_sign_has_no_root() {
+        assert_eq!(crossing(|_| 0.0), None);
+        assert_eq!(crossing(|_| f64::NAN), None);
+    }
+}
