@@ -259,23 +259,24 @@ fn find<R: Repeatable<N>, const N: usize>(
     kept: &mut Kept<R::Motion, R::State>,
 ) -> Result<Found, RunErrorKind> {
     let t0 = asked.span.start;
-    let mut last: Option<(bool, R::Stepper)> = None;
+    let mut last: Option<(bool, Element, R::Stepper)> = None;
     let mut make = |way: &Way<'_>| {
         let mesh = match way.grading {
             Some(grading) => run.through(&way.nodes(grading))?,
             None => run.even(way.cuts, way.step)?,
         };
-        let is_known =
-            matches!(&last, Some((by_iteration, _)) if *by_iteration == way.by_iteration);
+        let is_known = matches!(&last, Some((by_iteration, element, _))
+            if (*by_iteration, *element) == (way.by_iteration, way.element));
         if !is_known {
             let mut control = run.control();
             if way.by_iteration {
                 control.solve = Solve::FixedPoint;
                 control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
             }
-            last = Some((way.by_iteration, run.stepper(way.element, control, true)?));
+            let stepper = run.stepper(way.element, control, true)?;
+            last = Some((way.by_iteration, way.element, stepper));
         }
-        let Some((_, stepper)) = &mut last else {
+        let Some((.., stepper)) = &mut last else {
             return Err(RunErrorKind::Step { step: way.step });
         };
         R::set_tolerance(stepper, way.tolerance);

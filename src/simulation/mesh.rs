@@ -99,22 +99,27 @@ impl<const N: usize> Mesh<N> {
         Self::through(&(start..end), nodes, breaks, &impulses)
     }
 
-    /// The parts between `cuts`, in the order of the run, each in equal steps of at most `step`; of impulses those that act there.
+    /// The parts between `cuts`, in the order of the run, each in equal steps of at most `step`; of impulses those that act there. Some of the cuts may be `breaks`.
     pub(crate) fn even(
         cuts: &[f64],
         step: f64,
+        breaks: &[f64],
         impulses: &[Impulse<N>],
     ) -> Result<Self, RunErrorKind> {
         let (start, end) = ends(cuts);
         let impulses = acting(start, end, impulses);
         let mut mesh = Self::new(&(start..end), end - start, &[], &impulses)?;
-        mesh.has_breaks = cuts.len() > 2;
+        let mut breaks = breaks.to_vec();
+        sort(&mut breaks, mesh.direction);
+        mesh.has_breaks = !breaks.is_empty();
+        // Elsewhere nothing may be lost: a rounding at each of many cuts would add up.
+        let is_break = |time: f64| is_among(&breaks, time, mesh.direction);
         let parts = cuts.windows(2);
         mesh.segments = parts
             .map(|pair| {
                 let steps = ((pair[1] - pair[0]).abs() / step).ceil().max(1.0);
                 let mut segment = Segment::new(pair[0], pair[1], (pair[1] - pair[0]) / steps)?;
-                segment.at_break = (pair[0] != start, pair[1] != end);
+                segment.at_break = (is_break(pair[0]), is_break(pair[1]));
                 Ok(segment)
             })
             .collect::<Result<_, _>>()?;

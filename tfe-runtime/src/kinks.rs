@@ -54,6 +54,9 @@ pub(crate) trait Kinked: Halving<State: Clone> {
     /// Counts a crossing.
     fn crossed(&mut self);
 
+    /// Whether steps that fail are cut, kinks or not.
+    fn cuts(&self) -> bool;
+
     /// Whether whatever an iteration converges to is to be taken.
     fn trust(&mut self, all: bool);
 }
@@ -87,6 +90,14 @@ pub(crate) fn switches<M, const N: usize>(
     *values = log.into_inner();
 }
 
+/// What all arcs of a step have cost.
+#[derive(Default)]
+struct Effort {
+    trials: u32,
+    /// Why the first one failed that did.
+    failed: Option<StepError>,
+}
+
 /// How an arc has ended.
 enum Arc {
     /// The whole rest of the step, or as much of it as could be done at once.
@@ -112,11 +123,11 @@ pub(crate) fn in_arcs<S: Kinked>(
     let end = t + h;
     let (mut now, mut kicks) = (t, kicks.to_vec());
     let (mut begins_at_root, mut short) = (false, 0);
-    let mut work = 0;
-    while work < MAX_WORK {
+    let (mut effort, mut crossings) = (Effort::default(), 0);
+    while effort.trials < MAX_WORK {
         // Friction ends with a velocity of zero, relative to which all increments are large.
         stepper.trust(begins_at_root);
-        let arc = arc(stepper, (now, end), h, state, &kicks, &mut work)?;
+        let arc = arc(stepper, (now, end), h, state, &kicks, &mut effort)?;
         let (Arc::Smooth { length } | Arc::Crossing { length, .. }) = arc;
         short += u32::from(length.abs() < SHORTEST * h.abs());
         if short > MAX_SHORT {
@@ -134,6 +145,7 @@ pub(crate) fn in_arcs<S: Kinked>(
         begins_at_root = matches!(arc, Arc::Crossing { .. });
         if let Arc::Crossing { switch, margin, .. } = arc {
             stepper.crossed();
+            crossings += 1;
             stepper.trust(true);
             if slides(stepper, (now, length), h, switch, state) {
                 return Err(StepError::Slides);
@@ -148,7 +160,11 @@ pub(crate) fn in_arcs<S: Kinked>(
             }
         }
         if is_last {
-            return Ok(());
+            // It was not kinks that made longer arcs fail.
+            return match effort.failed {
+                Some(error) if crossings == 0 && !stepper.cuts() => Err(error),
+                _ => Ok(()),
+            };
         }
     }
     Err(StepError::Slides)
@@ -202,7 +218,7 @@ fn arc<S: Kinked>(
     h: f64,
     state: &mut S::State,
     kicks: &[S::Kick],
-    work: &mut u32,
+    effort: &mut Effort,
 ) -> Result<Arc, StepError> {
     let rest = (end - now).abs();
     let resolution = 4.0 * f64::EPSILON * now.abs().max(end.abs()).max(rest);
@@ -221,7 +237,7 @@ fn arc<S: Kinked>(
     let mut nearest: Option<Landing> = None;
     let mut is_to_settle = false;
     for trial in 0..MAX_TRIALS {
-        *work += 1;
+        effort.trials += 1;
         if trial > 0 {
             *state = start.clone();
             stepper.forget();
@@ -238,6 +254,7 @@ fn arc<S: Kinked>(
             .cloned()
             .collect();
         if let Err(error) = stepper.whole(now, signed, state, &inner) {
+            effort.failed.get_or_insert(error);
             bad = length;
             if !is_of_the_iteration(&error) || bad < 2.0 * resolution || is_to_settle {
                 return Err(error);

@@ -762,6 +762,10 @@ where
         self.memory.statistics.kinks += 1;
     }
 
+    fn cuts(&self) -> bool {
+        matches!(self.solve, Solve::Auto | Solve::Newton)
+    }
+
     fn trust(&mut self, all: bool) {
         self.control.solve = match (self.solve, all) {
             (Solve::Auto, true) => Solve::Trusting,

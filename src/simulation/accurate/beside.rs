@@ -2,7 +2,7 @@
 
 use super::super::mesh::{Mesh, up_to_break};
 use super::{MOST_ITERATIONS, Repeatable};
-use crate::accuracy::{Course, Pair, Trace};
+use crate::accuracy::{Course, Pair, Trace, next};
 use crate::error::RunErrorKind;
 use tfe_runtime::{Element, Statistics, StepError};
 
@@ -43,7 +43,10 @@ impl<'r, R: Repeatable<N>, const N: usize> Beside<'r, R, N> {
         control.tolerance = TOLERANCE * local;
         control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
         let stepper = |element| run.stepper(element, control, false);
-        let steppers = [stepper(element)?, stepper(next(element))?];
+        let steppers = [
+            stepper(element)?,
+            stepper(next(element).unwrap_or(Element::mixed(element.nodes())))?,
+        ];
         let trace = Trace::new(run.coordinates(), run.columns());
         let width = trace.width();
         let mut pair = Self {
@@ -72,21 +75,6 @@ impl<'r, R: Repeatable<N>, const N: usize> Beside<'r, R, N> {
     /// The part of steps that were made by Newton's method.
     pub(super) fn by_newton(&self) -> f64 {
         self.kept.0 as f64 / self.kept.1.max(1) as f64
-    }
-}
-
-/// One of higher order of the same kind, as far as there are any.
-fn next(element: Element) -> Element {
-    let nodes = element.nodes() + 1;
-    let same = if element == Element::radau(element.nodes()) {
-        Element::radau(nodes)
-    } else {
-        Element::mixed(nodes)
-    };
-    if same.validate().is_ok() {
-        same
-    } else {
-        Element::mixed(element.nodes())
     }
 }
 

@@ -213,7 +213,7 @@ impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
     }
 
     fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<0>, RunErrorKind> {
-        Mesh::even(cuts, step, &[])
+        Mesh::even(cuts, step, &self.breaks, &[])
     }
 
     fn through(&self, nodes: &[f64]) -> Result<Mesh<0>, RunErrorKind> {

@@ -16,8 +16,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Picks element and step so that the estimated error is at or below `accuracy` wherever it is estimated: of coordinates over the largest coordinate, of
     /// momenta over the largest momentum, of each declared output over its largest value.
     ///
-    /// An element chosen before stays, a step given before is the longest one allowed. The motion comes with its error and says what was picked and why. Three or
-    /// four runs over the span are made, all but the last with longer steps (`docs/theory.md` §14.3); the last two of them tell the error.
+    /// An element chosen before stays, a step given before is the longest one allowed. The motion comes with its error and says what was picked and why. Two to
+    /// four runs over the span are made with shorter and shorter steps, and one more that verifies the last: with an element of one node more over the same steps, which tells the
+    /// error as [`run_estimated`](Self::run_estimated) does (`docs/theory.md` §14.3). What is verified is the error of the steps and of their iterations at the times of comparison; that both
+    /// elements see all there is, such as a force that acts for a time much shorter than a step, is believed.
     ///
     /// Steps are equal, between breaks, for models that are conservative and do not depend on time. For others they are short where the motion is fast, if equal ones
     /// would be many and steps differ by more than three (`docs/theory.md` §14.5); [`Accurate::equal_steps`] forbids that. [Nodes](Simulation::nodes) given before are refined as a whole.
@@ -253,7 +255,7 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
     }
 
     fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind> {
-        Mesh::even(cuts, step, &self.impulses)
+        Mesh::even(cuts, step, &self.breaks, &self.impulses)
     }
 
     fn through(&self, nodes: &[f64]) -> Result<Mesh<N>, RunErrorKind> {
