@@ -17,6 +17,7 @@ mod reactions;
 mod redundant;
 mod reference_values;
 mod runs;
+mod small_steps;
 mod stability;
 mod starts;
 mod symplectic;

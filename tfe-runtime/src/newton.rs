@@ -63,6 +63,9 @@ pub(crate) const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
 /// The same where Newton's method is ill-conditioned, if they have not fallen for some time.
 pub(crate) const ROUGH_ROUND_OFF: f64 = 1e-10;
 
+/// Where Newton's method moves coordinates by less than that, relative to them, it is the rounding of constraints, summed over the points of an element.
+const POSITION_ROUND_OFF: f64 = 64.0 * f64::EPSILON;
+
 /// The same of large stiff models, where residuals are differences of forces many orders larger.
 #[cfg(feature = "sparse")]
 const STIFF_ROUND_OFF: f64 = 1e-6;
@@ -124,6 +127,8 @@ const LARGE: usize = 24;
 pub(crate) struct Monitor {
     tolerance: f64,
     last: f64,
+    /// By how much it moves the coordinates.
+    position: f64,
     rate: f64,
     risen: u32,
     /// Increments in a row that a fresh matrix did not make smaller.
@@ -150,6 +155,7 @@ impl Monitor {
         Self {
             tolerance,
             last: f64::INFINITY,
+            position: f64::INFINITY,
             rate: 1.0,
             risen: 0,
             #[cfg(feature = "sparse")]
@@ -174,6 +180,7 @@ impl Monitor {
     #[inline(always)]
     pub(crate) fn judge(&mut self, increment: Increment) -> Result<Verdict, StepError> {
         let size = increment.relative;
+        self.position = increment.position;
         if !size.is_finite() {
             return Err(StepError::NonFinite);
         }
@@ -220,10 +227,11 @@ impl Monitor {
         self.noise >= 2
     }
 
-    /// Whether the last increments are roundings of nearly dependent equations: small, and not halved any more by matrices made for them. They may go to and fro
-    /// between two values for ever.
+    /// Whether the last increments are roundings of nearly dependent equations: small, or no longer moving the coordinates, and not halved any more by matrices made for
+    /// them. They may go to and fro between two values for ever. Constraints leave roundings of positions, which in velocities are as large as they are over the step.
     fn is_rounding(&self, fresh: bool) -> bool {
-        fresh && self.idle >= IDLE && self.last <= ROUGH_ROUND_OFF
+        let is_small = self.last <= ROUGH_ROUND_OFF || self.position <= POSITION_ROUND_OFF;
+        fresh && self.idle >= IDLE && is_small
     }
 
     /// Whether the increments have not been halved for so long that they never will be: they go to and fro between some values.
