@@ -74,6 +74,37 @@ fn relaxation_oscillations_are_met() {
     }
 }
 
+/// The same as equations of first order, declared by H = p·f: a Hamiltonian is no proof of slow motion.
+#[dynamics(
+    coordinates(x, v), momenta(px, pv),
+    hamiltonian = px*v + pv*(mu*(1 - x^2)*v - x),
+)]
+struct FirstOrder {
+    mu: f64,
+}
+
+#[test]
+fn equations_of_first_order_have_them_too() {
+    let model = FirstOrder { mu: STIFF.mu };
+    let start = State {
+        q: [2.0, 0.0],
+        p: [0.0, 0.0],
+    };
+    for accuracy in [1e-3, 1e-6, 1e-9] {
+        let motion = Simulation::new(&model).accuracy(accuracy);
+        let motion = motion.run(start, 0.0..2000.0).expect("two jumps");
+        let largest = largest(
+            motion
+                .states()
+                .iter()
+                .map(|node| node.q[0].abs().max(node.q[1].abs())),
+        );
+        let off = (motion.last().q[0] - STIFF_END.0).abs() / largest;
+        assert!(off <= accuracy, "{accuracy:e}: {off:.1e}");
+        assert!(motion.states().len() < 10_000, "{}", motion.states().len());
+    }
+}
+
 /// What is recorded is a motion as any other: between nodes, and as the mesh of another run.
 #[test]
 fn nodes_of_one_run_serve_another() {

@@ -10,7 +10,9 @@ use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
 use std::ops::Range;
 use tfe_runtime::step::{Control, Stepper};
-use tfe_runtime::{Element, Form, Model, Solve, State, Statistics, StepError, constrained};
+use tfe_runtime::{
+    Element, First, Form, Model, Second, Solve, State, Statistics, StepError, constrained,
+};
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Picks element and step so that the estimated error is at or below `accuracy` wherever it is estimated: of coordinates over the largest coordinate, of
@@ -21,7 +23,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// error as [`run_estimated`](Self::run_estimated) does (`docs/theory.md` §14.3). What is verified is the error of the steps and of their iterations at the times of comparison; that both
     /// elements see all there is, such as a force that acts for a time much shorter than a step, is believed.
     ///
-    /// Steps are equal, between breaks, for models that are conservative and do not depend on time. For others they are short where the motion is fast, if equal ones
+    /// Steps are equal, between breaks, for models that are conservative and do not depend on time, unless their Hamiltonian is linear in the momenta (equations of first order, p·f(q)). For others they are short where the motion is fast, if equal ones
     /// would be many and steps differ by more than three (`docs/theory.md` §14.5); [`Accurate::equal_steps`] forbids that. [Nodes](Simulation::nodes) given before are refined as a whole.
     ///
     /// ```
@@ -132,7 +134,10 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
             solve: run.control.solve,
             graded: None,
         };
-        let steps = Steps::of(&M::FACTS, self.equal_steps, !M::CONSTRAINTS.is_empty());
+        let mut facts = M::FACTS;
+        // Equations of first order, written as p·f(q), conserve nothing that short and long steps could spoil.
+        facts.forced |= !M::FACTS.linear && is_of_first_order(run.model, span.start, &start);
+        let steps = Steps::of(&facts, self.equal_steps, !M::CONSTRAINTS.is_empty());
         accurate(run, &start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
     }
 
@@ -148,6 +153,16 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
         Mesh::new(span, h, &run.breaks, &run.impulses)?;
         check_constraints(run.model, span.start, h, start)
     }
+}
+
+/// Whether H is linear in the momenta: q̇ = f(q, t) does not hold them, and ṗ = −(∂f/∂q)ᵀ p is its adjoint.
+fn is_of_first_order<M: Model<N>, const N: usize>(model: &M, t: f64, start: &State<N>) -> bool {
+    let (mut first, mut second) = (First::ZERO, Second::ZERO);
+    let may_be = M::FORM == Form::Hamiltonian && M::FACTS.quadratic_in_z;
+    if may_be {
+        model.second(t, &start.q, &start.p, &mut first, &mut second);
+    }
+    may_be && second.zz.as_flattened().iter().all(|entry| *entry == 0.0)
 }
 
 impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
