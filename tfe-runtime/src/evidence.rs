@@ -37,10 +37,11 @@ impl Evidence {
     /// The second increment of Newton's method is what the linear model at the start is wrong by.
     const CURVED: f64 = 0.03;
 
-    /// `yielding` says that Newton's method may follow.
-    pub(crate) fn of_fixed_point(yielding: bool) -> Self {
+    /// Of the largest ratio of increments beyond [`FAR`](Self::FAR); `yielding` says that Newton's method may follow.
+    #[inline(always)]
+    pub(crate) fn of_fixed_point(ratio: f64, yielding: bool) -> Self {
         Self {
-            ratio: 0.0,
+            ratio,
             last: f64::INFINITY,
             count: 0,
             limit: if yielding {
@@ -56,7 +57,7 @@ impl Evidence {
         Self {
             limit: Self::PROVEN,
             reach: Self::CURVED,
-            ..Self::of_fixed_point(true)
+            ..Self::of_fixed_point(0.0, true)
         }
     }
 

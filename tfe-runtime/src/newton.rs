@@ -130,6 +130,8 @@ pub(crate) struct Monitor {
     /// By how much it moves the coordinates.
     position: f64,
     rate: f64,
+    /// The largest rate of increments that tell something of the root.
+    wildest: f64,
     risen: u32,
     /// Increments in a row that a fresh matrix did not make smaller.
     #[cfg(feature = "sparse")]
@@ -157,6 +159,7 @@ impl Monitor {
             last: f64::INFINITY,
             position: f64::INFINITY,
             rate: 1.0,
+            wildest: 0.0,
             risen: 0,
             #[cfg(feature = "sparse")]
             noise: 0,
@@ -168,6 +171,12 @@ impl Monitor {
     /// By how much the last increment was smaller than the one before.
     pub(crate) fn rate(&self) -> f64 {
         self.rate
+    }
+
+    /// What speaks for the root that a fixed point has found; `yielding` says that Newton's method may follow.
+    #[inline(always)]
+    pub(crate) fn evidence(&self, yielding: bool) -> Evidence {
+        Evidence::of_fixed_point(self.wildest, yielding)
     }
 
     /// The last increment.
@@ -197,6 +206,10 @@ impl Monitor {
         let rate = if size == 0.0 { 0.0 } else { size / last };
         self.last = size;
         self.rate = if first { 1.0 } else { rate };
+        if size > Evidence::FAR {
+            // Of the first one the rate is zero.
+            self.wildest = self.wildest.max(rate);
+        }
         if converged {
             return Ok(Verdict::Converged);
         }
@@ -263,7 +276,6 @@ where
     E: Equations,
 {
     let mut monitor = Monitor::new(control.tolerance);
-    let mut evidence = Evidence::of_fixed_point(yielding);
     let most = if yielding {
         control.max_iterations.min(PATIENCE)
     } else {
@@ -280,11 +292,10 @@ where
         statistics.iterations += 1;
         statistics.fixed_point_iterations += 1;
         let increment = equations.measure(unknowns, step);
-        evidence.see(increment.relative, true);
         let verdict = monitor.judge(increment)?;
         equations.statistics().contraction = Contraction::of(monitor.rate());
         if let Verdict::Converged = verdict {
-            return evidence.check(control.solve);
+            return monitor.evidence(yielding).check(control.solve);
         }
         // The start is good to a few digits, so one evaluation of mass matrices mostly serves.
         refresh = monitor.rate() > 0.1;

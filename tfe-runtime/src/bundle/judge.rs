@@ -182,7 +182,6 @@ mod tests {
             let like = Lanes([0.0; 4]);
             let mut judge = Judge::new(like, 1e-17, Solve::Auto);
             let mut monitors = [(); 4].map(|()| Monitor::new(1e-17));
-            let mut evidence = [(); 4].map(|()| Evidence::of_fixed_point(true));
             let mut active = [true; 4];
             for step in 0..24 {
                 let increments = Increments::new(
@@ -199,9 +198,9 @@ mod tests {
                     }
                     let (relative, position) = lanes[lane][step];
                     let monitor = &mut monitors[lane];
-                    evidence[lane].see(relative, true);
-                    let proven = evidence[lane].check(Solve::Auto).is_ok();
-                    let expected = match monitor.judge(Increment { relative, position }) {
+                    let verdict = monitor.judge(Increment { relative, position });
+                    let proven = monitor.evidence(true).check(Solve::Auto).is_ok();
+                    let expected = match verdict {
                         Ok(Verdict::Converged) => (f64::from(u8::from(proven)), 0.0),
                         Ok(Verdict::GoOn) => (0.0, 1.0),
                         Err(_) => (0.0, 0.0),

@@ -4,7 +4,6 @@ use super::kernel::Kernel;
 use super::lanes::Scale;
 use super::space::{Kind, Leg, Pass, Problem, Sizes, Space};
 use super::{FamilyState, Gradient, Sweep};
-use crate::evidence::Evidence;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 use crate::points::four::Four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -66,7 +65,6 @@ impl Registers {
         yielding: bool,
     ) -> Outcome {
         let mut monitor = Monitor::new(control.tolerance);
-        let mut evidence = Evidence::of_fixed_point(true);
         let (mut iterations, mut converged) = (0, false);
         let most = if yielding {
             control.max_iterations.min(PATIENCE)
@@ -81,11 +79,10 @@ impl Registers {
             }
             iterations += 1;
             let increment = scale.increment(sizes);
-            evidence.see(increment.relative, true);
             match monitor.judge(increment) {
                 Ok(Verdict::Converged) => {
                     // Without Newton's method there is nothing else that could be tried.
-                    converged = !yielding || evidence.check(control.solve).is_ok();
+                    converged = !yielding || monitor.evidence(true).check(control.solve).is_ok();
                     break;
                 }
                 Ok(Verdict::GoOn) => {}

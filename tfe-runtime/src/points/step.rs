@@ -2,7 +2,6 @@
 
 use super::four::Four;
 use super::{Leg, Outcome, Points, is_finite, is_phase, is_second_order, largest};
-use crate::evidence::Evidence;
 use crate::model::Model;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 
@@ -43,7 +42,6 @@ where
         points.begin::<V, M>(like, &leg);
         let is_rough = control.is_rough();
         let mut monitor = Monitor::new(control.tolerance);
-        let mut evidence = Evidence::of_fixed_point(yielding);
         let most = if yielding {
             control.max_iterations.min(PATIENCE)
         } else {
@@ -73,7 +71,6 @@ where
                 }
             };
             iterations += 1;
-            evidence.see(increment.relative, true);
             match monitor.judge(increment) {
                 Ok(Verdict::Converged) => {
                     converged = true;
@@ -92,7 +89,7 @@ where
         }
         // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
         let mut arrived = false;
-        if converged && evidence.check(control.solve).is_ok() {
+        if converged && monitor.evidence(yielding).check(control.solve).is_ok() {
             if const { is_second_order::<M, N>() } {
                 if is_rough {
                     points.finish_second_order::<V, false>(like, &leg);
