@@ -387,9 +387,38 @@ fn jumps_in_time_are_found() {
     }
 }
 
+/// A jump at a node of the grid is no step of length zero, and points at the ends of elements see the force of their own element.
+#[test]
+fn jumps_at_nodes_are_passed() {
+    fn check(what: &str, until: f64, run: Simulation<'_, impl Model<1>, 1>) {
+        for element in [
+            Element::mixed(4),
+            Element::radau(4),
+            Primal::<3>.lobatto(),
+            Element::mixed(3).lobatto(),
+        ] {
+            let run = run.clone().element(element).at_kinks(true);
+            let motion = run.run(tfe::State { q: [0.0], p: [0.0] }, 0.0..2.0);
+            let motion = motion.unwrap_or_else(|error| panic!("{what} {element} {until}: {error}"));
+            let off = motion.last().p[0] - until;
+            assert!(off.abs() < 1e-14, "{what} {element} {until}: {off:e}");
+        }
+    }
+    for until in [0.3, 0.5, 0.7, 1.0] {
+        check("<", until, Simulation::new(&Free { until }).step(0.1));
+        check("<=", until, Simulation::new(&Held { until }).step(0.1));
+    }
+}
+
 /// Force for some time.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, force(x) = select(t < until, 1, 0))]
 struct Free {
+    until: f64,
+}
+
+/// As before, with the force on the boundary.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2, force(x) = select(t <= until, 1, 0))]
+struct Held {
     until: f64,
 }
 

@@ -10,7 +10,7 @@ use crate::cut::{Halving, Instant};
 use crate::error::StepError;
 use crate::model::{Form, Model};
 use alloc::vec::Vec;
-use search::{Crossing, first_crossing};
+use search::{Crossing, begins_on_root, first_crossing};
 use watched::{Log, Watched};
 
 /// All arcs of a step may cost so many trials: a motion that needs more goes to and fro without end.
@@ -127,13 +127,14 @@ pub(crate) fn in_arcs<S: Kinked>(
     while effort.trials < MAX_WORK {
         // Friction ends with a velocity of zero, relative to which all increments are large.
         stepper.trust(begins_at_root);
-        let arc = arc(stepper, (now, end), h, state, &kicks, &mut effort)?;
+        let (from, kicked) = ((now, begins_at_root), &kicks);
+        let arc = arc(stepper, from, (end, h), state, kicked, &mut effort)?;
         let (Arc::Smooth { length } | Arc::Crossing { length, .. }) = arc;
         short += u32::from(length.abs() < SHORTEST * h.abs());
         if short > MAX_SHORT {
             return Err(StepError::Slides);
         }
-        let is_last = length == end - now;
+        let is_last = length == end - now || now + length == end;
         let until = if is_last { end } else { now + length };
         let (later, done) =
             (kicks.into_iter()).partition(|kick| is_later(kick, until, h) && !is_last);
@@ -214,8 +215,8 @@ impl Landing {
 /// iteration of a long arc fails, because forces jump within it, a shorter one is continued to the root.
 fn arc<S: Kinked>(
     stepper: &mut S,
-    (now, end): (f64, f64),
-    h: f64,
+    (now, begins_at_root): (f64, bool),
+    (end, h): (f64, f64),
     state: &mut S::State,
     kicks: &[S::Kick],
     effort: &mut Effort,
@@ -236,6 +237,8 @@ fn arc<S: Kinked>(
     // What came next to a root without crossing it; to be taken when nothing else comes nearer.
     let mut nearest: Option<Landing> = None;
     let mut is_to_settle = false;
+    // A length that is to be taken without a search.
+    let mut only = None;
     for trial in 0..MAX_TRIALS {
         effort.trials += 1;
         if trial > 0 {
@@ -275,12 +278,21 @@ fn arc<S: Kinked>(
         if let (true, Some(landing)) = (is_to_settle, nearest) {
             return Ok(landing.arc(h, margin));
         }
+        if only == Some(length) {
+            return Ok(Arc::Smooth { length: signed });
+        }
         let inside = stepper.inside();
         let mut values = |tau: f64, row: &mut Vec<f64>| {
             let here = S::at(&inside, tau);
             stepper.switches(now + tau * signed, &here, row);
         };
-        let found = first_crossing(0.0..1.0, samples, resolution / length, &mut values);
+        // A root at the end of a step that has a point there: on which side is a matter of rounding.
+        let beyond = if has_ends && length == rest {
+            resolution / length
+        } else {
+            0.0
+        };
+        let found = first_crossing(0.0..1.0 + beyond, samples, resolution / length, &mut values);
         if found.is_none() {
             good = good.max(length);
         }
@@ -304,6 +316,13 @@ fn arc<S: Kinked>(
                 let ahead = (bad.is_finite())
                     .then(|| first_crossing(1.0..until, 4, resolution / length, &mut values));
                 let Some(Crossing { switch, tau }) = ahead.flatten() else {
+                    let is_first = trial == 0 && !begins_at_root && length == rest;
+                    if is_first && has_ends && begins_on_root(resolution / length, &mut values) {
+                        // The point at the start may be on the other side.
+                        length = margin;
+                        only = Some(margin);
+                        continue;
+                    }
                     return Ok(Arc::Smooth { length: signed });
                 };
                 target = Some(switch);

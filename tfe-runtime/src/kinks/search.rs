@@ -65,6 +65,18 @@ pub(super) fn first_crossing(
     first
 }
 
+/// Whether any of the functions is zero at the start, to what it does within the resolution, and not soon after.
+pub(super) fn begins_on_root(resolution: f64, values: &mut dyn FnMut(f64, &mut Vec<f64>)) -> bool {
+    const SOON: f64 = 1e-3;
+    let (mut start, mut soon) = (Vec::new(), Vec::new());
+    values(0.0, &mut start);
+    values(SOON, &mut soon);
+    (start.iter().zip(&soon)).any(|(start, soon)| {
+        let moved = (soon - start).abs();
+        moved > 0.0 && start.abs() <= 2.0 * resolution / SOON * moved
+    })
+}
+
 /// The first part of the step in which the function goes to the other side of zero.
 fn bracket(
     times: &[f64],
