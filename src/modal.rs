@@ -185,6 +185,7 @@ impl<M: Reducible<S>, S: PhasePoint, const R: usize> Model<R> for Modal<'_, M, R
         constant_mass: true,
         linear: true,
         separable: true,
+        smooth: true,
     };
 
     fn energy_function<T: Real>(&self, _t: T, a: &[T; R], rates: &[T; R]) -> T {

@@ -33,6 +33,7 @@ const fn without(what: u8, known: Facts) -> Facts {
         time_dependent: known.time_dependent || what == AUTONOMOUS,
         constant_mass: known.constant_mass && what != CONSTANT_MASS,
         separable: known.separable && what != SEPARABLE,
+        smooth: known.smooth,
         quadratic_in_z: known.quadratic_in_z && what != QUADRATIC,
         forced: known.forced || what == FREE,
     }

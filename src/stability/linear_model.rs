@@ -174,6 +174,7 @@ impl<const N: usize> Model<N> for LinearModel<N> {
         constant_mass: true,
         linear: true,
         separable: false,
+        smooth: true,
     };
 
     fn energy_function<R: Real>(&self, _t: R, q: &[R; N], p: &[R; N]) -> R {

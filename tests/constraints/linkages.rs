@@ -17,7 +17,7 @@ use tfe::{RunErrorKind, StepError};
     constraint(loop_y) = r*sin(left) + d*sin(coupler) - r*sin(right),
 )]
 #[derive(Clone, Copy)]
-struct Parallelogram {
+pub struct Parallelogram {
     r: f64,
     d: f64,
     m: f64,
@@ -32,7 +32,7 @@ struct Parallelogram {
     coordinates(left),
     lagrangian = (2*j + m*r^2)/2*dot(left)^2 - (m + mc)*g*r*sin(left),
 )]
-struct OneAngle {
+pub struct OneAngle {
     r: f64,
     m: f64,
     mc: f64,
@@ -40,7 +40,7 @@ struct OneAngle {
     g: f64,
 }
 
-const LINKAGE: Parallelogram = Parallelogram {
+pub const LINKAGE: Parallelogram = Parallelogram {
     r: 0.5,
     d: 1.2,
     m: 1.0,
@@ -50,7 +50,7 @@ const LINKAGE: Parallelogram = Parallelogram {
     g: 9.81,
 };
 
-const ONE_ANGLE: OneAngle = OneAngle {
+pub const ONE_ANGLE: OneAngle = OneAngle {
     r: LINKAGE.r,
     m: LINKAGE.m,
     mc: LINKAGE.mc,
@@ -58,12 +58,12 @@ const ONE_ANGLE: OneAngle = OneAngle {
     g: LINKAGE.g,
 };
 
-fn parallel(angle: f64, rate: f64) -> State<3> {
+pub fn parallel(angle: f64, rate: f64) -> State<3> {
     LINKAGE.state([angle, 0.0, angle], [rate, 0.0, rate])
 }
 
 /// The largest difference to the pendulum at nodes.
-fn error(motion: &Motion<3>, step: f64, angle: f64, rate: f64) -> f64 {
+pub fn error(motion: &Motion<3>, step: f64, angle: f64, rate: f64) -> f64 {
     let end = motion.last().t;
     let exact = run(
         &ONE_ANGLE,

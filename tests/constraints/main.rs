@@ -17,6 +17,7 @@ mod reactions;
 mod redundant;
 mod reference_values;
 mod runs;
+mod singular;
 mod small_steps;
 mod stability;
 mod starts;

@@ -14,6 +14,7 @@
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern L_vv            (i,i)
 /// pattern L_vq            zero
@@ -59,6 +60,7 @@ const _: () = {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: true,
         };
         /// L(q, v, t): 4 +−, 8 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
@@ -261,6 +263,7 @@ impl<const N: usize> Chain<N> {
                 constant_mass: true,
                 linear: false,
                 separable: true,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -286,7 +289,7 @@ impl<const N: usize> Chain<N> {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = Σ_{i = 0..N} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..N − 1} (½ k (q[i + 1] − q[i])² + a/4 (q[i + 1] − q[i])⁴))\nQ(q[i]) = −c q\u{307}[i]\nQ(q[N − 1]) = f sin(ω t)\ncoordinates: q[N]      parameters: m, k, a, c, f, ω\noperations, value: 4 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 6 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 11 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, N coordinates\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (i,i)\npattern L_vq            zero\npattern L_qq            (i,i) (i,i+1) (i+1,i) (i+1,i+1)\npattern Q_v             (i,i)\npattern Q_q             zero",
+            page: "L = Σ_{i = 0..N} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..N − 1} (½ k (q[i + 1] − q[i])² + a/4 (q[i + 1] − q[i])⁴))\nQ(q[i]) = −c q\u{307}[i]\nQ(q[N − 1]) = f sin(ω t)\ncoordinates: q[N]      parameters: m, k, a, c, f, ω\noperations, value: 4 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 6 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 11 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, N coordinates\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (i,i)\npattern L_vq            zero\npattern L_qq            (i,i) (i,i+1) (i+1,i) (i+1,i+1)\npattern Q_v             (i,i)\npattern Q_q             zero",
         }
     }
     /// The observable `extension` at time `t`, coordinates `q` and velocities `v`.

@@ -14,6 +14,7 @@
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  no
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0) (1,1)
 /// pattern L_vq            zero
@@ -41,6 +42,7 @@ const _: () = {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: false,
         };
         /// L(q, v, t): 4 +−, 10 ×, 1 sin/cos, 1 other
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
@@ -250,6 +252,7 @@ impl Contact {
                 constant_mass: true,
                 linear: false,
                 separable: true,
+                smooth: false,
             },
             cyclic: &[],
             conserved: &[],
@@ -275,7 +278,7 @@ impl Contact {
                 sines: 1,
                 functions: 5,
             },
-            page: "gap = x − r cos θ\nL = ½ m (x\u{307}² + r² θ\u{307}²) − m g x − (½ k gap² if gap < 0 else 0)\nD = ½ c θ\u{307}²\ncoordinates: x, θ      parameters: m, r, g, k, c\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient: 2 +−, 10 ×, 0 ÷, 1 sin/cos, 2 other\noperations, gradient and second derivatives: 3 +−, 13 ×, 0 ÷, 1 sin/cos, 5 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_v             (1,1)\npattern Q_q             zero",
+            page: "gap = x − r cos θ\nL = ½ m (x\u{307}² + r² θ\u{307}²) − m g x − (½ k gap² if gap < 0 else 0)\nD = ½ c θ\u{307}²\ncoordinates: x, θ      parameters: m, r, g, k, c\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient: 2 +−, 10 ×, 0 ÷, 1 sin/cos, 2 other\noperations, gradient and second derivatives: 3 +−, 13 ×, 0 ÷, 1 sin/cos, 5 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  no\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_v             (1,1)\npattern Q_q             zero",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.

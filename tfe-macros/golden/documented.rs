@@ -17,6 +17,7 @@
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0)
 /// pattern L_vq            zero
@@ -40,6 +41,7 @@ const _: () = {
             constant_mass: true,
             linear: true,
             separable: true,
+            smooth: true,
         };
         /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
@@ -143,6 +145,7 @@ impl Spring {
                 constant_mass: true,
                 linear: true,
                 separable: true,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -168,7 +171,7 @@ impl Spring {
                 sines: 0,
                 functions: 0,
             },
-            page: "stretch = x − l\nL = ½ m x\u{307}² − ½ k stretch²\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "stretch = x − l\nL = ½ m x\u{307}² − ½ k stretch²\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
     /// Above the support, in metres.
@@ -308,6 +311,7 @@ impl ::core::fmt::Debug for Fast {
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0)
 /// pattern L_vq            zero
@@ -331,6 +335,7 @@ const _: () = {
             constant_mass: true,
             linear: true,
             separable: true,
+            smooth: true,
         };
         /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
@@ -434,6 +439,7 @@ impl Rigid {
                 constant_mass: true,
                 linear: true,
                 separable: true,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -459,7 +465,7 @@ impl Rigid {
                 sines: 0,
                 functions: 0,
             },
-            page: "Spring: truncated to degree 2 about x = l\nL = 0.5 (m x\u{307}² − k (x − l)²)\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "Spring: truncated to degree 2 about x = l\nL = 0.5 (m x\u{307}² − k (x − l)²)\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
     /// Above the support, in metres.

@@ -13,6 +13,7 @@
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0) (i+1,i+1)
 /// pattern L_vq            zero
@@ -44,6 +45,7 @@ const _: () = {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: true,
         };
         const MOMENTA_MOVE: bool = false;
         fn len(&self) -> usize {
@@ -276,6 +278,7 @@ impl Family {
                 constant_mass: true,
                 linear: false,
                 separable: true,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -301,7 +304,7 @@ impl Family {
                 sines: 0,
                 functions: 0,
             },
-            page: "L = ½ s\u{307}² + Σ_{i = 0..n} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..w} (½ k (q[i + 1] − q[i])² + a/3 (q[i + 1] − q[i])³)) − ½ k (q[0] − s)²\nQ(q[n − 1]) = −q\u{307}[n − 1]\ncoordinates: s, q[n]      parameters: n, w, m, k, a\noperations, value: 6 +−, 11 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 7 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 16 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, n+1 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (i+1,i+1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1) (i+1,i+1) (i+1,i+2) (i+2,i+1) (i+2,i+2)\npattern Q_v             (n,n)\npattern Q_q             zero",
+            page: "L = ½ s\u{307}² + Σ_{i = 0..n} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..w} (½ k (q[i + 1] − q[i])² + a/3 (q[i + 1] − q[i])³)) − ½ k (q[0] − s)²\nQ(q[n − 1]) = −q\u{307}[n − 1]\ncoordinates: s, q[n]      parameters: n, w, m, k, a\noperations, value: 6 +−, 11 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 7 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 16 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, n+1 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0) (i+1,i+1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1) (i+1,i+1) (i+1,i+2) (i+2,i+1) (i+2,i+2)\npattern Q_v             (n,n)\npattern Q_q             zero",
         }
     }
     /// The observable `extension` at time `t`, coordinates `q` and velocities `v`.

@@ -15,6 +15,7 @@
 /// quadratic in v          yes
 /// constant L_vv           no, diagonal
 /// separable (L_vq = 0)    no
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0) (1,1)
 /// pattern L_vq            (1,0)
@@ -43,6 +44,7 @@ const _: () = {
             constant_mass: false,
             linear: false,
             separable: false,
+            smooth: true,
         };
         /// L(q, v, t): 4 +−, 10 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
@@ -230,6 +232,7 @@ impl SpringPendulum {
                 constant_mass: false,
                 linear: false,
                 separable: false,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -255,7 +258,7 @@ impl SpringPendulum {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m (r\u{307}² + r² θ\u{307}²) + m g r cos θ − ½ k (r − l)²\ncoordinates: r, θ      parameters: m, l, g, k\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           no, diagonal\nseparable (L_vq = 0)    no\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            (1,0)\npattern L_qq            (0,0) (0,1) (1,0) (1,1)",
+            page: "L = ½ m (r\u{307}² + r² θ\u{307}²) + m g r cos θ − ½ k (r − l)²\ncoordinates: r, θ      parameters: m, l, g, k\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           no, diagonal\nseparable (L_vq = 0)    no\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            (1,0)\npattern L_qq            (0,0) (0,1) (1,0) (1,1)",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.
@@ -283,6 +286,7 @@ impl SpringPendulum {
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0)
 /// pattern L_vq            zero
@@ -309,6 +313,7 @@ const _: () = {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: true,
         };
         /// L(q, v, t): 3 +−, 9 ×, 1 ÷
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
@@ -462,6 +467,7 @@ impl Rod {
                 constant_mass: true,
                 linear: false,
                 separable: true,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -487,7 +493,7 @@ impl Rod {
                 sines: 0,
                 functions: 0,
             },
-            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = 0.5 m l² θ\u{307}² + m g l − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 9 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = 0.5 m l² θ\u{307}² + m g l − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 9 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.

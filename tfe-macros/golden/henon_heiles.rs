@@ -12,6 +12,7 @@
 /// quadratic in p          yes
 /// constant H_pp           yes, diagonal
 /// separable (H_pq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern H_pp            (0,0) (1,1)
 /// pattern H_pq            zero
@@ -33,6 +34,7 @@ const _: () = {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: true,
         };
         /// H(q, p, t): 5 +−, 7 ×, 1 ÷
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
@@ -177,6 +179,7 @@ impl HenonHeiles {
                 constant_mass: true,
                 linear: false,
                 separable: true,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -202,7 +205,7 @@ impl HenonHeiles {
                 sines: 0,
                 functions: 0,
             },
-            page: "H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)\ncoordinates: x, y      momenta: px, py      parameters: λ\noperations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in p          yes\nconstant H_pp           yes, diagonal\nseparable (H_pq = 0)    yes\ncyclic coordinates      none\npattern H_pp            (0,0) (1,1)\npattern H_pq            zero\npattern H_qq            (0,0) (0,1) (1,0) (1,1)",
+            page: "H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)\ncoordinates: x, y      momenta: px, py      parameters: λ\noperations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in p          yes\nconstant H_pp           yes, diagonal\nseparable (H_pq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern H_pp            (0,0) (1,1)\npattern H_pq            zero\npattern H_qq            (0,0) (0,1) (1,0) (1,1)",
         }
     }
 }

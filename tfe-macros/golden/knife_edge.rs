@@ -13,6 +13,7 @@
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      q[2]
 /// conserved momenta       p[2]
 /// pattern L_vv            (0,0) (1,1) (2,2)
@@ -39,6 +40,7 @@ const _: () = {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: true,
         };
         /// L(q, v, t): 3 +−, 9 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 3], z: &[R; 3]) -> R {
@@ -216,6 +218,7 @@ impl KnifeEdge {
                 constant_mass: true,
                 linear: false,
                 separable: true,
+                smooth: true,
             },
             cyclic: &["phi"],
             conserved: &["phi"],
@@ -241,7 +244,7 @@ impl KnifeEdge {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m (x\u{307}² + y\u{307}²) + ½ j φ\u{307}² + m g sin α x\n0 = x\u{307} sin φ − y\u{307} cos φ      (blade)\ncoordinates: x, y, φ      parameters: m, j, g, α\noperations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 3 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      q[2]\nconserved momenta       p[2]\npattern L_vv            (0,0) (1,1) (2,2)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             blade (velocity)",
+            page: "L = ½ m (x\u{307}² + y\u{307}²) + ½ j φ\u{307}² + m g sin α x\n0 = x\u{307} sin φ − y\u{307} cos φ      (blade)\ncoordinates: x, y, φ      parameters: m, j, g, α\noperations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 3 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      q[2]\nconserved momenta       p[2]\npattern L_vv            (0,0) (1,1) (2,2)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             blade (velocity)",
         }
     }
 }

@@ -14,6 +14,7 @@
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0)
 /// pattern L_vq            zero
@@ -40,6 +41,7 @@ const _: () = {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: true,
         };
         /// L(q, v, t): 1 +−, 6 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
@@ -169,6 +171,7 @@ impl Pendulum {
                 constant_mass: true,
                 linear: false,
                 separable: true,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -194,7 +197,7 @@ impl Pendulum {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m l² θ\u{307}² + m g l cos θ\ncoordinates: θ      parameters: m, l, g\noperations, value: 1 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: "L = ½ m l² θ\u{307}² + m g l cos θ\ncoordinates: θ      parameters: m, l, g\noperations, value: 1 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
         }
     }
 }

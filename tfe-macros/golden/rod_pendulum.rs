@@ -13,6 +13,7 @@
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0) (1,1)
 /// pattern L_vq            zero
@@ -37,6 +38,7 @@ const _: () = {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: true,
         };
         /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
@@ -196,6 +198,7 @@ impl RodPendulum {
                 constant_mass: true,
                 linear: false,
                 separable: true,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -221,7 +224,7 @@ impl RodPendulum {
                 sines: 0,
                 functions: 0,
             },
-            page: "L = ½ m (x\u{307}² + y\u{307}²) − m g y\n0 = x² + y² − l²      (rod)\ncoordinates: x, y      parameters: m, l, g\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             rod (holonomic, quadratic)",
+            page: "L = ½ m (x\u{307}² + y\u{307}²) − m g y\n0 = x² + y² − l²      (rod)\ncoordinates: x, y      parameters: m, l, g\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             rod (holonomic, quadratic)",
         }
     }
 }

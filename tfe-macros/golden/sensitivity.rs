@@ -14,6 +14,7 @@
 /// quadratic in v          yes
 /// constant L_vv           yes, diagonal
 /// separable (L_vq = 0)    yes
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern L_vv            (0,0)
 /// pattern L_vq            zero
@@ -41,6 +42,7 @@ const _: () = {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: true,
         };
         /// L(q, v, t): 2 +−, 8 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
@@ -234,6 +236,7 @@ impl Duffing {
                 constant_mass: true,
                 linear: false,
                 separable: true,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -259,7 +262,7 @@ impl Duffing {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m x\u{307}² − ½ k[0] x² − k[1]/4 x⁴\nD = ½ c x\u{307}²\nQ(x) = amplitude cos(ω t)\ncoordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c\noperations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)\npattern Q_v             (0,0)\npattern Q_q             zero",
+            page: "L = ½ m x\u{307}² − ½ k[0] x² − k[1]/4 x⁴\nD = ½ c x\u{307}²\nQ(x) = amplitude cos(ω t)\ncoordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c\noperations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)\npattern Q_v             (0,0)\npattern Q_q             zero",
         }
     }
 }

@@ -15,6 +15,7 @@
 /// quadratic in p          yes
 /// constant H_pp           no, diagonal
 /// separable (H_pq = 0)    no
+/// smooth                  yes
 /// cyclic coordinates      none
 /// pattern H_pp            (0,0)
 /// pattern H_pq            (0,0) (1,0)
@@ -40,6 +41,7 @@ const _: () = {
             constant_mass: false,
             linear: false,
             separable: false,
+            smooth: true,
         };
         /// H(q, p, t): 4 +−, 6 ×, 1 ÷, 2 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
@@ -301,6 +303,7 @@ impl Forced {
                 constant_mass: false,
                 linear: false,
                 separable: false,
+                smooth: true,
             },
             cyclic: &[],
             conserved: &[],
@@ -326,7 +329,7 @@ impl Forced {
                 sines: 2,
                 functions: 0,
             },
-            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 15 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 9 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no, diagonal\nseparable (H_pq = 0)    no\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
+            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 15 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 9 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no, diagonal\nseparable (H_pq = 0)    no\nsmooth                  yes\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
         }
     }
     /// The observable `energy` at time `tau`, coordinates `q` and momenta `p`.

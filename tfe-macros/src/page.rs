@@ -152,6 +152,7 @@ pub(crate) fn facts(derivation: &Derivation, path: &TokenStream) -> TokenStream 
     let (time_dependent, forced) = (structure.time_dependent, structure.forced);
     let (quadratic_in_z, constant_mass) = (structure.quadratic_in_z, structure.constant_mass);
     let (linear, separable) = (structure.linear, structure.separable);
+    let smooth = structure.smooth;
     quote! {
         #path::Facts {
             time_dependent: #time_dependent,
@@ -160,6 +161,7 @@ pub(crate) fn facts(derivation: &Derivation, path: &TokenStream) -> TokenStream 
             constant_mass: #constant_mass,
             linear: #linear,
             separable: #separable,
+            smooth: #smooth,
         }
     }
 }

@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
 use crate::model::State;
+use crate::quadrature::Quadrature;
 use crate::scheme::{MAX_RATES, SchemeRef};
 use crate::step::{Interval, Last};
 
@@ -145,6 +146,53 @@ impl<const N: usize> DenseElement<N> {
             start: *start,
             end: *end,
             rates: coefficients,
+            pieces: Box::new([]),
+        }
+    }
+
+    /// The parts before and after a time inside.
+    pub(crate) fn split(&self, time: f64) -> (Self, Self) {
+        let tau = (time - self.times.0) / (self.times.1 - self.times.0);
+        let node = self.at(tau);
+        let before = self.part((0.0, tau), (self.times.0, time), (self.start, node));
+        let after = self.part((tau, 1.0), (time, self.times.1), (node, self.end));
+        (before, after)
+    }
+
+    /// The same polynomials between two places, by other coefficients.
+    fn part(
+        &self,
+        (from, to): (f64, f64),
+        times: (f64, f64),
+        (start, end): (State<N>, State<N>),
+    ) -> Self {
+        let (count, length) = (self.degree(), to - from);
+        let rule = Quadrature::gauss(count.max(1));
+        let mut rates = vec![[0.0; N]; 2 * count].into_boxed_slice();
+        for point in 0..rule.len() {
+            let (mut here, mut whole) = ([0.0; MAX_NODES], [0.0; MAX_NODES]);
+            legendre(rule.node(point), &mut here);
+            legendre(from + length * rule.node(point), &mut whole);
+            for (new, old) in [(0..count, 0), (count..2 * count, count)] {
+                let mut value = [0.0; N];
+                for (m, weight) in whole.iter().take(count).enumerate() {
+                    for a in 0..N {
+                        value[a] += length * weight * self.rates[old + m][a];
+                    }
+                }
+                for (m, row) in rates[new].iter_mut().enumerate() {
+                    let weight = (2 * m + 1) as f64 * rule.weight(point) * here[m];
+                    for a in 0..N {
+                        row[a] += weight * value[a];
+                    }
+                }
+            }
+        }
+        Self {
+            times,
+            start,
+            end,
+            rates,
             pieces: Box::new([]),
         }
     }

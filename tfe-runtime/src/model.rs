@@ -104,6 +104,8 @@ pub struct Facts {
     pub linear: bool,
     /// The mixed second derivatives ∂²/∂z∂q vanish.
     pub separable: bool,
+    /// Nothing is chosen by a sign: no `select`, `abs`, `sign`, `min` or `max`.
+    pub smooth: bool,
 }
 
 impl Facts {
@@ -115,6 +117,7 @@ impl Facts {
         constant_mass: false,
         linear: false,
         separable: false,
+        smooth: false,
     };
 }
 

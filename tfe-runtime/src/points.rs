@@ -390,6 +390,7 @@ pub(crate) mod tests {
             constant_mass: false,
             linear: false,
             separable: false,
+            smooth: true,
         };
         const LANES: bool = true;
 

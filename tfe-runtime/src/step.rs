@@ -1,6 +1,7 @@
 //! Steps: one element after the other, on memory of the caller or on its own.
 
 use crate::basis::{MAX_NODES, legendre};
+use crate::constrained::rows::Independence;
 use crate::double_double::DoubleDouble;
 use crate::equations::{Equations, Span};
 use crate::error::StepError;
@@ -63,6 +64,8 @@ pub struct Memory<const N: usize> {
     ratio: Option<f64>,
     /// Which iteration a nonlinear step begins with.
     pub(crate) preference: Preference,
+    /// Of the rows of constraints at the start and at the end of the last step.
+    pub(crate) independence: Option<[Independence; 2]>,
 }
 
 /// The last step.
@@ -103,6 +106,7 @@ impl<const N: usize> Memory<N> {
             factored: None,
             ratio: None,
             preference: Preference::NONE,
+            independence: None,
         }
     }
 

@@ -1,12 +1,15 @@
 //! A stepper that owns its memory.
 
+mod over;
+
 use alloc::vec;
 use alloc::vec::Vec;
 
+use crate::constrained::rows::Independence;
 use crate::cut::{Halving, Instant, in_halves, may_be_cut};
 use crate::dense::DenseElement;
 use crate::element::{Element, ElementError};
-use crate::error::StepError;
+use crate::error::{ConstraintError, StepError};
 use crate::kinks::{Kinked, in_arcs, switches};
 use crate::model::{Model, State};
 use crate::newton::{Control, Solve};
@@ -17,6 +20,7 @@ use crate::statistics::{Contraction, Statistics};
 use crate::step::{Impulse, Interval, Last, Memory, Method, may_be_phase};
 use crate::transition::TransitionError;
 use crate::workspace::{Workspace, interior_len, numbers_len, pivots_len, transition_len, width};
+use over::Ahead;
 
 /// Steps a model with one element, on memory of its own.
 ///
@@ -82,6 +86,10 @@ pub struct Stepper<'m, M, const N: usize> {
     skipped: bool,
     /// Of a last step that was cut.
     pieces: Vec<Piece<N>>,
+    /// Where the last element has ended, if that was behind the node.
+    ahead: Option<Ahead<N>>,
+    /// An element of the last step went over one of its nodes.
+    passes_node: bool,
     /// Steps are cut at kinks, if there are any.
     at_kinks: bool,
     /// What was asked for; what is in use may trust more.
@@ -94,6 +102,7 @@ struct Piece<const N: usize> {
     last: Last<N>,
     impulses: Vec<Impulse<N>>,
     dense: DenseElement<N>,
+    independence: Option<[Independence; 2]>,
     /// The workspace after it.
     numbers: Vec<f64>,
     pivots: Vec<usize>,
@@ -116,6 +125,8 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             alike: self.alike,
             skipped: self.skipped,
             pieces: self.pieces.clone(),
+            ahead: self.ahead.clone(),
+            passes_node: self.passes_node,
             at_kinks: self.at_kinks,
             solve: self.solve,
         }
@@ -136,6 +147,8 @@ pub struct Suspended<const N: usize> {
     alike: (f64, usize),
     skipped: bool,
     pieces: Vec<Piece<N>>,
+    ahead: Option<Ahead<N>>,
+    passes_node: bool,
 }
 
 impl<const N: usize> Suspended<N> {
@@ -165,6 +178,8 @@ where
             alike: self.alike,
             skipped: self.skipped,
             pieces: self.pieces,
+            ahead: self.ahead,
+            passes_node: self.passes_node,
         }
     }
 
@@ -193,12 +208,18 @@ where
             alike: suspended.alike,
             skipped: suspended.skipped,
             pieces: suspended.pieces,
+            ahead: suspended.ahead,
+            passes_node: suspended.passes_node,
             at_kinks: false,
             solve: control.solve,
         })
     }
 
-    /// A constant, so that nothing is compiled for models that never step like this.
+    /// Constants, so that nothing is compiled for models that have none.
+    const MAY_HAVE_KINKS: bool = !M::FACTS.smooth;
+    const HAS_CONSTRAINTS: bool = !M::CONSTRAINTS.is_empty();
+
+    /// Likewise, for models that never step like this.
     const MAY_HAVE_POINTS: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
 
     /// Likewise a constant: whether all steps of one length have the same matrix.
@@ -230,6 +251,8 @@ where
             alike: (0.0, 0),
             skipped: false,
             pieces: Vec::new(),
+            ahead: None,
+            passes_node: false,
             at_kinks: false,
             solve: control.solve,
         };
@@ -296,9 +319,23 @@ where
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
         self.pieces.clear();
-        if self.at_kinks && self.has_kinks(t, state) {
+        if Self::MAY_HAVE_KINKS && self.at_kinks && self.has_kinks(t, state) {
             return self.advance_in_arcs(t, h, state, impulses);
         }
+        if Self::HAS_CONSTRAINTS {
+            return self.advance_constrained(t, h, state, impulses);
+        }
+        self.advance_plainly(t, h, state, impulses)
+    }
+
+    /// A step without a look at kinks.
+    fn advance_plainly(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+        impulses: &[Impulse<N>],
+    ) -> Result<(), StepError> {
         let error = match self.whole(t, h, state, impulses) {
             Err(error) if may_be_cut(&error, M::FACTS.linear, self.control.solve) => error,
             outcome => return outcome,
@@ -582,6 +619,10 @@ where
     /// [`TransitionError`] if there is no last step, its tangent
     /// is singular, or `matrix` is too short.
     pub fn transition(&mut self, matrix: &mut [f64]) -> Result<(), TransitionError> {
+        if self.passes_node {
+            // Where constraints lose rank the tangents of the motion are open.
+            return Err(StepError::from(ConstraintError::RankChanged).into());
+        }
         if self.pieces.is_empty() {
             return self.transition_of_last(matrix);
         }
@@ -723,6 +764,7 @@ where
                 last,
                 impulses: kicks,
                 dense,
+                independence: self.memory.independence,
                 numbers: self.numbers.clone(),
                 pivots: self.pivots.clone(),
             });

@@ -25,7 +25,7 @@ pub struct Structure {
     pub name: &'static str,
     /// Lagrangian or Hamiltonian.
     pub form: Form,
-    /// Linear? separable? autonomous? constant mass matrix?
+    /// Linear? separable? smooth? autonomous? constant mass matrix?
     pub facts: Facts,
     /// The coordinates that do not appear in the energy function: their momenta change by forces alone.
     pub cyclic: &'static [&'static str],

@@ -17,6 +17,7 @@ impl Model<2> for Row {
         constant_mass: true,
         linear: true,
         separable: true,
+        smooth: true,
     };
 
     fn energy_function<R: Real>(&self, _: R, q: &[R; 2], v: &[R; 2]) -> R {

@@ -216,6 +216,7 @@ pub(crate) mod tests {
             constant_mass: true,
             linear: false,
             separable: true,
+            smooth: true,
         };
         const LANES: bool = true;
 

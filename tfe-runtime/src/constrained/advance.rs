@@ -52,6 +52,10 @@ where
     let kicks: &[[f64; N]] = parts.kicks;
     let layout = Layout::new(&element, N, count);
     let mut rows = Rows::at_start(parts.rows, method.model, t, &state.q);
+    let start_rows = match memory.independence {
+        Some([_, end]) if warm => end,
+        _ => rows.independence(),
+    };
     if !warm {
         parts.active.fill(0);
     }
@@ -163,6 +167,7 @@ where
         return Err(StepError::NonFinite);
     }
     form.check_end(scratch.unknowns)?;
+    let end_rows = form.rows.independence();
     // Constraints that move do work.
     let is_conserved = conserves_energy::<M, N>()
         && impulses.is_empty()
@@ -185,6 +190,7 @@ where
         start_low: low,
         end,
     });
+    memory.independence = Some([start_rows, end_rows]);
     memory.low = end_low;
     memory.statistics.steps += 1;
     *state = end;

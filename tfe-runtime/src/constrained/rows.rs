@@ -308,6 +308,33 @@ impl<'a, const N: usize> Rows<'a, N> {
         bend
     }
 
+    /// How independent the rows are that were evaluated last.
+    pub(crate) fn independence(&mut self) -> Independence {
+        let (mut shortest, mut longest_row) = (f64::INFINITY, 0.0_f64);
+        for (spare, row) in self.spare.iter_mut().zip(&*self.rows) {
+            let length = norm(row);
+            (shortest, longest_row) = (shortest.min(length), longest_row.max(length));
+            *spare = if length > 0.0 { unit(row) } else { *row };
+        }
+        let mut found = Independence {
+            rank: 0,
+            least: 1.0,
+            shortest: shortest / longest_row,
+        };
+        while let Some((row, own)) = longest(self.spare)
+            && own > DEPENDENT
+        {
+            found.rank += 1;
+            found.least = found.least.min(own);
+            let direction = unit(&self.spare[row]);
+            for other in self.spare.iter_mut() {
+                subtract_part(other, &direction);
+            }
+            self.spare[row] = [0.0; N];
+        }
+        found
+    }
+
     /// ψ = A v + a of one constraint.
     pub(crate) fn psi(&self, constraint: usize, v: &[f64; N]) -> f64 {
         dot(&self.rows[constraint], v) + self.drift[constraint]
@@ -355,13 +382,7 @@ impl<'a, const N: usize> Rows<'a, N> {
                 rank += 1;
                 let direction = unit(&self.spare[c]);
                 for other in self.spare.iter_mut() {
-                    // Twice is enough for orthogonality to rounding.
-                    for _ in 0..2 {
-                        let part = dot(other, &direction);
-                        for a in 0..N {
-                            other[a] -= part * direction[a];
-                        }
-                    }
+                    subtract_part(other, &direction);
                 }
             }
         }
@@ -369,6 +390,51 @@ impl<'a, const N: usize> Rows<'a, N> {
             *mark /= 2;
         }
         rank
+    }
+}
+
+/// What rows have of their own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Independence {
+    /// How many are independent.
+    pub(crate) rank: usize,
+    /// What the last of them has beside those before it, relative to its length; each time that which has most comes next.
+    pub(crate) least: f64,
+    /// The shortest row relative to the longest one.
+    pub(crate) shortest: f64,
+}
+
+/// Where the independent part of a row is smaller, positions and velocities lose digits: those of a rounding over it.
+const LOST: f64 = 1e-4;
+
+/// That is so at the end of a step and not of the model, if it is so much smaller than at the start.
+const LOST_HERE: f64 = 0.125;
+
+/// A row that has become so much shorter is about to vanish.
+const VANISHING: f64 = 1e-3;
+
+impl Independence {
+    /// Whether much of it is lost at the end of a step that began with `start`.
+    pub(crate) fn is_lost_since(&self, start: &Self) -> bool {
+        self.rank < start.rank
+            || self.least < LOST.min(LOST_HERE * start.least)
+            || self.shortest < VANISHING * start.shortest
+    }
+}
+
+/// The longest row.
+fn longest<const N: usize>(rows: &[[f64; N]]) -> Option<(usize, f64)> {
+    let lengths = rows.iter().map(norm).enumerate();
+    lengths.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Leaves what is orthogonal to a direction. Twice is enough for that to rounding.
+fn subtract_part<const N: usize>(row: &mut [f64; N], direction: &[f64; N]) {
+    for _ in 0..2 {
+        let part = dot(row, direction);
+        for a in 0..N {
+            row[a] -= part * direction[a];
+        }
     }
 }
 

@@ -71,6 +71,7 @@ const SIMPLE: Facts = Facts {
     constant_mass: true,
     linear: false,
     separable: true,
+    smooth: true,
 };
 
 model! {

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use crate::derive::entry::Entry;
-use crate::expr::graph::{ExprId, Graph};
+use crate::expr::function::Function;
+use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
 use crate::model::declared::Form;
 use crate::program::Array;
@@ -39,6 +40,8 @@ pub struct Structure {
     pub linear: bool,
     /// ∂²/∂z∂q vanishes.
     pub separable: bool,
+    /// Nothing is chosen by a sign: no `select`, `abs`, `sign`, `min` or `max`.
+    pub smooth: bool,
     /// ∂Q/∂q is symmetric and ∂Q/∂z vanishes: the forces have a potential at every time.
     pub symmetric_forces: bool,
     /// Coordinates that the energy function does not depend on and no constraint acts on; empty where indices are not literal.
@@ -70,7 +73,7 @@ impl Dependence {
         let roots: Vec<ExprId> = values.collect();
         let mut found = Self::default();
         for id in graph.reachable(&roots) {
-            if let crate::expr::graph::Node::Input(input) = graph.node(id) {
+            if let Node::Input(input) = graph.node(id) {
                 match input {
                     Input::Time => found.time = true,
                     Input::Coordinate(_) => found.q = true,
@@ -124,6 +127,7 @@ impl Structure {
             constant_mass: !(mass.z || mass.q || mass.time),
             linear: !(tangent.z || tangent.q || constraints),
             separable: of(Array::ZQ).next().is_none(),
+            smooth: is_smooth(graph, entries),
             symmetric_forces: of(Array::ForceZ).next().is_none() && is_symmetric(entries),
             cyclic,
             conserved,
@@ -135,6 +139,19 @@ impl Structure {
             force_q: pattern(Array::ForceQ),
         }
     }
+}
+
+/// Whether no value is chosen by a sign.
+fn is_smooth(graph: &Graph, entries: &[Entry]) -> bool {
+    let values: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
+    !(graph.reachable(&values).into_iter()).any(|id| match graph.node(id) {
+        Node::Select { .. } => true,
+        Node::Call { function, .. } => matches!(
+            function,
+            Function::Abs | Function::Sign | Function::Min | Function::Max
+        ),
+        _ => false,
+    })
 }
 
 /// Whether there are constraints, and whether they depend on the time.
@@ -328,6 +345,7 @@ impl fmt::Display for Structure {
             "separable ({letter}_{z}q = 0)    {}",
             yes(self.separable)
         )?;
+        writeln!(f, "smooth                  {}", yes(self.smooth))?;
         writeln!(f, "cyclic coordinates      {}", listed(&self.cyclic, 'q'))?;
         if !self.cyclic.is_empty() {
             writeln!(

@@ -1,0 +1,254 @@
+//! Positions that the motion passes smoothly although constraints lose rank there, at nodes and beside them; and a linkage with redundant constraints all along.
+
+use crate::linkages::{LINKAGE, ONE_ANGLE, error, parallel};
+use tfe::prelude::*;
+
+/// Distances in time between a node and a singular position.
+const BESIDE: [f64; 12] = [
+    0.0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3,
+];
+
+/// Where a coordinate of a run passes zero.
+fn root(motion: &Motion<1>) -> f64 {
+    let of = |t: f64| motion.at(t).expect("within").q[0];
+    let (mut early, mut late) = (0.0, motion.last().t);
+    assert!(of(early) * of(late) < 0.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (early + late);
+        if of(early) * of(middle) > 0.0 {
+            early = middle;
+        } else {
+            late = middle;
+        }
+    }
+    0.5 * (early + late)
+}
+
+/// Steps such that node `node` lies beside a time.
+fn steps(when: f64, node: f64) -> impl Iterator<Item = f64> {
+    let sides = BESIDE.into_iter().flat_map(|beside| [-beside, beside]);
+    sides.map(move |beside| (when + beside) / node)
+}
+
+/// Rows that vanish: the angles of a parallelogram.
+#[test]
+fn nodes_in_the_flat_position() {
+    let (angle, rate) = (0.6, -14.0);
+    let run = Simulation::new(&ONE_ANGLE).element(Mixed::<10>).step(0.001);
+    let start = ONE_ANGLE.state([angle], [rate]);
+    let when = root(&run.run(start, 0.0..0.1).expect("a pendulum"));
+    for (nodes, most) in [(3, 7e-10), (4, 1e-13), (6, 1e-13)] {
+        for step in steps(when, 10.0) {
+            let what = format!("{nodes} nodes, h = {step:e}");
+            let run = Simulation::new(&LINKAGE).element(Element::mixed(nodes));
+            let motion = run
+                .step(step)
+                .run(parallel(angle, rate), 0.0..20.0 * step)
+                .unwrap_or_else(|error| panic!("{what}: {error}"));
+            let off = error(&motion, step, angle, rate);
+            assert!(off < most, "{what}: {off:e}");
+            assert!(motion.statistics().cuts <= 1, "{what}");
+        }
+    }
+}
+
+/// A chain of two four-bar linkages of equal bars, in natural coordinates (the benchmark of singular positions).
+#[dynamics(
+    coordinates(x[3], y[3]),
+    lagrangian = sum(i in 0..3, dot(x[i])^2 + dot(y[i])^2)/6
+        + sum(i in 0..2, dot(x[i])^2 + dot(x[i])*dot(x[i+1]) + dot(x[i+1])^2 + dot(y[i])^2 + dot(y[i])*dot(y[i+1]) + dot(y[i+1])^2)/6
+        - g*(y[0] + y[1] + y[2])/2 - g*(y[0] + 2*y[1] + y[2])/2,
+    constraint(rod0) = x[0]^2 + y[0]^2 - 1,
+    constraint(rod1) = (x[1] - 1)^2 + y[1]^2 - 1,
+    constraint(rod2) = (x[2] - 2)^2 + y[2]^2 - 1,
+    constraint(bar0) = (x[1] - x[0])^2 + (y[1] - y[0])^2 - 1,
+    constraint(bar1) = (x[2] - x[1])^2 + (y[2] - y[1])^2 - 1,
+)]
+struct Windows {
+    g: f64,
+}
+
+/// As long as the bars stay parallel.
+#[dynamics(coordinates(a), lagrangian = (1/2 + 1)*dot(a)^2 - g*(3/2 + 2)*sin(a))]
+struct Parallel {
+    g: f64,
+}
+
+/// Rows that become parallel.
+#[test]
+fn nodes_where_all_bars_are_in_line() {
+    let (chain, one) = (Windows { g: 9.81 }, Parallel { g: 9.81 });
+    let (angle, rate) = (0.5 * std::f64::consts::PI, -1.0);
+    let (c, s) = (angle.cos(), angle.sin());
+    let (x, y) = (-s * rate, c * rate);
+    let start = chain.state([c, 1.0 + c, 2.0 + c, s, s, s], [x, x, x, y, y, y]);
+    let exact = Simulation::new(&one)
+        .element(Mixed::<10>)
+        .step(0.002)
+        .run(one.state([angle], [rate]), 0.0..1.5)
+        .expect("a pendulum");
+    let when = root(&exact);
+    // Of the order 2(n − 1), as between other nodes.
+    for (nodes, most) in [(3, 2e-6), (4, 3e-10), (6, 2e-12)] {
+        for step in steps(when, 50.0) {
+            let what = format!("{nodes} nodes, h = {step:e}");
+            let run = Simulation::new(&chain).element(Element::mixed(nodes));
+            let motion = run
+                .step(step)
+                .run(start, 0.0..100.0 * step)
+                .unwrap_or_else(|error| panic!("{what}: {error}"));
+            for node in motion.states() {
+                let angle = exact.at(node.t).expect("within").q[0];
+                let off = (node.q[0] - angle.cos()).hypot(node.q[5] - angle.sin());
+                assert!(off < most, "{what}, t = {}: {off:e}", node.t);
+            }
+            assert!(motion.statistics().cuts <= 2, "{what}");
+            // Between the nodes, too.
+            let between = motion.at(when + 0.3 * step).expect("within");
+            let angle = exact.at(when + 0.3 * step).expect("within").q[0];
+            let off = (between.q[0] - angle.cos()).hypot(between.q[5] - angle.sin());
+            assert!(off < 100.0 * most, "{what}: {off:e}");
+        }
+    }
+}
+
+/// A node that was stepped over is no obstacle to going on from a checkpoint.
+#[test]
+fn checkpoints_at_singular_nodes() {
+    let (angle, rate) = (0.6, -14.0);
+    let run = Simulation::new(&ONE_ANGLE).element(Mixed::<10>).step(0.001);
+    let start = ONE_ANGLE.state([angle], [rate]);
+    let step = root(&run.run(start, 0.0..0.1).expect("a pendulum")) / 8.0;
+    let run = Simulation::new(&LINKAGE).element(Mixed::<4>).step(step);
+    let whole = run.run(parallel(angle, rate), 0.0..16.0 * step);
+    let first = run.run(parallel(angle, rate), 0.0..8.0 * step);
+    let first = first.expect("to the flat position");
+    let second = run.resume(first.checkpoint().expect("kept"), 16.0 * step);
+    let (whole, second) = (whole.expect("a run"), second.expect("a run"));
+    assert_eq!(whole.last(), second.last());
+    assert_eq!(first.statistics().cuts, 1);
+}
+
+/// Bennett's linkage.
+#[dynamics(
+    coordinates(r1[3], e1[4], r2[3], e2[4], r3[3], e3[4]),
+    let w1 = body_rate(e1),
+    let w2 = body_rate(e2),
+    let w3 = body_rate(e3),
+    let h1 = rotate(e1, [a/2, 0, 0]),
+    let h2 = rotate(e2, [b/2, 0, 0]),
+    let h3 = rotate(e3, [a/2, 0, 0]),
+    lagrangian = inner(dot(r1), dot(r1))/2 + inner(dot(r2), dot(r2))/2 + inner(dot(r3), dot(r3))/2
+        + a^2/24*(w1[0]^2/50 + w1[1]^2 + w1[2]^2) + b^2/24*(w2[0]^2/50 + w2[1]^2 + w2[2]^2)
+        + a^2/24*(w3[0]^2/50 + w3[1]^2 + w3[2]^2) - g*(r1[1] + r2[1] + r3[1]),
+    constraint(unit1) = inner(e1, e1) - 1,
+    constraint(unit2) = inner(e2, e2) - 1,
+    constraint(unit3) = inner(e3, e3) - 1,
+    constraint(at_a) = r1 - h1,
+    constraint(at_b) = r1 + h1 - r2 + h2,
+    constraint(at_c) = r2 + h2 - r3 + h3,
+    constraint(at_d) = r3 + h3 - [-b, 0, 0],
+    constraint(axis_a) = rotate(e1, [0, 0, 1]) - [0, 0, 1],
+    constraint(axis_b) = rotate(e1, [0, -sin(alpha), cos(alpha)]) - rotate(e2, [0, 0, 1]),
+    constraint(axis_c) = rotate(e2, [0, -sin(beta), cos(beta)]) - rotate(e3, [0, 0, 1]),
+    constraint(axis_d) = rotate(e3, [0, -sin(alpha), cos(alpha)]) - [0, sin(beta), cos(beta)],
+)]
+struct Bennett {
+    a: f64,
+    b: f64,
+    alpha: f64,
+    beta: f64,
+    g: f64,
+}
+
+type Quaternion = [f64; 4];
+
+fn times(a: Quaternion, b: Quaternion) -> Quaternion {
+    [
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    ]
+}
+
+fn turned(e: Quaternion, x: [f64; 3]) -> [f64; 3] {
+    let back = [e[0], -e[1], -e[2], -e[3]];
+    let [_, rest @ ..] = times(times(e, [0.0, x[0], x[1], x[2]]), back);
+    rest
+}
+
+impl Bennett {
+    fn at(&self, theta: f64, rate: f64) -> State<21> {
+        let ratio = (0.5 * (self.beta + self.alpha)).sin() / (0.5 * (self.beta - self.alpha)).sin();
+        let second = 2.0 * (ratio / (0.5 * theta).tan()).atan();
+        let angles = [theta, second, -theta];
+        let lengths = [self.a, self.b, self.a];
+        let twists = [self.alpha, self.beta, self.alpha];
+        let (mut place, mut e) = ([0.0; 3], [1.0, 0.0, 0.0, 0.0]);
+        let mut q = [0.0; 21];
+        for body in 0..3 {
+            e = times(
+                e,
+                [
+                    (0.5 * angles[body]).cos(),
+                    0.0,
+                    0.0,
+                    (0.5 * angles[body]).sin(),
+                ],
+            );
+            let along = turned(e, [lengths[body], 0.0, 0.0]);
+            for k in 0..3 {
+                q[7 * body + k] = place[k] + 0.5 * along[k];
+                place[k] += along[k];
+            }
+            q[7 * body + 3..7 * body + 7].copy_from_slice(&e);
+            e = times(
+                e,
+                [
+                    (0.5 * twists[body]).cos(),
+                    (0.5 * twists[body]).sin(),
+                    0.0,
+                    0.0,
+                ],
+            );
+        }
+        let mut v = [0.0; 21];
+        // Spin of the first body; the rest follows.
+        let w = [0.0, 0.0, 0.0, 0.5 * rate];
+        let spin = times(w, [q[3], q[4], q[5], q[6]]);
+        v[3..7].copy_from_slice(&spin);
+        self.project(q, v)
+    }
+    fn project(&self, q: [f64; 21], v: [f64; 21]) -> State<21> {
+        let start = self.consistent_state(q, v).expect("consistent");
+        assert!(start.position < 1e-14, "closed: {:e}", start.position);
+        assert_eq!(start.rank, 20);
+        start.state
+    }
+}
+
+/// 27 equations of which 20 are independent, for 21 coordinates.
+#[test]
+fn bennett() {
+    let alpha = 0.6_f64;
+    let model = Bennett {
+        a: 1.0,
+        b: 1.4,
+        alpha,
+        beta: (1.4 * alpha.sin()).asin(),
+        g: 9.81,
+    };
+    let start = model.at(1.0, 1.0);
+    let drift = |step: f64| {
+        let run = Simulation::new(&model).element(Mixed::<4>).step(step);
+        let motion = run.run(start, 0.0..4.0).expect("a run");
+        assert_eq!(motion.constraint_residual().rank, 20);
+        let energies = motion.energies();
+        (energies.iter()).fold(0.0_f64, |worst, one| worst.max((one - energies[0]).abs()))
+    };
+    let (long, short) = (drift(0.08), drift(0.04));
+    let order = (long / short).log2();
+    assert!((order - 6.0).abs() < 0.3, "{order}: {long:e}, {short:e}");
+    assert!(short < 5e-7, "{short:e}");
+}

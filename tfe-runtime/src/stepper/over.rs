@@ -1,0 +1,178 @@
+//! Steps over nodes at which constraints lose rank (T-120): the element next to such a node ends behind it.
+
+use super::{Piece, Stepper};
+use crate::cut::Halving;
+use crate::error::{ConstraintError, StepError};
+use crate::model::{Model, State};
+use crate::newton::Solve;
+use crate::step::Impulse;
+use alloc::vec::Vec;
+
+/// How far before the node the element over it begins, in parts of the step: one is tried after the other. Farther away less is lost to rounding, nearer the polynomial is
+/// better at the node.
+const REACHES: [f64; 5] = [1.0 / 64.0, 1.0 / 16.0, 1.0 / 256.0, 1.0 / 4.0, 1.0 / 1024.0];
+
+/// How far behind the node it ends, in parts of that: no point of the element is to lie on the node.
+const BEHIND: f64 = 0.75;
+
+/// Where the motion has got behind the last node.
+#[derive(Clone, Debug)]
+pub(super) struct Ahead<const N: usize> {
+    node: State<N>,
+    t: f64,
+    state: State<N>,
+    /// From the node to there.
+    piece: Piece<N>,
+}
+
+impl<const N: usize> Ahead<N> {
+    /// Whether a step begins at the node and ends behind what was done.
+    fn serves(&self, t: f64, h: f64, state: &State<N>) -> bool {
+        let done = (self.t - t) / h;
+        self.node.is_same(state) && done > 0.0 && done < 1.0
+    }
+}
+
+/// Whether a step may have failed because the constraints lose rank near its end.
+fn is_of_the_place(error: &StepError) -> bool {
+    matches!(
+        error,
+        StepError::Unproven { .. }
+            | StepError::EnergyJump { .. }
+            | StepError::NonFinite
+            | StepError::SingularTangent { .. }
+            | StepError::NewtonStalled { .. }
+            | StepError::Constraint(
+                ConstraintError::Dependent { .. } | ConstraintError::SingularMass
+            )
+    )
+}
+
+impl<M, const N: usize> Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    /// A step of a model with constraints.
+    pub(super) fn advance_constrained(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+        impulses: &[Impulse<N>],
+    ) -> Result<(), StepError> {
+        self.passes_node = false;
+        let ahead = self.ahead.take().filter(|_| impulses.is_empty());
+        if let Some(ahead) = ahead.filter(|one| one.serves(t, h, state)) {
+            return self.go_on(ahead, (t, h), state);
+        }
+        let (start, cuts) = (*state, self.memory.statistics.cuts);
+        let outcome = self.advance_plainly(t, h, state, impulses);
+        if !(impulses.is_empty() && matches!(self.control.solve, Solve::Auto | Solve::Newton)) {
+            return outcome;
+        }
+        match outcome {
+            Ok(()) if self.loses_rank() => {
+                let done = self.clone();
+                let mut moved = start;
+                self.memory.statistics.cuts = cuts;
+                self.memory.statistics.steps -= 1;
+                if self.over((t, h), &mut moved) {
+                    *state = moved;
+                } else {
+                    *self = done;
+                }
+                Ok(())
+            }
+            Err(error) if is_of_the_place(&error) && self.over((t, h), state) => Ok(()),
+            outcome => outcome,
+        }
+    }
+
+    /// Whether the constraints are much less independent where the last step has ended than where it began.
+    fn loses_rank(&self) -> bool {
+        let start = (self.pieces.first()).map_or(self.memory.independence, |one| one.independence);
+        match (start, self.memory.independence) {
+            (Some([start, _]), Some([_, end])) => end.is_lost_since(&start),
+            _ => false,
+        }
+    }
+
+    /// A step from a node that the last element has passed.
+    fn go_on(
+        &mut self,
+        ahead: Ahead<N>,
+        (t, h): (f64, f64),
+        state: &mut State<N>,
+    ) -> Result<(), StepError> {
+        let start = *state;
+        *state = ahead.state;
+        let rest = (t + h) - ahead.t;
+        // Its end may be another such node.
+        if let Err(error) = self.advance_constrained(ahead.t, rest, state, &[]) {
+            *state = start;
+            return Err(error);
+        }
+        if self.pieces.is_empty() {
+            self.passed(ahead.t, rest, Vec::new());
+        }
+        self.pieces.insert(0, ahead.piece);
+        self.passes_node = true;
+        Ok(())
+    }
+
+    /// Moves `state` to a node near which the constraints lose rank: by an element that ends behind it, whose polynomial has the state at the node. False, with nothing
+    /// changed, where that fails.
+    #[cold]
+    fn over(&mut self, (t, h): (f64, f64), state: &mut State<N>) -> bool {
+        let (start, steps) = (*state, self.memory.statistics.steps);
+        let passes = REACHES
+            .iter()
+            .any(|reach| self.over_from((t, h), reach * h, state));
+        self.memory.statistics.steps = steps;
+        if !passes {
+            (*state, self.memory.last) = (start, None);
+            self.pieces.clear();
+            return false;
+        }
+        self.memory.statistics.steps += 1;
+        self.memory.statistics.cuts += 1;
+        self.passes_node = true;
+        true
+    }
+
+    fn over_from(&mut self, (t, h): (f64, f64), reach: f64, state: &mut State<N>) -> bool {
+        let start = *state;
+        self.pieces.clear();
+        self.memory.last = None;
+        let (before, length) = (h - reach, reach + BEHIND * reach);
+        let mut moved = start;
+        if self.whole(t, before, &mut moved, &[]).is_err() {
+            return false;
+        }
+        self.passed(t, before, Vec::new());
+        let begins = t + before;
+        if self.whole(begins, length, &mut moved, &[]).is_err() {
+            return false;
+        }
+        let ends = begins + length;
+        self.passed(begins, length, Vec::new());
+        let Some(mut piece) = self.pieces.pop() else {
+            return false;
+        };
+        let (to_node, from_node) = piece.dense.split(t + h);
+        let node = to_node.at(1.0);
+        self.pieces.push(Piece {
+            dense: to_node,
+            ..piece.clone()
+        });
+        piece.dense = from_node;
+        self.ahead = Some(Ahead {
+            node,
+            t: ends,
+            state: moved,
+            piece,
+        });
+        *state = node;
+        true
+    }
+}
