@@ -22,3 +22,4 @@ mod small_steps;
 mod stability;
 mod starts;
 mod symplectic;
+mod tolerances;

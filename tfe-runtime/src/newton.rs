@@ -1,5 +1,6 @@
 //! The iterations inside an element: fixed point first, Newton where it must.
 
+use crate::constrained::START_TOLERANCE;
 use crate::equations::{Equations, Increment};
 use crate::error::StepError;
 use crate::evidence::Evidence;
@@ -33,6 +34,18 @@ pub struct Control {
     pub max_iterations: u32,
     /// Which iteration.
     pub solve: Solve,
+}
+
+/// Iterations with constraints leave no more, whatever is asked for: what violates constraints by much is no start of the next element.
+const MOST_WITH_CONSTRAINTS: f64 = 0.1 * START_TOLERANCE;
+
+impl Control {
+    pub(crate) fn with_constraints(self) -> Self {
+        Self {
+            tolerance: self.tolerance.min(MOST_WITH_CONSTRAINTS),
+            ..self
+        }
+    }
 }
 
 /// Steps whose iteration may end above it need no more than the working precision.

@@ -144,7 +144,8 @@ where
         active: parts.active,
         impulse: total(impulses),
     };
-    let first = newton(&mut form, &method.control, &mut scratch, false, false);
+    let control = method.control.with_constraints();
+    let first = newton(&mut form, &control, &mut scratch, false, false);
     let evidence = match first {
         Ok(evidence) => evidence,
         Err(error) if !warm => return Err(error),
@@ -159,7 +160,7 @@ where
                 &form.rows,
                 form.active,
             )?;
-            newton(&mut form, &method.control, &mut scratch, false, false)?
+            newton(&mut form, &control, &mut scratch, false, false)?
         }
     };
     let (end, end_low) = form.end_state(scratch.unknowns)?;

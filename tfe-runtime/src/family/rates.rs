@@ -262,7 +262,12 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
     }
 
     fn newton(&mut self, t: f64, h: f64) -> Result<(), StepError> {
-        let mut monitor = Monitor::new(self.control.tolerance);
+        let control = if self.constraints > 0 {
+            self.control.with_constraints()
+        } else {
+            self.control
+        };
+        let mut monitor = Monitor::new(control.tolerance);
         let known = self.matrix.is_factored() && self.factored == h;
         let mut fresh = !known;
         let (mut evidence, mut own) = (Evidence::of_newton(), false);
@@ -316,7 +321,7 @@ impl<'m, M: FamilyModel> Rates<'m, M> {
         Err(StepError::NewtonStalled {
             iterations,
             residual: monitor.last(),
-            tolerance: self.control.tolerance,
+            tolerance: control.tolerance,
         })
     }
 

@@ -1,0 +1,174 @@
+//! Loose tolerances and accuracies: what iterations leave is small beside it, and constraints hold.
+
+use tfe::prelude::*;
+use tfe::runtime::Model;
+use tfe::runtime::length::{Declared, FixedLength};
+
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - 1)]
+struct Rod {
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(x[2], y[2]),
+    lagrangian = (inner(dot(x), dot(x)) + inner(dot(y), dot(y)))/2 - g*(y[0] + y[1]),
+    constraint(upper) = x[0]^2 + y[0]^2 - 1,
+    constraint(lower) = (x[1] - x[0])^2 + (y[1] - y[0])^2 - 1,
+)]
+struct TwoRods {
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(a, b, x),
+    lagrangian = (0.3*dot(a)^2 + 0.7*dot(b)^2 + dot(x)^2)/2 - g*sin(a),
+    constraint(cx) = cos(a) + 2*cos(b) - x,
+    constraint(cy) = sin(a) - 2*sin(b),
+)]
+struct SliderCrank {
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(x, y, phi),
+    lagrangian = (dot(x)^2 + dot(y)^2 + dot(phi)^2)/2 + g*x,
+    constraint(blade) = dot(x)*sin(phi) - dot(y)*cos(phi),
+)]
+struct Knife {
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(x, y, a),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 + dot(a)^2/20 - g*y,
+    constraint(cx) = x - cos(a),
+    constraint(cy) = y - sin(a),
+    constraint(circle) = x^2 + y^2 - 1,
+)]
+struct Redundant {
+    g: f64,
+}
+
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - (1 + sin(t)/10)^2)]
+struct Pulled {
+    g: f64,
+}
+
+/// What is to be shown of every scene.
+trait Shown {
+    fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>)
+    where
+        M: Model<N> + Declared<N, Length = FixedLength>;
+}
+
+fn each(shown: &impl Shown) {
+    let g = 9.81;
+    let model = Rod { g };
+    shown.of("rod", &model, model.state([1.0, 0.0], [0.0; 2]));
+    let model = TwoRods { g };
+    let start = model.state([1.0, 1.0, 0.0, -1.0], [0.0, 0.5, 0.0, 0.0]);
+    shown.of("two rods", &model, start);
+    let model = SliderCrank { g };
+    let (a, w) = (0.5_f64, 4.0);
+    let b = (0.5 * a.sin()).asin();
+    let rate = 0.5 * a.cos() * w / b.cos();
+    let start = model.state(
+        [a, b, a.cos() + 2.0 * b.cos()],
+        [w, rate, -a.sin() * w - 2.0 * b.sin() * rate],
+    );
+    shown.of("slider-crank", &model, start);
+    let model = Knife { g };
+    shown.of("knife", &model, model.state([0.0; 3], [0.0, 0.0, 1.3]));
+    let model = Redundant { g };
+    let start = model.state([0.0, 1.0, std::f64::consts::FRAC_PI_2], [-1.0, 0.0, 1.0]);
+    shown.of("three rows", &model, start);
+    let model = Pulled { g };
+    shown.of("pulled", &model, model.state([1.0, 0.0], [0.1, 0.0]));
+}
+
+const END: f64 = 4.0;
+
+/// The largest error at the end, relative to the largest number there.
+fn off<const N: usize>(motion: &Motion<N>, exact: &Motion<N>) -> f64 {
+    let (a, b) = (motion.last(), exact.last());
+    let (mut off, mut scale) = (0.0_f64, 0.0_f64);
+    for k in 0..N {
+        off = off
+            .max((a.q[k] - b.q[k]).abs())
+            .max((a.p[k] - b.p[k]).abs());
+        scale = scale.max(b.q[k].abs()).max(b.p[k].abs());
+    }
+    off / scale
+}
+
+fn exact<M, const N: usize>(model: &M, start: State<N>) -> Motion<N>
+where
+    M: Model<N> + Declared<N, Length = FixedLength>,
+{
+    let run: Simulation<'_, M, N> = Simulation::new(model);
+    let run = run.element(Mixed::<8>).step(0.01);
+    run.run(start, 0.0..END).expect("a run")
+}
+
+/// Loose tolerances used to end in "the constraints are dependent", which was false.
+#[test]
+fn loose_tolerances_are_no_contradictions() {
+    struct Tolerances;
+    impl Shown for Tolerances {
+        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>)
+        where
+            M: Model<N> + Declared<N, Length = FixedLength>,
+        {
+            let exact = exact(model, start);
+            for nodes in [3, 4, 6] {
+                let run: Simulation<'_, M, N> = Simulation::new(model);
+                let run = run.element(Element::mixed(nodes)).step(0.02);
+                let tight = run.run(start, 0.0..END).expect("a run");
+                for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8] {
+                    let loose = run.clone().tolerance(tolerance).run(start, 0.0..END);
+                    let what = format!("{name}, {nodes} nodes, {tolerance:e}");
+                    let loose = loose.unwrap_or_else(|error| panic!("{what}: {error}"));
+                    let (off, best) = (off(&loose, &exact), off(&tight, &exact));
+                    assert!(off < 2.0 * best + 1e-6, "{what}: {off:e}, {best:e}");
+                    assert!(
+                        loose.warnings().is_empty(),
+                        "{what}: {:?}",
+                        loose.warnings()
+                    );
+                }
+            }
+        }
+    }
+    each(&Tolerances);
+}
+
+#[test]
+fn accuracies_are_met_with_constraints() {
+    struct Accuracies;
+    impl Shown for Accuracies {
+        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>)
+        where
+            M: Model<N> + Declared<N, Length = FixedLength>,
+        {
+            let exact = exact(model, start);
+            for accuracy in [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10] {
+                let run: Simulation<'_, M, N> = Simulation::new(model);
+                let motion = run.accuracy(accuracy).run(start, 0.0..END);
+                let what = format!("{name}, {accuracy:e}");
+                let motion = motion.unwrap_or_else(|error| panic!("{what}: {error}"));
+                let off = off(&motion, &exact);
+                assert!(off < accuracy, "{what}: {off:e}");
+                let estimate = motion.error_estimate();
+                // What the reference is known to.
+                assert!(
+                    off < 2.0 * estimate + 1e-14,
+                    "{what}: {off:e}, {estimate:e}"
+                );
+                // Thousands of steps were taken for 1e-2, since longer ones ended in errors.
+                let steps = motion.statistics().steps;
+                assert!(steps < 500, "{what}: {steps}");
+            }
+        }
+    }
+    each(&Accuracies);
+}
