@@ -404,24 +404,6 @@ pub(crate) struct Independence {
     pub(crate) shortest: f64,
 }
 
-/// Where the independent part of a row is smaller, positions and velocities lose digits: those of a rounding over it.
-const LOST: f64 = 1e-4;
-
-/// That is so at the end of a step and not of the model, if it is so much smaller than at the start.
-const LOST_HERE: f64 = 0.125;
-
-/// A row that has become so much shorter is about to vanish.
-const VANISHING: f64 = 1e-3;
-
-impl Independence {
-    /// Whether much of it is lost at the end of a step that began with `start`.
-    pub(crate) fn is_lost_since(&self, start: &Self) -> bool {
-        self.rank < start.rank
-            || self.least < LOST.min(LOST_HERE * start.least)
-            || self.shortest < VANISHING * start.shortest
-    }
-}
-
 /// The longest row.
 fn longest<const N: usize>(rows: &[[f64; N]]) -> Option<(usize, f64)> {
     let lengths = rows.iter().map(norm).enumerate();

@@ -1,6 +1,7 @@
 //! Steps over nodes at which constraints lose rank (T-120): the element next to such a node ends behind it.
 
 use super::{Piece, Stepper};
+use crate::constrained::rows::Independence;
 use crate::cut::Halving;
 use crate::error::{ConstraintError, StepError};
 use crate::model::{Model, State};
@@ -14,6 +15,15 @@ const REACHES: [f64; 5] = [1.0 / 64.0, 1.0 / 16.0, 1.0 / 256.0, 1.0 / 4.0, 1.0 /
 
 /// How far behind the node it ends, in parts of that: no point of the element is to lie on the node.
 const BEHIND: f64 = 0.75;
+
+/// Where the independent part of a constraint's row is smaller, positions and velocities lose digits: those of a rounding over it.
+const LOST: f64 = 1e-4;
+
+/// That is so at the end of a step and not of the model, if it is so much smaller than at the start.
+const LOST_HERE: f64 = 0.125;
+
+/// A row that has become so much shorter is about to vanish.
+const VANISHING: f64 = 1e-3;
 
 /// Where the motion has got behind the last node.
 #[derive(Clone, Debug)]
@@ -31,6 +41,13 @@ impl<const N: usize> Ahead<N> {
         let done = (self.t - t) / h;
         self.node.is_same(state) && done > 0.0 && done < 1.0
     }
+}
+
+/// Whether much of the constraints' independence is lost from the start of a step to its end.
+fn is_lost(start: &Independence, end: &Independence) -> bool {
+    end.rank < start.rank
+        || end.least < LOST.min(LOST_HERE * start.least)
+        || end.shortest < VANISHING * start.shortest
 }
 
 /// Whether a step may have failed because the constraints lose rank near its end.
@@ -92,7 +109,7 @@ where
     fn loses_rank(&self) -> bool {
         let start = (self.pieces.first()).map_or(self.memory.independence, |one| one.independence);
         match (start, self.memory.independence) {
-            (Some([start, _]), Some([_, end])) => end.is_lost_since(&start),
+            (Some([start, _]), Some([_, end])) => is_lost(&start, &end),
             _ => false,
         }
     }
