@@ -71,7 +71,22 @@ pub(crate) struct Ran {
 pub(crate) type Pilot<'r> = dyn FnMut(f64) -> Option<Graded> + 'r;
 
 /// What makes a run.
-pub(crate) type Runner<'r> = dyn FnMut(&Way<'_>) -> Result<Ran, RunErrorKind> + 'r;
+pub(crate) type Runner<'r> = dyn FnMut(&Way<'_>) -> Result<Ran, Failed> + 'r;
+
+/// Why a run has stopped.
+#[derive(Clone, Debug)]
+pub(crate) struct Failed {
+    pub(crate) kind: RunErrorKind,
+    /// Whether steps of any length stop there.
+    pub(crate) is_final: bool,
+}
+
+impl From<RunErrorKind> for Failed {
+    fn from(kind: RunErrorKind) -> Self {
+        let is_final = slides(&kind);
+        Self { kind, is_final }
+    }
+}
 
 /// What a search has found.
 #[derive(Clone, Debug)]
@@ -337,10 +352,10 @@ fn climb(
                 }
                 Verdict::Floor => break,
             },
-            Err(kind) if slides(&kind) => return Err(kind),
-            Err(kind) => {
+            Err(failed) if failed.is_final => return Err(failed.kind),
+            Err(failed) => {
                 ladder.fail(taken);
-                failure = Some(kind);
+                failure = Some(failed.kind);
                 way.step *= 0.6;
             }
         }

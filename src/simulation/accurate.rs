@@ -7,8 +7,8 @@ mod fixed;
 use super::mesh::Mesh;
 use super::progress::Bar;
 use crate::accuracy::{
-    Asked, Course, Estimated, Found, Graded, Grading, Pilot, Ran, Trace, Way, damping_element_for,
-    difference, element_for, explore, factor_for, search,
+    Asked, Course, Estimated, Failed, Found, Graded, Grading, Pilot, Ran, Trace, Way,
+    damping_element_for, difference, element_for, explore, factor_for, search,
 };
 use crate::error::RunErrorKind;
 use beside::Beside;
@@ -260,6 +260,7 @@ fn find<R: Repeatable<N>, const N: usize>(
 ) -> Result<Found, RunErrorKind> {
     let t0 = asked.span.start;
     let mut last: Option<(bool, Element, R::Stepper)> = None;
+    let mut place = Place::default();
     let mut make = |way: &Way<'_>| {
         let mesh = match way.grading {
             Some(grading) => run.through(&way.nodes(grading))?,
@@ -277,7 +278,7 @@ fn find<R: Repeatable<N>, const N: usize>(
             last = Some((way.by_iteration, way.element, stepper));
         }
         let Some((.., stepper)) = &mut last else {
-            return Err(RunErrorKind::Step { step: way.step });
+            return Err(RunErrorKind::Step { step: way.step }.into());
         };
         R::set_tolerance(stepper, way.tolerance);
         let before = R::statistics(stepper);
@@ -300,8 +301,12 @@ fn find<R: Repeatable<N>, const N: usize>(
             watcher.trace
         } else {
             follow(run, stepper, (t0, start), &mesh, times).map_err(|(kind, t, state)| {
+                let mut failed = Failed::from(kind);
+                if place.is_met_again(t0, &failed.kind) {
+                    failed.is_final |= !is_passed(run, way, &mesh, (&failed.kind, &state));
+                }
                 kept.keep_part(t0, t, state);
-                kind
+                failed
             })?
         };
         let after = R::statistics(stepper);
@@ -312,6 +317,77 @@ fn find<R: Repeatable<N>, const N: usize>(
         })
     };
     search(asked, &mut make, pilot)
+}
+
+/// Where runs with shorter and shorter steps stop.
+#[derive(Debug, Default)]
+struct Place {
+    last: Option<(f64, f64)>,
+    /// How many runs in succession have stopped there.
+    times: u32,
+}
+
+impl Place {
+    /// Whether runs have stopped again and again within a step or two of the same time, which is not the start's.
+    fn is_met_again(&mut self, start: f64, kind: &RunErrorKind) -> bool {
+        const OFTEN: u32 = 3;
+        let &RunErrorKind::Solve { time, step, .. } = kind else {
+            return false;
+        };
+        let is_same = |&(t, h): &(f64, f64)| (time - t).abs() <= 2.0 * h.abs().max(step.abs());
+        self.times = match self.last {
+            Some(last) if time != start && is_same(&last) => self.times + 1,
+            _ => 1,
+        };
+        self.last = Some((time, step));
+        self.times >= OFTEN
+    }
+}
+
+/// Whether the motion goes on beyond a time at which a run has stopped, with steps that are as short as they have to be. It does not where it ends in a singular point.
+fn is_passed<R: Repeatable<N>, const N: usize>(
+    run: &R,
+    way: &Way<'_>,
+    mesh: &Mesh<N>,
+    (kind, state): (&RunErrorKind, &R::State),
+) -> bool {
+    /// How far beyond, in steps of the run.
+    const BEYOND: f64 = 4.0;
+    const MOST: u32 = 2000;
+    let &RunErrorKind::Solve { time, step, .. } = kind else {
+        return true;
+    };
+    let solve = trusting(run.control()).solve;
+    let control = Control {
+        solve,
+        ..run.control()
+    };
+    let Ok(mut stepper) = run.stepper(way.element, control, false) else {
+        return true;
+    };
+    let (mut t, mut h, mut state) = (time, step, state.clone());
+    for _ in 0..MOST {
+        let mut moved = state.clone();
+        let next = t + h;
+        if next == t {
+            return false;
+        }
+        match run.advance(&mut stepper, (t, next, next - t), mesh, &mut moved) {
+            Ok(()) => {
+                (t, state) = (next, moved);
+                if (t - time).abs() >= BEYOND * step.abs() {
+                    return true;
+                }
+                h = if step.abs() > 2.0 * h.abs() {
+                    2.0 * h
+                } else {
+                    step
+                };
+            }
+            Err(_) => h /= 2.0,
+        }
+    }
+    true
 }
 
 /// Given nodes as a grading, with the factor 1 the nodes themselves.

@@ -67,8 +67,8 @@ pub(super) fn probe(
             }
             Ok(apart) if apart > 1.0 => 4.0,
             Ok(_) => 2.0,
-            Err(kind) => {
-                failure = Some(kind);
+            Err(failed) => {
+                failure = Some(failed.kind);
                 3.0
             }
         };
