@@ -121,7 +121,7 @@ impl<const N: usize> Motion<N> {
 
     /// The same of a run that goes on, whose velocity at the start is known.
     pub(crate) fn from_checkpoint<M: Model<N>>(model: &M, checkpoint: &Checkpoint<N>) -> Self {
-        let (t, start) = (checkpoint.time, &checkpoint.state);
+        let (t, start) = (checkpoint.time(), &checkpoint.state);
         let mut motion = Self::from_start(model, t, start);
         motion.nodes.clear();
         motion.velocities.clear();

@@ -22,7 +22,8 @@ use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 use watch::{Recorded, Watch};
 
 pub use accurate::Accurate;
-pub use checkpoint::Checkpoint;
+use checkpoint::Reached;
+pub use checkpoint::{Checkpoint, FamilyCheckpoint};
 pub use watch::Warning;
 
 /// A run to be: which model, with which element and step.
@@ -335,12 +336,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, finished)?;
         let last = *motion.last();
         motion.set_checkpoint(Checkpoint {
-            origin,
-            step: self
-                .step
-                .or_else(|| mesh.elements().next().map(|(.., h)| h.abs())),
-            elements: mesh.steps(),
-            time: last.t,
+            reached: Reached::new(origin, self.step, mesh, last.t),
             state: last.state(),
             velocity: motion.velocities().last().copied().unwrap_or([0.0; N]),
             stepper: stepper.suspend(),

@@ -3,6 +3,7 @@
 use super::larger;
 use crate::csv;
 use crate::error::AtError;
+use crate::simulation::FamilyCheckpoint;
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -87,6 +88,7 @@ pub struct FamilyMotion {
     elements: Vec<FamilyDense>,
     statistics: Statistics,
     names: Vec<CoordinateName>,
+    checkpoint: Option<Box<FamilyCheckpoint>>,
 }
 
 impl FamilyMotion {
@@ -117,6 +119,7 @@ impl FamilyMotion {
             elements: Vec::new(),
             statistics: Statistics::default(),
             names: Vec::new(),
+            checkpoint: None,
         }
     }
 
@@ -156,6 +159,16 @@ impl FamilyMotion {
 
     pub(crate) fn set_statistics(&mut self, statistics: Statistics) {
         self.statistics = statistics;
+    }
+
+    pub(crate) fn set_checkpoint(&mut self, checkpoint: FamilyCheckpoint) {
+        self.checkpoint = Some(Box::new(checkpoint));
+    }
+
+    /// Where the run ended, with all that [`FamilySimulation::resume`](crate::family::FamilySimulation::resume) needs to go on as if it had never stopped; `None` where the run
+    /// failed, or was made of several.
+    pub fn checkpoint(&self) -> Option<&FamilyCheckpoint> {
+        self.checkpoint.as_deref()
     }
 
     /// The last recorded node: the end of the span after a complete run.

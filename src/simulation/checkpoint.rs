@@ -1,8 +1,14 @@
 //! Runs that go on where others ended.
 
+mod family;
+
+pub use family::FamilyCheckpoint;
+
+use super::mesh::Mesh;
 use super::{Simulation, check_start};
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
+use std::ops::Range;
 use tfe_runtime::step::{Stepper, Suspended};
 use tfe_runtime::{Model, State};
 
@@ -12,21 +18,73 @@ use tfe_runtime::{Model, State};
 /// stepper, some kilobytes for a few coordinates.
 #[derive(Clone, Debug)]
 pub struct Checkpoint<const N: usize> {
-    /// Where the run began.
-    pub(super) origin: f64,
-    pub(super) step: Option<f64>,
-    /// How many elements were done.
-    pub(super) elements: usize,
-    pub(crate) time: f64,
+    pub(super) reached: Reached,
     pub(crate) state: State<N>,
     pub(crate) velocity: [f64; N],
     pub(super) stepper: Suspended<N>,
 }
 
+/// How far a run has got on its grid.
+#[derive(Clone, Debug)]
+pub(super) struct Reached {
+    /// Where it began.
+    pub(super) origin: f64,
+    pub(super) step: Option<f64>,
+    /// How many elements were done.
+    pub(super) elements: usize,
+    pub(super) time: f64,
+}
+
+impl Reached {
+    pub(super) fn new<const N: usize>(
+        origin: f64,
+        step: Option<f64>,
+        mesh: &Mesh<N>,
+        time: f64,
+    ) -> Self {
+        Self {
+            origin,
+            step: step.or_else(|| mesh.elements().next().map(|(.., h)| h.abs())),
+            elements: mesh.steps(),
+            time,
+        }
+    }
+
+    /// The mesh to go on over, how many elements of it are done, and where it begins: the grid of the run if the checkpoint lies on it, else one that begins there. Given nodes
+    /// are those that lie ahead.
+    fn place<const N: usize>(
+        &self,
+        end: f64,
+        nodes: &Option<Vec<f64>>,
+        mut mesh: impl FnMut(&Range<f64>, Option<Vec<f64>>) -> Result<Mesh<N>, RunErrorKind>,
+    ) -> Result<(Mesh<N>, usize, f64), RunErrorKind> {
+        let Self {
+            origin,
+            elements,
+            time,
+            ..
+        } = *self;
+        if let Some(nodes) = nodes {
+            let is_ahead = |node: &&f64| (end - time) * (**node - time) > 0.0;
+            let ahead = nodes.iter().filter(is_ahead).copied();
+            let nodes = std::iter::once(time).chain(ahead).collect();
+            return Ok((mesh(&(time..end), Some(nodes))?, 0, time));
+        }
+        let on_grid = mesh(&(origin..end), None).ok().filter(|mesh| {
+            let next = mesh.elements().nth(elements);
+            next.is_some_and(|(start, ..)| start == time)
+        });
+        match on_grid {
+            Some(mesh) => Ok((mesh, elements, origin)),
+            None => Ok((mesh(&(time..end), None)?, 0, time)),
+        }
+    }
+}
+
 impl<const N: usize> Checkpoint<N> {
     /// The time that the run has reached.
     pub fn time(&self) -> f64 {
-        self.time
+        self.reached.time
     }
 
     /// The state there.
@@ -64,15 +122,11 @@ impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
     pub fn resume(&self, checkpoint: &Checkpoint<N>, end: f64) -> Result<Motion<N>, RunError<N>> {
         let motion = Motion::from_checkpoint(self.model, checkpoint);
         let prepared = check_start(&checkpoint.state).and_then(|()| {
-            let step = self.step.or(checkpoint.step);
-            let mut run = Self {
-                step,
-                nodes: None,
-                ..self.clone()
-            };
+            let mut run = self.clone();
+            run.step = run.step.or(checkpoint.reached.step);
             // The last element of a run takes those at its end.
             run.impulses
-                .retain(|impulse| impulse.time != checkpoint.time);
+                .retain(|impulse| impulse.time != checkpoint.time());
             let element = self.chosen_element();
             let suspended = checkpoint.stepper.clone();
             let stepper = if suspended.element() == element {
@@ -81,28 +135,14 @@ impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
                 Stepper::new(self.model, element, self.control)
             };
             let stepper = self.cutting(stepper.map_err(RunErrorKind::Element)?);
-            let (time, origin) = (checkpoint.time, checkpoint.origin);
-            if let Some(nodes) = &self.nodes {
-                let is_ahead = |node: &&f64| (end - time) * (**node - time) > 0.0;
-                let ahead = nodes.iter().filter(is_ahead).copied();
-                let nodes = std::iter::once(time).chain(ahead).collect();
-                let run = Self {
-                    nodes: Some(nodes),
-                    ..self.clone()
-                };
-                return Ok((run.mesh(&(time..end))?, stepper, 0, time));
-            }
-            let on_grid = run.mesh(&(origin..end)).ok().filter(|mesh| {
-                let next = mesh.elements().nth(checkpoint.elements);
-                next.is_some_and(|(start, ..)| start == time)
-            });
-            match on_grid {
-                Some(mesh) => Ok((mesh, stepper, checkpoint.elements, origin)),
-                None => Ok((run.mesh(&(time..end))?, stepper, 0, time)),
-            }
+            let place = checkpoint.reached.place(end, &self.nodes, |span, nodes| {
+                run.nodes = nodes;
+                run.mesh(span)
+            })?;
+            Ok((place, stepper))
         });
         match prepared {
-            Ok((mesh, stepper, done, origin)) => self.drive_on(
+            Ok(((mesh, done, origin), stepper)) => self.drive_on(
                 motion,
                 &checkpoint.state,
                 (&mesh, done, origin),

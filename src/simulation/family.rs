@@ -1,6 +1,7 @@
 //! Runs of models of run-time length, and which kind of run `Simulation::new` gives.
 
 use super::accurate::{Broken, Passing};
+use super::checkpoint::{FamilyCheckpoint, Reached};
 use super::mesh::Mesh;
 use super::{Simulation, progress};
 use crate::error::RunErrorKind;
@@ -8,7 +9,7 @@ use crate::motion::family::{FamilyMotion, FamilyNode};
 use std::error::Error;
 use std::fmt;
 use std::ops::Range;
-use tfe_runtime::family::{FamilyError, FamilyModel, FamilyState, FamilyStepper};
+use tfe_runtime::family::{FamilyError, FamilyModel, FamilyState, FamilyStepper, FamilySuspended};
 use tfe_runtime::length::{FixedLength, RunTimeLength};
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Model, Solve};
@@ -194,10 +195,29 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         span: Range<f64>,
     ) -> Result<FamilyMotion, FamilyRunError> {
         let refused = |kind| self.refused(kind, span.start, &start);
-        let (mut stepper, _) = self.stepper(span.start, &start).map_err(refused)?;
+        let (stepper, _) = self.stepper(span.start, &start).map_err(refused)?;
         let mesh = self.mesh(&span).map_err(refused)?;
-        self.drive_over((span.start, &start), &mesh, &mut stepper, &mut |_, _, _| {})
-            .map_err(|broken| FamilyRunError::new(broken.0, broken.1))
+        let place = (&mesh, 0, span.start);
+        self.drive_on((span.start, &start), place, stepper)
+    }
+
+    /// Runs over what is left of a mesh, and leaves a checkpoint.
+    pub(super) fn drive_on(
+        &self,
+        start: (f64, &FamilyState),
+        (mesh, done, origin): (&Mesh<0>, usize, f64),
+        mut stepper: FamilyStepper<'m, M>,
+    ) -> Result<FamilyMotion, FamilyRunError> {
+        let motion = self.drive_from(start, (mesh, done), &mut stepper, &mut |_, _, _| {});
+        let mut motion = motion.map_err(|broken| FamilyRunError::new(broken.0, broken.1))?;
+        let last = motion.last();
+        let checkpoint = FamilyCheckpoint {
+            reached: Reached::new(origin, self.step, mesh, last.t),
+            state: last.state(),
+            stepper: stepper.suspend(),
+        };
+        motion.set_checkpoint(checkpoint);
+        Ok(motion)
     }
 
     pub(super) fn refused(
@@ -224,17 +244,28 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     /// Runs over a mesh with a stepper at rest, and shows the end of every element to `passed`.
     pub(super) fn drive_over(
         &self,
-        (t0, start): (f64, &FamilyState),
+        start: (f64, &FamilyState),
         mesh: &Mesh<0>,
+        stepper: &mut FamilyStepper<'m, M>,
+        passed: &mut Passing<'_, FamilyStepper<'m, M>, FamilyState>,
+    ) -> Result<FamilyMotion, Broken<FamilyMotion>> {
+        self.drive_from(start, (mesh, 0), stepper, passed)
+    }
+
+    /// The same after the elements that are done.
+    fn drive_from(
+        &self,
+        (t0, start): (f64, &FamilyState),
+        (mesh, done): (&Mesh<0>, usize),
         stepper: &mut FamilyStepper<'m, M>,
         passed: &mut Passing<'_, FamilyStepper<'m, M>, FamilyState>,
     ) -> Result<FamilyMotion, Broken<FamilyMotion>> {
         let velocity = stepper.velocity(t0, start);
         let mut motion = FamilyMotion::from_start(self.model, t0, start, velocity);
-        let mut bar = progress::Bar::new(self.progress, mesh.steps());
+        let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
         let mut failure = None;
         let mut state = start.clone();
-        for (element, (t, next, h)) in mesh.elements().enumerate() {
+        for (element, (t, next, h)) in mesh.elements().enumerate().skip(done) {
             if let Err(source) = stepper.advance(mesh.begin(t, h), h, &mut state) {
                 if motion.last().t != t {
                     motion.record(self.model, t, &state, stepper.velocity(t, &state));
@@ -297,6 +328,31 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         t: f64,
         start: &FamilyState,
     ) -> Result<(FamilyStepper<'m, M>, Vec<f64>), RunErrorKind> {
+        self.check(start)?;
+        let stepper = FamilyStepper::new(self.model, self.chosen_element(), self.control);
+        let mut stepper = stepper.map_err(RunErrorKind::Family)?;
+        // A run records velocities: what has none is refused before it begins.
+        let velocity = stepper.velocity(t, start).map_err(RunErrorKind::Family)?;
+        Ok((stepper, velocity))
+    }
+
+    /// A stepper that goes on, if model, element and state are good.
+    pub(super) fn resumed_stepper(
+        &self,
+        t: f64,
+        state: &FamilyState,
+        suspended: FamilySuspended,
+    ) -> Result<FamilyStepper<'m, M>, RunErrorKind> {
+        self.check(state)?;
+        let (element, control) = (self.chosen_element(), self.control);
+        let stepper = FamilyStepper::resume(self.model, element, control, suspended);
+        let mut stepper = stepper.map_err(RunErrorKind::Family)?;
+        stepper.velocity(t, state).map_err(RunErrorKind::Family)?;
+        Ok(stepper)
+    }
+
+    /// Whether model and start are good.
+    fn check(&self, start: &FamilyState) -> Result<(), RunErrorKind> {
         self.model.check().map_err(RunErrorKind::Family)?;
         // Before memory is asked for: a wrong length may be any number.
         let expected = self.model.len();
@@ -315,11 +371,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
                 return Err(RunErrorKind::Start { coordinate, q, p });
             }
         }
-        let stepper = FamilyStepper::new(self.model, self.chosen_element(), self.control);
-        let mut stepper = stepper.map_err(RunErrorKind::Family)?;
-        // A run records velocities: what has none is refused before it begins.
-        let velocity = stepper.velocity(t, start).map_err(RunErrorKind::Family)?;
-        Ok((stepper, velocity))
+        Ok(())
     }
 }
 

@@ -35,7 +35,7 @@ mod view;
 pub use dense::FamilyDense;
 pub use error::FamilyError;
 pub use pattern::{Pattern, Values};
-pub use stepper::FamilyStepper;
+pub use stepper::{FamilyStepper, FamilySuspended};
 #[cfg(feature = "sparse")]
 pub use transition::{FamilyTransition, FamilyTransitionError};
 

@@ -21,8 +21,8 @@ use alloc::vec;
 
 /// A stepper of this kind: a fixed-point iteration, and where that contracts badly Newton's method.
 #[derive(Clone, Debug)]
-pub(super) struct Forces<'m, M> {
-    model: &'m M,
+pub(super) struct Forces<M> {
+    model: M,
     table: SchemeTable,
     pub(super) control: Control,
     problem: Problem,
@@ -39,7 +39,29 @@ pub(super) struct Forces<'m, M> {
     next_low: FamilyState,
 }
 
-impl<'m, M: FamilyModel> Forces<'m, M> {
+impl<M> Forces<M> {
+    /// The same memory for another holder of the model, with nothing counted yet.
+    pub(super) fn hand_over<H>(self, model: H) -> Forces<H> {
+        Forces {
+            model,
+            table: self.table,
+            control: self.control,
+            problem: self.problem,
+            registers: self.registers,
+            statistics: Statistics::NONE,
+            preference: self.preference,
+            #[cfg(feature = "sparse")]
+            tangent: self.tangent,
+            last: self.last,
+            start: self.start,
+            end: self.end,
+            low: self.low,
+            next_low: self.next_low,
+        }
+    }
+}
+
+impl<'m, M: FamilyModel> Forces<&'m M> {
     /// A stepper at rest; the model has been checked.
     ///
     /// # Errors

@@ -31,8 +31,8 @@ const REST: f64 = 1e-5;
 
 /// A stepper of this kind.
 #[derive(Clone, Debug)]
-pub(super) struct Rates<'m, M> {
-    model: &'m M,
+pub(super) struct Rates<M> {
+    model: M,
     table: SchemeTable,
     pub(super) control: Control,
     pub(super) statistics: Statistics,
@@ -93,7 +93,37 @@ impl Point {
     }
 }
 
-impl<'m, M: FamilyModel> Rates<'m, M> {
+impl<M> Rates<M> {
+    /// The same memory for another holder of the model, with nothing counted yet.
+    pub(super) fn hand_over<H>(self, model: H) -> Rates<H> {
+        Rates {
+            model,
+            table: self.table,
+            control: self.control,
+            statistics: Statistics::NONE,
+            constraints: self.constraints,
+            matrix: self.matrix,
+            parts: self.parts,
+            node: self.node,
+            unknowns: self.unknowns,
+            step: self.step,
+            factored: self.factored,
+            points: self.points,
+            rows: self.rows,
+            start_rows: self.start_rows,
+            q_end: self.q_end,
+            v_end: self.v_end,
+            last: self.last,
+            start: self.start,
+            end: self.end,
+            low: self.low,
+            impulse: self.impulse,
+            force: self.force,
+        }
+    }
+}
+
+impl<'m, M: FamilyModel> Rates<&'m M> {
     /// A stepper at rest; the model has been checked.
     ///
     /// # Errors

@@ -29,20 +29,55 @@ use core::convert::Infallible;
 #[derive(Clone, Debug)]
 pub struct FamilyStepper<'m, M> {
     model: &'m M,
+    element: Element,
     length: usize,
-    way: Way<'m, M>,
+    way: Way<&'m M>,
     legendre: Legendre,
     control: Control,
     /// Of a last step that was cut.
     pieces: Vec<FamilyDense>,
 }
 
-/// What is solved for.
+/// What is solved for, by a holder of the model.
 #[derive(Clone, Debug)]
-enum Way<'m, M> {
-    Forces(Box<Forces<'m, M>>),
+enum Way<M> {
+    Forces(Box<Forces<M>>),
     #[cfg(feature = "sparse")]
-    Rates(Box<Rates<'m, M>>),
+    Rates(Box<Rates<M>>),
+}
+
+impl<M> Way<M> {
+    fn hand_over<H>(self, model: H) -> Way<H> {
+        match self {
+            Self::Forces(forces) => Way::Forces(Box::new(forces.hand_over(model))),
+            #[cfg(feature = "sparse")]
+            Self::Rates(rates) => Way::Rates(Box::new(rates.hand_over(model))),
+        }
+    }
+
+    fn control_mut(&mut self) -> &mut Control {
+        match self {
+            Self::Forces(forces) => &mut forces.control,
+            #[cfg(feature = "sparse")]
+            Self::Rates(rates) => &mut rates.control,
+        }
+    }
+}
+
+/// All that a [`FamilyStepper`] carries from step to step, without its model: with it the next step is the same to the last bit.
+#[derive(Clone, Debug)]
+pub struct FamilySuspended {
+    element: Element,
+    length: usize,
+    way: Way<()>,
+}
+
+impl FamilySuspended {
+    /// The element of the stepper.
+    #[must_use]
+    pub fn element(&self) -> Element {
+        self.element
+    }
 }
 
 impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
@@ -54,15 +89,49 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
         model.check()?;
         let table = SchemeTable::new(element).map_err(FamilyError::Element)?;
         let way = Self::way(model, element, table, control)?;
-        let length = model.len();
-        Ok(Self {
+        Ok(Self::with(model, element, way, control))
+    }
+
+    fn with(model: &'m M, element: Element, way: Way<&'m M>, control: Control) -> Self {
+        Self {
             model,
-            length,
+            element,
+            length: model.len(),
             way,
             legendre: Legendre::default(),
             control,
             pieces: Vec::new(),
-        })
+        }
+    }
+
+    /// Leaves the model.
+    #[must_use]
+    pub fn suspend(self) -> FamilySuspended {
+        FamilySuspended {
+            element: self.element,
+            length: self.length,
+            way: self.way.hand_over(()),
+        }
+    }
+
+    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where that had another element, length or way to solve.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn resume(
+        model: &'m M,
+        element: Element,
+        control: Control,
+        suspended: FamilySuspended,
+    ) -> Result<Self, FamilyError> {
+        model.check()?;
+        let mut way = suspended.way.hand_over(model);
+        let is_same = suspended.element == element && suspended.length == model.len();
+        if !is_same || way.control_mut().solve != control.solve {
+            return Self::new(model, element, control);
+        }
+        *way.control_mut() = control;
+        Ok(Self::with(model, element, way, control))
     }
 
     fn way(
@@ -70,7 +139,7 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
         element: Element,
         table: SchemeTable,
         control: Control,
-    ) -> Result<Way<'m, M>, FamilyError> {
+    ) -> Result<Way<&'m M>, FamilyError> {
         let by_rates = cfg!(feature = "sparse") && M::FORM == Form::Lagrangian;
         let has_form = match M::FORM {
             Form::Lagrangian => element.is_collocated(),
@@ -179,11 +248,7 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
 
     /// Changes what iterations may leave from the next step on: [`Control::tolerance`].
     pub fn set_tolerance(&mut self, tolerance: f64) {
-        match &mut self.way {
-            Way::Forces(forces) => forces.control.tolerance = tolerance,
-            #[cfg(feature = "sparse")]
-            Way::Rates(rates) => rates.control.tolerance = tolerance,
-        }
+        self.way.control_mut().tolerance = tolerance;
     }
 
     /// What the steps so far have cost.

@@ -172,7 +172,7 @@ impl FamilyTransition {
 
     fn next<V: FamilyModel>(
         view: &V,
-        rates: &mut Rates<'_, V>,
+        rates: &mut Rates<&V>,
         (table, pattern): (&SchemeTable, &Arc<Pattern>),
         state: &FamilyState,
         (t, h): (f64, f64),
@@ -224,7 +224,7 @@ impl FamilyTransition {
     }
 
     /// The derivatives by what is no state.
-    fn differentiate<V: FamilyModel>(&mut self, rates: &Rates<'_, V>) {
+    fn differentiate<V: FamilyModel>(&mut self, rates: &Rates<&V>) {
         let scheme = self.table.view();
         let count = scheme.unknowns();
         let sum = |weights: &[f64], a: usize| -> f64 {

@@ -1,0 +1,79 @@
+//! The same for families.
+
+use super::super::family::{FamilyRunError, FamilySimulation};
+use super::Reached;
+use crate::motion::family::FamilyMotion;
+use tfe_runtime::family::{FamilyModel, FamilyState, FamilySuspended};
+
+/// The end of a family's run, with all that the next step depends on: what [`Checkpoint`](crate::Checkpoint) is for models of fixed size.
+///
+/// One run and two halves of it are the same to the last bit: [`FamilySimulation::resume`]. It belongs to the model, with the same parameters, and holds the memory of a
+/// stepper.
+#[derive(Clone, Debug)]
+pub struct FamilyCheckpoint {
+    pub(in crate::simulation) reached: Reached,
+    pub(in crate::simulation) state: FamilyState,
+    pub(in crate::simulation) stepper: FamilySuspended,
+}
+
+impl FamilyCheckpoint {
+    /// The time that the run has reached.
+    pub fn time(&self) -> f64 {
+        self.reached.time
+    }
+
+    /// The state there.
+    pub fn state(&self) -> &FamilyState {
+        &self.state
+    }
+}
+
+impl<M: FamilyModel> FamilySimulation<'_, M> {
+    /// Goes on where a run ended, up to the time `end`: to the last bit as one run would have from there on, as [`Simulation::resume`](crate::Simulation::resume) does.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(
+    ///     coordinates(q[n]),
+    ///     lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + (q[i+1]-q[i])^4/4),
+    /// )]
+    /// struct Chain { n: usize }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let chain = Chain { n: 20 };
+    /// let start = chain.state((0..20).map(|i| f64::from(i).cos()).collect(), vec![0.0; 20]);
+    /// let simulation = Simulation::new(&chain).step(0.1);
+    /// let whole = simulation.run(start.clone(), 0.0..10.0)?;
+    /// let first = simulation.run(start, 0.0..3.0)?;
+    /// let checkpoint = first.checkpoint().ok_or("the run is complete")?;
+    /// let second = simulation.resume(checkpoint, 10.0)?;
+    /// assert_eq!(second.states(), &whole.states()[30..]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`FamilyRunError`], as from [`run`](Self::run).
+    pub fn resume(
+        &self,
+        checkpoint: &FamilyCheckpoint,
+        end: f64,
+    ) -> Result<FamilyMotion, FamilyRunError> {
+        let (time, state) = (checkpoint.time(), &checkpoint.state);
+        let refused = |kind| self.refused(kind, time, state);
+        let mut run = self.clone();
+        run.step = run.step.or(checkpoint.reached.step);
+        let place = checkpoint.reached.place(end, &self.nodes, |span, nodes| {
+            run.nodes = nodes;
+            run.mesh(span)
+        });
+        let (mesh, done, origin) = place.map_err(refused)?;
+        let stepper = self.resumed_stepper(time, state, checkpoint.stepper.clone());
+        self.drive_on(
+            (time, state),
+            (&mesh, done, origin),
+            stepper.map_err(refused)?,
+        )
+    }
+}

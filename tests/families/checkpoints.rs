@@ -1,0 +1,154 @@
+//! Runs of families that go on where others ended.
+
+use tfe::error::RunErrorKind;
+use tfe::family::{FamilyError, FamilyModel, FamilySimulation, FamilyState};
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + k/4*(q[i+1]-q[i])^4),
+    force(q[n-1]) = sin(t) - c*dot(q[n-1]),
+)]
+struct Chain {
+    n: usize,
+    k: f64,
+    c: f64,
+}
+
+/// One run, and two of it that are cut anywhere: all states, velocities and energies are the same numbers.
+fn check<M: FamilyModel>(
+    simulation: &FamilySimulation<'_, M>,
+    start: &FamilyState,
+    (steps, h): (u32, f64),
+    seed: &mut u64,
+) {
+    const CUTS: u32 = 25;
+    let end = f64::from(steps) * h;
+    let whole = simulation.run(start.clone(), 0.0..end).expect("a run");
+    for _ in 0..CUTS {
+        *seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let cut = 1 + (*seed >> 33) as u32 % (steps - 1);
+        let first = simulation.run(start.clone(), 0.0..f64::from(cut) * h);
+        let first = first.expect("a run");
+        let checkpoint = first.checkpoint().expect("complete");
+        let second = simulation.resume(checkpoint, end).expect("a run");
+        let at = cut as usize;
+        assert_eq!(first.states(), &whole.states()[..=at], "cut at {cut}");
+        assert_eq!(second.states(), &whole.states()[at..], "cut at {cut}");
+        assert_eq!(second.velocities(), &whole.velocities()[at..]);
+        assert_eq!(second.energies(), &whole.energies()[at..]);
+    }
+}
+
+fn wave(n: usize) -> FamilyState {
+    FamilyState {
+        q: (0..n).map(|i| (i as f64).sin()).collect(),
+        p: (0..n).map(|i| (2.0 * i as f64).cos()).collect(),
+    }
+}
+
+#[test]
+fn two_halves_are_one_run_to_the_bit() {
+    let mut seed = 1;
+    let chain = Chain {
+        n: 7,
+        k: 1.0,
+        c: 0.1,
+    };
+    for element in [
+        Element::mixed(4),
+        Element::mixed(6),
+        Element::primal(3),
+        Element::radau(4),
+    ] {
+        let h = 0.1;
+        let simulation = Simulation::new(&chain).element(element).step(h);
+        check(&simulation, &wave(7), (30, h), &mut seed);
+    }
+}
+
+/// Newton's method keeps factors from step to step.
+#[cfg(feature = "sparse")]
+#[test]
+fn halves_of_stiff_runs() {
+    let mut seed = 2;
+    let stiff = Chain {
+        n: 7,
+        k: 1e5,
+        c: 10.0,
+    };
+    for element in [Element::mixed(4), Element::radau(3)] {
+        let h = 0.05;
+        let simulation = Simulation::new(&stiff).element(element).step(h);
+        let start = FamilyState {
+            q: (0..7).map(f64::from).collect(),
+            p: vec![0.0; 7],
+        };
+        check(&simulation, &start, (30, h), &mut seed);
+    }
+}
+
+#[cfg(feature = "sparse")]
+#[dynamics(
+    coordinates(x[n], y[n]),
+    lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
+    constraint(first) = x[0]^2 + y[0]^2 - 1,
+    constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - 1,
+)]
+struct Rods {
+    n: usize,
+}
+
+#[cfg(feature = "sparse")]
+#[test]
+fn halves_of_constrained_runs() {
+    let mut seed = 3;
+    let rods = Rods { n: 4 };
+    let start = FamilyState {
+        q: vec![1.0, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.0],
+        p: vec![0.0; 8],
+    };
+    for nodes in [2, 4, 5] {
+        let h = 0.02;
+        let element = Element::mixed(nodes);
+        let simulation = Simulation::new(&rods).element(element).step(h);
+        check(&simulation, &start, (30, h), &mut seed);
+    }
+}
+
+/// A checkpoint beside the grid begins a new one; another element and another length are no obstacle and an error.
+#[test]
+fn checkpoints_of_other_runs() {
+    let chain = |n| Chain { n, k: 1.0, c: 0.1 };
+    let (seven, six) = (chain(7), chain(6));
+    let run = Simulation::new(&seven).step(0.1);
+    let whole = run.run(wave(7), 0.0..4.0).expect("a run");
+    let first = run.run(wave(7), 0.0..1.23).expect("a run");
+    let checkpoint = first.checkpoint().expect("complete");
+    assert_eq!(
+        (checkpoint.time(), checkpoint.state()),
+        (1.23, &first.last().state())
+    );
+    let other = run.clone().element(Element::mixed(7));
+    for run in [&run, &other] {
+        let second = run.resume(checkpoint, 4.0).expect("a run");
+        assert_eq!(second.states()[0].t, 1.23);
+        for (q, expected) in second.last().q.iter().zip(&whole.last().q) {
+            // Both are off by the sixth power of the step.
+            assert!((q - expected).abs() < 1e-6, "{q}, {expected}");
+        }
+    }
+    let refused = Simulation::new(&six).resume(checkpoint, 4.0);
+    let error = refused.expect_err("another length");
+    let expected = FamilyError::StateLength {
+        vector: "q",
+        length: 7,
+        expected: 6,
+    };
+    assert!(
+        matches!(error.kind(), RunErrorKind::Family(kind) if *kind == expected),
+        "{error}"
+    );
+}
