@@ -13,6 +13,7 @@ mod mechanisms;
 mod models;
 mod nonholonomic;
 mod orders;
+mod overconstrained;
 mod reactions;
 mod redundant;
 mod reference_values;
