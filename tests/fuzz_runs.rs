@@ -160,7 +160,7 @@ where
         0.0
     };
     let run: Simulation<'_, M, N> = Simulation::new(model);
-    let mut run = run.element(element).max_iterations(1 + random.below(100));
+    let mut run = run.element(element);
     run = match random.below(6) {
         0 => run.solver(Solve::FixedPoint),
         1 => run.solver(Solve::Newton),
@@ -184,6 +184,7 @@ where
         }
         _ => run
             .step(step)
+            .max_iterations(1 + random.below(100))
             .at_kinks(random.below(3) == 0)
             .run(start, from..end),
     };

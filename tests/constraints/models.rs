@@ -176,3 +176,52 @@ impl KnifeEdge {
 pub struct MovingGround {
     pub c: f64,
 }
+
+/// Andrews' squeezer: seven bodies in the plane by their angles, driven by a moment, against a spring (Schiehlen, *Multibody Systems Handbook*, 1990; names as in Hairer and Wanner II, VII.7).
+#[dynamics(
+    coordinates(beta, theta, gamma, phi, delta, omega, epsilon),
+    let xa = -0.06934, let ya = -0.00227, let xb = -0.03635, let yb = 0.03273, let xc = 0.014, let yc = 0.072,
+    let d = 0.028, let da = 0.0115, let e = 0.02, let ea = 0.01421, let rr = 0.007, let ra = 0.00092, let l0 = 0.07785,
+    let ss = 0.035, let sa = 0.01874, let sb = 0.01043, let sc = 0.018, let sd = 0.02, let ta = 0.02308, let tb = 0.00916,
+    let u = 0.04, let ua = 0.01228, let ub = 0.00449, let zf = 0.02, let zt = 0.04, let fa = 0.01421,
+    let x1 = ra*cos(beta), let y1 = ra*sin(beta),
+    let x2 = rr*cos(beta) - da*cos(beta + theta), let y2 = rr*sin(beta) - da*sin(beta + theta),
+    let x3 = xb + sa*sin(gamma) + sb*cos(gamma), let y3 = yb - sa*cos(gamma) + sb*sin(gamma),
+    let x4 = xa + zt*cos(delta) + (e - ea)*sin(phi + delta), let y4 = ya + zt*sin(delta) - (e - ea)*cos(phi + delta),
+    let x5 = xa + ta*cos(delta) - tb*sin(delta), let y5 = ya + ta*sin(delta) + tb*cos(delta),
+    let x6 = xa + u*sin(epsilon) + (zf - fa)*cos(omega + epsilon), let y6 = ya - u*cos(epsilon) + (zf - fa)*sin(omega + epsilon),
+    let x7 = xa + ua*sin(epsilon) - ub*cos(epsilon), let y7 = ya - ua*cos(epsilon) - ub*sin(epsilon),
+    let xd = sd*cos(gamma) + sc*sin(gamma) + xb, let yd = sd*sin(gamma) - sc*cos(gamma) + yb,
+    lagrangian = 0.04325/2*(dot(x1)^2 + dot(y1)^2) + 2.194e-6/2*dot(beta)^2
+        + 0.00365/2*(dot(x2)^2 + dot(y2)^2) + 4.410e-7/2*(dot(beta) + dot(theta))^2
+        + 0.02373/2*(dot(x3)^2 + dot(y3)^2) + 5.255e-6/2*dot(gamma)^2
+        + 0.00706/2*(dot(x4)^2 + dot(y4)^2) + 5.667e-7/2*(dot(phi) + dot(delta))^2
+        + 0.07050/2*(dot(x5)^2 + dot(y5)^2) + 1.169e-5/2*dot(delta)^2
+        + 0.00706/2*(dot(x6)^2 + dot(y6)^2) + 5.667e-7/2*(dot(omega) + dot(epsilon))^2
+        + 0.05498/2*(dot(x7)^2 + dot(y7)^2) + 1.912e-5/2*dot(epsilon)^2
+        - 4530/2*(sqrt((xd - xc)^2 + (yd - yc)^2) - l0)^2,
+    force(beta) = 0.033,
+    constraint(x_3) = rr*cos(beta) - d*cos(beta + theta) - ss*sin(gamma) - xb,
+    constraint(y_3) = rr*sin(beta) - d*sin(beta + theta) + ss*cos(gamma) - yb,
+    constraint(x_4) = rr*cos(beta) - d*cos(beta + theta) - e*sin(phi + delta) - zt*cos(delta) - xa,
+    constraint(y_4) = rr*sin(beta) - d*sin(beta + theta) + e*cos(phi + delta) - zt*sin(delta) - ya,
+    constraint(x_6) = rr*cos(beta) - d*cos(beta + theta) - zf*cos(omega + epsilon) - u*sin(epsilon) - xa,
+    constraint(y_6) = rr*sin(beta) - d*sin(beta + theta) - zf*sin(omega + epsilon) + u*cos(epsilon) - ya,
+)]
+pub struct Andrews;
+
+impl Andrews {
+    /// At rest.
+    pub fn at_rest(&self) -> State<7> {
+        let q = [
+            -0.0617138900142764496,
+            0.0,
+            0.455279819163070380,
+            0.222668390165885885,
+            0.487364979543842550,
+            -0.222668390165885885,
+            1.23054744454982119,
+        ];
+        self.state(q, [0.0; 7])
+    }
+}

@@ -35,7 +35,8 @@ macro_rules! plate {
             lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(th)^2 - m*g*y,
             $(constraint($bar) = $row),+
         )]
-        struct $name {
+        #[derive(Clone, Copy)]
+        pub struct $name {
             m: f64,
             j: f64,
             l: f64,
@@ -219,27 +220,28 @@ fn six_revolutes() {
     keeps_its_order(&linkage, linkage.through(0.7, 0.5), (0.05, 23));
 }
 
+/// A plate that swings.
+pub fn plate() -> (Plate, State<3>) {
+    let plate = Plate {
+        m: 1.0,
+        j: 0.3,
+        l: 0.7,
+        g: 9.81,
+    };
+    let start = consistent(&plate, [0.6, -0.8, 0.0], [0.8, 0.6, 0.0], 2);
+    (plate, start)
+}
+
 /// However the rows are given: the same motion.
 #[test]
 fn a_plate_on_three_bars() {
-    macro_rules! plate {
-        ($name:ident) => {
-            $name {
-                m: 1.0,
-                j: 0.3,
-                l: 0.7,
-                g: 9.81,
-            }
-        };
-    }
-    let (q, v) = ([0.6, -0.8, 0.0], [0.8, 0.6, 0.0]);
-    let plate = plate!(Plate);
-    let start = consistent(&plate, q, v, 2);
+    let (plate, start) = plate();
     keeps_its_order(&plate, start, (0.05, 2));
     for nodes in [2, 3, 4, 6] {
         macro_rules! end {
             ($name:ident) => {{
-                let plate = plate!($name);
+                let Plate { m, j, l, g } = plate;
+                let plate = $name { m, j, l, g };
                 let run = Simulation::new(&plate).element(Element::mixed(nodes));
                 let motion = run.step(0.05).run(start, 0.0..5.0).expect("a run");
                 motion.last().q

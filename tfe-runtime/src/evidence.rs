@@ -1,10 +1,11 @@
 //! What speaks for the solution of an element (T-115, T-117).
 
 use crate::element::{Element, Family};
+use crate::equations::Increment;
 use crate::error::StepError;
 use crate::legendre::energy_at;
 use crate::model::{Model, State};
-use crate::newton::Solve;
+use crate::newton::{POSITION_ROUND_OFF, Solve};
 
 /// Whether what an iteration has found is near where it began: increments that shrink by a factor from the first one on stay in a ball around the start, and the
 /// root in that ball is the only one (T-115). An iteration that wandered before it contracted may have found any root.
@@ -63,8 +64,10 @@ impl Evidence {
 
     /// The next increment; `own` says that its matrix was made in this step. What the matrix of another step does is no evidence.
     #[inline(always)]
-    pub(crate) fn see(&mut self, size: f64, own: bool) {
-        if size > Self::FAR {
+    pub(crate) fn see(&mut self, increment: Increment, own: bool) {
+        let size = increment.relative;
+        // Velocities and multipliers of short steps may go to and fro by the roundings of constraints over the step.
+        if size > Self::FAR && increment.position > POSITION_ROUND_OFF {
             let curved = self.count == 1 && size > self.reach;
             let ratio = if curved { 1.0 } else { size / self.last };
             self.ratio = self.ratio.max(ratio);

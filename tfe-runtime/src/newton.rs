@@ -77,7 +77,7 @@ pub(crate) const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
 pub(crate) const ROUGH_ROUND_OFF: f64 = 1e-10;
 
 /// Where Newton's method moves coordinates by less than that, relative to them, it is the rounding of constraints, summed over the points of an element.
-const POSITION_ROUND_OFF: f64 = 64.0 * f64::EPSILON;
+pub(crate) const POSITION_ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 /// The same of large stiff models, where residuals are differences of forces many orders larger.
 #[cfg(feature = "sparse")]
@@ -383,7 +383,7 @@ where
         statistics.newton_iterations += 1;
         let increment = equations.measure(unknowns, step);
         own |= fresh;
-        evidence.see(increment.relative, own);
+        evidence.see(increment, own);
         let verdict = monitor.judge(increment)?;
         // Equations that are linear are solved once; a second solution takes away the rounding.
         let refined = linear && iteration > 0 && increment.relative <= ROUND_OFF;

@@ -254,7 +254,7 @@ impl<'m, M: FamilyModel> Forces<&'m M> {
             self.statistics.iterations += 1;
             self.statistics.newton_iterations += 1;
             own |= fresh;
-            evidence.see(increment.relative, own);
+            evidence.see(increment, own);
             let verdict = monitor.judge(increment);
             outcome.residual = monitor.last();
             outcome.contraction = monitor.rate();

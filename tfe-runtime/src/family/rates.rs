@@ -329,7 +329,7 @@ impl<'m, M: FamilyModel> Rates<&'m M> {
             self.statistics.newton_iterations += 1;
             let increment = self.measure(h);
             own |= fresh;
-            evidence.see(increment.relative, own);
+            evidence.see(increment, own);
             match monitor.judge(increment) {
                 Ok(Verdict::Converged) => return evidence.check(self.control.solve),
                 Ok(Verdict::GoOn) if monitor.is_noise(fresh) => return Ok(()),
