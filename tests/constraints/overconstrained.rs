@@ -148,14 +148,14 @@ impl Bricard {
     }
 }
 
-fn consistent<M: Model<N>, const N: usize>(
+fn consistent<M, const N: usize>(
     model: &M,
     q: [f64; N],
     v: [f64; N],
     rank: usize,
 ) -> State<N>
 where
-    M: Declared<N, Length = FixedLength>,
+    M: Model<N> + Declared<N, Length = FixedLength>,
 {
     let start = model.consistent_state(q, v).expect("consistent");
     assert!(start.position < 1e-14, "closed: {:e}", start.position);
