@@ -148,12 +148,7 @@ impl Bricard {
     }
 }
 
-fn consistent<M, const N: usize>(
-    model: &M,
-    q: [f64; N],
-    v: [f64; N],
-    rank: usize,
-) -> State<N>
+fn consistent<M, const N: usize>(model: &M, q: [f64; N], v: [f64; N], rank: usize) -> State<N>
 where
     M: Model<N> + Declared<N, Length = FixedLength>,
 {
