@@ -2,20 +2,23 @@
 
 mod ends;
 mod error;
+mod plan;
 mod progress;
+mod under_way;
 
 pub use ends::{Ends, Failure};
 pub use error::EnsembleError;
+pub use under_way::EnsembleRun;
 
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use crate::simulation::mesh::Mesh;
-use crate::simulation::{check_constraints, check_start};
+use plan::Plan;
 use progress::Progress;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 use tfe_runtime::bundle::Bundle;
-use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 
 /// How many trajectories are stepped side by side.
@@ -76,6 +79,21 @@ impl<M> Clone for Models<'_, M> {
 }
 
 impl<M> Copy for Models<'_, M> {}
+
+impl<'m, M> Models<'m, M> {
+    /// The model of one run.
+    fn of(&self, index: usize) -> &'m M {
+        match self {
+            Self::One(model) => model,
+            Self::Many(models) => &models[index],
+        }
+    }
+}
+
+/// The start of one run; one alone serves all.
+fn start_of<const N: usize>(starts: &[State<N>], index: usize) -> &State<N> {
+    &starts[if starts.len() == 1 { 0 } else { index }]
+}
 
 impl<M, const N: usize> Clone for Ensemble<'_, M, N> {
     fn clone(&self) -> Self {
@@ -245,14 +263,13 @@ where
         let plan = Plan {
             element: self.element,
             control: self.control,
-            span,
+            end: span.end,
             mesh,
+            done: 0,
         };
         let progress = Progress::new(self.progress, count);
         let statistics = match self.models {
-            Models::One(model)
-                if Bundle::<M, N, WIDTH>::uses_lanes(&self.element, &self.control) =>
-            {
+            Models::One(model) if self.width() == WIDTH => {
                 // Made once, and one batch after the other runs in a copy.
                 let empty = Bundle::new(model, self.element, self.control);
                 let empty = empty.map_err(RunErrorKind::Element)?;
@@ -271,16 +288,8 @@ where
                 count,
                 || (),
                 |_: &mut (), index| {
-                    let model = match models {
-                        Models::One(model) => model,
-                        Models::Many(models) => &models[index],
-                    };
-                    let start = if starts.len() == 1 {
-                        &starts[0]
-                    } else {
-                        &starts[index]
-                    };
-                    let (result, statistics) = plan.run_alone(model, start);
+                    let start = start_of(starts, index);
+                    let (result, statistics) = plan.run_alone(models.of(index), start);
                     finished(index, result);
                     progress.advance(1);
                     statistics
@@ -288,6 +297,16 @@ where
             ),
         };
         Ok(statistics)
+    }
+
+    /// How many trajectories are stepped side by side: [`WIDTH`] or one.
+    fn width(&self) -> usize {
+        match self.models {
+            Models::One(_) if Bundle::<M, N, WIDTH>::uses_lanes(&self.element, &self.control) => {
+                WIDTH
+            }
+            _ => 1,
+        }
     }
 
     /// How many runs there are.
@@ -334,109 +353,4 @@ fn summed<P>(
 fn merged(mut sum: Statistics, other: Statistics) -> Statistics {
     sum.merge(&other);
     sum
-}
-
-/// What all runs have in common.
-struct Plan<const N: usize> {
-    element: Element,
-    control: Control,
-    span: Range<f64>,
-    mesh: Mesh<N>,
-}
-
-impl<const N: usize> Plan<N> {
-    fn end(&self, state: &State<N>) -> Node<N> {
-        Node {
-            t: self.span.end,
-            q: state.q,
-            p: state.p,
-        }
-    }
-
-    /// Up to [`WIDTH`] runs in lanes.
-    fn run_together<M>(
-        &self,
-        bundle: &mut Bundle<'_, M, N, WIDTH>,
-        starts: &[State<N>],
-        finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
-    ) -> Statistics
-    where
-        M: Model<N>,
-    {
-        bundle.start(starts);
-        let mut failures: [Option<RunErrorKind>; WIDTH] = [const { None }; WIDTH];
-        for (start, failure) in starts.iter().zip(&mut failures) {
-            *failure = check_start(start).err();
-        }
-        for (element, (time, _, step)) in self.mesh.elements().enumerate() {
-            if !bundle.advance(self.mesh.begin(time, step), step) {
-                continue;
-            }
-            for (lane, failure) in failures.iter_mut().enumerate().take(starts.len()) {
-                if let (Err(source), None) = (bundle.state(lane), &failure) {
-                    *failure = Some(RunErrorKind::Solve {
-                        element,
-                        time,
-                        step,
-                        source,
-                    });
-                }
-            }
-            if failures[..starts.len()].iter().all(Option::is_some) {
-                break;
-            }
-        }
-        for (lane, failure) in failures.into_iter().enumerate().take(starts.len()) {
-            let result = match (failure, bundle.state(lane)) {
-                (None, Ok(state)) => Ok(self.end(&state)),
-                (Some(failure), _) => Err(failure),
-                // Only a bad start fails outside a step, and it has been found.
-                (None, Err(source)) => Err(RunErrorKind::Solve {
-                    element: 0,
-                    time: self.span.start,
-                    step: 0.0,
-                    source,
-                }),
-            };
-            finished(lane, result);
-        }
-        bundle.take_statistics()
-    }
-
-    /// One run by itself.
-    fn run_alone<M>(
-        &self,
-        model: &M,
-        start: &State<N>,
-    ) -> (Result<Node<N>, RunErrorKind>, Statistics)
-    where
-        M: Model<N>,
-    {
-        let first = self.mesh.elements().next();
-        let checked = check_start(start).and_then(|()| match first {
-            Some((t, _, h)) => check_constraints(model, t, h, start),
-            None => Ok(()),
-        });
-        let stepper = checked.and_then(|()| {
-            Stepper::new(model, self.element, self.control).map_err(RunErrorKind::Element)
-        });
-        let mut stepper = match stepper {
-            Ok(stepper) => stepper,
-            Err(kind) => return (Err(kind), Statistics::default()),
-        };
-        let mut state = *start;
-        for (element, (time, _, step)) in self.mesh.elements().enumerate() {
-            if let Err(source) = stepper.advance(self.mesh.begin(time, step), step, &mut state, &[])
-            {
-                let kind = RunErrorKind::Solve {
-                    element,
-                    time,
-                    step,
-                    source,
-                };
-                return (Err(kind), *stepper.statistics());
-            }
-        }
-        (Ok(self.end(&state)), *stepper.statistics())
-    }
 }

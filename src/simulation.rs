@@ -22,7 +22,7 @@ use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 use watch::{Recorded, Watch};
 
 pub use accurate::Accurate;
-use checkpoint::Reached;
+pub(crate) use checkpoint::Reached;
 pub use checkpoint::{Checkpoint, FamilyCheckpoint};
 pub use watch::Warning;
 

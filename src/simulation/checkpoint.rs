@@ -26,17 +26,17 @@ pub struct Checkpoint<const N: usize> {
 
 /// How far a run has got on its grid.
 #[derive(Clone, Debug)]
-pub(super) struct Reached {
+pub(crate) struct Reached {
     /// Where it began.
-    pub(super) origin: f64,
-    pub(super) step: Option<f64>,
+    pub(crate) origin: f64,
+    pub(crate) step: Option<f64>,
     /// How many elements were done.
-    pub(super) elements: usize,
-    pub(super) time: f64,
+    pub(crate) elements: usize,
+    pub(crate) time: f64,
 }
 
 impl Reached {
-    pub(super) fn new<const N: usize>(
+    pub(crate) fn new<const N: usize>(
         origin: f64,
         step: Option<f64>,
         mesh: &Mesh<N>,
@@ -52,10 +52,10 @@ impl Reached {
 
     /// The mesh to go on over, how many elements of it are done, and where it begins: the grid of the run if the checkpoint lies on it, else one that begins there. Given nodes
     /// are those that lie ahead.
-    fn place<const N: usize>(
+    pub(crate) fn place<const N: usize>(
         &self,
         end: f64,
-        nodes: &Option<Vec<f64>>,
+        nodes: Option<&[f64]>,
         mut mesh: impl FnMut(&Range<f64>, Option<Vec<f64>>) -> Result<Mesh<N>, RunErrorKind>,
     ) -> Result<(Mesh<N>, usize, f64), RunErrorKind> {
         let Self {
@@ -135,10 +135,12 @@ impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
                 Stepper::new(self.model, element, self.control)
             };
             let stepper = self.cutting(stepper.map_err(RunErrorKind::Element)?);
-            let place = checkpoint.reached.place(end, &self.nodes, |span, nodes| {
-                run.nodes = nodes;
-                run.mesh(span)
-            })?;
+            let place = checkpoint
+                .reached
+                .place(end, self.nodes.as_deref(), |span, nodes| {
+                    run.nodes = nodes;
+                    run.mesh(span)
+                })?;
             Ok((place, stepper))
         });
         match prepared {

@@ -699,7 +699,7 @@ where
     }
 
     /// The same since the last call.
-    pub(crate) fn take_statistics(&mut self) -> Statistics {
+    pub fn take_statistics(&mut self) -> Statistics {
         core::mem::take(&mut self.memory.statistics)
     }
 }

@@ -64,10 +64,12 @@ impl<M: FamilyModel> FamilySimulation<'_, M> {
         let refused = |kind| self.refused(kind, time, state);
         let mut run = self.clone();
         run.step = run.step.or(checkpoint.reached.step);
-        let place = checkpoint.reached.place(end, &self.nodes, |span, nodes| {
-            run.nodes = nodes;
-            run.mesh(span)
-        });
+        let place = checkpoint
+            .reached
+            .place(end, self.nodes.as_deref(), |span, nodes| {
+                run.nodes = nodes;
+                run.mesh(span)
+            });
         let (mesh, done, origin) = place.map_err(refused)?;
         let stepper = self.resumed_stepper(time, state, checkpoint.stepper.clone());
         self.drive_on(

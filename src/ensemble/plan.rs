@@ -1,0 +1,164 @@
+//! How one batch of an ensemble is run.
+
+use super::WIDTH;
+use crate::error::RunErrorKind;
+use crate::motion::Node;
+use crate::simulation::mesh::Mesh;
+use crate::simulation::{check_constraints, check_start};
+use tfe_runtime::bundle::Bundle;
+use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::{Element, Model, State, Statistics};
+
+/// What all runs have in common.
+pub(super) struct Plan<const N: usize> {
+    pub(super) element: Element,
+    pub(super) control: Control,
+    pub(super) end: f64,
+    pub(super) mesh: Mesh<N>,
+    /// Elements of the mesh that are behind.
+    pub(super) done: usize,
+}
+
+/// Why trajectories in lanes have stopped.
+pub(super) type Failures = [Option<RunErrorKind>; WIDTH];
+
+impl<const N: usize> Plan<N> {
+    fn node(&self, state: &State<N>) -> Node<N> {
+        Node {
+            t: self.end,
+            q: state.q,
+            p: state.p,
+        }
+    }
+
+    /// Up to [`WIDTH`] runs in lanes.
+    pub(super) fn run_together<M>(
+        &self,
+        bundle: &mut Bundle<'_, M, N, WIDTH>,
+        starts: &[State<N>],
+        finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
+    ) -> Statistics
+    where
+        M: Model<N>,
+    {
+        let mut failures = begin(bundle, starts);
+        self.drive_together(bundle, starts.len(), &mut failures, finished)
+    }
+
+    /// The same from where they are.
+    pub(super) fn drive_together<M>(
+        &self,
+        bundle: &mut Bundle<'_, M, N, WIDTH>,
+        count: usize,
+        failures: &mut Failures,
+        finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
+    ) -> Statistics
+    where
+        M: Model<N>,
+    {
+        for (element, (time, _, step)) in self.mesh.elements().enumerate().skip(self.done) {
+            if !bundle.advance(self.mesh.begin(time, step), step) {
+                continue;
+            }
+            for (lane, failure) in failures.iter_mut().enumerate().take(count) {
+                if let (Err(source), None) = (bundle.state(lane), &failure) {
+                    *failure = Some(RunErrorKind::Solve {
+                        element,
+                        time,
+                        step,
+                        source,
+                    });
+                }
+            }
+            if failures[..count].iter().all(Option::is_some) {
+                break;
+            }
+        }
+        for (lane, failure) in failures.iter().enumerate().take(count) {
+            let result = match (failure, bundle.state(lane)) {
+                (None, Ok(state)) => Ok(self.node(&state)),
+                (Some(failure), _) => Err(failure.clone()),
+                // Only a bad start fails outside a step, and it has been found.
+                (None, Err(source)) => Err(RunErrorKind::Solve {
+                    element: 0,
+                    time: self.end,
+                    step: 0.0,
+                    source,
+                }),
+            };
+            finished(lane, result);
+        }
+        bundle.take_statistics()
+    }
+
+    /// One run by itself.
+    pub(super) fn run_alone<M>(
+        &self,
+        model: &M,
+        start: &State<N>,
+    ) -> (Result<Node<N>, RunErrorKind>, Statistics)
+    where
+        M: Model<N>,
+    {
+        let mut stepper = match self.stepper(model, start) {
+            Ok(stepper) => stepper,
+            Err(kind) => return (Err(kind), Statistics::default()),
+        };
+        let mut state = *start;
+        let outcome = self.drive_alone(&mut stepper, &mut state);
+        (outcome, *stepper.statistics())
+    }
+
+    /// A stepper at rest, if the start is good.
+    pub(super) fn stepper<'m, M>(
+        &self,
+        model: &'m M,
+        start: &State<N>,
+    ) -> Result<Stepper<'m, M, N>, RunErrorKind>
+    where
+        M: Model<N>,
+    {
+        check_start(start)?;
+        if let Some((t, _, h)) = self.mesh.elements().next() {
+            check_constraints(model, t, h, start)?;
+        }
+        Stepper::new(model, self.element, self.control).map_err(RunErrorKind::Element)
+    }
+
+    /// One run from where it is.
+    pub(super) fn drive_alone<M>(
+        &self,
+        stepper: &mut Stepper<'_, M, N>,
+        state: &mut State<N>,
+    ) -> Result<Node<N>, RunErrorKind>
+    where
+        M: Model<N>,
+    {
+        for (element, (time, _, step)) in self.mesh.elements().enumerate().skip(self.done) {
+            let outcome = stepper.advance(self.mesh.begin(time, step), step, state, &[]);
+            outcome.map_err(|source| RunErrorKind::Solve {
+                element,
+                time,
+                step,
+                source,
+            })?;
+        }
+        Ok(self.node(state))
+    }
+}
+
+/// Places trajectories in lanes; bad starts have failed already.
+pub(super) fn begin<M, const N: usize>(
+    bundle: &mut Bundle<'_, M, N, WIDTH>,
+    starts: &[State<N>],
+) -> Failures
+where
+    M: Model<N>,
+{
+    bundle.start(starts);
+    let mut failures = [const { None }; WIDTH];
+    for (start, failure) in starts.iter().zip(&mut failures) {
+        *failure = check_start(start).err();
+    }
+    failures
+}

@@ -1,0 +1,278 @@
+//! Ensembles that go on where they have got to.
+
+use super::plan::{Failures, Plan, begin};
+use super::progress::Progress;
+use super::{Ends, Ensemble, EnsembleError, WIDTH, start_of, summed};
+use crate::error::RunErrorKind;
+use crate::motion::Node;
+use crate::simulation::Reached;
+use crate::simulation::mesh::Mesh;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tfe_runtime::bundle::Bundle;
+use tfe_runtime::step::Stepper;
+use tfe_runtime::{Model, State, Statistics};
+
+/// An ensemble under way: made by [`Ensemble::begin`], moved by [`run_to`](Self::run_to).
+///
+/// It holds the memory of a stepper for each trajectory, or of a [`Bundle`] for eight: some kilobytes each for a few coordinates. A clone is a checkpoint.
+#[derive(Debug)]
+pub struct EnsembleRun<'m, M, const N: usize> {
+    ensemble: Ensemble<'m, M, N>,
+    reached: Reached,
+    batches: Vec<Batch<'m, M, N>>,
+}
+
+// Not derived: the models are borrowed, they need not be `Clone`.
+impl<M: Model<N>, const N: usize> Clone for EnsembleRun<'_, M, N> {
+    fn clone(&self) -> Self {
+        Self {
+            ensemble: self.ensemble.clone(),
+            reached: self.reached.clone(),
+            batches: self.batches.clone(),
+        }
+    }
+}
+
+/// Trajectories that are run one after the other on one processor.
+#[derive(Debug)]
+enum Batch<'m, M, const N: usize> {
+    /// Not begun: the starts.
+    At(Vec<State<N>>),
+    Lanes(Box<Lanes<'m, M, N>>),
+    Alone(Box<(Stepper<'m, M, N>, State<N>)>),
+    Failed(RunErrorKind),
+}
+
+#[derive(Debug)]
+struct Lanes<'m, M, const N: usize> {
+    bundle: Bundle<'m, M, N, WIDTH>,
+    failures: Failures,
+    count: usize,
+}
+
+impl<M: Model<N>, const N: usize> Clone for Batch<'_, M, N> {
+    fn clone(&self) -> Self {
+        match self {
+            Self::At(starts) => Self::At(starts.clone()),
+            Self::Lanes(lanes) => {
+                let Lanes {
+                    bundle,
+                    failures,
+                    count,
+                } = &**lanes;
+                Self::Lanes(Box::new(Lanes {
+                    bundle: bundle.clone(),
+                    failures: failures.clone(),
+                    count: *count,
+                }))
+            }
+            Self::Alone(one) => Self::Alone(Box::new((one.0.clone(), one.1))),
+            Self::Failed(kind) => Self::Failed(kind.clone()),
+        }
+    }
+}
+
+impl<'m, M, const N: usize> Ensemble<'m, M, N>
+where
+    M: Model<N> + Sync,
+{
+    /// Places all trajectories at their starts, at the time `t0`; [`EnsembleRun::run_to`] moves them. For results at several times, as one run would pass them to the bit:
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + cos(theta))]
+    /// struct Pendulum {}
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let pendulum = Pendulum {};
+    /// let starts: Vec<_> = (0..20).map(|k| pendulum.state([0.1 * f64::from(k)], [0.0])).collect();
+    /// let ensemble = Ensemble::new(&pendulum).step(0.1);
+    /// let mut run = ensemble.begin(&starts, 0.0)?;
+    /// let middle = run.run_to(3.0)?;
+    /// let end = run.run_to(10.0)?;
+    /// assert_eq!(middle[19], ensemble.run(&starts, 0.0..3.0)?[19]);
+    /// assert_eq!(end[19], ensemble.run(&starts, 0.0..10.0)?[19]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`EnsembleError`] where the element does not exist or the number of starts is not that of models. A bad start is a failure of its own run only.
+    pub fn begin(
+        &self,
+        starts: &[State<N>],
+        t0: f64,
+    ) -> Result<EnsembleRun<'m, M, N>, EnsembleError> {
+        let count = self.count(starts)?;
+        self.element.validate().map_err(RunErrorKind::Element)?;
+        let batches = match self.width() {
+            WIDTH => starts
+                .chunks(WIDTH)
+                .map(|some| Batch::At(some.to_vec()))
+                .collect(),
+            _ => (0..count)
+                .map(|index| Batch::At(vec![*start_of(starts, index)]))
+                .collect(),
+        };
+        Ok(EnsembleRun {
+            ensemble: self.clone(),
+            reached: Reached {
+                origin: t0,
+                step: self.step,
+                elements: 0,
+                time: t0,
+            },
+            batches,
+        })
+    }
+}
+
+impl<M, const N: usize> EnsembleRun<'_, M, N>
+where
+    M: Model<N> + Sync,
+{
+    /// The time that has been reached.
+    pub fn time(&self) -> f64 {
+        self.reached.time
+    }
+
+    /// Runs all trajectories on to the time `end`. What has failed stays so.
+    ///
+    /// Where that time lies on the grid of steps from the first start, and the last one did, the results are to the last bit those of one run; else the grid begins anew where the
+    /// ensemble is. Without a step of one's own it is a thousandth of the first span.
+    ///
+    /// # Errors
+    /// [`EnsembleError`] where step or span are not finite; nothing is changed then.
+    pub fn run_to(&mut self, end: f64) -> Result<Ends<N>, EnsembleError> {
+        let Self {
+            ensemble,
+            reached,
+            batches,
+        } = self;
+        let thousandth = (end - reached.time).abs() / 1000.0;
+        let step = reached.step.unwrap_or(thousandth);
+        let (mesh, done, origin) = reached.place(end, None, |span, _| {
+            Mesh::new(span, step, &ensemble.breaks, &[])
+        })?;
+        let next = Reached::new(origin, Some(step), &mesh, end);
+        let plan = Plan {
+            element: ensemble.element,
+            control: ensemble.control,
+            end,
+            mesh,
+            done,
+        };
+        let width = ensemble.width();
+        let places: Vec<_> = std::mem::take(batches)
+            .into_iter()
+            .map(Mutex::new)
+            .collect();
+        let count: usize = places.iter().map(|batch| lock(batch).count()).sum();
+        let results = Mutex::new(vec![None; count]);
+        let progress = Progress::new(ensemble.progress, count);
+        let statistics = summed(
+            places.len(),
+            || (),
+            |_: &mut (), number| {
+                let mut batch = lock(&places[number]);
+                let model = ensemble.models.of(number);
+                let finished = |lane: usize, result| {
+                    if let Some(place) = lock(&results).get_mut(number * width + lane) {
+                        *place = Some(result);
+                    }
+                };
+                let statistics = batch.drive(&plan, model, width, finished);
+                progress.advance(batch.count());
+                statistics
+            },
+        );
+        let unlocked = places.into_iter().map(Mutex::into_inner);
+        *batches = unlocked
+            .map(|batch| batch.unwrap_or_else(PoisonError::into_inner))
+            .collect();
+        *reached = next;
+        let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let results = results.into_iter().map_while(|result| result).collect();
+        Ok(Ends::new(results, statistics))
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Batch<'m, M, N> {
+    /// How many trajectories it has.
+    fn count(&self) -> usize {
+        match self {
+            Self::At(starts) => starts.len(),
+            Self::Lanes(lanes) => lanes.count,
+            Self::Alone(_) | Self::Failed(_) => 1,
+        }
+    }
+
+    /// Over the rest of the mesh.
+    fn drive(
+        &mut self,
+        plan: &Plan<N>,
+        model: &'m M,
+        width: usize,
+        finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
+    ) -> Statistics {
+        if let Self::At(starts) = self {
+            *self = Self::begin(plan, model, width, starts);
+        }
+        match self {
+            // Made above.
+            Self::At(_) => Statistics::default(),
+            Self::Lanes(lanes) => {
+                let Lanes {
+                    bundle,
+                    failures,
+                    count,
+                } = &mut **lanes;
+                plan.drive_together(bundle, *count, failures, finished)
+            }
+            Self::Alone(one) => {
+                let (stepper, state) = &mut **one;
+                let outcome = plan.drive_alone(stepper, state);
+                let statistics = stepper.take_statistics();
+                finished(0, outcome.clone());
+                if let Err(kind) = outcome {
+                    *self = Self::Failed(kind);
+                }
+                statistics
+            }
+            Self::Failed(kind) => {
+                finished(0, Err(kind.clone()));
+                Statistics::default()
+            }
+        }
+    }
+
+    fn begin(plan: &Plan<N>, model: &'m M, width: usize, starts: &[State<N>]) -> Self {
+        if width == WIDTH {
+            return match Bundle::new(model, plan.element, plan.control) {
+                Ok(mut bundle) => {
+                    let failures = begin(&mut bundle, starts);
+                    let count = starts.len();
+                    Self::Lanes(Box::new(Lanes {
+                        bundle,
+                        failures,
+                        count,
+                    }))
+                }
+                Err(error) => Self::Failed(RunErrorKind::Element(error)),
+            };
+        }
+        let Some(&start) = starts.first() else {
+            return Self::At(Vec::new());
+        };
+        match plan.stepper(model, &start) {
+            Ok(stepper) => Self::Alone(Box::new((stepper, start))),
+            Err(kind) => Self::Failed(kind),
+        }
+    }
+}
+
+/// A panic elsewhere leaves what is locked as good as it was.
+fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
+    place.lock().unwrap_or_else(PoisonError::into_inner)
+}
