@@ -1,11 +1,13 @@
 //! Ensembles: the same run from many starts, or with many parameter sets.
 
+mod doubts;
 mod ends;
 mod error;
 mod plan;
 mod progress;
 mod under_way;
 
+pub use doubts::WarningCounts;
 pub use ends::{Ends, Failure};
 pub use error::EnsembleError;
 pub use under_way::EnsembleRun;
@@ -13,10 +15,11 @@ pub use under_way::EnsembleRun;
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use crate::simulation::mesh::Mesh;
+use doubts::Energy;
 use plan::Plan;
 use progress::Progress;
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tfe_runtime::bundle::Bundle;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
@@ -88,6 +91,48 @@ impl<'m, M> Models<'m, M> {
             Self::Many(models) => &models[index],
         }
     }
+}
+
+/// Results as they come, in no particular order.
+struct Results<const N: usize> {
+    results: Vec<Option<Result<Node<N>, RunErrorKind>>>,
+    warnings: WarningCounts,
+}
+
+impl<const N: usize> Results<N> {
+    fn new(count: usize) -> Self {
+        Self {
+            results: vec![None; count],
+            warnings: WarningCounts::default(),
+        }
+    }
+
+    fn put(
+        &mut self,
+        index: usize,
+        result: Result<Node<N>, RunErrorKind>,
+        warnings: WarningCounts,
+    ) {
+        if let Some(place) = self.results.get_mut(index) {
+            *place = Some(result);
+        }
+        self.warnings.add(warnings);
+    }
+
+    /// When all are there, which are moved within the same memory.
+    fn into_ends(self, statistics: Statistics) -> Ends<N> {
+        let results = self.results.into_iter().map_while(|result| result);
+        Ends::new(results.collect(), statistics, self.warnings)
+    }
+}
+
+/// A panic elsewhere leaves what is locked as good as it was.
+fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
+    place.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn unlock<T>(place: Mutex<T>) -> T {
+    place.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The start of one run; one alone serves all.
@@ -205,18 +250,20 @@ where
     /// models. A bad start is a failure of its own run only.
     pub fn run(&self, starts: &[State<N>], span: Range<f64>) -> Result<Ends<N>, EnsembleError> {
         let count = self.count(starts)?;
-        let results = Mutex::new(vec![None; count]);
+        let results = Mutex::new(Results::new(count));
+        let (from, to) = (span.start, span.end);
         let statistics = self.for_each(starts, span, |index, result| {
-            // A panic elsewhere leaves the list as good as it was.
-            let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(place) = results.get_mut(index) {
-                *place = Some(result);
-            }
+            let model = self.models.of(index);
+            let warnings = result.as_ref().map_or_else(
+                |_| WarningCounts::default(),
+                |node| {
+                    let before = Energy::of(model, from, start_of(starts, index));
+                    WarningCounts::of::<M, N>(before, Energy::of(model, to, &node.state()))
+                },
+            );
+            lock(&results).put(index, result, warnings);
         })?;
-        let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-        // All are there, and are moved within the same memory.
-        let results = results.into_iter().map_while(|result| result).collect();
-        Ok(Ends::new(results, statistics))
+        Ok(unlock(results).into_ends(statistics))
     }
 
     /// Runs all trajectories and hands over each result, with the index of its run, as soon as it is known: in no particular order, and with

@@ -25,6 +25,7 @@ pub use accurate::Accurate;
 pub(crate) use checkpoint::Reached;
 pub use checkpoint::{Checkpoint, FamilyCheckpoint};
 pub use watch::Warning;
+pub(crate) use watch::is_jump;
 
 /// A run to be: which model, with which element and step.
 ///
@@ -370,6 +371,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let conserves = const { conserves_energy::<M, N>() };
         let mut is_conserved = conserves;
         watch.pass(recorded(&motion, false));
+        if let Some(velocity) = motion.velocities().last() {
+            watch.weigh(self.model, motion.last().t, (&start.q, velocity));
+        }
         let mut state = *start;
         let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
         let mut failure = None;
@@ -509,7 +513,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 }
 
 /// Whether the energy of a model is known to be conserved, and a jump tells of a step that is too long: linear models have steps of their own kind of error.
-const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
+pub(crate) const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
     let facts = M::FACTS;
     !(facts.time_dependent || facts.forced || facts.linear) && M::CONSTRAINTS.is_empty()
 }

@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use tfe::ensemble::EnsembleError;
 use tfe::prelude::*;
-use tfe::{RunErrorKind, StepError};
+use tfe::{RunErrorKind, StepError, Warning};
 
 #[dynamics(coordinates(theta), lagrangian = m/2*(l*dot(theta))^2 + m*g*l*cos(theta))]
 struct Pendulum {
@@ -462,4 +462,32 @@ fn ensembles_stop_where_they_are_told() {
     for (a, start) in back.nodes().zip(&starts) {
         assert!((a.q[0] - start.q[0]).abs() < 1e-12);
     }
+}
+
+/// What single runs would warn of, counted by kind: double pendulums in steps that are far too long, whose roots are trusted.
+#[test]
+fn warnings_are_counted_by_kind() {
+    let model = DoublePendulum { g: 9.81 };
+    let starts: Vec<_> = fractions(40)
+        .map(|f| model.state([3.0 * f, 2.0 - f], [f, 0.0]))
+        .collect();
+    let (h, end) = (0.6, 6.0);
+    let ensemble = Ensemble::new(&model).step(h).solver(Solve::Trusting);
+    let ends = ensemble.run(&starts, 0.0..end).expect("runs");
+    let single = Simulation::new(&model).step(h).solver(Solve::Trusting);
+    let single = single.record_every(10);
+    let is_jump = |start: &State<2>| {
+        let motion = single.run(*start, 0.0..end);
+        let jump = |one: &Warning| matches!(one, Warning::EnergyJump { .. });
+        motion.is_ok_and(|motion| motion.warnings().iter().any(jump))
+    };
+    let expected = starts.iter().filter(|start| is_jump(start)).count();
+    let found = ends.warnings();
+    assert_eq!(found.energy_jump, expected, "{found}");
+    assert!(expected > 10 && expected < 40, "{expected}");
+    let mut run = ensemble.begin(&starts, 0.0).expect("starts");
+    assert_eq!(run.run_to(end).expect("runs").warnings(), found);
+    // At a step of a proper length there are none.
+    let ends = ensemble.step(0.01).run(&starts, 0.0..end).expect("runs");
+    assert!(ends.warnings().is_empty(), "{}", ends.warnings());
 }

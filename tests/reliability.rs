@@ -182,6 +182,33 @@ fn a_mass_of_zero_is_told() {
     assert!(told, "{run:?}");
 }
 
+#[dynamics(coordinates(x, y), lagrangian = dot(x)^2/2 + c*dot(x)*dot(y) + dot(y)^2/2 - x^2 - y^2)]
+struct Coupled {
+    c: f64,
+}
+
+/// Eigenvalues 1 − c and 1 + c.
+#[test]
+fn masses_of_both_signs_are_told() {
+    let found = |c: f64| {
+        let model = Coupled { c };
+        let start = model.state([0.1, 0.2], [0.0, 0.0]);
+        let motion = Simulation::new(&model).step(0.01).run(start, 0.0..0.1);
+        let warnings = motion.expect("a run").warnings().to_vec();
+        warnings.into_iter().find_map(|warning| match warning {
+            Warning::MassIndefinite {
+                time,
+                least,
+                largest,
+            } => Some((time, least, largest)),
+            _ => None,
+        })
+    };
+    let (time, least, largest) = found(1.5).expect("told");
+    assert!(time == 0.0 && (least + 0.5).abs() < 1e-15 && (largest - 2.5).abs() < 1e-15);
+    assert_eq!((found(0.5), found(0.999)), (None, None));
+}
+
 #[dynamics(
     coordinates(x),
     lagrangian = dot(x)^2/2,

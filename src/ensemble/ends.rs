@@ -1,5 +1,6 @@
 //! What an ensemble came to.
 
+use super::WarningCounts;
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use std::ops::Index;
@@ -12,6 +13,7 @@ use tfe_runtime::Statistics;
 pub struct Ends<const N: usize> {
     results: Vec<Result<Node<N>, RunErrorKind>>,
     statistics: Statistics,
+    warnings: WarningCounts,
 }
 
 /// A run that stopped before its end.
@@ -24,10 +26,15 @@ pub struct Failure<'a> {
 }
 
 impl<const N: usize> Ends<N> {
-    pub(super) fn new(results: Vec<Result<Node<N>, RunErrorKind>>, statistics: Statistics) -> Self {
+    pub(super) fn new(
+        results: Vec<Result<Node<N>, RunErrorKind>>,
+        statistics: Statistics,
+        warnings: WarningCounts,
+    ) -> Self {
         Self {
             results,
             statistics,
+            warnings,
         }
     }
 
@@ -72,6 +79,11 @@ impl<const N: usize> Ends<N> {
     /// What all runs together have cost.
     pub fn statistics(&self) -> &Statistics {
         &self.statistics
+    }
+
+    /// How many runs came to their ends and are doubtful, by kind.
+    pub fn warnings(&self) -> &WarningCounts {
+        &self.warnings
     }
 
     /// All results by value, in order.

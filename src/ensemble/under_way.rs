@@ -1,13 +1,14 @@
 //! Ensembles that go on where they have got to.
 
+use super::doubts::{Energy, WarningCounts};
 use super::plan::{Failures, Plan, begin};
 use super::progress::Progress;
-use super::{Ends, Ensemble, EnsembleError, WIDTH, start_of, summed};
+use super::{Ends, Ensemble, EnsembleError, Results, WIDTH, lock, start_of, summed, unlock};
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use crate::simulation::Reached;
 use crate::simulation::mesh::Mesh;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 use tfe_runtime::bundle::Bundle;
 use tfe_runtime::step::Stepper;
 use tfe_runtime::{Model, State, Statistics};
@@ -20,6 +21,8 @@ pub struct EnsembleRun<'m, M, const N: usize> {
     ensemble: Ensemble<'m, M, N>,
     reached: Reached,
     batches: Vec<Batch<'m, M, N>>,
+    /// Of each run where it is.
+    energies: Vec<Energy>,
 }
 
 // Not derived: the models are borrowed, they need not be `Clone`.
@@ -29,6 +32,7 @@ impl<M: Model<N>, const N: usize> Clone for EnsembleRun<'_, M, N> {
             ensemble: self.ensemble.clone(),
             reached: self.reached.clone(),
             batches: self.batches.clone(),
+            energies: self.energies.clone(),
         }
     }
 }
@@ -124,6 +128,9 @@ where
                 time: t0,
             },
             batches,
+            energies: (0..count)
+                .map(|index| Energy::of(self.models.of(index), t0, start_of(starts, index)))
+                .collect(),
         })
     }
 }
@@ -149,6 +156,7 @@ where
             ensemble,
             reached,
             batches,
+            energies,
         } = self;
         let thousandth = (end - reached.time).abs() / 1000.0;
         let step = reached.step.unwrap_or(thousandth);
@@ -168,8 +176,8 @@ where
             .into_iter()
             .map(Mutex::new)
             .collect();
-        let count: usize = places.iter().map(|batch| lock(batch).count()).sum();
-        let results = Mutex::new(vec![None; count]);
+        let count = energies.len();
+        let results = Mutex::new((Results::new(count), energies));
         let progress = Progress::new(ensemble.progress, count);
         let statistics = summed(
             places.len(),
@@ -177,24 +185,28 @@ where
             |_: &mut (), number| {
                 let mut batch = lock(&places[number]);
                 let model = ensemble.models.of(number);
-                let finished = |lane: usize, result| {
-                    if let Some(place) = lock(&results).get_mut(number * width + lane) {
-                        *place = Some(result);
+                let finished = |lane: usize, result: Result<Node<N>, RunErrorKind>| {
+                    let index = number * width + lane;
+                    let after = result.as_ref().ok();
+                    let after = after.map(|node| Energy::of(model, end, &node.state()));
+                    let mut results = lock(&results);
+                    let (results, energies) = &mut *results;
+                    let mut warnings = WarningCounts::default();
+                    if let (Some(before), Some(after)) = (energies.get_mut(index), after) {
+                        warnings = WarningCounts::of::<M, N>(*before, after);
+                        *before = after;
                     }
+                    results.put(index, result, warnings);
                 };
                 let statistics = batch.drive(&plan, model, width, finished);
                 progress.advance(batch.count());
                 statistics
             },
         );
-        let unlocked = places.into_iter().map(Mutex::into_inner);
-        *batches = unlocked
-            .map(|batch| batch.unwrap_or_else(PoisonError::into_inner))
-            .collect();
+        *batches = places.into_iter().map(unlock).collect();
         *reached = next;
-        let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let results = results.into_iter().map_while(|result| result).collect();
-        Ok(Ends::new(results, statistics))
+        let (results, _) = unlock(results);
+        Ok(results.into_ends(statistics))
     }
 }
 
@@ -270,9 +282,4 @@ impl<'m, M: Model<N>, const N: usize> Batch<'m, M, N> {
             Err(kind) => Self::Failed(kind),
         }
     }
-}
-
-/// A panic elsewhere leaves what is locked as good as it was.
-fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
-    place.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -2,8 +2,9 @@
 
 use crate::stability::growth::is_a_stable;
 use crate::stability::linear_model::LinearModel;
+use nalgebra::DMatrix;
 use std::fmt;
-use tfe_runtime::{Element, Model, State};
+use tfe_runtime::{Element, First, Form, Model, State};
 
 /// What is doubtful about a motion that was computed without an error.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +29,17 @@ pub enum Warning {
         radius: f64,
         /// The factor |e^{λh}| by which the linear model amplifies it.
         exact: f64,
+    },
+    /// The mass matrix ∂²L/∂v² at the start has eigenvalues of both signs: forces speed up where they should slow down, mostly for a wrong sign in the Lagrangian.
+    ///
+    /// Looked for at the start of a run, for Lagrangians without constraints.
+    MassIndefinite {
+        /// The start.
+        time: f64,
+        /// The least eigenvalue.
+        least: f64,
+        /// The largest one.
+        largest: f64,
     },
     /// The energy at a node is not finite: the momentum belongs to no velocity there (the mass matrix is singular), or the model has a singular point.
     EnergyNotFinite {
@@ -66,6 +78,14 @@ impl fmt::Display for Warning {
                  or an element that is stable at every step, `{}` or `{}`",
                 Element::mixed(element.nodes()),
                 element.reduced(),
+            ),
+            Self::MassIndefinite {
+                time,
+                least,
+                largest,
+            } => write!(
+                f,
+                "the mass matrix at t = {time} has eigenvalues of both signs, {least:.3e} and {largest:.3e}: look for a wrong sign in the kinetic energy"
             ),
             Self::EnergyNotFinite { time } => write!(
                 f,
@@ -175,6 +195,28 @@ impl Watch {
         });
     }
 
+    /// Looks at the mass matrix at the start of a run.
+    pub(super) fn weigh<M: Model<N>, const N: usize>(
+        &mut self,
+        model: &M,
+        time: f64,
+        (q, v): (&[f64; N], &[f64; N]),
+    ) {
+        let has_mass = const { matches!(M::FORM, Form::Lagrangian) && M::CONSTRAINTS.is_empty() };
+        if !has_mass {
+            return;
+        }
+        let (mut first, mut mass) = (First::ZERO, [[0.0; N]; N]);
+        model.first_and_mass(time, q, v, &mut first, &mut mass);
+        if let Some((least, largest)) = signs(mass.as_flattened()) {
+            self.warnings.push(Warning::MassIndefinite {
+                time,
+                least,
+                largest,
+            });
+        }
+    }
+
     /// Looks at the energy of a recorded node, whose momentum has the product p·v with its velocity.
     pub(super) fn pass(&mut self, node: Recorded) {
         let Recorded {
@@ -197,11 +239,10 @@ impl Watch {
         let (Some(before), true) = (last, is_conserved) else {
             return;
         };
-        let jump = (energy - before).abs();
-        let rounding = 1e-9 * energy.abs().max(before.abs());
-        if jump <= (0.1 * self.energy.scale).max(rounding) {
+        if !is_jump([before, energy], self.energy.scale) {
             return;
         }
+        let jump = (energy - before).abs();
         let place = self.energy.jump.get_or_insert_with(|| {
             self.warnings.push(Warning::EnergyJump {
                 time,
@@ -228,6 +269,25 @@ impl Watch {
     pub(super) fn into_warnings(self) -> Vec<Warning> {
         self.warnings
     }
+}
+
+/// Whether an energy that is conserved differs by more than a tenth of a kinetic energy, and than roundings.
+pub(crate) fn is_jump([before, after]: [f64; 2], kinetic: f64) -> bool {
+    let rounding = 1e-9 * after.abs().max(before.abs());
+    (after - before).abs() > (0.1 * kinetic).max(rounding)
+}
+
+/// The least and the largest eigenvalue of a symmetric matrix, if they are of different signs beyond roundings.
+fn signs(matrix: &[f64]) -> Option<(f64, f64)> {
+    const ROUNDING: f64 = 1e-9;
+    if !matrix.iter().all(|entry| entry.is_finite()) {
+        return None;
+    }
+    let size = matrix.len().isqrt();
+    let eigenvalues = DMatrix::from_row_slice(size, size, matrix).symmetric_eigenvalues();
+    let (least, largest) = (eigenvalues.min(), eigenvalues.max());
+    let size = least.abs().max(largest.abs());
+    (least < -ROUNDING * size && largest > ROUNDING * size).then_some((least, largest))
 }
 
 /// What the energy of the nodes has been.

@@ -1,0 +1,75 @@
+//! What is doubtful about runs that came to their ends.
+
+use crate::simulation::{conserves_energy, is_jump};
+use std::fmt;
+use tfe_runtime::{Model, State, constrained, legendre};
+
+/// How many runs of an ensemble are doubtful although they came to their ends, by the kinds of [`Warning`](crate::Warning) that a single run would give; [`Ends::warnings`](super::Ends::warnings).
+///
+/// Energies are compared at the ends of the span only: what a run loses and regains in between is not seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct WarningCounts {
+    /// Runs that end with an energy that is not finite: [`Warning::EnergyNotFinite`](crate::Warning::EnergyNotFinite).
+    pub energy_not_finite: usize,
+    /// Runs that end with another energy than they began with, although the model conserves it: [`Warning::EnergyJump`](crate::Warning::EnergyJump).
+    pub energy_jump: usize,
+}
+
+impl WarningCounts {
+    /// Of one run, by the energies at its start and its end.
+    pub(super) fn of<M: Model<N>, const N: usize>(before: Energy, after: Energy) -> Self {
+        let kinetic = before.kinetic.max(after.kinetic);
+        let is_lost = !after.energy.is_finite();
+        let jumps = const { conserves_energy::<M, N>() }
+            && before.energy.is_finite()
+            && !is_lost
+            && is_jump([before.energy, after.energy], kinetic);
+        Self {
+            energy_not_finite: usize::from(is_lost),
+            energy_jump: usize::from(jumps),
+        }
+    }
+
+    pub(super) fn add(&mut self, other: Self) {
+        self.energy_not_finite += other.energy_not_finite;
+        self.energy_jump += other.energy_jump;
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl fmt::Display for WarningCounts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} with an energy that is not finite, {} with a jump of an energy that is conserved",
+            self.energy_not_finite, self.energy_jump
+        )
+    }
+}
+
+/// The energy of a state.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Energy {
+    energy: f64,
+    /// Half of p·v stands for it, whatever the Hamiltonian.
+    kinetic: f64,
+}
+
+impl Energy {
+    /// Not a number where no velocity belongs to the momentum.
+    pub(super) fn of<M: Model<N>, const N: usize>(model: &M, t: f64, state: &State<N>) -> Self {
+        let State { q, p } = state;
+        let velocity = constrained::velocity_of(model, t, q, p, &[0.0; N]);
+        let velocity = velocity.unwrap_or([f64::NAN; N]);
+        let action: f64 = velocity.iter().zip(p).map(|(v, p)| v * p).sum();
+        Self {
+            energy: legendre::energy_at(model, t, q, p, &velocity),
+            kinetic: 0.5 * action.abs(),
+        }
+    }
+}
