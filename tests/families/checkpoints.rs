@@ -60,7 +60,7 @@ fn two_halves_are_one_run_to_the_bit() {
     for element in [
         Element::mixed(4),
         Element::mixed(6),
-        Element::primal(3),
+        Element::primal(3).reduced(),
         Element::radau(4),
     ] {
         let h = 0.1;
