@@ -458,6 +458,22 @@ fn ensembles_stop_where_they_are_told() {
     for (a, b) in end.nodes().zip(whole.nodes()) {
         assert!(distance(a, b) < 1e-12);
     }
+    // Without a step of one's own the first span with a length tells it; a bad start is one failure.
+    let bad = [
+        starts[0],
+        State {
+            q: [f64::NAN],
+            p: [0.0],
+        },
+        starts[1],
+    ];
+    let mut default = Ensemble::new(&Quartic).begin(&bad, 0.0).expect("starts");
+    let ends = default.run_to(0.0).expect("nothing to do");
+    assert_eq!((ends.nodes().count(), ends.failures().count()), (2, 1));
+    let ends = default.run_to(2.0).expect("runs");
+    let [first, second] = [0, 2].map(|k| ends[k].clone().expect("arrives"));
+    assert!(distance(&first, &whole[0].clone().expect("arrives")) < 1e-12);
+    assert!(distance(&second, &whole[1].clone().expect("arrives")) < 1e-12);
     let back = run.run_to(0.0).expect("runs back");
     for (a, start) in back.nodes().zip(&starts) {
         assert!((a.q[0] - start.q[0]).abs() < 1e-12);

@@ -158,12 +158,13 @@ where
             batches,
             energies,
         } = self;
-        let thousandth = (end - reached.time).abs() / 1000.0;
-        let step = reached.step.unwrap_or(thousandth);
+        let length = (end - reached.time).abs();
+        // Of the first span that has a length.
+        let chosen = (reached.step).or_else(|| (length > 0.0).then_some(length / 1000.0));
         let (mesh, done, origin) = reached.place(end, None, |span, _| {
-            Mesh::new(span, step, &ensemble.breaks, &[])
+            Mesh::new(span, chosen.unwrap_or(0.0), &ensemble.breaks, &[])
         })?;
-        let next = Reached::new(origin, Some(step), &mesh, end);
+        let next = Reached::new(origin, chosen, &mesh, end);
         let plan = Plan {
             element: ensemble.element,
             control: ensemble.control,

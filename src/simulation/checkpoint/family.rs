@@ -42,7 +42,8 @@ impl<M: FamilyModel> FamilySimulation<'_, M> {
     ///
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// let chain = Chain { n: 20 };
-    /// let start = chain.state((0..20).map(|i| f64::from(i).cos()).collect(), vec![0.0; 20]);
+    /// let q: Vec<f64> = (0..20).map(|i| f64::from(i).cos()).collect();
+    /// let start = chain.state(q, vec![0.0; 20]);
     /// let simulation = Simulation::new(&chain).step(0.1);
     /// let whole = simulation.run(start.clone(), 0.0..10.0)?;
     /// let first = simulation.run(start, 0.0..3.0)?;
