@@ -19,6 +19,7 @@ use tfe_runtime::length::Declared;
 use tfe_runtime::step::{Control, Impulse, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
+use watch::resolution::{Examined, Resolution};
 use watch::{Recorded, Watch};
 
 pub use accurate::Accurate;
@@ -368,6 +369,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         mut finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
     ) -> Result<Motion<N>, RunError<N>> {
         let mut watch = Watch::new(self.chosen_element());
+        let mut resolution = Resolution::new(self.model, self.chosen_element(), self.control);
         let conserves = const { conserves_energy::<M, N>() };
         let mut is_conserved = conserves;
         watch.pass(recorded(&motion, false));
@@ -414,6 +416,15 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 failure = Some(kind);
                 break;
             }
+            if impulses.is_empty() {
+                let examined = Examined {
+                    t,
+                    h,
+                    before: &before,
+                    after: &state,
+                };
+                resolution.look(stepper.statistics(), examined);
+            }
             if let Some(dense) = dense {
                 motion.keep_element(dense);
             }
@@ -424,6 +435,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             }
             bar.advance();
         }
+        watch.add(resolution.warning(&state));
         motion.set_statistics(*stepper.statistics());
         motion.set_warnings(watch.into_warnings());
         match failure {

@@ -149,6 +149,109 @@ fn is_told<const N: usize>(run: Result<tfe::Motion<N>, tfe::RunError<N>>) -> boo
     }
 }
 
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2 + x^2/2 - x^4/4,
+    force(x) = 0.3*cos(1.2*t) - 0.2*dot(x)
+)]
+struct DrivenDuffing;
+
+fn is_unresolved<const N: usize>(motion: &tfe::Motion<N>) -> bool {
+    let told = |one: &Warning| matches!(one, Warning::Unresolved { .. });
+    motion.warnings().iter().any(told)
+}
+
+/// There is no energy to compare: a driven, damped oscillator, two steps of 1 to 3 from 200 states. An end that is wrong by a fifth of the way is told.
+#[test]
+fn steps_that_do_not_resolve_a_driven_motion_are_told() {
+    let (mut wrong, mut told) = (0, 0);
+    for k in 0..200 {
+        let part = |factor: u32| f64::from(k * factor % 200) / 200.0;
+        let start = DrivenDuffing.state([3.0 * part(7) - 1.5], [3.0 * part(31) - 1.5]);
+        let h = 1.0 + 2.0 * part(1);
+        let fine = Simulation::new(&DrivenDuffing)
+            .element(Mixed::<8>)
+            .step(0.01);
+        let fine = fine.run(start, 0.0..2.0 * h).expect("a fine run");
+        assert!(fine.warnings().is_empty(), "{:?}", fine.warnings());
+        let way: f64 = fine
+            .states()
+            .windows(2)
+            .map(|pair| (pair[1].q[0] - pair[0].q[0]).abs())
+            .sum();
+        for element in [Element::mixed(3), Element::primal(3), Element::radau(3)] {
+            let long = Simulation::new(&DrivenDuffing).element(element).step(h);
+            let Ok(motion) = long.run(start, 0.0..2.0 * h) else {
+                continue;
+            };
+            let off = (motion.last().q[0] - fine.last().q[0]).abs();
+            told += u32::from(is_unresolved(&motion));
+            if off > way / 5.0 {
+                wrong += 1;
+                assert!(
+                    !motion.warnings().is_empty(),
+                    "{element}, h = {h}: off by {off:.2} of {way:.2} from {start:?}"
+                );
+            }
+        }
+    }
+    assert!(told > wrong && wrong > 5, "{wrong} wrong, {told} told");
+}
+
+/// Elements that keep the energy keep it on wrong roots as well.
+#[test]
+fn long_steps_that_keep_the_energy_are_told() {
+    let mut wrong = 0;
+    for start in starts() {
+        let fine = Simulation::new(&PENDULUM).element(Mixed::<8>).step(0.01);
+        let fine = fine.run(start, 0.0..3.0).expect("a fine run");
+        let element = Element::energy_conserving(3);
+        let long = Simulation::new(&PENDULUM).element(element).step(1.5);
+        let Ok(motion) = long.run(start, 0.0..3.0) else {
+            continue;
+        };
+        let off = |a: usize| (motion.last().q[a] - fine.last().q[a]).abs();
+        if off(0) + off(1) > 2.0 {
+            wrong += 1;
+            assert!(is_unresolved(&motion), "from {start:?}");
+        }
+    }
+    assert!(wrong > 5, "{wrong} wrong");
+}
+
+/// No warning where there is nothing to warn of: also of the first order, from rest, past turning points, and in steps that take Newton's method.
+#[test]
+fn steps_that_resolve_are_not_warned_of() {
+    let elements = [
+        (Element::radau(2), 0.01),
+        (Element::mixed(2), 0.03),
+        (Element::mixed(4), 0.1),
+        (Element::primal(3).reduced(), 0.03),
+        (Element::energy_conserving(3), 0.05),
+        (Element::mixed(8), 0.15),
+    ];
+    for (element, h) in elements {
+        for solve in [Solve::Auto, Solve::Newton] {
+            for start in starts().into_iter().step_by(5) {
+                let run = Simulation::new(&PENDULUM).element(element).step(h);
+                let motion = run.solver(solve).run(start, 0.0..3.0).expect("a run");
+                let told = motion.warnings();
+                assert!(!is_unresolved(&motion), "{element}, {start:?}: {told:?}");
+            }
+            let run = Simulation::new(&DrivenDuffing).element(element).step(h);
+            for x in [0.1, 0.5, 1.0, 1.5] {
+                let start = DrivenDuffing.state([x], [0.0]);
+                let motion = run
+                    .clone()
+                    .solver(solve)
+                    .run(start, 0.0..20.0)
+                    .expect("a run");
+                assert!(!is_unresolved(&motion), "{element}, {x}");
+            }
+        }
+    }
+}
+
 #[test]
 fn singular_points_are_told() {
     for nodes in 2..=8 {

@@ -1,5 +1,7 @@
 //! What a run notices about itself: steps at which the method grows, not the model.
 
+pub(super) mod resolution;
+
 use crate::stability::growth::is_a_stable;
 use crate::stability::linear_model::LinearModel;
 use nalgebra::DMatrix;
@@ -60,6 +62,20 @@ pub enum Warning {
         /// How many such jumps there are.
         count: usize,
     },
+    /// An element and three of a third of its length end at different places: the step is too long to resolve the motion (`docs/theory.md`, (T-121)).
+    ///
+    /// Looked for in the elements whose iteration did not contract quickly, by their numbers 0, 1, 2, 4, 8, … among these; not in linear models, nor with
+    /// [`Solve::Trusting`](crate::Solve::Trusting).
+    Unresolved {
+        /// Where the first such element begins.
+        time: f64,
+        /// The length of that element; negative in a run backwards.
+        step: f64,
+        /// The largest distance of both ends, as a part of what the motion extends over.
+        distance: f64,
+        /// How many such elements were found.
+        count: usize,
+    },
 }
 
 impl fmt::Display for Warning {
@@ -108,6 +124,16 @@ impl fmt::Display for Warning {
                 }
                 f.write_str(": take a shorter step, or look for a singular point of the model")
             }
+            Self::Unresolved {
+                time,
+                step,
+                distance,
+                ..
+            } => write!(
+                f,
+                "the step {step} at t = {time} does not resolve the motion: three thirds of it end elsewhere by {distance:.2} of what the motion extends over; \
+                 take a shorter step or an element with more nodes"
+            ),
         }
     }
 }
@@ -264,6 +290,11 @@ impl Watch {
                 (*at, *from, *after) = (time, before, energy);
             }
         }
+    }
+
+    /// One more, if there is one.
+    pub(super) fn add(&mut self, warning: Option<Warning>) {
+        self.warnings.extend(warning);
     }
 
     pub(super) fn into_warnings(self) -> Vec<Warning> {
