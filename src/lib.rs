@@ -21,6 +21,7 @@ pub mod periodic;
 pub mod periodic_schur;
 pub mod simulation;
 pub mod stability;
+mod velocity;
 pub mod work_precision;
 
 pub use assembly::{AssemblyError, MeshError};
@@ -44,14 +45,15 @@ pub use tfe_runtime::{
     Element, EnergyConserving, Family, Mixed, Model, Primal, Radau, Rule, Solve, State, Statistics,
     StepError, Structure, ThreeField,
 };
+pub use velocity::{FamilyVelocity, Velocity};
 pub use work_precision::WorkPrecision;
 
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
     pub use crate::{
         BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Ensemble,
-        Fidelity, Mixed, Modal, Model, Motion, Node, PeriodicOrbit, Primal, Radau, Simulation,
-        Solve, State, ThreeField, WorkPrecision, dynamics, stability,
+        FamilyVelocity, Fidelity, Mixed, Modal, Model, Motion, Node, PeriodicOrbit, Primal, Radau,
+        Simulation, Solve, State, ThreeField, Velocity, WorkPrecision, dynamics, stability,
     };
 }
 

@@ -22,9 +22,22 @@ pub struct Node<const N: usize> {
     pub q: [f64; N],
     /// Generalized momenta p = ∂L/∂v.
     pub p: [f64; N],
+    /// Velocities dq/dt: those of the state at nodes, NaN where no velocity belongs to the momentum; between nodes the derivative of the polynomial.
+    pub v: [f64; N],
 }
 
 impl<const N: usize> Node<N> {
+    /// A state of a model, whose velocities are looked for from `guess` on.
+    pub(crate) fn new<M: Model<N>>(model: &M, t: f64, state: &State<N>, guess: &[f64; N]) -> Self {
+        let velocity = constrained::velocity_of(model, t, &state.q, &state.p, guess);
+        Self {
+            t,
+            q: state.q,
+            p: state.p,
+            v: velocity.unwrap_or([f64::NAN; N]),
+        }
+    }
+
     /// The point of phase space, without the time.
     pub fn state(&self) -> State<N> {
         State {
@@ -164,6 +177,7 @@ impl<const N: usize> Motion<N> {
             t,
             q: state.q,
             p: state.p,
+            v: velocity,
         });
         if const { !M::CONSTRAINTS.is_empty() } {
             self.record_constraints(model, t, state, &velocity);
@@ -280,6 +294,7 @@ impl<const N: usize> Motion<N> {
                     t: time,
                     q: state.q,
                     p: state.p,
+                    v: element.velocity_at_time(time),
                 })
             }
             _ => Err(AtError::NotRecorded { time }),

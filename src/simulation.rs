@@ -4,13 +4,15 @@ mod accurate;
 mod checkpoint;
 pub(crate) mod family;
 pub(crate) mod mesh;
+mod progress;
+mod steps;
 mod watch;
 
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
-use crate::motion::{Motion, Node};
+use crate::motion::Motion;
 use family::Runs;
-use mesh::Mesh;
+use mesh::{Endless, Mesh};
 use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
@@ -18,13 +20,14 @@ use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::length::Declared;
 use tfe_runtime::step::{Control, Impulse, Stepper};
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
+use tfe_runtime::{Element, Mixed, Model, Solve, State};
 use watch::resolution::{Examined, Resolution};
 use watch::{Recorded, Watch};
 
 pub use accurate::Accurate;
 pub(crate) use checkpoint::Reached;
 pub use checkpoint::{Checkpoint, FamilyCheckpoint};
+pub use steps::Steps;
 pub use watch::Warning;
 pub(crate) use watch::is_jump;
 
@@ -199,7 +202,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 
     /// Whether steps are cut where a force has a kink or a jump: where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the arguments
     /// of a `min` or `max` changes its sign, in the state or in time (`docs/theory.md` §10.7). Elements keep their order then, and the run stays on the grid asked for;
-    /// [`Statistics::kinks`] counts the crossings. A motion that would slide along a jump is an error, [`StepError::Slides`](crate::runtime::StepError::Slides).
+    /// [`Statistics::kinks`](crate::Statistics::kinks) counts the crossings. A motion that would slide along a jump is an error, [`StepError::Slides`](crate::runtime::StepError::Slides).
     ///
     /// [`run`](Self::run), [`steps`](Self::steps) and [`run_estimated`](Self::run_estimated) do so only if asked, runs with an [`accuracy`](Self::accuracy) unless forbidden;
     /// [`run_linearised`](Self::run_linearised) never does.
@@ -459,8 +462,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
     }
 
-    /// The states that follow `start`, one a step, without end and in constant memory. After an error the iterator is finished. There are no
-    /// [warnings](Motion::warnings).
+    /// The states that follow `start`, one a step, without end and in constant memory; elements end at [breaks](Self::break_at), as in [`run`](Self::run). After an error the iterator
+    /// is finished. There are no [warnings](Motion::warnings).
     ///
     /// ```
     /// # use tfe::prelude::*;
@@ -481,34 +484,20 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// ```
     pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
         let step = self.step.unwrap_or(f64::NAN);
-        let stepper = check_start(&start).and_then(|()| {
+        let ready = check_start(&start).and_then(|()| {
             check_constraints(self.model, t0, step, &start)?;
-            if !(step.is_finite() && step != 0.0) {
-                return Err(RunErrorKind::Step { step });
-            }
             if !t0.is_finite() {
                 return Err(RunErrorKind::Span {
                     start: t0,
                     end: f64::INFINITY,
                 });
             }
-            Stepper::new(self.model, self.chosen_element(), self.control)
-                .map(|stepper| self.cutting(stepper).ends_only())
-                .map_err(RunErrorKind::Element)
+            let elements = Endless::new(t0, step, &self.breaks)?;
+            let stepper = Stepper::new(self.model, self.chosen_element(), self.control)
+                .map_err(RunErrorKind::Element)?;
+            Ok((self.cutting(stepper).ends_only(), elements))
         });
-        let (stepper, failure) = match stepper {
-            Ok(stepper) => (Some(stepper), None),
-            Err(kind) => (None, Some(kind)),
-        };
-        Steps {
-            stepper,
-            failure,
-            state: start,
-            t0,
-            step,
-            element: 0,
-            impulses: self.impulses.clone(),
-        }
+        Steps::new(ready, start, t0, self.impulses.clone())
     }
 
     fn chosen_element(&self) -> Element {
@@ -579,140 +568,5 @@ pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
         Ok(())
     } else {
         Err(RunErrorKind::Inconsistent { time, residuals })
-    }
-}
-
-/// The endless sequence of states of [`Simulation::steps`].
-#[derive(Debug)]
-pub struct Steps<'m, M, const N: usize> {
-    stepper: Option<Stepper<'m, M, N>>,
-    failure: Option<RunErrorKind>,
-    state: State<N>,
-    t0: f64,
-    step: f64,
-    element: usize,
-    impulses: Vec<Impulse<N>>,
-}
-
-impl<M: Model<N>, const N: usize> Steps<'_, M, N> {
-    /// What the steps so far have cost.
-    pub fn statistics(&self) -> Statistics {
-        self.stepper
-            .as_ref()
-            .map(|stepper| *stepper.statistics())
-            .unwrap_or_default()
-    }
-}
-
-impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
-    type Item = Result<Node<N>, RunErrorKind>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if let Some(kind) = self.failure.take() {
-            self.stepper = None;
-            return Some(Err(kind));
-        }
-        let stepper = self.stepper.as_mut()?;
-        // Times are products, not sums: a million additions of 0.1 are off by 1e-6.
-        let time = |element: usize| self.t0 + element as f64 * self.step;
-        let (t, next) = (time(self.element), time(self.element + 1));
-        let impulses: Vec<_> = if self.impulses.is_empty() {
-            Vec::new()
-        } else {
-            self.impulses
-                .iter()
-                .filter(|impulse| mesh::within(impulse.time, t, next))
-                .copied()
-                .collect()
-        };
-        match stepper.advance(t, self.step, &mut self.state, &impulses) {
-            Ok(()) => {
-                self.element += 1;
-                Some(Ok(Node {
-                    t: next,
-                    q: self.state.q,
-                    p: self.state.p,
-                }))
-            }
-            Err(source) => {
-                self.stepper = None;
-                Some(Err(RunErrorKind::Solve {
-                    element: self.element,
-                    time: t,
-                    step: self.step,
-                    source,
-                }))
-            }
-        }
-    }
-}
-
-mod progress {
-    //! Progress on standard error.
-
-    use std::io::Write;
-    use std::time::{Duration, Instant};
-
-    /// A line that says how far a run is, rewritten once a second.
-    pub(super) struct Bar {
-        shown: Option<Shown>,
-        steps: usize,
-        done: usize,
-    }
-
-    struct Shown {
-        start: Instant,
-        next: Instant,
-    }
-
-    impl Bar {
-        pub(super) fn new(wanted: bool, steps: usize) -> Self {
-            let now = Instant::now();
-            let shown = wanted.then(|| Shown {
-                start: now,
-                next: now + Duration::from_secs(1),
-            });
-            Self {
-                shown,
-                steps,
-                done: 0,
-            }
-        }
-
-        pub(super) fn advance(&mut self) {
-            self.done += 1;
-            let Some(shown) = &mut self.shown else { return };
-            // Asking for the time costs more than a small step does.
-            if !self.done.is_multiple_of(256) && self.done != self.steps {
-                return;
-            }
-            let now = Instant::now();
-            if now < shown.next {
-                return;
-            }
-            shown.next = now + Duration::from_secs(1);
-            let fraction = self.done as f64 / self.steps as f64;
-            let left = (now - shown.start).as_secs_f64() * (1.0 / fraction - 1.0);
-            let (done, steps, percent) = (self.done, self.steps, 100.0 * fraction);
-            // Progress that cannot be shown is no reason to stop a run.
-            let _ = write!(
-                std::io::stderr(),
-                "\r{done} of {steps} steps ({percent:.0} %), {left:.0} s left "
-            );
-            if self.done == self.steps {
-                let _ = writeln!(std::io::stderr());
-            }
-        }
-    }
-
-    impl Drop for Bar {
-        fn drop(&mut self) {
-            if let Some(shown) = &self.shown
-                && shown.next > shown.start + Duration::from_secs(1)
-                && self.done != self.steps
-            {
-                let _ = writeln!(std::io::stderr());
-            }
-        }
     }
 }

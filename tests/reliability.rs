@@ -322,6 +322,34 @@ struct Switched {
     late: f64,
 }
 
+/// `steps` end at breaks as runs do, on the same nodes to the bit.
+#[test]
+fn endless_steps_end_at_breaks() {
+    let model = Switched { late: 0.0 };
+    let start = model.state([0.0], [0.0]);
+    for element in [Element::radau(3), Element::mixed(3), Element::primal(3)] {
+        for breaks in [&[0.5][..], &[0.0, 0.5], &[0.5, 0.77, -3.0, f64::INFINITY]] {
+            for (h, end) in [(0.1, 1.2), (0.07, 1.2), (-0.1, -0.7)] {
+                let mut simulation = Simulation::new(&model).element(element).step(h);
+                for time in breaks {
+                    simulation = simulation.break_at(*time);
+                }
+                let motion = simulation.run(start, 0.0..end).expect("a run");
+                let nodes = &motion.states()[1..motion.states().len() - 1];
+                let steps = simulation.steps(start, 0.0);
+                for (node, step) in nodes.iter().zip(steps) {
+                    assert_eq!(step.expect("a step"), *node, "{element}, h = {h}");
+                }
+            }
+        }
+        let simulation = Simulation::new(&model).element(element).step(0.1);
+        let mut steps = simulation.break_at(0.5).steps(start, 0.0);
+        let node = steps.find_map(|node| node.ok().filter(|node| node.t > 0.95));
+        let node = node.expect("a node");
+        assert!((node.v[0] - 0.5).abs() < 1e-14, "{}", node.v[0]);
+    }
+}
+
 /// Force 1 before t = 0.5, none after: x(1) = 3/8, whichever side the model counts the break to, and back again.
 #[test]
 fn forces_at_breaks_are_those_of_the_element() {

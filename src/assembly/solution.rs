@@ -37,11 +37,7 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
         let times = self.mesh.times(self.start, self.length);
         let nodes = times.zip(&self.iterate.nodes);
         nodes
-            .map(|(t, state)| Node {
-                t,
-                q: state.q,
-                p: state.p,
-            })
+            .map(|(t, state)| Node::new(self.model, t, state, &[0.0; N]))
             .collect()
     }
 

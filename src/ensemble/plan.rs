@@ -23,12 +23,8 @@ pub(super) struct Plan<const N: usize> {
 pub(super) type Failures = [Option<RunErrorKind>; WIDTH];
 
 impl<const N: usize> Plan<N> {
-    fn node(&self, state: &State<N>) -> Node<N> {
-        Node {
-            t: self.end,
-            q: state.q,
-            p: state.p,
-        }
+    fn node<M: Model<N>>(&self, model: &M, state: &State<N>) -> Node<N> {
+        Node::new(model, self.end, state, &[0.0; N])
     }
 
     /// Up to [`WIDTH`] runs in lanes.
@@ -76,7 +72,7 @@ impl<const N: usize> Plan<N> {
         }
         for (lane, failure) in failures.iter().enumerate().take(count) {
             let result = match (failure, bundle.state(lane)) {
-                (None, Ok(state)) => Ok(self.node(&state)),
+                (None, Ok(state)) => Ok(self.node(bundle.model(), &state)),
                 (Some(failure), _) => Err(failure.clone()),
                 // Only a bad start fails outside a step, and it has been found.
                 (None, Err(source)) => Err(RunErrorKind::Solve {
@@ -143,7 +139,7 @@ impl<const N: usize> Plan<N> {
                 source,
             })?;
         }
-        Ok(self.node(state))
+        Ok(self.node(stepper.model(), state))
     }
 }
 

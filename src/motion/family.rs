@@ -19,12 +19,15 @@ pub struct FamilyNode {
     pub q: Vec<f64>,
     /// Generalized momenta p = ∂L/∂v.
     pub p: Vec<f64>,
+    /// Velocities dq/dt: those of the state at nodes, NaN where no velocity belongs to the momentum; between nodes the derivative of the polynomial.
+    pub v: Vec<f64>,
 }
 
 impl FamilyNode {
-    pub(crate) fn new(t: f64, state: FamilyState) -> Self {
+    pub(crate) fn new(t: f64, state: FamilyState, velocity: Result<Vec<f64>, FamilyError>) -> Self {
         let FamilyState { q, p } = state;
-        Self { t, q, p }
+        let v = velocity.unwrap_or_else(|_| vec![f64::NAN; q.len()]);
+        Self { t, q, p, v }
     }
 
     /// The point of phase space, without the time.
@@ -76,7 +79,7 @@ impl FamilyOutputs {
 
 /// A recorded motion of a model of run-time length: what [`Motion`](crate::Motion) is for models of fixed size, by the same names.
 ///
-/// A node keeps 3 n numbers for n coordinates, the polynomial of an element of s stages 2 s n more: for long chains and long runs,
+/// A node keeps 4 n numbers for n coordinates, the polynomial of an element of s stages 2 s n more: for long chains and long runs,
 /// [`record_every`](crate::family::FamilySimulation::record_every) leaves nodes and polynomials out.
 #[derive(Clone)]
 pub struct FamilyMotion {
@@ -111,7 +114,7 @@ impl FamilyMotion {
     /// The start of a run that never began: nothing of the model is asked.
     pub(crate) fn empty<M: FamilyModel>(_: &M, t: f64, start: &FamilyState) -> Self {
         Self {
-            nodes: vec![FamilyNode::new(t, start.clone())],
+            nodes: vec![FamilyNode::new(t, start.clone(), Ok(Vec::new()))],
             velocities: Vec::new(),
             energies: Vec::new(),
             outputs: FamilyOutputs::default(),
@@ -149,7 +152,8 @@ impl FamilyMotion {
             let before = self.residual;
             self.residual = (larger(before.0, position), larger(before.1, velocity));
         }
-        self.nodes.push(FamilyNode::new(t, state.clone()));
+        self.nodes
+            .push(FamilyNode::new(t, state.clone(), Ok(velocity.clone())));
         self.velocities.push(velocity);
     }
 
@@ -210,7 +214,8 @@ impl FamilyMotion {
         let element = after.checked_sub(1).and_then(|at| self.elements.get(at));
         match element {
             Some(element) if direction * element.end() >= direction * time => {
-                Ok(FamilyNode::new(time, element.at_time(time)))
+                let velocity = element.velocity_at_time(time);
+                Ok(FamilyNode::new(time, element.at_time(time), Ok(velocity)))
             }
             _ => Err(AtError::NotRecorded { time }),
         }

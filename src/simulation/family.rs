@@ -2,7 +2,7 @@
 
 use super::accurate::{Broken, Passing};
 use super::checkpoint::{FamilyCheckpoint, Reached};
-use super::mesh::Mesh;
+use super::mesh::{Endless, Mesh};
 use super::{Simulation, progress};
 use crate::error::RunErrorKind;
 use crate::motion::family::{FamilyMotion, FamilyNode};
@@ -299,25 +299,15 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     pub fn steps(&self, start: FamilyState, t0: f64) -> FamilySteps<'m, M> {
         let step = self.step.unwrap_or(f64::NAN);
         let stepper = self.stepper(t0, &start).and_then(|(stepper, _)| {
-            if !(step.is_finite() && step != 0.0) {
-                return Err(RunErrorKind::Step { step });
-            }
             if !t0.is_finite() {
                 let (start, end) = (t0, f64::INFINITY);
                 return Err(RunErrorKind::Span { start, end });
             }
-            Ok(stepper)
+            Ok((stepper, Endless::new(t0, step, &self.breaks)?))
         });
-        let (stepper, failure) = match stepper {
-            Ok(stepper) => (Some(stepper), None),
-            Err(kind) => (None, Some(kind)),
-        };
         FamilySteps {
-            stepper,
-            failure,
+            course: stepper.map_err(Some),
             state: start,
-            t0,
-            step,
             element: 0,
         }
     }
@@ -378,11 +368,8 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
 /// The endless sequence of states of [`FamilySimulation::steps`].
 #[derive(Debug)]
 pub struct FamilySteps<'m, M> {
-    stepper: Option<FamilyStepper<'m, M>>,
-    failure: Option<RunErrorKind>,
+    course: Result<(FamilyStepper<'m, M>, Endless), Option<RunErrorKind>>,
     state: FamilyState,
-    t0: f64,
-    step: f64,
     element: usize,
 }
 
@@ -390,29 +377,24 @@ impl<M: FamilyModel> Iterator for FamilySteps<'_, M> {
     type Item = Result<FamilyNode, RunErrorKind>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if let Some(kind) = self.failure.take() {
-            self.stepper = None;
-            return Some(Err(kind));
+        let (stepper, elements) = match &mut self.course {
+            Ok(course) => course,
+            Err(failure) => return failure.take().map(Err),
+        };
+        let (t, next, h, begin) = elements.element();
+        if let Err(source) = stepper.advance(begin, h, &mut self.state) {
+            self.course = Err(None);
+            return Some(Err(RunErrorKind::Solve {
+                element: self.element,
+                time: t,
+                step: h,
+                source,
+            }));
         }
-        let stepper = self.stepper.as_mut()?;
-        // Times are products, not sums: a million additions of 0.1 are off by 1e-6.
-        let time = |element: usize| self.t0 + element as f64 * self.step;
-        let (t, next) = (time(self.element), time(self.element + 1));
-        match stepper.advance(t, self.step, &mut self.state) {
-            Ok(()) => {
-                self.element += 1;
-                Some(Ok(FamilyNode::new(next, self.state.clone())))
-            }
-            Err(source) => {
-                self.stepper = None;
-                Some(Err(RunErrorKind::Solve {
-                    element: self.element,
-                    time: t,
-                    step: self.step,
-                    source,
-                }))
-            }
-        }
+        elements.advance();
+        self.element += 1;
+        let velocity = stepper.velocity(next, &self.state);
+        Some(Ok(FamilyNode::new(next, self.state.clone(), velocity)))
     }
 }
 

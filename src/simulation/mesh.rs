@@ -212,6 +212,65 @@ impl<const N: usize> Mesh<N> {
     }
 }
 
+/// The elements of a run without an end.
+#[derive(Clone, Debug)]
+pub(crate) struct Endless {
+    /// Up to the last break, and a last one beyond it.
+    segments: Vec<Segment>,
+    segment: usize,
+    /// Elements of this segment that are behind.
+    done: usize,
+}
+
+impl Endless {
+    pub(crate) fn new(start: f64, step: f64, breaks: &[f64]) -> Result<Self, RunErrorKind> {
+        if !(step.is_finite() && step != 0.0) {
+            return Err(RunErrorKind::Step { step });
+        }
+        let direction = step.signum();
+        let is_ahead = |time: &f64| {
+            time.is_finite() && direction * start < direction * time && !is_same(*time, start)
+        };
+        let mut ahead: Vec<f64> = breaks.iter().copied().filter(is_ahead).collect();
+        sort(&mut ahead, direction);
+        let last = ahead.last().copied().unwrap_or(start);
+        let mut segments = Mesh::<0>::new(&(start..last), step, breaks, &[])?.segments;
+        segments.push(Segment {
+            start: last,
+            end: direction * f64::INFINITY,
+            step,
+            steps: usize::MAX,
+            whole: true,
+            at_break: (breaks.iter().any(|one| is_same(*one, last)), false),
+        });
+        Ok(Self {
+            segments,
+            segment: 0,
+            done: 0,
+        })
+    }
+
+    /// Start, end and length of the next element, and where the force is first felt in it.
+    pub(crate) fn element(&self) -> (f64, f64, f64, f64) {
+        let (segment, k) = (&self.segments[self.segment], self.done);
+        let (t, next, h) = (segment.node(k), segment.node(k + 1), segment.length(k));
+        let is_after_break = segment.at_break.0 && k == 0;
+        let begin = if is_after_break {
+            t + rounding(t, h)
+        } else {
+            t
+        };
+        (t, next, h, begin)
+    }
+
+    pub(crate) fn advance(&mut self) {
+        self.done += 1;
+        if self.done == self.segments[self.segment].steps {
+            (self.segment, self.done) = (self.segment + 1, 0);
+        }
+    }
+}
+
 fn ends(times: &[f64]) -> (f64, f64) {
     match times {
         [start, .., end] => (*start, *end),

@@ -299,6 +299,32 @@ fn steps_are_those_of_a_run() {
     assert!(off.abs() < 1e-9, "{off:e}");
 }
 
+/// Velocities of nodes, between nodes and of states; steps that end at breaks.
+#[test]
+fn nodes_have_velocities() {
+    let chain = Chain {
+        n: 5,
+        m: 1.0,
+        k: 1.0,
+        a: 0.2,
+    };
+    let simulation = Simulation::new(&chain).step(0.1).break_at(0.55);
+    let start = chain.state(START, PUSH);
+    let motion = simulation.run(start.clone(), 0.0..1.0).expect("a run");
+    for (node, v) in motion.states().iter().zip(motion.velocities()) {
+        assert_eq!(&node.v, v);
+        assert_eq!(&chain.velocity(node.t, &node.state()), v);
+    }
+    for (node, other) in simulation.steps(start, 0.0).zip(&motion.states()[1..9]) {
+        assert_eq!(node.expect("a step"), *other);
+    }
+    // The derivative of the polynomial is off by h³ between nodes.
+    let between = motion.at(0.34).expect("inside");
+    let exact = chain.velocity(0.34, &between.state());
+    let apart = exact.iter().zip(&between.v).map(|(a, b)| (a - b).abs());
+    assert!(apart.sum::<f64>() < 1e-3);
+}
+
 #[test]
 fn a_motion_is_written_with_the_names_of_its_coordinates() {
     let (m, q, v) = planets(2);

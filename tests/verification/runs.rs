@@ -183,6 +183,29 @@ fn steps_are_the_nodes_of_a_run() {
     assert!(broken.next().is_none());
 }
 
+#[test]
+fn nodes_have_velocities() {
+    let model = Pendulum { k: 1.0 };
+    let start = model.state([1.0], [0.5]);
+    let simulation = Simulation::new(&model).element(Mixed::<6>).step(0.25);
+    let motion = simulation.run(start, 0.0..5.0).expect("a run");
+    for (node, v) in motion.states().iter().zip(motion.velocities()) {
+        assert_eq!(node.v, *v);
+        assert_eq!(model.velocity(node.t, &node.state()), *v);
+    }
+    // Between nodes the derivative of a polynomial of degree five: off by h⁵, and by no more than roundings at the points where the equations hold.
+    for k in 1..200 {
+        let between = motion.at(0.025 * f64::from(k)).expect("inside");
+        let [v] = model.velocity(between.t, &between.state());
+        let [found] = between.v;
+        assert!((v - found).abs() < 1e-6, "{found} for {v}");
+    }
+    let ends = Ensemble::new(&model).step(0.25).run(&[start], 0.0..5.0);
+    let ends = ends.expect("an ensemble");
+    let end = ends.iter().next().expect("one").as_ref().expect("an end");
+    assert_eq!(end.v, model.velocity(5.0, &end.state()));
+}
+
 /// A free particle and a linear force that is a sum of impulses in the limit: an impulse in the middle of an element is weighted exactly.
 #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2)]
 struct Free {

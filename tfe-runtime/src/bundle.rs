@@ -213,6 +213,11 @@ where
         }
     }
 
+    /// The model that is stepped.
+    pub fn model(&self) -> &'m M {
+        self.model
+    }
+
     /// Moves all trajectories from t to t + h; true if one of them failed in this step. One that has failed stays at its last good state.
     pub fn advance(&mut self, t: f64, h: f64) -> bool {
         let mut lanes = [false; W];

@@ -237,18 +237,42 @@ impl<const N: usize> DenseElement<N> {
         state
     }
 
+    /// dq/dt at a time between start and end: the derivative of the polynomial.
+    #[must_use]
+    pub fn velocity_at_time(&self, time: f64) -> [f64; N] {
+        if let Some(piece) = self.piece_at(time) {
+            return piece.velocity_at_time(time);
+        }
+        let length = self.times.1 - self.times.0;
+        let mut values = [0.0; MAX_NODES];
+        legendre((time - self.times.0) / length, &mut values);
+        let mut velocity = [0.0; N];
+        for (rate, value) in self.rates[..self.rates.len() / 2].iter().zip(values) {
+            for a in 0..N {
+                velocity[a] += value / length * rate[a];
+            }
+        }
+        velocity
+    }
+
     /// The state at a time between start and end.
     #[must_use]
     pub fn at_time(&self, time: f64) -> State<N> {
         if time == self.times.1 {
             return self.end;
         }
+        match self.piece_at(time) {
+            Some(piece) => piece.at_time(time),
+            None => self.at((time - self.times.0) / (self.times.1 - self.times.0)),
+        }
+    }
+
+    /// The piece of an element that was cut.
+    fn piece_at(&self, time: f64) -> Option<&Self> {
         let ahead = self.times.1 >= self.times.0;
         let begun = |piece: &Self| (piece.times.0 <= time) == ahead || piece.times.0 == time;
-        if let Some(after) = (self.pieces.partition_point(begun)).checked_sub(1) {
-            return self.pieces[after].at_time(time);
-        }
-        self.at((time - self.times.0) / (self.times.1 - self.times.0))
+        let after = self.pieces.partition_point(begun).checked_sub(1)?;
+        self.pieces.get(after)
     }
 }
 

@@ -692,6 +692,12 @@ where
         )
     }
 
+    /// The model that is stepped.
+    #[must_use]
+    pub fn model(&self) -> &'m M {
+        self.model
+    }
+
     /// What the steps so far have cost.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {

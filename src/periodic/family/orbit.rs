@@ -46,7 +46,10 @@ impl<'m, M: FamilyModel> FamilyOrbit<'m, M> {
         let times = shooting.mesh.times(shooting.start, shooting.period);
         let nodes = times.zip(&shooting.nodes);
         nodes
-            .map(|(t, state)| FamilyNode::new(t, state.clone()))
+            .map(|(t, state)| {
+                let velocity = family::velocity(shooting.model, t, state);
+                FamilyNode::new(t, state.clone(), velocity)
+            })
             .collect()
     }
 

@@ -1,7 +1,7 @@
 //! The solution of a family between the nodes: integrated rates (T-69).
 
 use super::FamilyState;
-use crate::basis::{MAX_NODES, legendre_integrals};
+use crate::basis::{MAX_NODES, legendre, legendre_integrals};
 use crate::scheme::SchemeRef;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -132,10 +132,8 @@ impl FamilyDense {
         if time == self.times.1 {
             return self.end.clone();
         }
-        let ahead = self.times.1 >= self.times.0;
-        let begun = |piece: &Self| (piece.times.0 <= time) == ahead || piece.times.0 == time;
-        if let Some(after) = (self.pieces.partition_point(begun)).checked_sub(1) {
-            return self.pieces[after].at_time(time);
+        if let Some(piece) = self.piece_at(time) {
+            return piece.at_time(time);
         }
         let tau = (time - self.times.0) / (self.times.1 - self.times.0);
         let mut integrals = [0.0; MAX_NODES];
@@ -147,12 +145,37 @@ impl FamilyDense {
             #[cfg(feature = "sparse")]
             Momenta::Values(values) => {
                 let mut polynomials = [0.0; MAX_NODES];
-                crate::basis::legendre(tau, &mut polynomials);
+                legendre(tau, &mut polynomials);
                 state.p.fill(0.0);
                 add(values, &polynomials, &mut state.p);
             }
         }
         state
+    }
+
+    /// dq/dt at a time between start and end: the derivative of the polynomial.
+    #[must_use]
+    pub fn velocity_at_time(&self, time: f64) -> Vec<f64> {
+        if let Some(piece) = self.piece_at(time) {
+            return piece.velocity_at_time(time);
+        }
+        let length = self.times.1 - self.times.0;
+        let mut values = [0.0; MAX_NODES];
+        legendre((time - self.times.0) / length, &mut values);
+        let mut velocity = vec![0.0; self.start.q.len()];
+        add(&self.rates, &values, &mut velocity);
+        for rate in &mut velocity {
+            *rate /= length;
+        }
+        velocity
+    }
+
+    /// The piece of an element that was cut.
+    fn piece_at(&self, time: f64) -> Option<&Self> {
+        let ahead = self.times.1 >= self.times.0;
+        let begun = |piece: &Self| (piece.times.0 <= time) == ahead || piece.times.0 == time;
+        let after = self.pieces.partition_point(begun).checked_sub(1)?;
+        self.pieces.get(after)
     }
 }
 

@@ -1,0 +1,55 @@
+//! Velocities of states.
+
+use tfe_runtime::family::{self, FamilyModel, FamilyState};
+use tfe_runtime::{Model, State, constrained};
+
+/// The velocities that belong to states of a model of fixed size.
+pub trait Velocity<const N: usize>: Model<N> + Sized {
+    /// dq/dt of a state at the time t: v with ∂L/∂v = p and on the constraints, or ∂H/∂p. NaN where the mass matrix is singular, or where the iteration for v of a kinetic
+    /// energy that is not quadratic fails.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(r, phi), lagrangian = m/2*(dot(r)^2 + r^2*dot(phi)^2) + mu/r)]
+    /// struct Planet { m: f64, mu: f64 }
+    ///
+    /// let planet = Planet { m: 2.0, mu: 1.0 };
+    /// let state = planet.state([3.0, 0.0], [0.25, 0.5]);
+    /// assert_eq!(state.p, [0.5, 9.0]);
+    /// assert_eq!(planet.velocity(0.0, &state), [0.25, 0.5]);
+    /// ```
+    fn velocity(&self, t: f64, state: &State<N>) -> [f64; N] {
+        let found = constrained::velocity_of(self, t, &state.q, &state.p, &[0.0; N]);
+        found.unwrap_or([f64::NAN; N])
+    }
+}
+
+impl<M: Model<N>, const N: usize> Velocity<N> for M {}
+
+/// The same for models of run-time length.
+pub trait FamilyVelocity: FamilyModel + Sized {
+    /// dq/dt of a state at the time t; NaN where there is none, or where the state is not as long as the model.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(
+    ///     coordinates(q[n]),
+    ///     lagrangian = sum(i in 0..n, m*dot(q[i])^2/2) - sum(i in 0..n-1, k*(q[i+1] - q[i])^2/2)
+    /// )]
+    /// struct Chain { n: usize, m: f64, k: f64 }
+    ///
+    /// let chain = Chain { n: 3, m: 2.0, k: 1.0 };
+    /// let state = chain.state([0.0, 0.1, 0.3], [0.5, 0.0, -1.0]);
+    /// assert_eq!(chain.velocity(0.0, &state), [0.5, 0.0, -1.0]);
+    /// ```
+    fn velocity(&self, t: f64, state: &FamilyState) -> Vec<f64> {
+        let n = self.len();
+        let fits = self.check().is_ok() && (state.q.len(), state.p.len()) == (n, n);
+        let found = fits.then(|| family::velocity(self, t, state).ok());
+        found.flatten().unwrap_or_else(|| vec![f64::NAN; n])
+    }
+}
+
+impl<M: FamilyModel> FamilyVelocity for M {}
