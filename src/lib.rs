@@ -50,6 +50,7 @@ pub use work_precision::WorkPrecision;
 
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
+    pub use crate::stability::Blocks;
     pub use crate::{
         BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Ensemble,
         FamilyVelocity, Fidelity, Mixed, Modal, Model, Motion, Node, PeriodicOrbit, Primal, Radau,

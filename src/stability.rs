@@ -1,6 +1,7 @@
 //! Linearised behaviour of steps: transition matrices, their spectra, and the steps at which a method fails.
 
 mod arnoldi;
+mod blocks;
 pub(crate) mod chebyshev;
 mod eigenvalues;
 pub(crate) mod growth;
@@ -14,6 +15,7 @@ mod step;
 mod time_scales;
 
 pub use arnoldi::{Dominant, DominantError, Iteration, dominant_of};
+pub use blocks::Blocks;
 pub use eigenvalues::{EigenvalueError, eigenvalues};
 pub use intervals::{IntervalError, UnstableInterval, stability_changes_of, unstable_intervals_of};
 pub use linear_model::{LinearModel, LinearModelError};
@@ -43,7 +45,7 @@ use tfe_runtime::{Element, Model, State};
 /// Of a model of run-time length too, with the feature `sparse`; for a long one take `transition`, which is no matrix but an operator.
 ///
 /// # Shapes
-/// 2N × 2N, ordered (p, q).
+/// 2N × 2N, ordered (p, q); [`Blocks`] names its four blocks.
 /// # Errors
 /// [`TransitionError`] (or `FamilyTransitionError`) where the element does not exist, cannot be solved, or has a singular tangent.
 ///
