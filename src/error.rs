@@ -98,6 +98,25 @@ pub enum RunErrorKind {
         /// When it was to act.
         time: f64,
     },
+    /// The model declares no event or output of a name.
+    NoEvent {
+        /// The name asked for.
+        name: String,
+        /// Those that there are.
+        known: Vec<String>,
+    },
+    /// An event came a thousand times within one step, or twice within a millionth of it: the motion comes to rest by ever shorter ways there.
+    EventsWithoutEnd {
+        /// The output that changes its sign.
+        name: String,
+        /// When.
+        time: f64,
+    },
+    /// Events were to be looked for by something that cannot.
+    EventsUnsupported {
+        /// What was called.
+        call: &'static str,
+    },
     /// An element could not be solved.
     Solve {
         /// The number of the element, from 0.
@@ -192,6 +211,28 @@ impl fmt::Display for RunErrorKind {
                     f,
                     "a step of {step} is not resolved at t = {time}, where the least is {least:.1e}: count time from an origin near the motion"
                 )
+            }
+            Self::NoEvent { name, known } if known.is_empty() => {
+                write!(
+                    f,
+                    "there is no event or output `{name}`: the model declares none; add `event({name}) = …` to its `#[dynamics(...)]`"
+                )
+            }
+            Self::NoEvent { name, known } => {
+                write!(
+                    f,
+                    "there is no event or output `{name}`: the model declares {}",
+                    known.join(", ")
+                )
+            }
+            Self::EventsWithoutEnd { name, time } => {
+                write!(
+                    f,
+                    "the event `{name}` comes ever sooner and without end at t = {time}: let `Act::Stop` end the run, or `Act::Record` leave the motion alone, where it comes to rest"
+                )
+            }
+            Self::EventsUnsupported { call } => {
+                write!(f, "`{call}` does not look for events; `run` does")
             }
             Self::NodeOrder { node, time } => {
                 write!(

@@ -37,7 +37,7 @@ pub use linearised::Linearised;
 pub use modal::Modal;
 pub use motion::{Motion, Node, Outputs};
 pub use periodic::{Orbit, PeriodicOrbit};
-pub use simulation::{Checkpoint, Simulation, Steps, Warning};
+pub use simulation::{Act, Checkpoint, Crossing, Event, Occurrence, Simulation, Steps, Warning};
 pub use tfe_macros::dynamics;
 /// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
 pub use tfe_runtime as runtime;
@@ -52,9 +52,10 @@ pub use work_precision::WorkPrecision;
 pub mod prelude {
     pub use crate::stability::Blocks;
     pub use crate::{
-        BoundaryValue, ConsistentState, Continuation, Element, EnergyConserving, Ensemble,
-        FamilyVelocity, Fidelity, Mixed, Modal, Model, Motion, Node, PeriodicOrbit, Primal, Radau,
-        Simulation, Solve, State, ThreeField, Velocity, WorkPrecision, dynamics, stability,
+        Act, BoundaryValue, ConsistentState, Continuation, Crossing, Element, EnergyConserving,
+        Ensemble, FamilyVelocity, Fidelity, Mixed, Modal, Model, Motion, Node, PeriodicOrbit,
+        Primal, Radau, Simulation, Solve, State, ThreeField, Velocity, WorkPrecision, dynamics,
+        stability,
     };
 }
 

@@ -5,7 +5,7 @@ pub(crate) mod family;
 use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv;
 use crate::error::AtError;
-use crate::simulation::{Checkpoint, Warning};
+use crate::simulation::{Checkpoint, Event, Warning};
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -98,6 +98,7 @@ pub struct Motion<const N: usize> {
     warnings: Vec<Warning>,
     names: Vec<CoordinateName>,
     checkpoint: Option<Box<Checkpoint<N>>>,
+    events: Vec<Event<N>>,
 }
 
 impl<const N: usize> Motion<N> {
@@ -127,6 +128,7 @@ impl<const N: usize> Motion<N> {
             warnings: Vec::new(),
             names: (0..N).map(M::coordinate_name).collect(),
             checkpoint: None,
+            events: Vec::new(),
         };
         motion.record(model, t, start);
         motion
@@ -350,8 +352,17 @@ impl<const N: usize> Motion<N> {
         let mut velocity = self.velocities[0];
         let (mut sum, mut integrals) = (0.0, vec![0.0]);
         let mut rule = Quadrature::gauss(1);
-        for (element, pair) in self.elements.iter().zip(self.nodes.windows(2)) {
+        let mut elements = self.elements.iter();
+        for pair in self.nodes.windows(2) {
             let (from, to) = (pair[0].t, pair[1].t);
+            // The states before and after an event.
+            if from == to {
+                integrals.push(sum);
+                continue;
+            }
+            let Some(element) = elements.next() else {
+                break;
+            };
             if (element.start(), element.end()) != (from, to) {
                 return Err(AtError::NotRecorded { time: from });
             }
@@ -411,6 +422,15 @@ impl<const N: usize> Motion<N> {
     /// None is no proof that the motion is right: [`Warning`] says what is looked for, and how often.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
+    }
+
+    pub(crate) fn set_events(&mut self, events: Vec<Event<N>>) {
+        self.events = events;
+    }
+
+    /// The events that [`Simulation::on`](crate::Simulation::on) asked for, in the order in which they happened.
+    pub fn events(&self) -> &[Event<N>] {
+        &self.events
     }
 
     /// The observables at the recorded nodes.

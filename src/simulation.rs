@@ -2,6 +2,7 @@
 
 mod accurate;
 mod checkpoint;
+mod events;
 pub(crate) mod family;
 pub(crate) mod mesh;
 mod progress;
@@ -11,11 +12,13 @@ mod watch;
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
 use crate::motion::Motion;
+use events::{Cut, Events, On, Passage};
 use family::Runs;
 use mesh::{Endless, Mesh};
 use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
+use std::sync::Arc;
 use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::length::Declared;
 use tfe_runtime::step::{Control, Impulse, Stepper};
@@ -27,6 +30,7 @@ use watch::{Recorded, Watch};
 pub use accurate::Accurate;
 pub(crate) use checkpoint::Reached;
 pub use checkpoint::{Checkpoint, FamilyCheckpoint};
+pub use events::{Act, Crossing, Event, Occurrence};
 pub use steps::Steps;
 pub use watch::Warning;
 pub(crate) use watch::is_jump;
@@ -62,6 +66,7 @@ pub struct Simulation<'m, M, const N: usize> {
     record_every: usize,
     impulses: Vec<Impulse<N>>,
     breaks: Vec<f64>,
+    events: Vec<On<'m, N>>,
     /// What was asked for.
     at_kinks: Option<bool>,
     progress: bool,
@@ -73,6 +78,7 @@ impl<M, const N: usize> Clone for Simulation<'_, M, N> {
             nodes: self.nodes.clone(),
             impulses: self.impulses.clone(),
             breaks: self.breaks.clone(),
+            events: self.events.clone(),
             ..*self
         }
     }
@@ -104,6 +110,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             record_every: 1,
             impulses: Vec::new(),
             breaks: Vec::new(),
+            events: Vec::new(),
             at_kinks: None,
             progress: false,
         }
@@ -200,6 +207,59 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         self
     }
 
+    /// Does `act` whenever the event or output `name` of the model changes its sign in the direction of `crossing`; [`Motion::events`] lists what was met. Of several events the run does
+    /// what is to be done in the order of time.
+    ///
+    /// Times are those of an element that ends at the event, so that they are as accurate as nodes. An element ends there too where the state changes: two nodes have that
+    /// time then, with the states before and after. The signs of outputs are looked at in 8 to 24 parts of an element and where a parabola through them comes near zero: a
+    /// pair of changes within such a part may be missed, and a value that touches zero without changing its sign is no event.
+    ///
+    /// [`run`](Self::run) looks for events; [`steps`](Self::steps), [`run_linearised`](Self::run_linearised) and runs with an [`accuracy`](Self::accuracy) refuse them.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// /// A ball above the ground.
+    /// #[dynamics(coordinates(y), lagrangian = m/2*dot(y)^2 - m*g*y, event(impact) = y)]
+    /// struct Ball { m: f64, g: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let ball = Ball { m: 0.1, g: 9.81 };
+    /// let motion = Simulation::new(&ball)
+    ///     .step(0.01)
+    ///     .on("impact", Crossing::Falling, |event| Act::Restart(event.state_with_velocity([-0.8 * event.v[0]])))
+    ///     .run(ball.state([1.0], [0.0]), 0.0..2.0)?;
+    /// let first = (2.0 / 9.81_f64).sqrt();
+    /// assert!((motion.events()[0].t - first).abs() < 1e-15);
+    /// assert!((motion.events()[1].t - 2.6 * first).abs() < 1e-14);
+    /// assert!(motion.states().iter().all(|node| node.q[0] > -1e-15));
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn on(
+        mut self,
+        name: impl Into<String>,
+        crossing: Crossing,
+        act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
+    ) -> Self {
+        self.events.push(On {
+            name: name.into(),
+            crossing,
+            act: Arc::new(act),
+        });
+        self
+    }
+
+    /// Refuses events where nothing looks for them.
+    fn refuse_events(&self, call: &'static str) -> Result<(), RunErrorKind> {
+        if self.events.is_empty() {
+            Ok(())
+        } else {
+            Err(RunErrorKind::EventsUnsupported { call })
+        }
+    }
+
     /// Whether steps are cut where a force has a kink or a jump: where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the arguments
     /// of a `min` or `max` changes its sign, in the state or in time (`docs/theory.md` §10.7). Elements keep their order then, and the run stays on the grid asked for;
     /// [`Statistics::kinks`](crate::Statistics::kinks) counts the crossings. A motion that would slide along a jump is an error, [`StepError::Slides`](crate::runtime::StepError::Slides).
@@ -261,7 +321,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # }
     /// ```
     pub fn run(&self, start: State<N>, span: Range<f64>) -> Result<Motion<N>, RunError<N>> {
-        let ends_only = self.record_every != 1;
+        let ends_only = self.record_every != 1 && self.events.is_empty();
         let ready = |stepper: Stepper<'m, M, N>| {
             let stepper = self.cutting(stepper);
             if ends_only {
@@ -295,6 +355,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         start: State<N>,
         span: Range<f64>,
     ) -> Result<Linearised<N>, RunError<N>> {
+        if let Err(kind) = self.refuse_events("run_linearised") {
+            let motion = Motion::from_start(self.model, span.start, &start);
+            return Err(RunError::new(kind, motion));
+        }
         let mut transitions = Vec::new();
         let mut entries = vec![0.0; 4 * N * N];
         let mut starts = Vec::new();
@@ -340,6 +404,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ) -> Result<Motion<N>, RunError<N>> {
         let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, finished)?;
         let last = *motion.last();
+        // A run that was stopped has no grid to go on with.
+        if mesh.end().is_some_and(|end| end != last.t) {
+            return Ok(motion);
+        }
         motion.set_checkpoint(Checkpoint {
             reached: Reached::new(origin, self.step, mesh, last.t),
             state: last.state(),
@@ -382,65 +450,129 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let mut state = *start;
         let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
         let mut failure = None;
-        for (element, (t, next, h)) in mesh.elements().enumerate().skip(done) {
+        let chosen = (self.chosen_element(), self.control);
+        let mut events = match Events::new(self.model, &self.events, chosen) {
+            Ok(events) => events,
+            Err(kind) => return Err(RunError::new(kind, motion)),
+        };
+        let keeps = self.record_every == 1;
+        'run: for (element, (t, next, h)) in mesh.elements().enumerate().skip(done) {
             let last = element + 1 == mesh.steps();
-            let before = state;
-            watch.look(self.model, element, (t, h), &before);
+            watch.look(self.model, element, (t, h), &state);
             let impulses = mesh.impulses_in(t, next, last);
             is_conserved &= impulses.is_empty();
-            let step = stepper.advance(mesh.begin(t, h), h, &mut state, impulses);
-            let step = step.map_err(|source| RunErrorKind::Solve {
-                element,
-                time: t,
-                step: h,
-                source,
-            });
-            // Before the matrix, which needs the same memory.
-            let dense = (self.record_every == 1 && step.is_ok()).then(|| stepper.dense(t, next));
-            let passed = Passed {
-                start: t,
-                before: &before,
-                end: next,
-                after: &state,
-            };
-            let step = step.and_then(|()| {
-                finished(stepper, passed).map_err(|source| RunErrorKind::Transition {
+            events.begin(h);
+            // What is left of the element behind its last event.
+            let (mut from, mut length) = (t, h);
+            loop {
+                let before = state;
+                let begin = if from == t { mesh.begin(t, h) } else { from };
+                let ahead = |impulse: &&Impulse<N>| {
+                    from == t || h.signum() * impulse.time >= h.signum() * from
+                };
+                let behind = impulses.iter().take_while(|one| !ahead(one)).count();
+                let impulses = &impulses[behind..];
+                let step = stepper.advance(begin, length, &mut state, impulses);
+                let step = step.map_err(|source| RunErrorKind::Solve {
                     element,
-                    time: t,
-                    step: h,
+                    time: from,
+                    step: length,
                     source,
-                })
-            });
-            if let Err(kind) = step {
-                watch.examine(self.model, element, (t, h), &before);
-                if motion.last().t != t {
-                    motion.record(self.model, t, &before);
-                }
-                failure = Some(kind);
-                break;
-            }
-            if impulses.is_empty() {
-                let examined = Examined {
-                    t,
-                    h,
+                });
+                // Before the matrix, which needs the same memory.
+                let dense = ((keeps || !events.is_empty()) && step.is_ok())
+                    .then(|| stepper.dense(from, next));
+                let passed = Passed {
+                    start: from,
                     before: &before,
+                    end: next,
                     after: &state,
                 };
-                resolution.look(stepper.statistics(), examined);
-            }
-            if let Some(dense) = dense {
-                motion.keep_element(dense);
-            }
-            if last || (element + 1) % self.record_every == 0 {
-                motion.record(self.model, next, &state);
-                watch.pass(recorded(&motion, is_conserved));
-                is_conserved = conserves;
+                let step = step.and_then(|()| {
+                    finished(stepper, passed).map_err(|source| RunErrorKind::Transition {
+                        element,
+                        time: from,
+                        step: length,
+                        source,
+                    })
+                });
+                let looked = step.and_then(|()| match &dense {
+                    Some(dense) if !events.is_empty() => events.look(&Passage {
+                        t: from,
+                        h: length,
+                        before: &before,
+                        after: &state,
+                        dense,
+                        impulses,
+                    }),
+                    _ => Ok(None),
+                });
+                let cut = match looked {
+                    Ok(cut) => cut,
+                    Err(kind) => {
+                        watch.examine(self.model, element, (from, length), &before);
+                        if motion.last().t != from {
+                            motion.record(self.model, from, &before);
+                        }
+                        failure = Some(kind);
+                        break 'run;
+                    }
+                };
+                let Some(cut) = cut else {
+                    if impulses.is_empty() {
+                        let examined = Examined {
+                            t: from,
+                            h: length,
+                            before: &before,
+                            after: &state,
+                        };
+                        resolution.look(stepper.statistics(), examined);
+                    }
+                    if let Some(dense) = dense.filter(|_| keeps) {
+                        motion.keep_element(dense);
+                    }
+                    if last || (element + 1) % self.record_every == 0 {
+                        motion.record(self.model, next, &state);
+                        watch.pass(recorded(&motion, is_conserved));
+                        is_conserved = conserves;
+                    }
+                    break;
+                };
+                is_conserved = false;
+                let Cut {
+                    t: time,
+                    at,
+                    inside,
+                    after,
+                } = cut;
+                if let Some(dense) = inside.filter(|_| keeps) {
+                    motion.keep_element(dense);
+                }
+                if motion.last().t != time {
+                    motion.record(self.model, time, &at);
+                }
+                let Some(after) = after else {
+                    state = at;
+                    break 'run;
+                };
+                if let Err(kind) = check_restart(self.model, time, length, &after) {
+                    failure = Some(kind);
+                    break 'run;
+                }
+                motion.record(self.model, time, &after);
+                state = after;
+                if time == next {
+                    break;
+                }
+                length -= time - from;
+                from = time;
             }
             bar.advance();
         }
         watch.add(resolution.warning(&state));
         motion.set_statistics(*stepper.statistics());
         motion.set_warnings(watch.into_warnings());
+        motion.set_events(events.met);
         match failure {
             None => Ok(motion),
             Some(kind) => Err(RunError::new(kind, motion)),
@@ -485,6 +617,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
         let step = self.step.unwrap_or(f64::NAN);
         let ready = check_start(&start).and_then(|()| {
+            self.refuse_events("steps")?;
             check_constraints(self.model, t0, step, &start)?;
             if !t0.is_finite() {
                 return Err(RunErrorKind::Span {
@@ -545,6 +678,17 @@ pub(crate) fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErr
         }
     }
     Ok(())
+}
+
+/// Refuses a state from which a run cannot go on.
+fn check_restart<M: Model<N>, const N: usize>(
+    model: &M,
+    time: f64,
+    h: f64,
+    state: &State<N>,
+) -> Result<(), RunErrorKind> {
+    check_start(state)?;
+    check_constraints(model, time, h, state)
 }
 
 /// Refuses a start that is not on the constraints.

@@ -20,7 +20,15 @@ struct Doc {
 }
 
 /// The arguments whose first word in parentheses, or behind `let`, is a name.
-const NAMED: &[&str] = &["let", "force", "constraint", "output", "solver", "model"];
+const NAMED: &[&str] = &[
+    "let",
+    "force",
+    "constraint",
+    "output",
+    "event",
+    "solver",
+    "model",
+];
 
 /// The arguments for which something with a documentation of its own is generated.
 const DOCUMENTED: &[&str] = &["output", "solver", "model"];
@@ -30,6 +38,12 @@ impl Docs {
         let mut docs = Self::default();
         for range in parse::split_arguments(&map.text) {
             let (word, name) = head(&map.text[range.clone()]);
+            // An output by another word.
+            let word = if word == "event" {
+                "output".to_owned()
+            } else {
+                word
+            };
             for (at, text) in &map.docs {
                 if range.contains(at) {
                     docs.0.push(Doc {

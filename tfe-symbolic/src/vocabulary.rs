@@ -26,6 +26,8 @@ pub enum Argument {
     Constraint,
     /// `output(name) = value`
     Output,
+    /// `event(name) = value`: an output by another word
+    Event,
     /// `sensitivity(k)`
     Sensitivity,
     /// `solver(Name, Mixed::<4>)`
@@ -53,7 +55,7 @@ enum Declares {
 }
 
 /// The arguments with the words that they begin with.
-const ARGUMENTS: [(Argument, &str, Times, Declares); 14] = [
+const ARGUMENTS: [(Argument, &str, Times, Declares); 15] = [
     (
         Argument::Coordinates,
         "coordinates",
@@ -99,6 +101,7 @@ const ARGUMENTS: [(Argument, &str, Times, Declares); 14] = [
         Times::Repeated,
         Declares::Nothing,
     ),
+    (Argument::Event, "event", Times::Repeated, Declares::Nothing),
     (
         Argument::Sensitivity,
         "sensitivity",

@@ -85,7 +85,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
     ) -> Result<Estimated<Motion<N>>, RunError<N>> {
         let beginning = || Motion::from_start(self.model, span.start, &start);
-        let mesh = self.prepare(&start, &span).map(|(mesh, _)| mesh);
+        let mesh = self
+            .refuse_events("run_estimated")
+            .and_then(|()| self.prepare(&start, &span));
+        let mesh = mesh.map(|(mesh, _)| mesh);
         let mesh = mesh.map_err(|kind| RunError::new(kind, beginning()))?;
         estimated(self, (span.start, &start), &mesh)
             .map_err(|broken| RunError::new(broken.0, broken.1))
@@ -105,6 +108,10 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
     ) -> Result<Estimated<Motion<N>>, RunError<N>> {
         let run = &self.simulation;
         let run = &run.clone().at_kinks(run.at_kinks.unwrap_or(true));
+        run.refuse_events("accuracy").map_err(|kind| {
+            let motion = Motion::from_start(run.model, span.start, &start);
+            RunError::new(kind, motion)
+        })?;
         if span.start == span.end {
             let motion = run.run(start, span)?;
             let outputs = run.outputs();

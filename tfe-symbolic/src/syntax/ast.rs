@@ -64,7 +64,7 @@ pub enum Item {
         /// The expression that vanishes.
         value: Expr,
     },
-    /// `output(name) = value` or `output(name[i in a..b]) = value`
+    /// `output(name) = value` or `output(name[i in a..b]) = value`; `event` for `output` means the same
     Output {
         /// The name of the observable.
         name: Name,

@@ -144,6 +144,7 @@ fn rule_of(argument: Argument) -> Rule {
         Argument::TimeTransformation => Rule::time_transformation,
         Argument::Constraint => Rule::constraint,
         Argument::Output => Rule::output,
+        Argument::Event => Rule::event,
         Argument::Sensitivity => Rule::sensitivity,
         Argument::Solver => Rule::solver,
         Argument::Model => Rule::model,
@@ -204,7 +205,7 @@ impl Builder<'_> {
                 target: self.expression(parts.next(Rule::expression)?)?,
                 value: self.expression(parts.next(Rule::expression)?)?,
             },
-            Rule::constraint | Rule::output => {
+            Rule::constraint | Rule::output | Rule::event => {
                 let name = self.name(&parts.next(Rule::name)?);
                 let range = match parts.optional(Rule::range) {
                     Some(range) => Some(self.range(range)?),
