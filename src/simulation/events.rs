@@ -3,6 +3,7 @@
 mod search;
 
 use crate::error::RunErrorKind;
+use std::cell::RefCell;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -125,6 +126,8 @@ pub(super) struct Events<'a, 'm, M, const N: usize> {
     sides: Vec<f64>,
     element: Element,
     control: Control,
+    /// Room for all outputs.
+    values: RefCell<Vec<f64>>,
     /// Finds the times of events, apart from the run.
     probe: Option<Stepper<'m, M, N>>,
     pub(super) met: Vec<Event<N>>,
@@ -190,6 +193,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             watched,
             element,
             control,
+            values: RefCell::new(vec![0.0; model.columns()]),
             probe: None,
             met: Vec::new(),
             cuts: 0,
@@ -216,7 +220,9 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             let time = t + tau * h;
             let inside = 0.0 < tau && tau < 1.0;
             let (state, v) = if inside {
-                (dense.at_time(time), dense.velocity_at_time(time))
+                (dense.at_time(time), velocity_of_form::<M, N>(dense, time))
+            } else if matches!(M::FORM, Form::Hamiltonian) {
+                (*if tau == 0.0 { arc.before } else { arc.after }, [0.0; N])
             } else {
                 // Two elements agree at a node.
                 let (time, state) = if tau == 0.0 {
@@ -229,6 +235,9 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             };
             self.outputs(time, &state, &v, row);
         };
+        if search::stays_off(&self.sides, &value) {
+            return Ok(None);
+        }
         let (found, sides) = search::crossings(&self.sides, samples, resolution / h.abs(), value);
         for (number, root) in found.iter().enumerate() {
             let (_, on) = self.watched[root.function];
@@ -309,7 +318,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             Form::Lagrangian => v,
             Form::Hamiltonian => &state.p,
         };
-        let mut values = vec![0.0; self.model.columns()];
+        let mut values = self.values.borrow_mut();
         self.model.observables(t, &state.q, z, &mut values);
         row.extend(self.watched.iter().map(|(column, _)| values[*column]));
     }
@@ -387,5 +396,13 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             (length / h + NEAR).min(1.0) * h,
         );
         (value(to) - value(from)) / (to - from)
+    }
+}
+
+/// The velocity that observables of a Lagrangian are functions of; those of a Hamiltonian are of the momentum, and need none.
+fn velocity_of_form<M: Model<N>, const N: usize>(dense: &DenseElement<N>, time: f64) -> [f64; N] {
+    match M::FORM {
+        Form::Lagrangian => dense.velocity_at_time(time),
+        Form::Hamiltonian => [0.0; N],
     }
 }

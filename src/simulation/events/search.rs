@@ -17,6 +17,26 @@ const MAX_EVALUATIONS: u32 = 100;
 /// Where a function is on no side at first it is looked at closer to the start, in parts of the first sample of 4⁻¹, 4⁻², …
 const CLOSER: i32 = 12;
 
+/// Whether all functions stay on their sides: in five places they are further from zero than they move along the element.
+pub(super) fn stays_off(sides: &[f64], values: &impl Fn(f64, &mut Vec<f64>)) -> bool {
+    const PLACES: [f64; 5] = [1.0, 0.0, 0.5, 0.25, 0.75];
+    let mut row = Vec::with_capacity(sides.len());
+    let mut bounds = vec![(f64::INFINITY, f64::NEG_INFINITY); sides.len()];
+    for tau in PLACES {
+        row.clear();
+        values(tau, &mut row);
+        for ((side, value), (least, largest)) in sides.iter().zip(&row).zip(&mut bounds) {
+            let value = side * value;
+            *least = value.min(*least);
+            *largest = value.max(*largest);
+            if !(value > 0.0 && *largest < 2.0 * *least) {
+                return false;
+            }
+        }
+    }
+    true
+}
+
 /// The changes of sign of the functions that `values` gives at τ, and the sides on which they are at the end. Each is on one of `sides` at the start; zero where that is
 /// not known. The signs are looked at in `samples` equal parts, and at the vertex of a parabola where a function comes near zero between them; a change between two parts
 /// belongs to the later one.
@@ -198,6 +218,16 @@ mod tests {
         // A short hop from the ground, with a rounding at its start.
         let hop = taus(0.0, |tau| tau * (1e-3 - tau) - 1e-20);
         assert!(is_near(&hop, &[1e-3]), "{hop:?}");
+    }
+
+    #[test]
+    fn what_is_far_from_zero_is_not_searched() {
+        let off = |side: f64, f: fn(f64) -> f64| {
+            stays_off(&[side], &|tau: f64, row: &mut Vec<f64>| row.push(f(tau)))
+        };
+        assert!(off(1.0, |tau| 3.0 + tau) && off(-1.0, |tau| tau - 3.0));
+        assert!(!off(1.0, |tau| 0.5 + tau) && !off(-1.0, |tau| 3.0 + tau));
+        assert!(!off(0.0, |_| 1.0) && !off(1.0, |_| f64::NAN));
     }
 
     #[test]
