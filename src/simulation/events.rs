@@ -166,6 +166,18 @@ struct Met<const N: usize> {
     inside: Option<DenseElement<N>>,
 }
 
+impl<const N: usize> Met<N> {
+    /// Of the polynomial alone, where no element can end there.
+    fn between(dense: &DenseElement<N>, t: f64, length: f64) -> Self {
+        Self {
+            length,
+            state: dense.at_time(t + length),
+            velocity: dense.velocity_at_time(t + length),
+            inside: None,
+        }
+    }
+}
+
 impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
     /// So many events within one step are a motion that comes to rest by ever more of them.
     const MAX_CUTS: u32 = 1000;
@@ -244,9 +256,8 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             if !on.crossing.counts(root.rises) {
                 continue;
             }
-            let Some(met) = self.locate(arc, root, resolution) else {
-                continue;
-            };
+            let met = self.locate(arc, root, resolution);
+            let met = met.unwrap_or_else(|| Met::between(dense, t, root.tau * h));
             let time = if (h - met.length).abs() <= resolution {
                 dense.end()
             } else {
@@ -323,8 +334,8 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
         row.extend(self.watched.iter().map(|(column, _)| values[*column]));
     }
 
-    /// The length of the element that ends at the event: nodes are more accurate than the polynomial between them, which tells where to begin. None where no such element
-    /// is found.
+    /// The length of the element that ends at the event: nodes are more accurate than the polynomial between them, which tells where to begin. None where such an element
+    /// cannot be solved.
     fn locate(
         &mut self,
         arc: &Passage<'_, N>,
