@@ -52,6 +52,8 @@ mod propagator;
 mod quad;
 pub mod quadrature;
 pub mod real;
+#[cfg(feature = "alloc")]
+mod root;
 pub mod scheme;
 pub mod statistics;
 pub mod step;
@@ -96,6 +98,8 @@ pub mod __private {
     };
     pub use crate::newton::{Control, Solve};
     pub use crate::real::Real;
+    #[cfg(feature = "alloc")]
+    pub use crate::root::root;
     pub use crate::scheme::{Scheme, SchemeRef, Tables};
     pub use crate::statistics::Statistics;
     pub use crate::step::{Impulse, Interval, Memory, Method};

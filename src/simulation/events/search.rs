@@ -1,5 +1,7 @@
 //! All changes of sign of functions along an element, in their order.
 
+use tfe_runtime::__private::root;
+
 /// A function changes its sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Root {
@@ -10,9 +12,6 @@ pub(super) struct Root {
     /// Whether from below zero to above.
     pub(super) rises: bool,
 }
-
-/// Evaluations that a root may cost.
-const MAX_EVALUATIONS: u32 = 100;
 
 /// Where a function is on no side at first it is looked at closer to the start, in parts of the first sample of 4⁻¹, 4⁻², …
 const CLOSER: i32 = 12;
@@ -67,7 +66,7 @@ pub(super) fn crossings(
         let mut from = 0.0;
         let mut change = |from: f64, to: f64, side: &mut f64| {
             let rises = *side < 0.0;
-            let tau = root(from, to, (*side, resolution), &mut value);
+            let tau = root(from..to, *side, 0.25 * resolution, &mut value);
             roots.push(Root {
                 function,
                 tau,
@@ -125,53 +124,6 @@ fn vertex(times: &[f64], column: &[f64], side: f64) -> Option<f64> {
     let (first, second) = ((f1 - f0) / (t1 - t0), (f2 - f1) / (t2 - t1));
     let bend = (second - first) / (t2 - t0);
     Some(0.5 * (t0 + t1) - 0.5 * first / bend)
-}
-
-/// The root between two places, by false position with halved weights (Illinois) and bisection where that is slow. At `from` the function is on its side, or zero.
-fn root(
-    mut from: f64,
-    mut to: f64,
-    (side, resolution): (f64, f64),
-    value: &mut dyn FnMut(f64) -> f64,
-) -> f64 {
-    let (mut low, mut high) = (side * value(from), side * value(to));
-    if !(low > 0.0) {
-        return from;
-    }
-    let mut kept = 0_i32;
-    for evaluation in 0..MAX_EVALUATIONS {
-        if to - from <= 0.25 * resolution {
-            break;
-        }
-        let guess = from + (to - from) * (low / (low - high));
-        let is_slow = evaluation % 8 == 7;
-        let tau = if is_slow || !(guess > from && guess < to) {
-            0.5 * (from + to)
-        } else {
-            guess
-        };
-        if tau == from || tau == to {
-            break;
-        }
-        let here = side * value(tau);
-        if here == 0.0 {
-            return tau;
-        }
-        if here > 0.0 {
-            (from, low) = (tau, here);
-            if kept > 0 {
-                high *= 0.5;
-            }
-            kept = 1;
-        } else {
-            (to, high) = (tau, here);
-            if kept < 0 {
-                low *= 0.5;
-            }
-            kept = -1;
-        }
-    }
-    to
 }
 
 #[cfg(test)]

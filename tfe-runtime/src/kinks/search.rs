@@ -1,5 +1,6 @@
 //! The first root of switching functions along a step.
 
+use crate::root::root;
 use alloc::vec::Vec;
 use core::ops::Range;
 
@@ -14,9 +15,6 @@ pub(super) struct Crossing {
 
 /// Values that are smaller, relative to the largest one of the step, are roundings.
 const ROUNDING: f64 = 1e-13;
-
-/// Evaluations that a root may cost.
-const MAX_EVALUATIONS: u32 = 80;
 
 /// Finds the first change of sign of any of the functions that `values` gives at τ; the signs are looked at in `samples` equal parts of the range, and where a function
 /// comes close to zero between two of them. Roots are known to `resolution`; one that is as near to the start as that has been passed before.
@@ -51,13 +49,13 @@ pub(super) fn first_crossing(
             values(tau, &mut row);
             row.get(switch).copied().unwrap_or(f64::NAN)
         };
-        let Some((from, to)) = bracket(&times, &column, passed, &mut value) else {
+        let Some((side, bracket)) = bracket(&times, &column, passed, &mut value) else {
             continue;
         };
-        if first.is_some_and(|first| first.tau <= from) {
+        if first.is_some_and(|first| first.tau <= bracket.start) {
             continue;
         }
-        let tau = root(from, to, resolution, &mut value);
+        let tau = root(bracket, side, resolution, &mut value);
         if first.is_none_or(|first| tau < first.tau) {
             first = Some(Crossing { switch, tau });
         }
@@ -77,13 +75,13 @@ pub(super) fn begins_on_root(resolution: f64, values: &mut dyn FnMut(f64, &mut V
     })
 }
 
-/// The first part of the step in which the function goes to the other side of zero.
+/// The side on which the function begins, and the first part of the step in which it goes to the other one.
 fn bracket(
     times: &[f64],
     column: &[f64],
     passed: f64,
     value: &mut dyn FnMut(f64) -> f64,
-) -> Option<(f64, f64)> {
+) -> Option<(f64, Range<f64>)> {
     let largest = (column.iter()).fold(0.0_f64, |largest, value| largest.max(value.abs()));
     let moved = (column[1] - column[0]).abs();
     let on_surface = (passed * moved).max(ROUNDING * largest);
@@ -93,7 +91,7 @@ fn bracket(
     for k in begins + 1..column.len() {
         let here = side * column[k];
         if here < 0.0 {
-            return Some((times[k - 1], times[k]));
+            return Some((side, times[k - 1]..times[k]));
         }
         // Down and up again between the samples.
         if k + 1 == column.len() {
@@ -105,52 +103,11 @@ fn bracket(
             let vertex = (0.5 * (before - after) / bend).clamp(-1.0, 1.0);
             let tau = times[k] + vertex * (times[k + 1] - times[k]);
             if side * value(tau) < 0.0 {
-                return Some((times[k - 1], tau));
+                return Some((side, times[k - 1]..tau));
             }
         }
     }
     None
-}
-
-/// The root in a bracket, by false position with halved weights (Illinois) and bisection where that is slow.
-fn root(mut from: f64, mut to: f64, resolution: f64, value: &mut dyn FnMut(f64) -> f64) -> f64 {
-    let (mut low, mut high) = (value(from), value(to));
-    let side = -high.signum();
-    // Weights of false position; the signs above are never changed.
-    let mut kept = 0_i32;
-    for evaluation in 0..MAX_EVALUATIONS {
-        if to - from <= resolution {
-            break;
-        }
-        let guess = from + (to - from) * (low / (low - high));
-        let is_slow = evaluation % 8 == 7;
-        let tau = if is_slow || !(guess > from && guess < to) {
-            0.5 * (from + to)
-        } else {
-            guess
-        };
-        if tau == from || tau == to {
-            break;
-        }
-        let here = value(tau);
-        if here == 0.0 {
-            return tau;
-        }
-        if side * here > 0.0 {
-            (from, low) = (tau, here);
-            if kept > 0 {
-                high *= 0.5;
-            }
-            kept = 1;
-        } else {
-            (to, high) = (tau, here);
-            if kept < 0 {
-                low *= 0.5;
-            }
-            kept = -1;
-        }
-    }
-    to
 }
 
 #[cfg(test)]

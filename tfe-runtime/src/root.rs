@@ -1,0 +1,61 @@
+//! The root of a function of one number in a bracket.
+
+use core::ops::Range;
+
+/// Evaluations that a root may cost.
+const MAX_EVALUATIONS: u32 = 100;
+
+/// The root of a function that is on `side` of zero (its sign) at the start of the bracket and not at its end, by false position with halved weights (Illinois) and
+/// bisection where that is slow.
+///
+/// It is a place on the other side, or zero, within `resolution` of one that is not; the start, where the function is not on its side there.
+pub fn root(
+    bracket: Range<f64>,
+    side: f64,
+    resolution: f64,
+    value: &mut dyn FnMut(f64) -> f64,
+) -> f64 {
+    let Range {
+        start: mut from,
+        end: mut to,
+    } = bracket;
+    // Weights of false position: their signs never change.
+    let (mut low, mut high) = (side * value(from), side * value(to));
+    if !(low > 0.0) {
+        return from;
+    }
+    let mut kept = 0_i32;
+    for evaluation in 0..MAX_EVALUATIONS {
+        if to - from <= resolution {
+            break;
+        }
+        let guess = from + (to - from) * (low / (low - high));
+        let is_slow = evaluation % 8 == 7;
+        let tau = if is_slow || !(guess > from && guess < to) {
+            0.5 * (from + to)
+        } else {
+            guess
+        };
+        if tau == from || tau == to {
+            break;
+        }
+        let here = side * value(tau);
+        if here == 0.0 {
+            return tau;
+        }
+        if here > 0.0 {
+            (from, low) = (tau, here);
+            if kept > 0 {
+                high *= 0.5;
+            }
+            kept = 1;
+        } else {
+            (to, high) = (tau, here);
+            if kept < 0 {
+                low *= 0.5;
+            }
+            kept = -1;
+        }
+    }
+    to
+}
