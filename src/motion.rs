@@ -6,6 +6,7 @@ use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv;
 use crate::error::AtError;
 use crate::simulation::{Checkpoint, Event, Warning};
+use crate::velocity::velocity_from;
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -29,12 +30,11 @@ pub struct Node<const N: usize> {
 impl<const N: usize> Node<N> {
     /// A state of a model, whose velocities are looked for from `guess` on.
     pub(crate) fn new<M: Model<N>>(model: &M, t: f64, state: &State<N>, guess: &[f64; N]) -> Self {
-        let velocity = constrained::velocity_of(model, t, &state.q, &state.p, guess);
         Self {
             t,
             q: state.q,
             p: state.p,
-            v: velocity.unwrap_or([f64::NAN; N]),
+            v: velocity_from(model, t, state, guess),
         }
     }
 
@@ -161,8 +161,7 @@ impl<const N: usize> Motion<N> {
     /// recorded as NaN: the state itself is good, and its momentum may well belong to no velocity (a singular mass matrix).
     pub(crate) fn record<M: Model<N>>(&mut self, model: &M, t: f64, state: &State<N>) {
         let guess = self.velocities.last().copied().unwrap_or([0.0; N]);
-        let velocity =
-            constrained::velocity_of(model, t, &state.q, &state.p, &guess).unwrap_or([f64::NAN; N]);
+        let velocity = velocity_from(model, t, state, &guess);
         self.record_with(model, t, state, velocity);
     }
 

@@ -2,6 +2,7 @@
 
 mod accurate;
 mod checkpoint;
+mod course;
 mod events;
 pub(crate) mod family;
 pub(crate) mod mesh;

@@ -20,9 +20,19 @@ pub trait Velocity<const N: usize>: Model<N> + Sized {
     /// assert_eq!(planet.velocity(0.0, &state), [0.25, 0.5]);
     /// ```
     fn velocity(&self, t: f64, state: &State<N>) -> [f64; N] {
-        let found = constrained::velocity_of(self, t, &state.q, &state.p, &[0.0; N]);
-        found.unwrap_or([f64::NAN; N])
+        velocity_from(self, t, state, &[0.0; N])
     }
+}
+
+/// The same, looked for from `guess` on.
+pub(crate) fn velocity_from<M: Model<N>, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+    guess: &[f64; N],
+) -> [f64; N] {
+    let found = constrained::velocity_of(model, t, &state.q, &state.p, guess);
+    found.unwrap_or([f64::NAN; N])
 }
 
 impl<M: Model<N>, const N: usize> Velocity<N> for M {}

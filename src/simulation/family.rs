@@ -2,6 +2,7 @@
 
 use super::accurate::{Broken, Passing};
 use super::checkpoint::{FamilyCheckpoint, Reached};
+use super::course::{Course, Leg};
 use super::mesh::{Endless, Mesh};
 use super::{Simulation, progress};
 use crate::error::RunErrorKind;
@@ -306,9 +307,8 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             Ok((stepper, Endless::new(t0, step, &self.breaks)?))
         });
         FamilySteps {
-            course: stepper.map_err(Some),
+            course: Course::new(stepper),
             state: start,
-            element: 0,
         }
     }
 
@@ -368,33 +368,22 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
 /// The endless sequence of states of [`FamilySimulation::steps`].
 #[derive(Debug)]
 pub struct FamilySteps<'m, M> {
-    course: Result<(FamilyStepper<'m, M>, Endless), Option<RunErrorKind>>,
+    course: Course<FamilyStepper<'m, M>>,
     state: FamilyState,
-    element: usize,
 }
 
 impl<M: FamilyModel> Iterator for FamilySteps<'_, M> {
     type Item = Result<FamilyNode, RunErrorKind>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let (stepper, elements) = match &mut self.course {
-            Ok(course) => course,
-            Err(failure) => return failure.take().map(Err),
+        let state = &mut self.state;
+        let advance = |stepper: &mut FamilyStepper<'_, M>, leg: Leg| {
+            stepper.advance(leg.begin, leg.h, state)?;
+            let (_, next) = leg.nodes;
+            let velocity = stepper.velocity(next, state);
+            Ok(FamilyNode::new(next, state.clone(), velocity))
         };
-        let (t, next, h, begin) = elements.element();
-        if let Err(source) = stepper.advance(begin, h, &mut self.state) {
-            self.course = Err(None);
-            return Some(Err(RunErrorKind::Solve {
-                element: self.element,
-                time: t,
-                step: h,
-                source,
-            }));
-        }
-        elements.advance();
-        self.element += 1;
-        let velocity = stepper.velocity(next, &self.state);
-        Some(Ok(FamilyNode::new(next, self.state.clone(), velocity)))
+        self.course.next(advance, |_| ())
     }
 }
 

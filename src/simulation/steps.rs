@@ -1,5 +1,6 @@
 //! The endless sequence of states.
 
+use super::course::{Course, Leg};
 use super::mesh::{self, Endless};
 use crate::error::RunErrorKind;
 use crate::motion::Node;
@@ -9,33 +10,29 @@ use tfe_runtime::{Model, State, Statistics};
 /// The endless sequence of states of [`Simulation::steps`](crate::Simulation::steps).
 #[derive(Debug)]
 pub struct Steps<'m, M, const N: usize> {
-    course: Result<Course<'m, M, N>, Option<RunErrorKind>>,
+    course: Course<Stepper<'m, M, N>>,
     state: State<N>,
     /// Of the last node, from where the next is looked for.
     velocity: [f64; N],
-    element: usize,
     impulses: Vec<Impulse<N>>,
+    /// Of a course that has ended.
     statistics: Statistics,
 }
 
-/// What goes on until a step fails.
-type Course<'m, M, const N: usize> = (Stepper<'m, M, N>, Endless);
-
 impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
     pub(super) fn new(
-        course: Result<Course<'m, M, N>, RunErrorKind>,
+        way: Result<(Stepper<'m, M, N>, Endless), RunErrorKind>,
         start: State<N>,
         t0: f64,
         impulses: Vec<Impulse<N>>,
     ) -> Self {
-        let node =
-            |(stepper, _): &Course<'m, M, N>| Node::new(stepper.model(), t0, &start, &[0.0; N]);
-        let velocity = course.as_ref().map_or([0.0; N], |course| node(course).v);
+        let course = Course::new(way);
+        let node = |stepper: &Stepper<'m, M, N>| Node::new(stepper.model(), t0, &start, &[0.0; N]);
+        let velocity = course.stepper().map_or([0.0; N], |stepper| node(stepper).v);
         Self {
-            course: course.map_err(Some),
+            course,
             state: start,
             velocity,
-            element: 0,
             impulses,
             statistics: Statistics::default(),
         }
@@ -43,9 +40,9 @@ impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
 
     /// What the steps so far have cost.
     pub fn statistics(&self) -> Statistics {
-        match &self.course {
-            Ok((stepper, _)) => *stepper.statistics(),
-            Err(_) => self.statistics,
+        match self.course.stepper() {
+            Some(stepper) => *stepper.statistics(),
+            None => self.statistics,
         }
     }
 }
@@ -54,27 +51,22 @@ impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
     type Item = Result<Node<N>, RunErrorKind>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let (stepper, elements) = match &mut self.course {
-            Ok(course) => course,
-            Err(failure) => return failure.take().map(Err),
+        let Self {
+            course,
+            state,
+            velocity,
+            impulses,
+            statistics,
+        } = self;
+        let advance = |stepper: &mut Stepper<'_, M, N>, leg: Leg| {
+            let (t, next) = leg.nodes;
+            let acts = |impulse: &&Impulse<N>| mesh::within(impulse.time, t, next);
+            let impulses: Vec<_> = impulses.iter().filter(acts).copied().collect();
+            stepper.advance(leg.begin, leg.h, state, &impulses)?;
+            let node = Node::new(stepper.model(), next, state, velocity);
+            *velocity = node.v;
+            Ok(node)
         };
-        let (t, next, h, begin) = elements.element();
-        let acts = |impulse: &&Impulse<N>| mesh::within(impulse.time, t, next);
-        let impulses: Vec<_> = self.impulses.iter().filter(acts).copied().collect();
-        if let Err(source) = stepper.advance(begin, h, &mut self.state, &impulses) {
-            self.statistics = *stepper.statistics();
-            self.course = Err(None);
-            return Some(Err(RunErrorKind::Solve {
-                element: self.element,
-                time: t,
-                step: h,
-                source,
-            }));
-        }
-        elements.advance();
-        self.element += 1;
-        let node = Node::new(stepper.model(), next, &self.state, &self.velocity);
-        self.velocity = node.v;
-        Some(Ok(node))
+        course.next(advance, |stepper| *statistics = *stepper.statistics())
     }
 }

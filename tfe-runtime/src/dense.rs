@@ -269,11 +269,20 @@ impl<const N: usize> DenseElement<N> {
 
     /// The piece of an element that was cut.
     fn piece_at(&self, time: f64) -> Option<&Self> {
-        let ahead = self.times.1 >= self.times.0;
-        let begun = |piece: &Self| (piece.times.0 <= time) == ahead || piece.times.0 == time;
-        let after = self.pieces.partition_point(begun).checked_sub(1)?;
-        self.pieces.get(after)
+        piece_at(&self.pieces, |piece| piece.times.0, self.times, time)
     }
+}
+
+/// The piece that holds a time, of an element between two times that was cut; `start` is where a piece begins.
+pub(crate) fn piece_at<P>(
+    pieces: &[P],
+    start: impl Fn(&P) -> f64,
+    (from, to): (f64, f64),
+    time: f64,
+) -> Option<&P> {
+    let begun = |piece: &P| (start(piece) <= time) == (to >= from) || start(piece) == time;
+    let after = pieces.partition_point(begun).checked_sub(1)?;
+    pieces.get(after)
 }
 
 fn project<const N: usize>(

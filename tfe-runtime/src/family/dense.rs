@@ -2,6 +2,7 @@
 
 use super::FamilyState;
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
+use crate::dense::piece_at;
 use crate::scheme::SchemeRef;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -172,10 +173,7 @@ impl FamilyDense {
 
     /// The piece of an element that was cut.
     fn piece_at(&self, time: f64) -> Option<&Self> {
-        let ahead = self.times.1 >= self.times.0;
-        let begun = |piece: &Self| (piece.times.0 <= time) == ahead || piece.times.0 == time;
-        let after = self.pieces.partition_point(begun).checked_sub(1)?;
-        self.pieces.get(after)
+        piece_at(&self.pieces, |piece| piece.times.0, self.times, time)
     }
 }
 

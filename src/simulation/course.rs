@@ -1,0 +1,67 @@
+//! Step after step until one fails: what the endless sequences of both kinds of models have in common.
+
+use super::mesh::Endless;
+use crate::error::RunErrorKind;
+use tfe_runtime::StepError;
+
+/// A stepper on its way, or the error that it ended with, until that is told.
+#[derive(Debug)]
+pub(super) struct Course<S> {
+    way: Result<(S, Endless), Option<RunErrorKind>>,
+    element: usize,
+}
+
+/// An element of a course.
+pub(super) struct Leg {
+    /// Where it begins, to all digits.
+    pub(super) begin: f64,
+    /// Its length.
+    pub(super) h: f64,
+    /// The nodes.
+    pub(super) nodes: (f64, f64),
+}
+
+impl<S> Course<S> {
+    pub(super) fn new(way: Result<(S, Endless), RunErrorKind>) -> Self {
+        Self {
+            way: way.map_err(Some),
+            element: 0,
+        }
+    }
+
+    /// The stepper, unless the course has ended.
+    pub(super) fn stepper(&self) -> Option<&S> {
+        self.way.as_ref().ok().map(|(stepper, _)| stepper)
+    }
+
+    /// What `advance` makes of the next element; the stepper goes to `ended` where it fails.
+    pub(super) fn next<T>(
+        &mut self,
+        advance: impl FnOnce(&mut S, Leg) -> Result<T, StepError>,
+        ended: impl FnOnce(&S),
+    ) -> Option<Result<T, RunErrorKind>> {
+        let (stepper, elements) = match &mut self.way {
+            Ok(way) => way,
+            Err(failure) => return failure.take().map(Err),
+        };
+        let (time, next, h, begin) = elements.element();
+        let nodes = (time, next);
+        match advance(stepper, Leg { begin, h, nodes }) {
+            Ok(found) => {
+                elements.advance();
+                self.element += 1;
+                Some(Ok(found))
+            }
+            Err(source) => {
+                ended(stepper);
+                self.way = Err(None);
+                Some(Err(RunErrorKind::Solve {
+                    element: self.element,
+                    time,
+                    step: h,
+                    source,
+                }))
+            }
+        }
+    }
+}
