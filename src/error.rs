@@ -1,6 +1,7 @@
 //! What can go wrong in a run, where and why.
 
 use crate::constraints::write_residuals;
+use crate::driven::InputError;
 use crate::motion::Motion;
 use std::error::Error;
 use std::fmt;
@@ -110,6 +111,13 @@ pub enum RunErrorKind {
         /// The output that changes its sign.
         name: String,
         /// When.
+        time: f64,
+    },
+    /// An input that the model does not have, or that is none.
+    Input(InputError),
+    /// An earlier step failed: nothing goes on from here.
+    Ended {
+        /// The last node.
         time: f64,
     },
     /// Events were to be looked for by something that cannot.
@@ -231,6 +239,10 @@ impl fmt::Display for RunErrorKind {
                     "the event `{name}` comes ever sooner and without end at t = {time}: let `Act::Stop` end the run, or `Act::Record` leave the motion alone, where it comes to rest"
                 )
             }
+            Self::Input(error) => error.fmt(f),
+            Self::Ended { time } => {
+                write!(f, "a step after t = {time} failed: the run has ended")
+            }
             Self::EventsUnsupported { call } => {
                 write!(f, "`{call}` does not look for events; `run` does")
             }
@@ -300,6 +312,7 @@ impl Error for RunErrorKind {
         match self {
             Self::Element(error) => Some(error),
             Self::Family(error) => Some(error),
+            Self::Input(error) => Some(error),
             Self::Solve { source, .. } => Some(source),
             Self::Transition { source, .. } => Some(source),
             _ => None,

@@ -10,6 +10,7 @@ pub mod charts;
 pub mod constraints;
 pub mod continuation;
 mod csv;
+mod driven;
 pub mod ensemble;
 pub mod error;
 pub mod family;
@@ -30,6 +31,7 @@ pub use constraints::{
     Consistent, ConsistentError, ConsistentState, ConstraintResidual, Reactions,
 };
 pub use continuation::{Branch, Continuation};
+pub use driven::{Driven, InputError, Interpolation};
 pub use ensemble::Ensemble;
 pub use error::{AtError, RunError, RunErrorKind};
 pub use fidelity::Fidelity;
@@ -37,7 +39,9 @@ pub use linearised::Linearised;
 pub use modal::Modal;
 pub use motion::{Motion, Node, Outputs};
 pub use periodic::{Orbit, PeriodicOrbit};
-pub use simulation::{Act, Checkpoint, Crossing, Event, Occurrence, Simulation, Steps, Warning};
+pub use simulation::{
+    Act, Checkpoint, Crossing, Event, Held, HeldNode, Occurrence, Simulation, Steps, Warning,
+};
 pub use tfe_macros::dynamics;
 /// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
 pub use tfe_runtime as runtime;
@@ -53,9 +57,9 @@ pub mod prelude {
     pub use crate::stability::Blocks;
     pub use crate::{
         Act, BoundaryValue, ConsistentState, Continuation, Crossing, Element, EnergyConserving,
-        Ensemble, FamilyVelocity, Fidelity, Mixed, Modal, Model, Motion, Node, PeriodicOrbit,
-        Primal, Radau, Simulation, Solve, State, ThreeField, Velocity, WorkPrecision, dynamics,
-        stability,
+        Ensemble, FamilyVelocity, Fidelity, Interpolation, Mixed, Modal, Model, Motion, Node,
+        PeriodicOrbit, Primal, Radau, Simulation, Solve, State, ThreeField, Velocity,
+        WorkPrecision, dynamics, stability,
     };
 }
 

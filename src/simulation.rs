@@ -5,6 +5,8 @@ mod checkpoint;
 mod course;
 mod events;
 pub(crate) mod family;
+mod held;
+mod inputs;
 pub(crate) mod mesh;
 mod progress;
 mod steps;
@@ -24,7 +26,7 @@ use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::length::Declared;
 use tfe_runtime::step::{Control, Impulse, Stepper};
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Element, Mixed, Model, Solve, State};
+use tfe_runtime::{Element, Mixed, Model, Share, Solve, State};
 use watch::resolution::{Examined, Resolution};
 use watch::{Recorded, Watch};
 
@@ -32,6 +34,7 @@ pub use accurate::Accurate;
 pub(crate) use checkpoint::Reached;
 pub use checkpoint::{Checkpoint, FamilyCheckpoint};
 pub use events::{Act, Crossing, Event, Occurrence};
+pub use held::{Held, HeldNode};
 pub use steps::Steps;
 pub use watch::Warning;
 pub(crate) use watch::is_jump;
@@ -58,7 +61,7 @@ pub(crate) use watch::is_jump;
 /// Defaults: `Mixed::<4>` (order 6), a thousandth of the span as step, every node recorded, iteration to round-off.
 #[derive(Debug)]
 pub struct Simulation<'m, M, const N: usize> {
-    model: &'m M,
+    model: Share<'m, M>,
     /// The default where it is not chosen.
     element: Option<Element>,
     step: Option<f64>,
@@ -71,15 +74,19 @@ pub struct Simulation<'m, M, const N: usize> {
     /// What was asked for.
     at_kinks: Option<bool>,
     progress: bool,
+    /// What was asked for and cannot be done.
+    refusal: Option<RunErrorKind>,
 }
 
 impl<M, const N: usize> Clone for Simulation<'_, M, N> {
     fn clone(&self) -> Self {
         Self {
+            model: self.model.clone(),
             nodes: self.nodes.clone(),
             impulses: self.impulses.clone(),
             breaks: self.breaks.clone(),
             events: self.events.clone(),
+            refusal: self.refusal.clone(),
             ..*self
         }
     }
@@ -103,7 +110,7 @@ impl<'m, M, const N: usize> Simulation<'m, M, N> {
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     fn with_defaults(model: &'m M) -> Self {
         Self {
-            model,
+            model: Share::Borrowed(model),
             element: None,
             step: None,
             nodes: None,
@@ -114,6 +121,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             events: Vec::new(),
             at_kinks: None,
             progress: false,
+            refusal: None,
         }
     }
 
@@ -357,7 +365,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
     ) -> Result<Linearised<N>, RunError<N>> {
         if let Err(kind) = self.refuse_events("run_linearised") {
-            let motion = Motion::from_start(self.model, span.start, &start);
+            let motion = Motion::from_start(&*self.model, span.start, &start);
             return Err(RunError::new(kind, motion));
         }
         let mut transitions = Vec::new();
@@ -371,7 +379,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             }
             Ok(())
         })?;
-        Ok(Linearised::new(self.model, motion, transitions, &starts))
+        Ok(Linearised::new(&*self.model, motion, transitions, &starts))
     }
 
     /// Runs over the span and shows every finished element to `finished`.
@@ -385,11 +393,11 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let (mesh, stepper) = match self.prepare(&start, span) {
             Ok(prepared) => prepared,
             Err(kind) => {
-                let motion = Motion::from_start(self.model, span.start, &start);
+                let motion = Motion::from_start(&*self.model, span.start, &start);
                 return Err(RunError::new(kind, motion));
             }
         };
-        let motion = Motion::from_start(self.model, span.start, &start);
+        let motion = Motion::from_start(&*self.model, span.start, &start);
         let place = (&mesh, 0, span.start);
         self.drive_on(motion, &start, place, ready(stepper), finished)
     }
@@ -427,7 +435,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         stepper: &mut Stepper<'m, M, N>,
         finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
     ) -> Result<Motion<N>, RunError<N>> {
-        let motion = Motion::from_start(self.model, t0, &start);
+        let motion = Motion::from_start(&*self.model, t0, &start);
         self.drive_from(motion, &start, (mesh, 0), stepper, finished)
     }
 
@@ -441,25 +449,25 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         mut finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
     ) -> Result<Motion<N>, RunError<N>> {
         let mut watch = Watch::new(self.chosen_element());
-        let mut resolution = Resolution::new(self.model, self.chosen_element(), self.control);
+        let mut resolution = Resolution::new(&*self.model, self.chosen_element(), self.control);
         let conserves = const { conserves_energy::<M, N>() };
         let mut is_conserved = conserves;
         watch.pass(recorded(&motion, false));
         if let Some(velocity) = motion.velocities().last() {
-            watch.weigh(self.model, motion.last().t, (&start.q, velocity));
+            watch.weigh(&*self.model, motion.last().t, (&start.q, velocity));
         }
         let mut state = *start;
         let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
         let mut failure = None;
         let chosen = (self.chosen_element(), self.control);
-        let mut events = match Events::new(self.model, &self.events, chosen) {
+        let mut events = match Events::new(&*self.model, &self.events, chosen) {
             Ok(events) => events,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
         let keeps = self.record_every == 1;
         'run: for (element, (t, next, h)) in mesh.elements().enumerate().skip(done) {
             let last = element + 1 == mesh.steps();
-            watch.look(self.model, element, (t, h), &state);
+            watch.look(&*self.model, element, (t, h), &state);
             let impulses = mesh.impulses_in(t, next, last);
             is_conserved &= impulses.is_empty();
             events.begin(h);
@@ -511,9 +519,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 let cut = match looked {
                     Ok(cut) => cut,
                     Err(kind) => {
-                        watch.examine(self.model, element, (from, length), &before);
+                        watch.examine(&*self.model, element, (from, length), &before);
                         if motion.last().t != from {
-                            motion.record(self.model, from, &before);
+                            motion.record(&*self.model, from, &before);
                         }
                         failure = Some(kind);
                         break 'run;
@@ -533,7 +541,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                         motion.keep_element(dense);
                     }
                     if last || (element + 1) % self.record_every == 0 {
-                        motion.record(self.model, next, &state);
+                        motion.record(&*self.model, next, &state);
                         watch.pass(recorded(&motion, is_conserved));
                         is_conserved = conserves;
                     }
@@ -550,17 +558,17 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                     motion.keep_element(dense);
                 }
                 if motion.last().t != time {
-                    motion.record(self.model, time, &at);
+                    motion.record(&*self.model, time, &at);
                 }
                 let Some(after) = after else {
                     state = at;
                     break 'run;
                 };
-                if let Err(kind) = check_restart(self.model, time, length, &after) {
+                if let Err(kind) = check_restart(&*self.model, time, length, &after) {
                     failure = Some(kind);
                     break 'run;
                 }
-                motion.record(self.model, time, &after);
+                motion.record(&*self.model, time, &after);
                 state = after;
                 if time == next {
                     break;
@@ -580,18 +588,26 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
     }
 
+    /// Whether the run can begin at `start`.
+    fn check_start(&self, start: &State<N>) -> Result<(), RunErrorKind> {
+        match &self.refusal {
+            Some(refusal) => Err(refusal.clone()),
+            None => check_start(start),
+        }
+    }
+
     /// The elements of a run and its stepper, if all arguments are good.
     fn prepare(
         &self,
         start: &State<N>,
         span: &Range<f64>,
     ) -> Result<(Mesh<N>, Stepper<'m, M, N>), RunErrorKind> {
-        check_start(start)?;
+        self.check_start(start)?;
         let mesh = self.mesh(span)?;
         if let Some((_, _, h)) = mesh.elements().next() {
-            check_constraints(self.model, span.start, h, start)?;
+            check_constraints(&*self.model, span.start, h, start)?;
         }
-        let stepper = Stepper::new(self.model, self.chosen_element(), self.control);
+        let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control);
         Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
     }
 
@@ -617,9 +633,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// ```
     pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
         let step = self.step.unwrap_or(f64::NAN);
-        let ready = check_start(&start).and_then(|()| {
+        let ready = self.check_start(&start).and_then(|()| {
             self.refuse_events("steps")?;
-            check_constraints(self.model, t0, step, &start)?;
+            check_constraints(&*self.model, t0, step, &start)?;
             if !t0.is_finite() {
                 return Err(RunErrorKind::Span {
                     start: t0,
@@ -627,7 +643,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 });
             }
             let elements = Endless::new(t0, step, &self.breaks)?;
-            let stepper = Stepper::new(self.model, self.chosen_element(), self.control)
+            let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control)
                 .map_err(RunErrorKind::Element)?;
             Ok((self.cutting(stepper).ends_only(), elements))
         });

@@ -4,8 +4,8 @@ mod family;
 
 pub use family::FamilyCheckpoint;
 
+use super::Simulation;
 use super::mesh::Mesh;
-use super::{Simulation, check_start};
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
 use std::ops::Range;
@@ -120,8 +120,8 @@ impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run).
     pub fn resume(&self, checkpoint: &Checkpoint<N>, end: f64) -> Result<Motion<N>, RunError<N>> {
-        let motion = Motion::from_checkpoint(self.model, checkpoint);
-        let prepared = check_start(&checkpoint.state).and_then(|()| {
+        let motion = Motion::from_checkpoint(&*self.model, checkpoint);
+        let prepared = self.check_start(&checkpoint.state).and_then(|()| {
             let mut run = self.clone();
             run.step = run.step.or(checkpoint.reached.step);
             // The last element of a run takes those at its end.
@@ -130,9 +130,9 @@ impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
             let element = self.chosen_element();
             let suspended = checkpoint.stepper.clone();
             let stepper = if suspended.element() == element {
-                Stepper::resume(self.model, self.control, suspended)
+                Stepper::resume(self.model.clone(), self.control, suspended)
             } else {
-                Stepper::new(self.model, element, self.control)
+                Stepper::sharing(self.model.clone(), element, self.control)
             };
             let stepper = self.cutting(stepper.map_err(RunErrorKind::Element)?);
             let place = checkpoint

@@ -34,6 +34,13 @@ impl<S> Course<S> {
         self.way.as_ref().ok().map(|(stepper, _)| stepper)
     }
 
+    /// When the next element begins, unless the course has ended.
+    pub(super) fn time(&self) -> Option<f64> {
+        let (_, elements) = self.way.as_ref().ok()?;
+        let (time, ..) = elements.element();
+        Some(time)
+    }
+
     /// What `advance` makes of the next element; the stepper goes to `ended` where it fails.
     pub(super) fn next<T>(
         &mut self,

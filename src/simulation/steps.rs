@@ -38,6 +38,22 @@ impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
         }
     }
 
+    /// The model, unless the steps have ended.
+    pub(super) fn model(&self) -> Option<&M> {
+        self.course.stepper().map(Stepper::model)
+    }
+
+    /// The node from which the next step goes, unless the steps have ended.
+    pub(super) fn node(&self) -> Option<Node<N>> {
+        let t = self.course.time()?;
+        Some(Node {
+            t,
+            q: self.state.q,
+            p: self.state.p,
+            v: self.velocity,
+        })
+    }
+
     /// What the steps so far have cost.
     pub fn statistics(&self) -> Statistics {
         match self.course.stepper() {

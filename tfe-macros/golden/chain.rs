@@ -225,12 +225,6 @@ const _: () = {
                 second.force_z[i][i] = t10;
             }
         }
-        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
-            match index {
-                0.. => __tfe::CoordinateName::element("q", index),
-            }
-        }
-        const OBSERVABLES: &'static [&'static str] = &["extension"];
         fn observables<R: __tfe::Real>(
             &self,
             t: R,
@@ -240,6 +234,12 @@ const _: () = {
         ) {
             values[0] = q[N.saturating_sub(1)] - q[0];
         }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0.. => __tfe::CoordinateName::element("q", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["extension"];
     }
 };
 #[automatically_derived]

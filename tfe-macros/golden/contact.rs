@@ -204,14 +204,6 @@ const _: () = {
             second.qq[1][0] = t19;
             second.qq[1][1] = -t18;
         }
-        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
-            match index {
-                0 => __tfe::CoordinateName::single("x"),
-                1 => __tfe::CoordinateName::single("theta"),
-                _ => __tfe::CoordinateName::element("", index),
-            }
-        }
-        const OBSERVABLES: &'static [&'static str] = &["height", "speed"];
         fn observables<R: __tfe::Real>(
             &self,
             t: R,
@@ -229,6 +221,14 @@ const _: () = {
             let t4 = t2 + t3;
             values[1] = t4.sqrt();
         }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                1 => __tfe::CoordinateName::single("theta"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height", "speed"];
     }
 };
 #[automatically_derived]

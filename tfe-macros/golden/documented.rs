@@ -106,13 +106,6 @@ const _: () = {
             first.q[0] = k * t0;
             second.qq[0][0] = -k;
         }
-        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
-            match index {
-                0 => __tfe::CoordinateName::single("x"),
-                _ => __tfe::CoordinateName::element("", index),
-            }
-        }
-        const OBSERVABLES: &'static [&'static str] = &["height"];
         fn observables<R: __tfe::Real>(
             &self,
             t: R,
@@ -122,6 +115,13 @@ const _: () = {
         ) {
             values[0] = -q[0];
         }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height"];
     }
 };
 #[automatically_derived]
@@ -400,13 +400,6 @@ const _: () = {
             first.q[0] = k * t0;
             second.qq[0][0] = -k;
         }
-        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
-            match index {
-                0 => __tfe::CoordinateName::single("x"),
-                _ => __tfe::CoordinateName::element("", index),
-            }
-        }
-        const OBSERVABLES: &'static [&'static str] = &["height"];
         fn observables<R: __tfe::Real>(
             &self,
             t: R,
@@ -416,6 +409,13 @@ const _: () = {
         ) {
             values[0] = -q[0];
         }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height"];
     }
 };
 #[automatically_derived]

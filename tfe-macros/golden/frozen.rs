@@ -190,14 +190,6 @@ const _: () = {
             second.qq[1][0] = t13;
             second.qq[1][1] = -t11;
         }
-        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
-            match index {
-                0 => __tfe::CoordinateName::single("r"),
-                1 => __tfe::CoordinateName::single("theta"),
-                _ => __tfe::CoordinateName::element("", index),
-            }
-        }
-        const OBSERVABLES: &'static [&'static str] = &["height"];
         fn observables<R: __tfe::Real>(
             &self,
             t: R,
@@ -209,6 +201,14 @@ const _: () = {
             let t0 = q[0] * cos_theta;
             values[0] = -t0;
         }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("r"),
+                1 => __tfe::CoordinateName::single("theta"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height"];
     }
 };
 #[automatically_derived]
@@ -425,13 +425,6 @@ const _: () = {
             let t7 = t.like(0.5) * t4;
             second.qq[0][0] = t7 - t2;
         }
-        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
-            match index {
-                0 => __tfe::CoordinateName::single("theta"),
-                _ => __tfe::CoordinateName::element("", index),
-            }
-        }
-        const OBSERVABLES: &'static [&'static str] = &["height"];
         fn observables<R: __tfe::Real>(
             &self,
             t: R,
@@ -444,6 +437,13 @@ const _: () = {
             let t0 = l * cos_theta;
             values[0] = -t0;
         }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("theta"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["height"];
     }
 };
 #[automatically_derived]

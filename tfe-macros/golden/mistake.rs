@@ -45,6 +45,46 @@ const _: () = {
             __tfe::CoordinateName::single("")
         }
     }
+    #[automatically_derived]
+    #[allow(clippy::all)]
+    impl __tfe::Controlled<1> for Oscillator {
+        const INPUTS: &'static [&'static str] = &[];
+        fn energy_function_with<__R: __tfe::Real>(
+            &self,
+            _: &[__R; __tfe::MAX_INPUTS],
+            t: __R,
+            _: &[__R; 1],
+            _: &[__R; 1],
+        ) -> __R {
+            t
+        }
+        fn first_with<__R: __tfe::Real>(
+            &self,
+            _: &[__R; __tfe::MAX_INPUTS],
+            _: __R,
+            _: &[__R; 1],
+            _: &[__R; 1],
+            _: &mut __tfe::First<__R, 1>,
+        ) {}
+        fn first_and_mass_with<__R: __tfe::Real>(
+            &self,
+            _: &[__R; __tfe::MAX_INPUTS],
+            _: __R,
+            _: &[__R; 1],
+            _: &[__R; 1],
+            _: &mut __tfe::First<__R, 1>,
+            _: &mut [[__R; 1]; 1],
+        ) {}
+        fn second_with<__R: __tfe::Real>(
+            &self,
+            _: &[__R; __tfe::MAX_INPUTS],
+            _: __R,
+            _: &[__R; 1],
+            _: &[__R; 1],
+            _: &mut __tfe::First<__R, 1>,
+            _: &mut __tfe::Second<__R, 1>,
+        ) {}
+    }
 };
 #[automatically_derived]
 #[allow(dead_code, missing_docs, clippy::all)]

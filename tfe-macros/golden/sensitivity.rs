@@ -160,21 +160,6 @@ const _: () = {
             let t9 = t.like(self.k[0]) + t8;
             second.qq[0][0] = -t9;
         }
-        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
-            match index {
-                0 => __tfe::CoordinateName::single("x"),
-                _ => __tfe::CoordinateName::element("", index),
-            }
-        }
-        const SENSITIVITIES: &'static [&'static str] = &["omega", "k[1]", "c"];
-        fn sensitivity_parameter(&self, index: usize) -> f64 {
-            match index {
-                0 => self.omega,
-                1 => self.k[1],
-                2 => self.c,
-                _ => ::core::primitive::f64::NAN,
-            }
-        }
         fn first_by<R: __tfe::Real>(
             &self,
             by: __tfe::By,
@@ -211,6 +196,21 @@ const _: () = {
                     first.force[0] = -z[0];
                 }
                 _ => {}
+            }
+        }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("x"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const SENSITIVITIES: &'static [&'static str] = &["omega", "k[1]", "c"];
+        fn sensitivity_parameter(&self, index: usize) -> f64 {
+            match index {
+                0 => self.omega,
+                1 => self.k[1],
+                2 => self.c,
+                _ => ::core::primitive::f64::NAN,
             }
         }
     }

@@ -232,14 +232,6 @@ const _: () = {
             second.force_q[0][0] = t8 * t28;
             second.force_z[1][0] = t.like(2.0) * t28;
         }
-        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
-            match index {
-                0 => __tfe::CoordinateName::single("q"),
-                1 => __tfe::CoordinateName::single("t"),
-                _ => __tfe::CoordinateName::element("", index),
-            }
-        }
-        const OBSERVABLES: &'static [&'static str] = &["energy"];
         fn observables<R: __tfe::Real>(
             &self,
             t: R,
@@ -252,6 +244,14 @@ const _: () = {
             let t1 = t.like(0.5) * t0;
             values[0] = t1 - cos_q;
         }
+        fn coordinate_name(index: usize) -> __tfe::CoordinateName {
+            match index {
+                0 => __tfe::CoordinateName::single("q"),
+                1 => __tfe::CoordinateName::single("t"),
+                _ => __tfe::CoordinateName::element("", index),
+            }
+        }
+        const OBSERVABLES: &'static [&'static str] = &["energy"];
     }
 };
 #[automatically_derived]

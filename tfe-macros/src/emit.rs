@@ -15,6 +15,8 @@ use tfe_symbolic::program::{Array, Operand, Operation, Place, Program, Statement
 pub(crate) struct Emitter<'a> {
     /// The names of the coordinates by flat index, for readable temporaries.
     coordinates: &'a [String],
+    /// The names of the inputs, in order.
+    inputs: &'a [String],
     /// Where second derivatives go: `second.`, or nothing where the mass matrix alone is an argument.
     second: TokenStream,
     /// Second derivatives are told entry by entry, as those of models of run-time length are.
@@ -65,6 +67,7 @@ impl<'a> Emitter<'a> {
     pub(crate) fn new(coordinates: &'a [String], second: TokenStream) -> Self {
         Self {
             coordinates,
+            inputs: &[],
             second,
             by_entries: false,
             onto_zeros: false,
@@ -79,6 +82,12 @@ impl<'a> Emitter<'a> {
             keeps: BTreeMap::new(),
             value: None,
         }
+    }
+
+    /// The same for a model with these inputs.
+    pub(crate) fn with_inputs(mut self, inputs: &'a [String]) -> Self {
+        self.inputs = inputs;
+        self
     }
 
     /// The same with `v` for velocities, as in the kernels of constraints.
@@ -525,6 +534,11 @@ impl<'a> Emitter<'a> {
                 at(&quote!(#z), &[a])
             }
             Input::Multiplier(a) => at(&quote!(mu), &[a]),
+            Input::Control(name) => {
+                let place = self.inputs.iter().position(|own| own == name);
+                let place = Literal::usize_unsuffixed(place.unwrap_or_default());
+                quote!(inputs[#place])
+            }
             Input::Parameter(name) => {
                 let local = match self.parameters.get(name) {
                     Some(local) => local.clone(),
@@ -610,6 +624,7 @@ impl<'a> Emitter<'a> {
             "psi_q",
             "row_rates",
             "kept",
+            "inputs",
         ];
         let temporary = field
             .strip_prefix('t')

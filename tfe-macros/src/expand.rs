@@ -6,8 +6,8 @@ use crate::indices;
 use crate::lengths::Lengths;
 use crate::source_map::SourceMap;
 use crate::{constraint, fallback, family, input, page, solver, state, variant};
-use proc_macro2::{Literal, TokenStream};
-use quote::quote;
+use proc_macro2::{Ident, Literal, TokenStream};
+use quote::{format_ident, quote};
 use syn::ItemStruct;
 use tfe_symbolic::compile;
 use tfe_symbolic::derive::derivation::Derivation;
@@ -106,6 +106,27 @@ pub(crate) fn runtime_path(declared: &Declared) -> TokenStream {
     }
 }
 
+/// The inputs among the parameters and the arguments of kernels; nothing where there are none.
+struct Given {
+    parameter: TokenStream,
+    argument: TokenStream,
+}
+
+impl Given {
+    fn of(declared: &Declared) -> Self {
+        if declared.inputs.is_empty() {
+            return Self {
+                parameter: TokenStream::new(),
+                argument: TokenStream::new(),
+            };
+        }
+        Self {
+            parameter: quote!(inputs: &[R; __tfe::MAX_INPUTS],),
+            argument: quote!(inputs,),
+        }
+    }
+}
+
 /// Everything that the emitted implementations have in common.
 struct Kernels<'a> {
     declared: &'a Declared,
@@ -148,11 +169,14 @@ impl<'a> Kernels<'a> {
         signature: &Signature,
     ) -> emit::Body {
         Emitter::new(&self.coordinates, second)
+            .with_inputs(&self.declared.inputs)
             .body_in_parts(&self.derivation.program(request), signature)
     }
 
     fn emitted(&self, program: &Program, second: TokenStream) -> emit::Body {
-        Emitter::new(&self.coordinates, second).body(program)
+        Emitter::new(&self.coordinates, second)
+            .with_inputs(&self.declared.inputs)
+            .body(program)
     }
 
     /// `impl Model<N> for Name`.
@@ -168,10 +192,14 @@ impl<'a> Kernels<'a> {
             value: true,
             ..nothing
         };
+        let Given {
+            parameter: given,
+            argument: give,
+        } = Given::of(self.declared);
         let at = Signature {
             name: "value",
-            parameters: quote!(t: R, q: &[R; #dof], z: &[R; #dof]),
-            arguments: quote!(t, q, z),
+            parameters: quote!(#given t: R, q: &[R; #dof], z: &[R; #dof]),
+            arguments: quote!(#give t, q, z),
             inline: false,
         };
         let value = self.body_in_parts(value, argument(), &at);
@@ -202,8 +230,8 @@ impl<'a> Kernels<'a> {
         let [value_doc, first_doc, mass_doc, second_doc] = self.docs();
         let firsts = |name| Signature {
             name,
-            parameters: quote!(t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>),
-            arguments: quote!(t, q, z, first),
+            parameters: quote!(#given t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>),
+            arguments: quote!(#give t, q, z, first),
             inline: lanes,
         };
         let with = |name, parameter: TokenStream, argument: TokenStream, inline| {
@@ -244,16 +272,23 @@ impl<'a> Kernels<'a> {
             constant,
             statement: lengths,
         } = Lengths::of(self.declared, item);
-        let firsts_and_masses = match lanes {
+        let [value_name, first_name, mass_name, second_name] =
+            ["energy_function", "first", "first_and_mass", "second"].map(|name| self.kernel(name));
+        let has_inputs = !self.declared.inputs.is_empty();
+        // Those of `Controlled` are written into those of `Model`, which say that they are.
+        let inline = (lanes && has_inputs).then(|| quote!(#[inline(always)]));
+        let firsts_and_masses = match lanes && !has_inputs {
             false => quote! {
                 #[doc = #first_doc]
-                fn first<R: __tfe::Real>(&self, #first_parameters) {
+                #inline
+                fn #first_name<R: __tfe::Real>(&self, #first_parameters) {
                     #lengths
                     #first
                 }
 
                 #[doc = #mass_doc]
-                fn first_and_mass<R: __tfe::Real>(&self, #mass_parameters) {
+                #inline
+                fn #mass_name<R: __tfe::Real>(&self, #mass_parameters) {
                     #lengths
                     #mass
                 }
@@ -290,9 +325,53 @@ impl<'a> Kernels<'a> {
         };
         let facts = page::facts(self.derivation, &quote!(__tfe));
         let coordinate_name = self.coordinate_name();
-        let observables = self.observables();
+        let (observable_names, observables) = self.observables();
         let constraints = constraint::members(self.declared, self.derivation, &self.coordinates);
-        let sensitivities = self.sensitivities();
+        let (sensitivity_values, first_by) = self.sensitivities();
+        let kernels = quote! {
+            #[doc = #value_doc]
+            fn #value_name<R: __tfe::Real>(&self, #given t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
+                #lengths
+                #value_statements
+                #value
+            }
+
+            #firsts_and_masses
+
+            #[doc = #second_doc]
+            fn #second_name<R: __tfe::Real>(
+                &self,
+                #given
+                t: R,
+                q: &[R; #dof],
+                z: &[R; #dof],
+                first: &mut __tfe::First<R, #dof>,
+                second: &mut __tfe::Second<R, #dof>,
+            ) {
+                #lengths
+                #second
+            }
+
+            #observables
+            #first_by
+        };
+        let (kernels, controlled) = match has_inputs {
+            false => (kernels, TokenStream::new()),
+            true => {
+                let names = &self.declared.inputs;
+                let controlled = quote! {
+                    #[automatically_derived]
+                    #[allow(unused_variables, non_snake_case, clippy::too_many_arguments)]
+                    impl #impl_generics __tfe::Controlled<#dof> for #name #type_generics #where_clause {
+                        const INPUTS: &'static [&'static str] = &[#(#names),*];
+
+                        #kernels
+                    }
+                };
+                let lanes = lanes.then_some(lanes_here);
+                (self.without_inputs(lanes), controlled)
+            }
+        };
         quote! {
             const _: () = {
                 use #path::__private as __tfe;
@@ -305,36 +384,112 @@ impl<'a> Kernels<'a> {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;
 
-                    #[doc = #value_doc]
-                    fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
-                        #lengths
-                        #value_statements
-                        #value
-                    }
-
-                    #firsts_and_masses
-
-                    #[doc = #second_doc]
-                    fn second<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R; #dof],
-                        z: &[R; #dof],
-                        first: &mut __tfe::First<R, #dof>,
-                        second: &mut __tfe::Second<R, #dof>,
-                    ) {
-                        #lengths
-                        #second
-                    }
+                    #kernels
 
                     #coordinate_name
-                    #observables
+                    #observable_names
                     #constraints
-                    #sensitivities
+                    #sensitivity_values
                 }
+
+                #controlled
 
                 #parts
             };
+        }
+    }
+
+    /// The name of a kernel: that of `Model`, or of `Controlled` where there are inputs.
+    fn kernel(&self, name: &str) -> Ident {
+        match self.declared.inputs.is_empty() {
+            true => format_ident!("{name}"),
+            false => format_ident!("{name}_with"),
+        }
+    }
+
+    /// The kernels of `Model` where those of `Controlled` are given inputs: all of them zero. `lanes` says whether the first derivatives are there for several points at once.
+    fn without_inputs(&self, lanes: Option<TokenStream>) -> TokenStream {
+        let dof = &self.dof;
+        let trait_name = quote!(<Self as __tfe::Controlled<#dof>>);
+        let zeros = quote!(&[t.like(0.0); __tfe::MAX_INPUTS]);
+        let observables = (!self.declared.observables.is_empty()).then(|| {
+            quote! {
+                fn observables<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], values: &mut [R]) {
+                    #trait_name::observables_with(self, #zeros, t, q, z, values);
+                }
+            }
+        });
+        let first_by = (!self.declared.sensitivities.is_empty()).then(|| {
+            quote! {
+                fn first_by<R: __tfe::Real>(
+                    &self,
+                    by: __tfe::By,
+                    t: R,
+                    q: &[R; #dof],
+                    z: &[R; #dof],
+                    first: &mut __tfe::First<R, #dof>,
+                ) {
+                    #trait_name::first_by_with(self, by, #zeros, t, q, z, first);
+                }
+            }
+        });
+        let lanes = lanes.map(|lanes| {
+            quote! {
+                const LANES: bool = #lanes;
+
+                #[inline(always)]
+                fn first_inline<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>) {
+                    #trait_name::first_with(self, #zeros, t, q, z, first);
+                }
+
+                #[inline(always)]
+                fn first_and_mass_inline<R: __tfe::Real>(
+                    &self,
+                    t: R,
+                    q: &[R; #dof],
+                    z: &[R; #dof],
+                    first: &mut __tfe::First<R, #dof>,
+                    zz: &mut [[R; #dof]; #dof],
+                ) {
+                    #trait_name::first_and_mass_with(self, #zeros, t, q, z, first, zz);
+                }
+            }
+        });
+        quote! {
+            fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
+                #trait_name::energy_function_with(self, #zeros, t, q, z)
+            }
+
+            #lanes
+
+            fn first<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>) {
+                #trait_name::first_with(self, #zeros, t, q, z, first);
+            }
+
+            fn first_and_mass<R: __tfe::Real>(
+                &self,
+                t: R,
+                q: &[R; #dof],
+                z: &[R; #dof],
+                first: &mut __tfe::First<R, #dof>,
+                zz: &mut [[R; #dof]; #dof],
+            ) {
+                #trait_name::first_and_mass_with(self, #zeros, t, q, z, first, zz);
+            }
+
+            fn second<R: __tfe::Real>(
+                &self,
+                t: R,
+                q: &[R; #dof],
+                z: &[R; #dof],
+                first: &mut __tfe::First<R, #dof>,
+                second: &mut __tfe::Second<R, #dof>,
+            ) {
+                #trait_name::second_with(self, #zeros, t, q, z, first, second);
+            }
+
+            #observables
+            #first_by
         }
     }
 
@@ -426,10 +581,15 @@ impl<'a> Kernels<'a> {
         }
     }
 
-    fn observables(&self) -> TokenStream {
+    /// The names of the observables, and their kernel.
+    fn observables(&self) -> (TokenStream, TokenStream) {
         if self.declared.observables.is_empty() {
-            return TokenStream::new();
+            return Default::default();
         }
+        let (given, kernel) = (
+            Given::of(self.declared).parameter,
+            self.kernel("observables"),
+        );
         let dof = &self.dof;
         let names = self.declared.observables.iter().map(|one| &one.name);
         let request = Request {
@@ -437,28 +597,27 @@ impl<'a> Kernels<'a> {
             ..Request::default()
         };
         let body = self.body(request, TokenStream::new()).statements;
-        quote! {
-            const OBSERVABLES: &'static [&'static str] = &[#(#names),*];
-
-            fn observables<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], values: &mut [R]) {
+        let names = quote!(const OBSERVABLES: &'static [&'static str] = &[#(#names),*];);
+        let kernel = quote! {
+            fn #kernel<R: __tfe::Real>(&self, #given t: R, q: &[R; #dof], z: &[R; #dof], values: &mut [R]) {
                 #body
             }
-        }
+        };
+        (names, kernel)
     }
 
-    /// The names and values of the parameters of `sensitivity(…)`, and the derivatives by them and by the time.
-    fn sensitivities(&self) -> TokenStream {
+    /// The names and values of the parameters of `sensitivity(…)`; the derivatives by them and by the time.
+    fn sensitivities(&self) -> (TokenStream, TokenStream) {
         let parameters = &self.declared.sensitivities;
         if parameters.is_empty() {
-            return TokenStream::new();
+            return Default::default();
         }
         let names = parameters.iter().map(ToString::to_string);
         let values = parameters.iter().enumerate().map(|(k, parameter)| {
             let (k, value) = (Literal::usize_unsuffixed(k), self.parameter(parameter));
             quote!(#k => #value,)
         });
-        let first_by = self.first_by();
-        quote! {
+        let values = quote! {
             const SENSITIVITIES: &'static [&'static str] = &[#(#names),*];
 
             fn sensitivity_parameter(&self, index: usize) -> f64 {
@@ -467,9 +626,8 @@ impl<'a> Kernels<'a> {
                     _ => ::core::primitive::f64::NAN,
                 }
             }
-
-            #first_by
-        }
+        };
+        (values, self.first_by())
     }
 
     /// The value of a parameter; NaN where an array of any length is too short for it.
@@ -507,13 +665,15 @@ impl<'a> Kernels<'a> {
             .chain(parameters.map(By::Parameter))
             .filter_map(arm)
             .collect();
-        if arms.is_empty() {
+        if arms.is_empty() && self.declared.inputs.is_empty() {
             return TokenStream::new();
         }
+        let (given, kernel) = (Given::of(self.declared).parameter, self.kernel("first_by"));
         quote! {
-            fn first_by<R: __tfe::Real>(
+            fn #kernel<R: __tfe::Real>(
                 &self,
                 by: __tfe::By,
+                #given
                 t: R,
                 q: &[R; #dof],
                 z: &[R; #dof],
@@ -546,7 +706,11 @@ impl<'a> Kernels<'a> {
         let count = Literal::usize_unsuffixed(self.declared.observables.len());
         let observables = self.declared.observables.iter().enumerate().map(|(k, Observable { name, .. })| {
             let (method, k) = (indices::identifier(name), Literal::usize_unsuffixed(k));
-            let doc = format!(" The observable `{name}` at time `{time}`, coordinates `q` and {second_doc} `{second}`.");
+            let inputs = match self.declared.inputs.is_empty() {
+                true => "",
+                false => "; all inputs are zero",
+            };
+            let doc = format!(" The observable `{name}` at time `{time}`, coordinates `q` and {second_doc} `{second}`{inputs}.");
             let own = docs.attributes("output", name);
             quote! {
                 #own

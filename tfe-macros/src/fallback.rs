@@ -138,6 +138,54 @@ fn implementations(item: &DeriveInput, guess: &Guess) -> TokenStream {
                     __tfe::CoordinateName ::single("")
                 }
             }
+
+            #[automatically_derived]
+            #[allow(clippy::all)]
+            impl #impl_generics __tfe::Controlled<#dof> for #name #type_generics #where_clause {
+                const INPUTS: &'static [&'static str] = &[];
+
+                fn energy_function_with<__R: __tfe::Real>(
+                    &self,
+                    _: &[__R; __tfe::MAX_INPUTS],
+                    t: __R,
+                    _: &[__R; #dof],
+                    _: &[__R; #dof],
+                ) -> __R {
+                    t
+                }
+
+                fn first_with<__R: __tfe::Real>(
+                    &self,
+                    _: &[__R; __tfe::MAX_INPUTS],
+                    _: __R,
+                    _: &[__R; #dof],
+                    _: &[__R; #dof],
+                    _: &mut __tfe::First<__R, #dof>,
+                ) {
+                }
+
+                fn first_and_mass_with<__R: __tfe::Real>(
+                    &self,
+                    _: &[__R; __tfe::MAX_INPUTS],
+                    _: __R,
+                    _: &[__R; #dof],
+                    _: &[__R; #dof],
+                    _: &mut __tfe::First<__R, #dof>,
+                    _: &mut [[__R; #dof]; #dof],
+                ) {
+                }
+
+                fn second_with<__R: __tfe::Real>(
+                    &self,
+                    _: &[__R; __tfe::MAX_INPUTS],
+                    _: __R,
+                    _: &[__R; #dof],
+                    _: &[__R; #dof],
+                    _: &mut __tfe::First<__R, #dof>,
+                    _: &mut __tfe::Second<__R, #dof>,
+                ) {
+                }
+            }
         };
 
         #[automatically_derived]

@@ -21,6 +21,7 @@ mod condense;
 #[cfg(feature = "alloc")]
 pub mod condenser;
 pub mod constrained;
+mod controlled;
 #[cfg(feature = "alloc")]
 mod cut;
 #[cfg(feature = "alloc")]
@@ -55,6 +56,8 @@ pub mod real;
 #[cfg(feature = "alloc")]
 mod root;
 pub mod scheme;
+#[cfg(feature = "alloc")]
+mod share;
 pub mod statistics;
 pub mod step;
 #[cfg(feature = "alloc")]
@@ -68,6 +71,7 @@ mod velocity_form;
 pub mod weak_form;
 pub mod workspace;
 
+pub use controlled::{Controlled, MAX_INPUTS};
 pub use element::{
     Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule, ThreeField,
 };
@@ -78,12 +82,15 @@ pub use model::{
 };
 pub use newton::Solve;
 pub use real::{Lanes, Real};
+#[cfg(feature = "alloc")]
+pub use share::Share;
 pub use statistics::{Choice, Contraction, Statistics};
 pub use structure::{Operations, Structure};
 
 /// What generated code refers to. Not part of the public interface.
 #[doc(hidden)]
 pub mod __private {
+    pub use crate::controlled::{Controlled, MAX_INPUTS};
     pub use crate::element::{Element, EnergyConserving, Mixed, Primal, Radau, Rule, ThreeField};
     pub use crate::error::StepError;
     #[cfg(feature = "alloc")]

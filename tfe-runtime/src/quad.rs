@@ -131,6 +131,10 @@ macro_rules! register {
                 Self { value, ..self }
             }
 
+            fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
+                self.with(self.lanes().map(function))
+            }
+
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
                 let (sin, cos) = crate::trigonometry::reduced(self);

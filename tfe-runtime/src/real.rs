@@ -84,6 +84,11 @@ pub trait Real:
     fn less_or_equal(self, other: Self) -> Self::Mask;
     /// `then` where the mask holds, `otherwise` elsewhere.
     fn select(mask: Self::Mask, then: Self, otherwise: Self) -> Self;
+    /// A function of numbers that is not known to kernels, such as an input of a model; lane by lane. NaN of a scalar that does not say how.
+    #[must_use]
+    fn map(self, _function: &mut dyn FnMut(f64) -> f64) -> Self {
+        self.like(f64::NAN)
+    }
 }
 
 /// The elementary functions of `f64` and `f32`: from `std`, or from `libm` without it.
@@ -195,6 +200,15 @@ macro_rules! scalar_items {
             value as $scalar
         }
         #[inline]
+        #[allow(
+            clippy::cast_lossless,
+            clippy::cast_possible_truncation,
+            reason = "f32 rounds to its nearest number"
+        )]
+        fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
+            function(self as f64) as $scalar
+        }
+        #[inline]
         fn abs(self) -> Self {
             $scalar::abs(self)
         }
@@ -252,6 +266,10 @@ macro_rules! lane_items {
         #[inline]
         fn from_f64(value: f64) -> Self {
             Self([value; W])
+        }
+        #[inline]
+        fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
+            Self(self.0.map(function))
         }
         #[inline]
         fn sin_cos(self) -> (Self, Self) {

@@ -16,6 +16,7 @@ use crate::newton::{Control, Solve};
 use crate::points::{Leg, Points};
 use crate::propagator::Propagator;
 use crate::scheme::{SchemeTable, Tables};
+use crate::share::Share;
 use crate::statistics::{Contraction, Statistics};
 use crate::step::{Impulse, Interval, Last, Memory, Method, may_be_phase};
 use crate::transition::TransitionError;
@@ -67,7 +68,7 @@ use over::Ahead;
 /// ```
 #[derive(Debug)]
 pub struct Stepper<'m, M, const N: usize> {
-    model: &'m M,
+    model: Share<'m, M>,
     table: SchemeTable,
     control: Control,
     memory: Memory<N>,
@@ -112,7 +113,7 @@ struct Piece<const N: usize> {
 impl<M, const N: usize> Clone for Stepper<'_, M, N> {
     fn clone(&self) -> Self {
         Self {
-            model: self.model,
+            model: self.model.clone(),
             table: self.table.clone(),
             control: self.control,
             memory: self.memory.clone(),
@@ -188,7 +189,7 @@ where
     /// # Errors
     /// As [`new`](Self::new).
     pub fn resume(
-        model: &'m M,
+        model: Share<'m, M>,
         control: Control,
         suspended: Suspended<N>,
     ) -> Result<Self, ElementError> {
@@ -231,9 +232,21 @@ where
     /// # Errors
     /// [`ElementError`] if the element is none.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
+        Self::sharing(Share::Borrowed(model), element, control)
+    }
+
+    /// The same of a model that may belong to the stepper.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn sharing(
+        model: Share<'m, M>,
+        element: Element,
+        control: Control,
+    ) -> Result<Self, ElementError> {
         let table = SchemeTable::new(element)?;
         let points = if Self::MAY_HAVE_POINTS && control.solve != Solve::Newton {
-            Points::new(model, &table.view())
+            Points::new(&*model, &table.view())
         } else {
             None
         };
@@ -453,7 +466,7 @@ where
             start: state,
             low: &self.memory.low,
         };
-        let outcome = points.advance(self.model, &self.table, &self.control, leg, yielding);
+        let outcome = points.advance(&*self.model, &self.table, &self.control, leg, yielding);
         let statistics = &mut self.memory.statistics;
         let iterations = u64::from(outcome.iterations);
         statistics.iterations += iterations;
@@ -540,7 +553,7 @@ where
         state: &mut State<N>,
     ) -> Result<(), StepError> {
         let method = Method {
-            model: self.model,
+            model: &*self.model,
             tables: &self.table,
             control: Control {
                 solve: Solve::Trusting,
@@ -679,7 +692,7 @@ where
             pivots: &mut self.pivots,
         };
         let method = Method {
-            model: self.model,
+            model: &*self.model,
             tables: &self.table,
             control: self.control,
         };
@@ -694,8 +707,8 @@ where
 
     /// The model that is stepped.
     #[must_use]
-    pub fn model(&self) -> &'m M {
-        self.model
+    pub fn model(&self) -> &M {
+        &self.model
     }
 
     /// What the steps so far have cost.
@@ -752,7 +765,7 @@ where
             pivots: &mut self.pivots,
         };
         let method = Method {
-            model: self.model,
+            model: &*self.model,
             tables: &self.table,
             control: self.control,
         };
@@ -797,7 +810,7 @@ where
     }
 
     fn switches(&self, t: f64, state: &State<N>, values: &mut Vec<f64>) {
-        switches(self.model, t, state, values);
+        switches(&*self.model, t, state, values);
     }
 
     fn points(&self) -> (usize, bool) {

@@ -19,6 +19,9 @@ use crate::vocabulary::{Argument, is_function};
 /// The most coordinates of literal arrays: beyond it, tables of the engine get out of hand.
 pub const MAX_COORDINATES: usize = 10_000;
 
+/// The most inputs a model can have.
+pub const MAX_INPUTS: usize = 16;
+
 /// The methods that the macro gives every model; outputs become methods beside them.
 const METHODS: &[&str] = &["state", "structure"];
 /// The functions that the macro gives models made from another.
@@ -33,6 +36,8 @@ pub enum Symbol {
     Coordinate(usize),
     /// The momentum (array) of this number.
     Momentum(usize),
+    /// The input of this number.
+    Input(usize),
     /// The `let` of this number.
     Let(usize),
     /// The field of this number.
@@ -47,6 +52,7 @@ impl Symbol {
         match self {
             Self::Coordinate(_) => Role::Coordinate,
             Self::Momentum(_) => Role::Momentum,
+            Self::Input(_) => Role::Input,
             Self::Let(_) => Role::Let,
             Self::Field(_) => Role::Field,
             Self::ConstParameter => Role::ConstParameter,
@@ -83,6 +89,8 @@ pub struct Model {
     pub momenta: Vec<Slots>,
     /// How many coordinates there are.
     pub dof: Affine,
+    /// The numbers given at run time.
+    pub inputs: Vec<Name>,
     /// The `let`s, in order.
     pub lets: Vec<(Name, Expr)>,
     /// L or H.
@@ -167,6 +175,12 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
                 model.momenta = slots(arrays, context, bag);
                 momenta.push(span);
             }
+            Item::Input(names) => {
+                if names.is_empty() {
+                    bag.push(span, Kind::NoInput);
+                }
+                model.inputs.extend(names);
+            }
             Item::Let { name, value } => model.lets.push((name, value)),
             Item::Lagrangian(value) => model.set_energy(Form::Lagrangian, value, span, bag),
             Item::Hamiltonian(value) => model.set_energy(Form::Hamiltonian, value, span, bag),
@@ -190,6 +204,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
     }
     model.register(bag);
     model.sizes(bag);
+    model.inputs(bag);
     model.outputs(bag);
     model.constraint_names(bag);
     model.transformation(bag);
@@ -392,6 +407,7 @@ impl Model {
     fn register(&mut self, bag: &mut Bag) {
         let coordinates = self.coordinates.iter().map(|slots| &slots.name);
         let momenta = self.momenta.iter().map(|slots| &slots.name);
+        let inputs = self.inputs.iter();
         let lets = self.lets.iter().map(|(name, _)| name);
         let names: Vec<(Name, Symbol)> = coordinates
             .enumerate()
@@ -400,6 +416,11 @@ impl Model {
                 momenta
                     .enumerate()
                     .map(|(at, name)| (name, Symbol::Momentum(at))),
+            )
+            .chain(
+                inputs
+                    .enumerate()
+                    .map(|(at, name)| (name, Symbol::Input(at))),
             )
             .chain(lets.enumerate().map(|(at, name)| (name, Symbol::Let(at))))
             .map(|(name, symbol)| (name.clone(), symbol))
@@ -472,6 +493,28 @@ impl Model {
         if let Some(parameter) = self.sensitivities.first() {
             let argument = "sensitivity";
             bag.push(parameter.span, Kind::RunTimeLength { argument });
+        }
+        if let Some(input) = self.inputs.first() {
+            let argument = "input";
+            bag.push(input.span, Kind::RunTimeLength { argument });
+        }
+    }
+
+    /// What stands beside inputs has to know what they are.
+    fn inputs(&self, bag: &mut Bag) {
+        let Some(first) = self.inputs.first() else {
+            return;
+        };
+        if let Some(one) = self.inputs.get(MAX_INPUTS) {
+            bag.push(one.span, Kind::TooManyInputs { limit: MAX_INPUTS });
+        }
+        for (argument, is_there) in [
+            ("solver", !self.solver_spans.is_empty()),
+            ("model", !self.variants.is_empty()),
+        ] {
+            if is_there {
+                bag.push(first.span, Kind::InputWith { argument });
+            }
         }
     }
 

@@ -110,6 +110,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         constraints,
         observables,
         sensitivities,
+        inputs: model.inputs.iter().map(|name| name.node.clone()).collect(),
         solvers: model.solvers.clone(),
         variants: Vec::new(),
         crate_path: model.crate_path.clone(),
@@ -241,6 +242,8 @@ struct Lowerer<'a> {
     extents: Map<Affine, Option<(i64, i64)>>,
     /// Which fields formulas use.
     fields: Vec<bool>,
+    /// Which inputs formulas use.
+    inputs: Vec<bool>,
     /// What must hold of lengths that are known at run time only.
     requirements: Vec<Requirement>,
     /// What is unusual about the declaration, though no mistake.
@@ -272,6 +275,7 @@ impl<'a> Lowerer<'a> {
             vector_sums: Map::default(),
             extents: Map::default(),
             fields: vec![false; context.fields.len()],
+            inputs: vec![false; model.inputs.len()],
             requirements: Vec::new(),
             remarks: Vec::new(),
         };

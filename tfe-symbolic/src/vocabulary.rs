@@ -10,6 +10,8 @@ pub enum Argument {
     Coordinates,
     /// `momenta(pa, p[3])`
     Momenta,
+    /// `input(u, w)`
+    Input,
     /// `let name = value`
     Let,
     /// `lagrangian = value`
@@ -55,7 +57,7 @@ enum Declares {
 }
 
 /// The arguments with the words that they begin with.
-const ARGUMENTS: [(Argument, &str, Times, Declares); 15] = [
+const ARGUMENTS: [(Argument, &str, Times, Declares); 16] = [
     (
         Argument::Coordinates,
         "coordinates",
@@ -63,6 +65,7 @@ const ARGUMENTS: [(Argument, &str, Times, Declares); 15] = [
         Declares::Names,
     ),
     (Argument::Momenta, "momenta", Times::Once, Declares::Names),
+    (Argument::Input, "input", Times::Repeated, Declares::Names),
     (Argument::Let, "let", Times::Repeated, Declares::Names),
     (
         Argument::Lagrangian,

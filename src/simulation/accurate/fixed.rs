@@ -1,7 +1,7 @@
 //! Runs of models of fixed size with an estimate of their error.
 
 use super::super::mesh::Mesh;
-use super::super::{Simulation, check_constraints, check_start};
+use super::super::{Simulation, check_constraints};
 use super::{
     Accurate, Broken, Passing, Repeatable, Steps, accurate, check_accuracy, estimated, trusting,
 };
@@ -84,7 +84,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         start: State<N>,
         span: Range<f64>,
     ) -> Result<Estimated<Motion<N>>, RunError<N>> {
-        let beginning = || Motion::from_start(self.model, span.start, &start);
+        let beginning = || Motion::from_start(&*self.model, span.start, &start);
         let mesh = self
             .refuse_events("run_estimated")
             .and_then(|()| self.prepare(&start, &span));
@@ -109,7 +109,7 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
         let run = &self.simulation;
         let run = &run.clone().at_kinks(run.at_kinks.unwrap_or(true));
         run.refuse_events("accuracy").map_err(|kind| {
-            let motion = Motion::from_start(run.model, span.start, &start);
+            let motion = Motion::from_start(&*run.model, span.start, &start);
             RunError::new(kind, motion)
         })?;
         if span.start == span.end {
@@ -124,7 +124,7 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
             ));
         }
         let refused = |kind| {
-            let motion = Motion::from_start(run.model, span.start, &start);
+            let motion = Motion::from_start(&*run.model, span.start, &start);
             RunError::new(kind, motion)
         };
         self.check(&start, &span).map_err(refused)?;
@@ -143,7 +143,7 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
         };
         let mut facts = M::FACTS;
         // Equations of first order, written as p·f(q), conserve nothing that short and long steps could spoil.
-        facts.forced |= !M::FACTS.linear && is_of_first_order(run.model, span.start, &start);
+        facts.forced |= !M::FACTS.linear && is_of_first_order(&*run.model, span.start, &start);
         let steps = Steps::of(&facts, self.equal_steps, !M::CONSTRAINTS.is_empty());
         accurate(run, &start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
     }
@@ -151,14 +151,14 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
     fn check(&self, start: &State<N>, span: &Range<f64>) -> Result<(), RunErrorKind> {
         let run = &self.simulation;
         check_accuracy(self.accuracy)?;
-        check_start(start)?;
+        run.check_start(start)?;
         // Of span, breaks and impulses.
         let h = (span.end - span.start) / 1000.0;
         if run.nodes.is_some() {
             run.mesh(span)?;
         }
         Mesh::new(span, h, &run.breaks, &run.impulses)?;
-        check_constraints(run.model, span.start, h, start)
+        check_constraints(&*run.model, span.start, h, start)
     }
 }
 
@@ -210,7 +210,8 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         is_recorded: bool,
     ) -> Result<Stepper<'m, M, N>, RunErrorKind> {
         let control = trusting(control);
-        let stepper = Stepper::new(self.model, element, control).map_err(RunErrorKind::Element)?;
+        let stepper = Stepper::sharing(self.model.clone(), element, control)
+            .map_err(RunErrorKind::Element)?;
         let stepper = self.cutting(stepper);
         Ok(if is_recorded && self.record_every == 1 {
             stepper
@@ -247,7 +248,7 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         let z = match M::FORM {
             Form::Hamiltonian => state.p,
             Form::Lagrangian => {
-                constrained::velocity_of(self.model, t, &state.q, &state.p, &[0.0; N])
+                constrained::velocity_of(&*self.model, t, &state.q, &state.p, &[0.0; N])
                     .unwrap_or([f64::NAN; N])
             }
         };
@@ -269,9 +270,9 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
     }
 
     fn part(&self, (t0, start): (f64, &State<N>), (t, end): (f64, &State<N>)) -> Motion<N> {
-        let mut motion = Motion::from_start(self.model, t0, start);
+        let mut motion = Motion::from_start(&*self.model, t0, start);
         if t != t0 {
-            motion.record(self.model, t, end);
+            motion.record(&*self.model, t, end);
         }
         motion
     }

@@ -161,6 +161,10 @@ impl<V: Four> Real for Pair<V> {
         Self(value, value)
     }
 
+    fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
+        Self(self.0.map(function), self.1.map(function))
+    }
+
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let (first, second) = self.0.sin_cos_of_two(self.1);

@@ -96,6 +96,9 @@ impl Real for Watched<'_> {
 
     smooth!(sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp ln sqrt);
 
+    fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
+        self.of(function(self.value))
+    }
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = Real::sin_cos(self.value);
         (self.of(sin), self.of(cos))

@@ -21,6 +21,7 @@ impl Model {
             ("constraint", !self.constraints.is_empty()),
             ("sensitivity", !self.sensitivities.is_empty()),
             ("model", !self.variants.is_empty()),
+            ("input", !self.inputs.is_empty()),
         ] {
             if is_there {
                 bag.push(span, Kind::TransformationWith { argument });

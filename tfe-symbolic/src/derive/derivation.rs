@@ -186,7 +186,7 @@ impl Derivation {
             .iter()
             .filter(|entry| entry.place.array == Array::ByZ);
         let mut inputs = momenta.flat_map(|entry| self.graph.inputs_of(entry.value));
-        inputs.any(|input| input == Input::Time)
+        inputs.any(|input| matches!(input, Input::Time | Input::Control(_)))
     }
 
     /// What is known about the model.

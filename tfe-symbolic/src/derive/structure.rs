@@ -26,7 +26,7 @@ pub struct Structure {
     pub form: Form,
     /// The number of coordinates.
     pub dof: Affine,
-    /// The time appears in the energy function, in a force or in a constraint.
+    /// The time or an input appears in the energy function, in a force or in a constraint.
     pub time_dependent: bool,
     /// There are forces or dissipation.
     pub forced: bool,
@@ -75,7 +75,7 @@ impl Dependence {
         for id in graph.reachable(&roots) {
             if let Node::Input(input) = graph.node(id) {
                 match input {
-                    Input::Time => found.time = true,
+                    Input::Time | Input::Control(_) => found.time = true,
                     Input::Coordinate(_) => found.q = true,
                     Input::Velocity(_) | Input::Momentum(_) => found.z = true,
                     Input::Multiplier(_)

@@ -264,6 +264,35 @@ kinds! {
     DissipationWithoutVelocity,
     /// `sensitivity()`
     NoSensitivity,
+    /// `input()`
+    NoInput,
+    /// More inputs than a model can have.
+    TooManyInputs {
+        /// The most there can be.
+        limit: usize,
+    },
+    /// An input beside an argument that has to know all that a model depends on.
+    InputWith {
+        /// The argument.
+        argument: &'static str,
+    },
+    /// An input that no formula uses.
+    UnusedInput {
+        /// Its name.
+        name: String,
+    },
+    /// `dot(u)` of an input.
+    RateOfInput {
+        /// Its name.
+        name: String,
+    },
+    /// An input in a constraint.
+    InputOfConstraint {
+        /// Its name.
+        name: String,
+        /// The constraint.
+        constraint: String,
+    },
     /// A name in `sensitivity(...)` that nothing declares.
     UnknownParameter {
         /// The name.
@@ -660,6 +689,8 @@ pub enum Role {
     Field,
     /// A const parameter of the struct.
     ConstParameter,
+    /// An input.
+    Input,
     /// A `let`.
     Let,
     /// The index of a sum.
@@ -685,6 +716,7 @@ impl fmt::Display for Role {
             Self::Momentum => "a momentum",
             Self::Field => "a field of the struct",
             Self::ConstParameter => "a const parameter of the struct",
+            Self::Input => "an input",
             Self::Let => "a `let`",
             Self::Index => "the index of a sum around it",
             Self::Output => "an output",

@@ -190,6 +190,18 @@ impl Kind {
             Self::DissipationWithoutVelocity => {
                 "a Rayleigh function holds velocities, such as `c/2*dot(x)^2`".into()
             }
+            Self::NoInput => "name numbers that are given at run time, as in `input(u)`".into(),
+            Self::TooManyInputs { .. } => {
+                "put those that depend on each other into formulas of one".into()
+            }
+            Self::InputWith { argument } => {
+                format!("remove one of them: what `{argument}` makes is given no inputs")
+            }
+            Self::UnusedInput { name } => format!("use it, as in `force(x) = {name}`, or remove it"),
+            Self::RateOfInput { .. } => "declare an input of its own for the rate".into(),
+            Self::InputOfConstraint { .. } => {
+                "write the motion as a formula of `t`, or let a stiff spring follow the input".into()
+            }
             Self::NoSensitivity => "name fields of the struct, as in `sensitivity(omega)`".into(),
             Self::UnknownParameter {
                 nearest: None,

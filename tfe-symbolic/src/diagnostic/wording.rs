@@ -119,6 +119,16 @@ impl Kind {
                 format!("the {energy} does not depend on the state of the system")
             }
             Self::DissipationWithoutVelocity => "the dissipation depends on no velocity".into(),
+            Self::NoInput => "`input` names nothing".into(),
+            Self::TooManyInputs { limit } => format!("a model can have at most {limit} inputs"),
+            Self::InputWith { argument } => {
+                format!("an input cannot stand beside `{argument}`")
+            }
+            Self::UnusedInput { name } => format!("input `{name}` is not used in any formula"),
+            Self::RateOfInput { name } => format!("the rate of input `{name}` is not known"),
+            Self::InputOfConstraint { name, constraint } => {
+                format!("constraint `{constraint}` depends on input `{name}`, whose rate is not known")
+            }
             Self::NoSensitivity => "`sensitivity` names no parameter".into(),
             Self::NotAParameter {
                 target,

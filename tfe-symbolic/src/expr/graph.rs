@@ -300,7 +300,7 @@ impl Input {
     /// The index of an element, or the number itself.
     pub(crate) fn index(&self) -> Option<&Affine> {
         match self {
-            Self::Time | Self::Parameter(_) => None,
+            Self::Time | Self::Control(_) | Self::Parameter(_) => None,
             Self::Coordinate(index)
             | Self::Velocity(index)
             | Self::Momentum(index)
@@ -314,7 +314,7 @@ impl Input {
     /// The same leaf with another index.
     pub(crate) fn with_index(&self, index: Affine) -> Self {
         match self {
-            Self::Time | Self::Parameter(_) => self.clone(),
+            Self::Time | Self::Control(_) | Self::Parameter(_) => self.clone(),
             Self::Coordinate(_) => Self::Coordinate(index),
             Self::Velocity(_) => Self::Velocity(index),
             Self::Momentum(_) => Self::Momentum(index),

@@ -43,6 +43,8 @@ pub enum Input {
     Multiplier(Affine),
     /// Stands for an expression while others are made, by a number and an index; kernels are given none.
     Placeholder(u32, Affine),
+    /// A number given at run time, of which nothing is known but that it may change with the time.
+    Control(String),
     /// A scalar field of the struct.
     Parameter(String),
     /// An element of an array field of the struct.
@@ -195,7 +197,7 @@ impl fmt::Display for Input {
             Self::Momentum(index) => write!(f, "p[{index}]"),
             Self::Multiplier(number) => write!(f, "mu[{number}]"),
             Self::Placeholder(number, index) => write!(f, "placeholder {number}[{index}]"),
-            Self::Parameter(name) => f.write_str(name),
+            Self::Control(name) | Self::Parameter(name) => f.write_str(name),
             Self::ParameterElement(name, index) => write!(f, "{name}[{index}]"),
             Self::Integer(value) => write!(f, "({value})"),
         }

@@ -130,6 +130,11 @@ impl Lowerer<'_> {
                 self.report(span, Kind::MomentumInConstraint);
                 return;
             }
+            if let Some(name) = self.input_in(row) {
+                let constraint = own();
+                self.report(span, Kind::InputOfConstraint { name, constraint });
+                return;
+            }
             let Some(row) = self.written_out(row) else {
                 let (name, limit) = (own(), LONGEST_WRITTEN_OUT as usize);
                 self.report(span, Kind::SumInConstraint { name, limit });
@@ -168,6 +173,15 @@ impl Lowerer<'_> {
     pub(super) fn holds_momentum(&self, id: ExprId) -> bool {
         let momentum = |input: &Input| matches!(input, Input::Momentum(_));
         self.graph.inputs_of(id).iter().any(momentum)
+    }
+
+    /// An input that a value holds.
+    fn input_in(&self, id: ExprId) -> Option<String> {
+        let inputs = self.graph.inputs_of(id);
+        inputs.into_iter().find_map(|input| match input {
+            Input::Control(name) => Some(name),
+            _ => None,
+        })
     }
 
     /// The first name that stands for a momentum, or for a `let` that holds one.

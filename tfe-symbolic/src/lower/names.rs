@@ -138,6 +138,10 @@ impl Lowerer<'_> {
             Some(Symbol::Momentum(at)) => {
                 self.slots(&self.model.momenta[at], Input::Momentum, span)
             }
+            Some(Symbol::Input(at)) => {
+                self.inputs[at] = true;
+                Value::Scalar(self.graph.input(Input::Control(name.to_owned())))
+            }
             Some(Symbol::Let(at)) => {
                 if self.setting.dot == DotRule::Forbidden && self.rates[at] {
                     let via = Some(name.to_owned());
@@ -369,7 +373,7 @@ impl Lowerer<'_> {
                 self.fields[at] = true;
                 Some((Array::Field(name.to_owned()), Affine::default(), length))
             }
-            Symbol::Let(_) | Symbol::ConstParameter => None,
+            Symbol::Input(_) | Symbol::Let(_) | Symbol::ConstParameter => None,
         }
     }
 

@@ -247,6 +247,7 @@ impl Lowerer<'_> {
             Input::Coordinate(_)
             | Input::Velocity(_)
             | Input::Momentum(_)
+            | Input::Control(_)
             | Input::Multiplier(_) => false,
         };
         if !self.graph.inputs_of(id).iter().all(is_fixed) {

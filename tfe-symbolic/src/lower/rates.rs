@@ -12,6 +12,7 @@ use crate::syntax::ast::Expr;
 struct Trouble {
     acceleration: bool,
     momentum: bool,
+    input: Option<String>,
     varying_index: bool,
 }
 
@@ -66,6 +67,10 @@ impl Lowerer<'_> {
                 trouble.momentum = true;
                 None
             }
+            Input::Control(name) => {
+                trouble.input = Some(name.clone());
+                None
+            }
             Input::Multiplier(_)
             | Input::Placeholder(..)
             | Input::Parameter(_)
@@ -77,6 +82,9 @@ impl Lowerer<'_> {
                 acceleration: true, ..
             } => Kind::Acceleration,
             Trouble { momentum: true, .. } => Kind::RateOfMomentum,
+            Trouble {
+                input: Some(name), ..
+            } => Kind::RateOfInput { name },
             Trouble {
                 varying_index: true,
                 ..

@@ -168,7 +168,11 @@ impl Lowerer<'_> {
         let varying = |input: &Input| {
             matches!(
                 input,
-                Input::Time | Input::Coordinate(_) | Input::Velocity(_) | Input::Momentum(_)
+                Input::Time
+                    | Input::Control(_)
+                    | Input::Coordinate(_)
+                    | Input::Velocity(_)
+                    | Input::Momentum(_)
             )
         };
         self.graph.inputs_of(id).iter().any(varying)

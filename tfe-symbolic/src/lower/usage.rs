@@ -50,6 +50,7 @@ impl Lowerer<'_> {
             return;
         }
         self.check_fields();
+        self.check_inputs();
         if let Some(energy) = energy
             && !self.model.coordinates.is_empty()
         {
@@ -85,6 +86,18 @@ impl Lowerer<'_> {
                         name: field.name.clone(),
                     },
                 );
+            }
+        }
+    }
+
+    fn check_inputs(&mut self) {
+        let model = self.model;
+        for (input, used) in model.inputs.iter().zip(self.inputs.clone()) {
+            // A name with another mistake is not to blame.
+            let is_wrong = self.bag.iter().any(|mistake| mistake.span == input.span);
+            if !(used || is_wrong || input.node.starts_with('_')) {
+                let name = input.node.clone();
+                self.report(input.span, Kind::UnusedInput { name });
             }
         }
     }

@@ -336,6 +336,8 @@ pub struct Declared {
     pub observables: Vec<Observable>,
     /// The parameters by which derivatives are wanted, in the order of `sensitivity(…)`.
     pub sensitivities: Vec<Parameter>,
+    /// The numbers given at run time, in the order of `input(…)`.
+    pub inputs: Vec<String>,
     /// The specialised steppers asked for.
     pub solvers: Vec<Solver>,
     /// The models made from this one.
@@ -381,6 +383,13 @@ impl fmt::Display for Declared {
                 .map(|name| crate::model::notation::symbol(name))
                 .collect();
             write!(f, "      parameters: {}", names.join(", "))?;
+        }
+        if !self.inputs.is_empty() {
+            let names = self.inputs.iter();
+            let names: Vec<String> = names
+                .map(|name| crate::model::notation::symbol(name))
+                .collect();
+            write!(f, "      inputs: {}", names.join(", "))?;
         }
         if !self.sensitivities.is_empty() {
             let names: Vec<String> = self

@@ -147,6 +147,7 @@ fn read(graph: &mut Graph, argument: ExprId) -> Option<(Angle, bool)> {
                 Input::Coordinate(_)
                 | Input::Parameter(_)
                 | Input::ParameterElement(..)
+                | Input::Control(_)
                 | Input::Time,
             ) => {
                 let part = parts.entry(x).or_default();

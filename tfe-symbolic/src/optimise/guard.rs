@@ -264,7 +264,11 @@ fn angle_size(
     let depth = depth.checked_sub(1)?;
     match graph.node(id) {
         Node::Input(
-            Input::Coordinate(_) | Input::Parameter(_) | Input::ParameterElement(..) | Input::Time,
+            Input::Coordinate(_)
+            | Input::Control(_)
+            | Input::Parameter(_)
+            | Input::ParameterElement(..)
+            | Input::Time,
         ) => Some(of(id).value.abs()),
         Node::Sum { constant, terms } => {
             let mut size = constant.to_f64().abs();

@@ -270,7 +270,7 @@ impl Machine<'_> {
                 self.element("z", &environment.z, index)
             }
             Input::Multiplier(index) => self.element("mu", &environment.mu, index),
-            Input::Parameter(name) => environment
+            Input::Control(name) | Input::Parameter(name) => environment
                 .parameters
                 .get(name)
                 .copied()

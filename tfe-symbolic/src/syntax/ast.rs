@@ -33,6 +33,8 @@ pub enum Item {
     Coordinates(Vec<Array>),
     /// `momenta(pa, p[3])`
     Momenta(Vec<Array>),
+    /// `input(u, w)`: numbers given at run time
+    Input(Vec<Name>),
     /// `let name = value`
     Let {
         /// The name bound.
@@ -99,6 +101,7 @@ impl Item {
         match self {
             Self::Coordinates(_) => Argument::Coordinates,
             Self::Momenta(_) => Argument::Momenta,
+            Self::Input(_) => Argument::Input,
             Self::Let { .. } => Argument::Let,
             Self::Lagrangian(_) => Argument::Lagrangian,
             Self::Hamiltonian(_) => Argument::Hamiltonian,

@@ -136,6 +136,7 @@ fn rule_of(argument: Argument) -> Rule {
     match argument {
         Argument::Coordinates => Rule::coordinates,
         Argument::Momenta => Rule::momenta,
+        Argument::Input => Rule::input,
         Argument::Let => Rule::binding,
         Argument::Lagrangian => Rule::lagrangian,
         Argument::Hamiltonian => Rule::hamiltonian,
@@ -191,6 +192,10 @@ impl Builder<'_> {
         Some(match rule {
             Rule::coordinates => Item::Coordinates(self.arrays(parts)?),
             Rule::momenta => Item::Momenta(self.arrays(parts)?),
+            Rule::input => {
+                let names = parts.0.filter(|pair| pair.as_rule() == Rule::name);
+                Item::Input(names.map(|pair| self.name(&pair)).collect())
+            }
             Rule::binding => Item::Let {
                 name: self.name(&parts.next(Rule::name)?),
                 value: self.expression(parts.next(Rule::expression)?)?,

@@ -199,6 +199,10 @@ impl fmt::Display for Item {
         match self {
             Self::Coordinates(arrays) => write!(f, "coordinates({})", Listed(arrays)),
             Self::Momenta(arrays) => write!(f, "momenta({})", Listed(arrays)),
+            Self::Input(names) => {
+                let names: Vec<&str> = names.iter().map(|name| &*name.node).collect();
+                write!(f, "input({})", names.join(", "))
+            }
             Self::Let { name, value } => write!(f, "let {name} = {value}"),
             Self::Lagrangian(value) => write!(f, "lagrangian = {value}"),
             Self::Hamiltonian(value) => write!(f, "hamiltonian = {value}"),

@@ -41,7 +41,7 @@ fn written(
         Node::Input(input) => match input {
             Input::Coordinate(_) | Input::Velocity(_) | Input::Momentum(_) => state(input)?,
             Input::Time => name("t"),
-            Input::Parameter(field) => name(field),
+            Input::Control(field) | Input::Parameter(field) => name(field),
             Input::ParameterElement(field, index) => element(name(field), index),
             Input::Multiplier(index) => element(name("mu"), index),
             Input::Integer(value) => affine(value),

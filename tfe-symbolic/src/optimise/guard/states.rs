@@ -91,7 +91,9 @@ impl Regime {
             }
             // At rest with each other, but not at the place of anything.
             Input::Velocity(_) | Input::Momentum(_) => (Kind::Rate, 0.75),
-            Input::Time | Input::Coordinate(_) | Input::Multiplier(_) => (Kind::Coordinate, 1.0),
+            Input::Time | Input::Control(_) | Input::Coordinate(_) | Input::Multiplier(_) => {
+                (Kind::Coordinate, 1.0)
+            }
         };
         let together = match self.cluster {
             Cluster::Nobody => false,

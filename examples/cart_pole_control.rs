@@ -1,0 +1,136 @@
+//! A pendulum kept upright by the cart that carries it: a loop of control with an input that is held between samples.
+//!
+//! ```text
+//! L = ½ (M + m) ẋ² + m l ẋ θ̇ cos θ + ½ m l² θ̇² − m g l cos θ ,     force on x: u
+//! ```
+//!
+//! θ is measured from the upright. The feedback u = k·(x, ẋ, θ, θ̇) puts the four roots of the linear model at −3 in continuous time. A controller knows the state only when it samples it: the longer the
+//! time between two samples, the later u answers. The run shows how far one may go: the cart is pushed at 4 s, by an impulse, and the table says how long it takes to come back, for samples of 5 ms to 200 ms. Between
+//! two samples the run takes ten steps; u is held.
+//!
+//! `cargo run --release --example cart_pole_control` writes `cart_pole_control.svg`, or the file that is named behind `--`.
+
+use std::error::Error;
+use tfe::RunErrorKind;
+use tfe::charts::{Axis, Chart, Style};
+use tfe::prelude::*;
+
+/// A cart with an upright pendulum.
+#[dynamics(
+    coordinates(x, theta),
+    lagrangian = (cart + m)/2*dot(x)^2 + m*l*dot(x)*dot(theta)*cos(theta) + m*l^2/2*dot(theta)^2 - m*g*l*cos(theta),
+    input(u),
+    force(x) = u,
+    output(force) = u,
+    output(tip) = x + l*sin(theta),
+)]
+struct CartPole {
+    cart: f64, // kg
+    m: f64,    // kg
+    l: f64,    // m
+    g: f64,    // m/s²
+}
+
+const CART: CartPole = CartPole {
+    cart: 1.0,
+    m: 0.2,
+    l: 0.6,
+    g: 9.81,
+};
+
+/// The roots of the linear model with feedback are all here.
+const ROOT: f64 = 3.0;
+
+/// Steps between two samples.
+const STEPS: usize = 10;
+
+const PUSH: f64 = 4.0; // s
+const END: f64 = 12.0; // s
+
+/// The factors of x, ẋ, θ, θ̇ in u. The linear model is M ẍ = u − m g θ and l θ̈ = g θ − ẍ; with y = x + l θ, for which θ = ÿ/g, it is one equation of fourth order in y.
+fn gains(model: &CartPole) -> [f64; 4] {
+    let CartPole { cart, m, l, g } = *model;
+    // y⁗ = g (g (M + m) θ − u)/(M l) = −(c₀ y + c₁ ẏ + c₂ ÿ + c₃ y⃛) with (s + r)⁴.
+    let [c0, c1, c2, c3] = [
+        ROOT.powi(4),
+        4.0 * ROOT.powi(3),
+        6.0 * ROOT.powi(2),
+        4.0 * ROOT,
+    ];
+    let scale = cart * l / g;
+    [
+        scale * c0,
+        scale * c1,
+        (cart + m) * g + scale * (c0 * l + c2 * g),
+        scale * (c1 * l + c3 * g),
+    ]
+}
+
+/// One run: time, place of the tip, force.
+type Rows = Vec<[f64; 3]>;
+
+/// The motion with samples every `sample`, as far as it stays upright.
+fn controlled(sample: f64) -> Result<Rows, RunErrorKind> {
+    let gains = gains(&CART);
+    let start = CART.state([0.0, 0.2], [0.0, 0.0]);
+    let mut run = Simulation::new(&CART)
+        .element(Mixed::<4>)
+        .step(sample / STEPS as f64)
+        .impulse(PUSH, [1.0, 0.0])
+        .hold(start, 0.0)?;
+    let mut rows = Rows::new();
+    while run.node().t < END && run.node().q[1].abs() < 1.5 {
+        let node = run.node();
+        let state = [node.q[0], node.v[0], node.q[1], node.v[1]];
+        let u: f64 = gains
+            .iter()
+            .zip(state)
+            .map(|(gain, value)| gain * value)
+            .sum();
+        run.set("u", u);
+        for _ in 0..STEPS {
+            run.advance()?;
+            let node = run.node();
+            let output = |name| node.output(name).unwrap_or(f64::NAN);
+            rows.push([node.t, output("tip"), output("force")]);
+        }
+    }
+    Ok(rows)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    println!("sample (ms)   back within 1 cm after the push (s)   largest force (N)");
+    let mut shown = Vec::new();
+    for sample in [0.005, 0.02, 0.05, 0.1, 0.15, 0.2] {
+        let rows = controlled(sample)?;
+        let largest = rows.iter().map(|[_, _, u]| u.abs()).fold(0.0, f64::max);
+        let fell = rows.last().is_none_or(|[t, ..]| *t < END);
+        let away = rows.iter().rev().find(|[_, tip, _]| tip.abs() > 0.01);
+        let back = match away {
+            _ if fell => "falls".to_owned(),
+            Some([t, ..]) if *t < END - 0.5 => format!("{:.2}", t - PUSH),
+            _ => "swings on".to_owned(),
+        };
+        println!("{:11.0}   {back:>35}   {largest:17.1}", 1e3 * sample);
+        if [0.005, 0.1, 0.15].contains(&sample) {
+            shown.push((sample, rows));
+        }
+    }
+    let mut chart = Chart::new("An upright pendulum on a cart, pushed at 4 s")
+        .x(Axis::new("t (s)"))
+        .y(Axis::new("place of the tip (m)"));
+    for (sample, rows) in &shown {
+        let points = rows.iter().map(|[t, tip, _]| (*t, *tip));
+        let points: Vec<_> = points.collect();
+        chart = chart.series(
+            format!("samples every {:.0} ms", 1e3 * sample),
+            Style::Line,
+            points,
+        );
+    }
+    let path = std::env::args().nth(1);
+    let path = path.unwrap_or_else(|| "cart_pole_control.svg".to_owned());
+    chart.save(&path)?;
+    println!("{path}: the tip");
+    Ok(())
+}

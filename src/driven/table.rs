@@ -1,0 +1,215 @@
+//! Values at given times, and what lies between.
+
+/// How an input goes from one value of a table to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpolation {
+    /// It keeps its value until the next time: zero-order hold.
+    Hold,
+    /// Straight lines.
+    Linear,
+    /// A cubic spline with continuous second derivatives, whose first two pieces are one cubic, and its last two ("not a knot"); of three values the parabola through
+    /// them, of two the line.
+    Spline,
+}
+
+/// A piecewise cubic.
+#[derive(Debug)]
+pub(super) struct Table {
+    times: Vec<f64>,
+    values: Vec<f64>,
+    /// Of every piece: what multiplies s, s² and s³, s the time since it began.
+    pieces: Vec<[f64; 3]>,
+}
+
+impl Table {
+    pub(super) fn new(
+        times: &[f64],
+        values: &[f64],
+        interpolation: Interpolation,
+    ) -> Result<Self, &'static str> {
+        if times.is_empty() || times.len() != values.len() {
+            return Err("there must be as many values as times, and at least one");
+        }
+        if !times.iter().chain(values).all(|number| number.is_finite()) {
+            return Err("all numbers must be finite");
+        }
+        if !times.is_sorted_by(|a, b| a < b) {
+            return Err("the times must increase");
+        }
+        let pieces = match interpolation {
+            Interpolation::Hold => vec![[0.0; 3]; times.len() - 1],
+            Interpolation::Linear => slopes(times, values)
+                .map(|slope| [slope, 0.0, 0.0])
+                .collect(),
+            Interpolation::Spline => spline(times, values),
+        };
+        Ok(Self {
+            times: times.to_vec(),
+            values: values.to_vec(),
+            pieces,
+        })
+    }
+
+    /// The value at a time; at one of the table's its own, which begins a piece.
+    pub(super) fn at(&self, t: f64) -> f64 {
+        if t.is_nan() {
+            return t;
+        }
+        let Some(piece) = self.times.partition_point(|time| *time <= t).checked_sub(1) else {
+            return self.values[0];
+        };
+        let Some([a, b, c]) = self.pieces.get(piece) else {
+            return self.values[piece];
+        };
+        let s = t - self.times[piece];
+        self.values[piece] + s * (a + s * (b + s * c))
+    }
+}
+
+/// The slopes of the chords.
+fn slopes<'a>(times: &'a [f64], values: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    let pairs = times.windows(2).zip(values.windows(2));
+    pairs.map(|(t, f)| (f[1] - f[0]) / (t[1] - t[0]))
+}
+
+/// The pieces of a spline, from its second derivatives at the times.
+fn spline(times: &[f64], values: &[f64]) -> Vec<[f64; 3]> {
+    let chords: Vec<f64> = slopes(times, values).collect();
+    let steps: Vec<f64> = times.windows(2).map(|t| t[1] - t[0]).collect();
+    let bends = bends(&steps, &chords);
+    (steps.iter().zip(&chords).enumerate())
+        .map(|(k, (h, chord))| {
+            let (start, end) = (bends[k], bends[k + 1]);
+            let slope = chord - h * (2.0 * start + end) / 6.0;
+            [slope, 0.5 * start, (end - start) / (6.0 * h)]
+        })
+        .collect()
+}
+
+/// Second derivatives at the times.
+fn bends(steps: &[f64], chords: &[f64]) -> Vec<f64> {
+    let n = steps.len();
+    match n {
+        0 => return vec![0.0],
+        1 => return vec![0.0; 2],
+        2 => return vec![2.0 * (chords[1] - chords[0]) / (steps[0] + steps[1]); 3],
+        _ => {}
+    }
+    // Continuous slopes inside: h₋ f″₋ + 2(h₋ + h) f″ + h f″₊ = 6(c − c₋); the ends are extrapolated, f″₀ = f″₁ − (h₀/h₁)(f″₂ − f″₁).
+    let (mut diagonal, mut right) = (vec![0.0; n - 1], vec![0.0; n - 1]);
+    let (mut lower, mut upper) = (vec![0.0; n - 1], vec![0.0; n - 1]);
+    for k in 0..n - 1 {
+        let (before, after) = (steps[k], steps[k + 1]);
+        diagonal[k] = 2.0 * (before + after);
+        lower[k] = before;
+        upper[k] = after;
+        right[k] = 6.0 * (chords[k + 1] - chords[k]);
+    }
+    let first = steps[0] / steps[1];
+    diagonal[0] += steps[0] * (1.0 + first);
+    upper[0] -= steps[0] * first;
+    let last = steps[n - 1] / steps[n - 2];
+    diagonal[n - 2] += steps[n - 1] * (1.0 + last);
+    lower[n - 2] -= steps[n - 1] * last;
+    for k in 1..n - 1 {
+        let factor = lower[k] / diagonal[k - 1];
+        diagonal[k] -= factor * upper[k - 1];
+        right[k] -= factor * right[k - 1];
+    }
+    let mut bends = vec![0.0; n + 1];
+    for k in (0..n - 1).rev() {
+        let after = if k + 1 < n - 1 {
+            upper[k] * bends[k + 2]
+        } else {
+            0.0
+        };
+        bends[k + 1] = (right[k] - after) / diagonal[k];
+    }
+    bends[0] = bends[1] - first * (bends[2] - bends[1]);
+    bends[n] = bends[n - 1] + last * (bends[n - 1] - bends[n - 2]);
+    bends
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TIMES: [f64; 6] = [-1.0, -0.3, 0.2, 1.0, 1.1, 2.5];
+
+    fn table(interpolation: Interpolation, of: fn(f64) -> f64, count: usize) -> Table {
+        let times = &TIMES[..count];
+        let values: Vec<f64> = times.iter().map(|t| of(*t)).collect();
+        Table::new(times, &values, interpolation).expect("a table")
+    }
+
+    /// What has as many degrees as values is its own interpolation.
+    #[test]
+    fn polynomials_are_reproduced() {
+        let cubic = |t: f64| 1.0 + t * (2.0 + t * (-3.0 + t * 0.5));
+        let square = |t: f64| 1.0 + t * (2.0 - 3.0 * t);
+        let line = |t: f64| 1.0 + 2.0 * t;
+        for (of, counts) in [
+            (cubic as fn(f64) -> f64, 4..7),
+            (square, 3..7),
+            (line, 2..7),
+        ] {
+            for count in counts {
+                let table = table(Interpolation::Spline, of, count);
+                for k in 0..=40 {
+                    let t = TIMES[0] + (TIMES[count - 1] - TIMES[0]) * f64::from(k) / 40.0;
+                    assert!((table.at(t) - of(t)).abs() < 2e-14, "{count} values at {t}");
+                }
+            }
+        }
+        let lines = table(Interpolation::Linear, line, 6);
+        assert!((lines.at(0.77) - line(0.77)).abs() < 1e-15);
+    }
+
+    /// Of order four with its ends.
+    #[test]
+    fn splines_have_order_four() {
+        let error = |count: u32| {
+            let times: Vec<f64> = (0..=count)
+                .map(|k| f64::from(k) / f64::from(count))
+                .collect();
+            let values: Vec<f64> = times.iter().map(|t| (3.0 * t).sin()).collect();
+            let table = Table::new(&times, &values, Interpolation::Spline).expect("a table");
+            (0..8 * count)
+                .map(|k| f64::from(k) / f64::from(8 * count))
+                .map(|t| (table.at(t) - (3.0 * t).sin()).abs())
+                .fold(0.0, f64::max)
+        };
+        // The ends, which are extrapolated, let it begin a little higher.
+        let order = (error(256) / error(512)).log2();
+        assert!((order - 4.0).abs() < 0.1, "{order}");
+    }
+
+    #[test]
+    fn values_are_kept_at_the_ends() {
+        for way in [
+            Interpolation::Hold,
+            Interpolation::Linear,
+            Interpolation::Spline,
+        ] {
+            let table = table(way, |t| t * t, 6);
+            assert_eq!((table.at(-7.0), table.at(7.0)), (1.0, 6.25));
+            for (k, t) in TIMES.iter().enumerate() {
+                assert_eq!(table.at(*t), TIMES[k] * TIMES[k]);
+            }
+            assert!(table.at(f64::NAN).is_nan());
+        }
+        let held = table(Interpolation::Hold, |t| t * t, 6);
+        assert_eq!(held.at(0.999), 0.2 * 0.2);
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused() {
+        let new = |times: &[f64], values: &[f64]| {
+            Table::new(times, values, Interpolation::Linear).is_err()
+        };
+        assert!(new(&[], &[]) && new(&[0.0], &[0.0, 1.0]));
+        assert!(new(&[0.0, 0.0], &[0.0, 1.0]) && new(&[0.0, f64::NAN], &[0.0, 1.0]));
+        assert!(new(&[0.0, 1.0], &[0.0, f64::INFINITY]));
+        assert!(!new(&[3.0], &[1.0]));
+    }
+}

@@ -1,0 +1,430 @@
+//! Inputs: functions of the time, tables, loops of control.
+
+use tfe::prelude::*;
+use tfe::{Driven, InputError, RunErrorKind};
+
+/// A pendulum whose pivot is moved and whose axis is turned: inputs in the energy, in forces, in outputs.
+#[dynamics(
+    coordinates(theta),
+    let vx = l*dot(theta)*cos(theta) + w,
+    let vy = l*dot(theta)*sin(theta),
+    lagrangian = m/2*(vx^2 + vy^2) + m*g*l*cos(theta),
+    input(w, u),
+    force(theta) = u - c*dot(theta),
+    output(torque) = u - c*dot(theta),
+    sensitivity(g),
+)]
+struct Driving {
+    m: f64,
+    l: f64,
+    g: f64,
+    c: f64,
+}
+
+/// The same with the motions written as formulas of t.
+#[dynamics(
+    coordinates(theta),
+    let w = 0.3*cos(2*t),
+    let u = 0.1*sin(t)*exp(-t/10),
+    let vx = l*dot(theta)*cos(theta) + w,
+    let vy = l*dot(theta)*sin(theta),
+    lagrangian = m/2*(vx^2 + vy^2) + m*g*l*cos(theta),
+    force(theta) = u - c*dot(theta),
+    output(torque) = u - c*dot(theta),
+    sensitivity(g),
+)]
+struct Written {
+    m: f64,
+    l: f64,
+    g: f64,
+    c: f64,
+}
+
+/// A Hamiltonian with an input in both of its halves.
+#[dynamics(
+    coordinates(x, y),
+    momenta(px, py),
+    hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + x^2*y - y^3/3 + e*(x*px - y*py),
+    input(e, f),
+    force(x) = f*px,
+)]
+struct Kicked;
+
+#[dynamics(
+    coordinates(x, y),
+    momenta(px, py),
+    let e = 0.01*sin(3*t),
+    hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + x^2*y - y^3/3 + e*(x*px - y*py),
+    force(x) = -0.1*cos(t)*px,
+)]
+struct KickedWritten;
+
+/// A bead on a sphere, pushed.
+#[dynamics(
+    coordinates(r[3]),
+    lagrangian = m/2*inner(dot(r), dot(r)) - m*g*r[2],
+    constraint(sphere) = inner(r, r) - 1,
+    input(push),
+    force(r[0]) = push,
+)]
+struct Bead {
+    m: f64,
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(r[3]),
+    lagrangian = m/2*inner(dot(r), dot(r)) - m*g*r[2],
+    constraint(sphere) = inner(r, r) - 1,
+    force(r[0]) = cos(5*t),
+)]
+struct BeadWritten {
+    m: f64,
+    g: f64,
+}
+
+const DRIVING: Driving = Driving {
+    m: 1.3,
+    l: 0.7,
+    g: 9.81,
+    c: 0.05,
+};
+const WRITTEN: Written = Written {
+    m: 1.3,
+    l: 0.7,
+    g: 9.81,
+    c: 0.05,
+};
+
+fn elements() -> [Element; 6] {
+    [
+        Mixed::<4>.into(),
+        Mixed::<2>.into(),
+        Mixed::<7>.into(),
+        Primal::<3>.into(),
+        Radau::<3>.into(),
+        EnergyConserving::<4>.into(),
+    ]
+}
+
+fn w(t: f64) -> f64 {
+    0.3 * (2.0 * t).cos()
+}
+
+fn u(t: f64) -> f64 {
+    0.1 * t.sin() * (-t / 10.0).exp()
+}
+
+/// A function given at run time is the same as one that is written in the declaration, in runs of every kind.
+#[test]
+fn an_input_is_what_a_formula_of_time_is() {
+    let start = WRITTEN.state([1.0], [0.5]);
+    for element in elements() {
+        let given = Simulation::new(&DRIVING)
+            .element(element)
+            .step(0.05)
+            .input("u", u)
+            .input("w", w);
+        let written = Simulation::new(&WRITTEN).element(element).step(0.05);
+        let (a, b) = (
+            given.run(start, 0.0..20.0).unwrap(),
+            written.run(start, 0.0..20.0).unwrap(),
+        );
+        assert_eq!(a.states().len(), b.states().len());
+        for (a, b) in a.states().iter().zip(b.states()) {
+            assert!(
+                (a.q[0] - b.q[0]).abs() < 1e-12 && (a.v[0] - b.v[0]).abs() < 1e-12,
+                "{element:?} at {}",
+                a.t
+            );
+        }
+        let (columns, others) = (
+            a.outputs().column("torque").unwrap(),
+            b.outputs().column("torque").unwrap(),
+        );
+        assert!(
+            columns
+                .iter()
+                .zip(&others)
+                .all(|(a, b)| (a - b).abs() < 1e-12)
+        );
+        assert_eq!(a.warnings().len(), b.warnings().len());
+        let (a, b) = (
+            given.run_linearised(start, 0.0..5.0).unwrap(),
+            written.run_linearised(start, 0.0..5.0).unwrap(),
+        );
+        assert!((a.product() - b.product()).norm() < 1e-10);
+        for (a, b) in given
+            .steps(start, 0.0)
+            .zip(written.steps(start, 0.0))
+            .take(50)
+        {
+            assert!((a.unwrap().q[0] - b.unwrap().q[0]).abs() < 1e-13);
+        }
+    }
+    let given = Simulation::new(&DRIVING)
+        .input("u", u)
+        .input("w", w)
+        .accuracy(1e-9);
+    let written = Simulation::new(&WRITTEN).accuracy(1e-9);
+    let (a, b) = (
+        given.run(start, 0.0..20.0).unwrap(),
+        written.run(start, 0.0..20.0).unwrap(),
+    );
+    assert!((a.last().q[0] - b.last().q[0]).abs() < 1e-8);
+    assert!(a.error_estimate() < 1e-9);
+}
+
+/// Points side by side in the registers of the processor, Newton's method, models declared by a Hamiltonian.
+#[test]
+fn inputs_of_hamiltonian_models_are_the_same() {
+    let start = State {
+        q: [0.1, -0.05],
+        p: [0.2, 0.3],
+    };
+    for element in elements() {
+        for solver in [Solve::Auto, Solve::Newton] {
+            let given = Simulation::new(&Kicked)
+                .element(element)
+                .step(0.1)
+                .solver(solver)
+                .input("e", |t| 0.01 * (3.0 * t).sin())
+                .input("f", |t| -0.1 * t.cos());
+            let written = Simulation::new(&KickedWritten)
+                .element(element)
+                .step(0.1)
+                .solver(solver);
+            let (a, b) = (
+                given.run(start, 0.0..10.0).unwrap(),
+                written.run(start, 0.0..10.0).unwrap(),
+            );
+            for k in 0..2 {
+                assert!((a.last().q[k] - b.last().q[k]).abs() < 1e-12, "{element:?}");
+                assert!((a.last().p[k] - b.last().p[k]).abs() < 1e-12, "{element:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn inputs_push_models_with_constraints() {
+    let (bead, written) = (Bead { m: 0.5, g: 9.81 }, BeadWritten { m: 0.5, g: 9.81 });
+    let start = bead.state([0.6, 0.0, -0.8], [0.0, 1.0, 0.0]);
+    let simulation = Simulation::new(&bead)
+        .step(0.01)
+        .input("push", |t| (5.0 * t).cos());
+    let a = simulation.run(start, 0.0..3.0).unwrap();
+    let b = Simulation::new(&written)
+        .step(0.01)
+        .run(start, 0.0..3.0)
+        .unwrap();
+    for k in 0..3 {
+        assert!((a.last().q[k] - b.last().q[k]).abs() < 1e-12);
+    }
+}
+
+/// As a model the struct has all inputs zero, and so has a run in which some are not given.
+#[test]
+fn what_is_not_given_is_zero() {
+    let start = DRIVING.state([1.0], [0.0]);
+    let plain = Simulation::new(&DRIVING)
+        .step(0.05)
+        .run(start, 0.0..5.0)
+        .unwrap();
+    let zeros = Simulation::new(&DRIVING)
+        .step(0.05)
+        .input("u", |_| 0.0)
+        .run(start, 0.0..5.0)
+        .unwrap();
+    assert_eq!(plain.states(), zeros.states());
+}
+
+/// A driven model is a model: ensembles and orbits take it.
+#[test]
+fn driven_models_are_models() {
+    let driven = Driven::new(&DRIVING)
+        .input("u", u)
+        .unwrap()
+        .input("w", w)
+        .unwrap();
+    let start = DRIVING.state([1.0], [0.0]);
+    let alone = Simulation::new(&driven)
+        .step(0.05)
+        .run(start, 0.0..5.0)
+        .unwrap();
+    let nodes = Ensemble::new(&driven)
+        .step(0.05)
+        .run(&[start; 9], 0.0..5.0)
+        .unwrap();
+    for node in &nodes {
+        let node = node.as_ref().unwrap();
+        assert!((node.q[0] - alone.last().q[0]).abs() < 1e-12);
+    }
+    // The answer to a drive of period 2π/3.
+    let damped = Driving { c: 0.8, ..DRIVING };
+    let turned = Driven::new(&damped)
+        .input("u", |t| (3.0 * t).sin())
+        .unwrap();
+    let period = 2.0 * std::f64::consts::PI / 3.0;
+    let orbit = PeriodicOrbit::of(&turned).period(period).solve().unwrap();
+    let node = orbit.start();
+    let after = Simulation::new(&turned)
+        .step(period / 400.0)
+        .run(node, 0.0..period)
+        .unwrap();
+    assert!((after.last().q[0] - node.q[0]).abs() < 1e-9);
+}
+
+/// Elements end at the times of a table: a spline of its own knots costs no order, and a jump no digits.
+#[test]
+fn elements_end_at_the_times_of_a_table() {
+    // θ″ = u exactly where the pendulum has no weight.
+    let free = Driving {
+        m: 1.0,
+        l: 1.0,
+        g: 0.0,
+        c: 0.0,
+    };
+    let start = free.state([0.0], [0.0]);
+    let times = [0.0, 0.7, 1.1, 2.03];
+    let run = |values: [f64; 4], way| {
+        let simulation = Simulation::new(&free)
+            .step(0.25)
+            .table("u", times, values, way);
+        let motion = simulation.run(start, 0.0..3.0).unwrap();
+        assert!(
+            times
+                .iter()
+                .all(|time| motion.states().iter().any(|node| node.t == *time))
+        );
+        (motion.last().v[0], motion.last().q[0])
+    };
+    // ∫u and ∫(3 − t)u dt by hand.
+    let (v, _) = run([1.0, -2.0, 0.5, 0.0], Interpolation::Hold);
+    assert!((v - (0.7 - 0.8 + 0.465)).abs() < 1e-14, "{v}");
+    let (v, _) = run([1.0, -2.0, 0.5, 0.0], Interpolation::Linear);
+    assert!((v - (-0.35 - 0.3 + 0.2325)).abs() < 1e-14, "{v}");
+    // A cubic on four points is itself: u = t³ up to 2.03, then kept.
+    let (v, q) = run(times.map(|t| t.powi(3)), Interpolation::Spline);
+    let (end, kept) = (times[3], times[3].powi(3));
+    let rest = 3.0 - end;
+    assert!((v - (end.powi(4) / 4.0 + kept * rest)).abs() < 1e-13);
+    let exact = end.powi(5) / 20.0 + end.powi(4) / 4.0 * rest + kept * rest * rest / 2.0;
+    assert!((q - exact).abs() < 1e-13);
+}
+
+/// A loop of control gives what a table of the same values gives.
+#[test]
+fn a_loop_holds_what_was_set() {
+    let start = DRIVING.state([0.3], [0.0]);
+    let mut run = Simulation::new(&DRIVING)
+        .step(0.02)
+        .input("w", w)
+        .hold(start, 0.0)
+        .unwrap();
+    let (mut times, mut values) = (Vec::new(), Vec::new());
+    for _ in 0..200 {
+        let node = run.node();
+        let torque = -2.0 * node.q[0] - 0.5 * node.v[0];
+        times.push(node.t);
+        values.push(torque);
+        run.set("u", torque);
+        run.advance().unwrap();
+        let node = run.node();
+        assert_eq!(node.output("torque"), Some(torque - DRIVING.c * node.v[0]));
+    }
+    assert_eq!(run.statistics().steps, 200);
+    let table = Simulation::new(&DRIVING).step(0.02).input("w", w).table(
+        "u",
+        &times,
+        &values,
+        Interpolation::Hold,
+    );
+    let motion = table.run(start, 0.0..run.node().t).unwrap();
+    assert!((motion.last().q[0] - run.node().q[0]).abs() < 1e-12);
+}
+
+#[test]
+fn misuse_is_told() {
+    let start = DRIVING.state([1.0], [0.0]);
+    let unknown = Simulation::new(&DRIVING)
+        .input("torque", |_| 1.0)
+        .run(start, 0.0..1.0)
+        .unwrap_err();
+    let InputError::Unknown { name, known } = (match unknown.kind() {
+        RunErrorKind::Input(error) => error.clone(),
+        other => panic!("{other}"),
+    }) else {
+        panic!("{unknown}");
+    };
+    assert_eq!((name.as_str(), &known[..]), ("torque", &["w", "u"][..]));
+    assert_eq!(
+        unknown.to_string(),
+        "the model has no input `torque`, only `w`, `u`"
+    );
+    let table = |times: &[f64], values: &[f64]| {
+        let run = Simulation::new(&DRIVING).table("u", times, values, Interpolation::Spline);
+        run.steps(start, 0.0)
+            .next()
+            .unwrap()
+            .unwrap_err()
+            .to_string()
+    };
+    assert_eq!(
+        table(&[0.0, 1.0], &[1.0]),
+        "the table of input `u`: there must be as many values as times, and at least one"
+    );
+    assert_eq!(
+        table(&[0.0, 0.0], &[1.0, 2.0]),
+        "the table of input `u`: the times must increase"
+    );
+    // Without a number there is no state, and an error says where.
+    let nan = Simulation::new(&DRIVING)
+        .step(0.1)
+        .input("u", |t| if t < 0.5 { 0.0 } else { f64::NAN });
+    let error = nan.run(start, 0.0..1.0).unwrap_err();
+    assert!(
+        matches!(error.kind(), RunErrorKind::Solve { element: 4 | 5, .. }),
+        "{error}"
+    );
+    assert!(error.partial().last().q[0].is_finite());
+    let mut run = Simulation::new(&DRIVING)
+        .step(0.1)
+        .hold(start, 0.0)
+        .unwrap();
+    run.set("u", f64::NAN);
+    assert_eq!(
+        run.advance().unwrap_err().to_string(),
+        "input `u` was set to NaN"
+    );
+    run.set("v", 1.0);
+    assert!(matches!(
+        run.advance(),
+        Err(RunErrorKind::Input(InputError::Unknown { .. }))
+    ));
+    run.advance().unwrap();
+    assert_eq!(run.node().t, 0.1);
+    assert!(matches!(
+        Simulation::new(&DRIVING).hold(start, 0.0),
+        Err(RunErrorKind::Step { .. })
+    ));
+}
+
+/// Events see inputs.
+#[test]
+fn events_of_inputs_are_met() {
+    #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y, input(floor), event(hit) = y - floor)]
+    struct Ball {
+        g: f64,
+    }
+    let ball = Ball { g: 10.0 };
+    let motion = Simulation::new(&ball)
+        .step(0.03)
+        .on("hit", Crossing::Falling, |_| Act::Stop)
+        .input("floor", |t| 0.1 * t)
+        .run(ball.state([1.0], [0.0]), 0.0..1.0)
+        .unwrap();
+    // 1 − 5t² = 0.1 t
+    let exact = (-0.1 + (0.01_f64 + 20.0).sqrt()) / 10.0;
+    assert!((motion.events()[0].t - exact).abs() < 1e-14);
+}
