@@ -3,7 +3,7 @@
 use super::arc::Row;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Problem};
 use crate::periodic::problem::Periodic;
-use tfe_runtime::condenser::Direction;
+use tfe_runtime::condenser::{Direction, Parameter};
 use tfe_runtime::{LegendreError, Model, legendre};
 
 /// The field of a model that is the parameter.
@@ -70,7 +70,7 @@ impl<M: Model<N> + Clone, const N: usize> Problem<N> for Continued<'_, M, N> {
             *direction = Direction {
                 time: self.rate * stretched.time,
                 length: self.rate * stretched.length,
-                parameter: Some(self.sensitivity),
+                parameter: Some(Parameter::Named(self.sensitivity)),
                 damping: 0.0,
             };
         }

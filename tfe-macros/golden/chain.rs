@@ -65,8 +65,8 @@ const _: () = {
         /// L(q, v, t): 4 +−, 8 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
             let () = Self::__TFE_LENGTHS;
-            let a = t.like(self.a);
-            let k = t.like(self.k);
+            let a = t.parameter(N + 1, self.a);
+            let k = t.parameter(N, self.k);
             let mut t0 = t.like(0.0);
             let t1 = t.like(0.5) * k;
             let t2 = t.like(0.25) * a;
@@ -79,7 +79,7 @@ const _: () = {
                 t0 -= t7;
             }
             for i in 0..N {
-                let t8 = t.like(0.5) * t.like(self.m[i]);
+                let t8 = t.like(0.5) * t.parameter(i, self.m[i]);
                 let t9 = z[i] * z[i];
                 t0 += t8 * t9;
             }
@@ -96,11 +96,11 @@ const _: () = {
             first: &mut __tfe::First<R, N>,
         ) {
             let () = Self::__TFE_LENGTHS;
-            let a = t.like(self.a);
-            let c = t.like(self.c);
-            let f = t.like(self.f);
-            let k = t.like(self.k);
-            let omega = t.like(self.omega);
+            let a = t.parameter(N + 1, self.a);
+            let c = t.parameter(N + 2, self.c);
+            let f = t.parameter(N + 3, self.f);
+            let k = t.parameter(N, self.k);
+            let omega = t.parameter(N + 4, self.omega);
             first.q.fill(t.like(0.0));
             first.force.fill(t.like(0.0));
             let t0 = t * omega;
@@ -116,7 +116,7 @@ const _: () = {
                 first.q[i + 1] += t6;
             }
             for i in 0..N {
-                first.z[i] = t.like(self.m[i]) * z[i];
+                first.z[i] = t.parameter(i, self.m[i]) * z[i];
                 let t7 = c * z[i];
                 first.force[i] -= t7;
             }
@@ -132,11 +132,11 @@ const _: () = {
             zz: &mut [[R; N]; N],
         ) {
             let () = Self::__TFE_LENGTHS;
-            let a = t.like(self.a);
-            let c = t.like(self.c);
-            let f = t.like(self.f);
-            let k = t.like(self.k);
-            let omega = t.like(self.omega);
+            let a = t.parameter(N + 1, self.a);
+            let c = t.parameter(N + 2, self.c);
+            let f = t.parameter(N + 3, self.f);
+            let k = t.parameter(N, self.k);
+            let omega = t.parameter(N + 4, self.omega);
             first.q.fill(t.like(0.0));
             first.force.fill(t.like(0.0));
             let t0 = t * omega;
@@ -153,9 +153,9 @@ const _: () = {
             }
             for i in 0..N {
                 let t7 = c * z[i];
-                first.z[i] = t.like(self.m[i]) * z[i];
+                first.z[i] = t.parameter(i, self.m[i]) * z[i];
                 first.force[i] -= t7;
-                zz[i][i] = t.like(self.m[i]);
+                zz[i][i] = t.parameter(i, self.m[i]);
             }
         }
         fn first<R: __tfe::Real>(
@@ -187,11 +187,11 @@ const _: () = {
             second: &mut __tfe::Second<R, N>,
         ) {
             let () = Self::__TFE_LENGTHS;
-            let a = t.like(self.a);
-            let c = t.like(self.c);
-            let f = t.like(self.f);
-            let k = t.like(self.k);
-            let omega = t.like(self.omega);
+            let a = t.parameter(N + 1, self.a);
+            let c = t.parameter(N + 2, self.c);
+            let f = t.parameter(N + 3, self.f);
+            let k = t.parameter(N, self.k);
+            let omega = t.parameter(N + 4, self.omega);
             first.q.fill(t.like(0.0));
             first.force.fill(t.like(0.0));
             for row in &mut second.qq {
@@ -219,9 +219,9 @@ const _: () = {
             let t10 = -c;
             for i in 0..N {
                 let t11 = c * z[i];
-                first.z[i] = t.like(self.m[i]) * z[i];
+                first.z[i] = t.parameter(i, self.m[i]) * z[i];
                 first.force[i] -= t11;
-                second.zz[i][i] = t.like(self.m[i]);
+                second.zz[i][i] = t.parameter(i, self.m[i]);
                 second.force_z[i][i] = t10;
             }
         }
@@ -240,6 +240,74 @@ const _: () = {
             }
         }
         const OBSERVABLES: &'static [&'static str] = &["extension"];
+        fn parameters(&self) -> usize {
+            N + 5
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < N {
+                return __tfe::CoordinateName::element("m", index);
+            }
+            if index < N + 1 {
+                return __tfe::CoordinateName::single("k");
+            }
+            if index < N + 2 {
+                return __tfe::CoordinateName::single("a");
+            }
+            if index < N + 3 {
+                return __tfe::CoordinateName::single("c");
+            }
+            if index < N + 4 {
+                return __tfe::CoordinateName::single("f");
+            }
+            if index < N + 5 {
+                return __tfe::CoordinateName::single("omega");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < N {
+                return self.m[index];
+            }
+            if index < N + 1 {
+                return self.k;
+            }
+            if index < N + 2 {
+                return self.a;
+            }
+            if index < N + 3 {
+                return self.c;
+            }
+            if index < N + 4 {
+                return self.f;
+            }
+            if index < N + 5 {
+                return self.omega;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < N {
+                made.m[index] = value;
+            } else if index < N + 1 {
+                made.k = value;
+            } else if index < N + 2 {
+                made.a = value;
+            } else if index < N + 3 {
+                made.c = value;
+            } else if index < N + 4 {
+                made.f = value;
+            } else if index < N + 5 {
+                made.omega = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
+        }
     }
 };
 #[automatically_derived]

@@ -46,10 +46,10 @@ const _: () = {
         };
         /// L(q, v, t): 4 +−, 10 ×, 1 sin/cos, 1 other
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
-            let g = t.like(self.g);
-            let k = t.like(self.k);
-            let m = t.like(self.m);
-            let r = t.like(self.r);
+            let g = t.parameter(2, self.g);
+            let k = t.parameter(3, self.k);
+            let m = t.parameter(0, self.m);
+            let r = t.parameter(1, self.r);
             let cos_theta = q[1].cos();
             let t0 = z[0] * z[0];
             let t1 = r * z[1];
@@ -77,11 +77,11 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            let c = t.like(self.c);
-            let g = t.like(self.g);
-            let k = t.like(self.k);
-            let m = t.like(self.m);
-            let r = t.like(self.r);
+            let c = t.parameter(4, self.c);
+            let g = t.parameter(2, self.g);
+            let k = t.parameter(3, self.k);
+            let m = t.parameter(0, self.m);
+            let r = t.parameter(1, self.r);
             let (sin_theta, cos_theta) = q[1].sin_cos();
             first.z[0] = m * z[0];
             let t0 = g * m;
@@ -111,11 +111,11 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            let c = t.like(self.c);
-            let g = t.like(self.g);
-            let k = t.like(self.k);
-            let m = t.like(self.m);
-            let r = t.like(self.r);
+            let c = t.parameter(4, self.c);
+            let g = t.parameter(2, self.g);
+            let k = t.parameter(3, self.k);
+            let m = t.parameter(0, self.m);
+            let r = t.parameter(1, self.r);
             let (sin_theta, cos_theta) = q[1].sin_cos();
             zz[0][0] = m;
             first.z[0] = m * z[0];
@@ -165,11 +165,11 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             second: &mut __tfe::Second<R, 2>,
         ) {
-            let c = t.like(self.c);
-            let g = t.like(self.g);
-            let k = t.like(self.k);
-            let m = t.like(self.m);
-            let r = t.like(self.r);
+            let c = t.parameter(4, self.c);
+            let g = t.parameter(2, self.g);
+            let k = t.parameter(3, self.k);
+            let m = t.parameter(0, self.m);
+            let r = t.parameter(1, self.r);
             let (sin_theta, cos_theta) = q[1].sin_cos();
             second.zz[0][0] = m;
             first.z[0] = m * z[0];
@@ -211,7 +211,7 @@ const _: () = {
             z: &[R; 2],
             values: &mut [R],
         ) {
-            let r = t.like(self.r);
+            let r = t.parameter(1, self.r);
             let cos_theta = q[1].cos();
             let t0 = r * cos_theta;
             values[0] = q[0] - t0;
@@ -229,6 +229,66 @@ const _: () = {
             }
         }
         const OBSERVABLES: &'static [&'static str] = &["height", "speed"];
+        fn parameters(&self) -> usize {
+            5
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("m");
+            }
+            if index < 2 {
+                return __tfe::CoordinateName::single("r");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::single("g");
+            }
+            if index < 4 {
+                return __tfe::CoordinateName::single("k");
+            }
+            if index < 5 {
+                return __tfe::CoordinateName::single("c");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.m;
+            }
+            if index < 2 {
+                return self.r;
+            }
+            if index < 3 {
+                return self.g;
+            }
+            if index < 4 {
+                return self.k;
+            }
+            if index < 5 {
+                return self.c;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.m = value;
+            } else if index < 2 {
+                made.r = value;
+            } else if index < 3 {
+                made.g = value;
+            } else if index < 4 {
+                made.k = value;
+            } else if index < 5 {
+                made.c = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
+        }
     }
 };
 #[automatically_derived]

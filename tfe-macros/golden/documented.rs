@@ -45,9 +45,9 @@ const _: () = {
         };
         /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let k = t.parameter(1, self.k);
+            let l = t.parameter(2, self.l);
+            let m = t.parameter(0, self.m);
             let t0 = q[0] - l;
             let t1 = z[0] * z[0];
             let t2 = m * t1;
@@ -64,9 +64,9 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let k = t.parameter(1, self.k);
+            let l = t.parameter(2, self.l);
+            let m = t.parameter(0, self.m);
             first.z[0] = m * z[0];
             let t0 = l - q[0];
             first.q[0] = k * t0;
@@ -80,9 +80,9 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let k = t.parameter(1, self.k);
+            let l = t.parameter(2, self.l);
+            let m = t.parameter(0, self.m);
             zz[0][0] = m;
             first.z[0] = m * z[0];
             let t0 = l - q[0];
@@ -97,9 +97,9 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             second: &mut __tfe::Second<R, 1>,
         ) {
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let k = t.parameter(1, self.k);
+            let l = t.parameter(2, self.l);
+            let m = t.parameter(0, self.m);
             second.zz[0][0] = m;
             first.z[0] = m * z[0];
             let t0 = l - q[0];
@@ -122,6 +122,50 @@ const _: () = {
             }
         }
         const OBSERVABLES: &'static [&'static str] = &["height"];
+        fn parameters(&self) -> usize {
+            3
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("m");
+            }
+            if index < 2 {
+                return __tfe::CoordinateName::single("k");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::single("l");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.m;
+            }
+            if index < 2 {
+                return self.k;
+            }
+            if index < 3 {
+                return self.l;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.m = value;
+            } else if index < 2 {
+                made.k = value;
+            } else if index < 3 {
+                made.l = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
+        }
     }
 };
 #[automatically_derived]
@@ -339,9 +383,9 @@ const _: () = {
         };
         /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let k = t.parameter(1, self.k);
+            let l = t.parameter(2, self.l);
+            let m = t.parameter(0, self.m);
             let t0 = q[0] - l;
             let t1 = z[0] * z[0];
             let t2 = m * t1;
@@ -358,9 +402,9 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let k = t.parameter(1, self.k);
+            let l = t.parameter(2, self.l);
+            let m = t.parameter(0, self.m);
             first.z[0] = m * z[0];
             let t0 = l - q[0];
             first.q[0] = k * t0;
@@ -374,9 +418,9 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let k = t.parameter(1, self.k);
+            let l = t.parameter(2, self.l);
+            let m = t.parameter(0, self.m);
             zz[0][0] = m;
             first.z[0] = m * z[0];
             let t0 = l - q[0];
@@ -391,9 +435,9 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             second: &mut __tfe::Second<R, 1>,
         ) {
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let k = t.parameter(1, self.k);
+            let l = t.parameter(2, self.l);
+            let m = t.parameter(0, self.m);
             second.zz[0][0] = m;
             first.z[0] = m * z[0];
             let t0 = l - q[0];
@@ -416,6 +460,50 @@ const _: () = {
             }
         }
         const OBSERVABLES: &'static [&'static str] = &["height"];
+        fn parameters(&self) -> usize {
+            3
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("m");
+            }
+            if index < 2 {
+                return __tfe::CoordinateName::single("k");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::single("l");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.m;
+            }
+            if index < 2 {
+                return self.k;
+            }
+            if index < 3 {
+                return self.l;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.m = value;
+            } else if index < 2 {
+                made.k = value;
+            } else if index < 3 {
+                made.l = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
+        }
     }
 };
 #[automatically_derived]

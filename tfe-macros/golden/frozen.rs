@@ -48,10 +48,10 @@ const _: () = {
         };
         /// L(q, v, t): 4 +−, 10 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
-            let g = t.like(self.g);
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let k = t.parameter(3, self.k);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let cos_theta = q[1].cos();
             let t0 = z[0] * z[0];
             let t1 = q[0] * z[1];
@@ -78,10 +78,10 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            let g = t.like(self.g);
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let k = t.parameter(3, self.k);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let (sin_theta, cos_theta) = q[1].sin_cos();
             first.z[0] = m * z[0];
             let t0 = g * m;
@@ -108,10 +108,10 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            let g = t.like(self.g);
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let k = t.parameter(3, self.k);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let (sin_theta, cos_theta) = q[1].sin_cos();
             zz[0][0] = m;
             first.z[0] = m * z[0];
@@ -159,10 +159,10 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             second: &mut __tfe::Second<R, 2>,
         ) {
-            let g = t.like(self.g);
-            let k = t.like(self.k);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let k = t.parameter(3, self.k);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let (sin_theta, cos_theta) = q[1].sin_cos();
             second.zz[0][0] = m;
             first.z[0] = m * z[0];
@@ -209,6 +209,58 @@ const _: () = {
             }
         }
         const OBSERVABLES: &'static [&'static str] = &["height"];
+        fn parameters(&self) -> usize {
+            4
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("m");
+            }
+            if index < 2 {
+                return __tfe::CoordinateName::single("l");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::single("g");
+            }
+            if index < 4 {
+                return __tfe::CoordinateName::single("k");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.m;
+            }
+            if index < 2 {
+                return self.l;
+            }
+            if index < 3 {
+                return self.g;
+            }
+            if index < 4 {
+                return self.k;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.m = value;
+            } else if index < 2 {
+                made.l = value;
+            } else if index < 3 {
+                made.g = value;
+            } else if index < 4 {
+                made.k = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
+        }
     }
 };
 #[automatically_derived]
@@ -317,9 +369,9 @@ const _: () = {
         };
         /// L(q, v, t): 3 +−, 9 ×, 1 ÷
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
-            let g = t.like(self.g);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let t0 = l * m;
             let t1 = z[0] * z[0];
             let t2 = t.like(0.5) * t1;
@@ -344,9 +396,9 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            let g = t.like(self.g);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let t0 = l * m;
             let t1 = l * z[0];
             first.z[0] = t0 * t1;
@@ -367,9 +419,9 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            let g = t.like(self.g);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let t0 = l * m;
             let t1 = l * t0;
             zz[0][0] = t1;
@@ -409,9 +461,9 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             second: &mut __tfe::Second<R, 1>,
         ) {
-            let g = t.like(self.g);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let t0 = l * m;
             let t1 = l * t0;
             second.zz[0][0] = t1;
@@ -432,7 +484,7 @@ const _: () = {
             z: &[R; 1],
             values: &mut [R],
         ) {
-            let l = t.like(self.l);
+            let l = t.parameter(1, self.l);
             let cos_theta = q[0].cos();
             let t0 = l * cos_theta;
             values[0] = -t0;
@@ -444,6 +496,50 @@ const _: () = {
             }
         }
         const OBSERVABLES: &'static [&'static str] = &["height"];
+        fn parameters(&self) -> usize {
+            3
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("m");
+            }
+            if index < 2 {
+                return __tfe::CoordinateName::single("l");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::single("g");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.m;
+            }
+            if index < 2 {
+                return self.l;
+            }
+            if index < 3 {
+                return self.g;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.m = value;
+            } else if index < 2 {
+                made.l = value;
+            } else if index < 3 {
+                made.g = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
+        }
     }
 };
 #[automatically_derived]

@@ -38,7 +38,7 @@ const _: () = {
         };
         /// H(q, p, t): 5 +−, 7 ×, 1 ÷
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
-            let lambda = t.like(self.lambda);
+            let lambda = t.parameter(0, self.lambda);
             let t0 = q[0] * q[0];
             let t1 = z[0] * z[0];
             let t2 = z[1] * z[1];
@@ -63,7 +63,7 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            let lambda = t.like(self.lambda);
+            let lambda = t.parameter(0, self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
             let t0 = q[0] * q[1];
@@ -86,7 +86,7 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            let lambda = t.like(self.lambda);
+            let lambda = t.parameter(0, self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
             zz[0][0] = t.like(1.0);
@@ -129,7 +129,7 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             second: &mut __tfe::Second<R, 2>,
         ) {
-            let lambda = t.like(self.lambda);
+            let lambda = t.parameter(0, self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
             second.zz[0][0] = t.like(1.0);
@@ -155,6 +155,34 @@ const _: () = {
                 1 => __tfe::CoordinateName::single("y"),
                 _ => __tfe::CoordinateName::element("", index),
             }
+        }
+        fn parameters(&self) -> usize {
+            1
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("lambda");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.lambda;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.lambda = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
         }
     }
 };

@@ -44,10 +44,10 @@ const _: () = {
         };
         /// L(q, v, t): 3 +−, 9 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 3], z: &[R; 3]) -> R {
-            let alpha = t.like(self.alpha);
-            let g = t.like(self.g);
-            let j = t.like(self.j);
-            let m = t.like(self.m);
+            let alpha = t.parameter(3, self.alpha);
+            let g = t.parameter(2, self.g);
+            let j = t.parameter(1, self.j);
+            let m = t.parameter(0, self.m);
             let t0 = alpha.sin();
             let t1 = z[2] * z[2];
             let t2 = j * t1;
@@ -70,10 +70,10 @@ const _: () = {
             z: &[R; 3],
             first: &mut __tfe::First<R, 3>,
         ) {
-            let alpha = t.like(self.alpha);
-            let g = t.like(self.g);
-            let j = t.like(self.j);
-            let m = t.like(self.m);
+            let alpha = t.parameter(3, self.alpha);
+            let g = t.parameter(2, self.g);
+            let j = t.parameter(1, self.j);
+            let m = t.parameter(0, self.m);
             let t0 = alpha.sin();
             first.z[2] = j * z[2];
             first.z[0] = m * z[0];
@@ -90,10 +90,10 @@ const _: () = {
             first: &mut __tfe::First<R, 3>,
             zz: &mut [[R; 3]; 3],
         ) {
-            let alpha = t.like(self.alpha);
-            let g = t.like(self.g);
-            let j = t.like(self.j);
-            let m = t.like(self.m);
+            let alpha = t.parameter(3, self.alpha);
+            let g = t.parameter(2, self.g);
+            let j = t.parameter(1, self.j);
+            let m = t.parameter(0, self.m);
             let t0 = alpha.sin();
             zz[0][0] = m;
             zz[1][1] = m;
@@ -113,10 +113,10 @@ const _: () = {
             first: &mut __tfe::First<R, 3>,
             second: &mut __tfe::Second<R, 3>,
         ) {
-            let alpha = t.like(self.alpha);
-            let g = t.like(self.g);
-            let j = t.like(self.j);
-            let m = t.like(self.m);
+            let alpha = t.parameter(3, self.alpha);
+            let g = t.parameter(2, self.g);
+            let j = t.parameter(1, self.j);
+            let m = t.parameter(0, self.m);
             let t0 = alpha.sin();
             second.zz[0][0] = m;
             second.zz[1][1] = m;
@@ -194,6 +194,58 @@ const _: () = {
             let t6 = mu[0] * t3;
             second.rate_q[1][2] = mu[0] * t2;
             second.rate_q[0][2] = -t6;
+        }
+        fn parameters(&self) -> usize {
+            4
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("m");
+            }
+            if index < 2 {
+                return __tfe::CoordinateName::single("j");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::single("g");
+            }
+            if index < 4 {
+                return __tfe::CoordinateName::single("alpha");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.m;
+            }
+            if index < 2 {
+                return self.j;
+            }
+            if index < 3 {
+                return self.g;
+            }
+            if index < 4 {
+                return self.alpha;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.m = value;
+            } else if index < 2 {
+                made.j = value;
+            } else if index < 3 {
+                made.g = value;
+            } else if index < 4 {
+                made.alpha = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
         }
     }
 };

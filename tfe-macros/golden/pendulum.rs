@@ -45,9 +45,9 @@ const _: () = {
         };
         /// L(q, v, t): 1 +−, 6 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
-            let g = t.like(self.g);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let cos_theta = q[0].cos();
             let t0 = g * cos_theta;
             let t1 = l * m;
@@ -67,9 +67,9 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            let g = t.like(self.g);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let sin_theta = q[0].sin();
             let t0 = g * sin_theta;
             let t1 = l * m;
@@ -88,9 +88,9 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            let g = t.like(self.g);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let sin_theta = q[0].sin();
             let t0 = g * sin_theta;
             let t1 = l * m;
@@ -128,9 +128,9 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             second: &mut __tfe::Second<R, 1>,
         ) {
-            let g = t.like(self.g);
-            let l = t.like(self.l);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let l = t.parameter(1, self.l);
+            let m = t.parameter(0, self.m);
             let (sin_theta, cos_theta) = q[0].sin_cos();
             let t0 = l * m;
             let t1 = l * t0;
@@ -147,6 +147,50 @@ const _: () = {
                 0 => __tfe::CoordinateName::single("theta"),
                 _ => __tfe::CoordinateName::element("", index),
             }
+        }
+        fn parameters(&self) -> usize {
+            3
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("m");
+            }
+            if index < 2 {
+                return __tfe::CoordinateName::single("l");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::single("g");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.m;
+            }
+            if index < 2 {
+                return self.l;
+            }
+            if index < 3 {
+                return self.g;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.m = value;
+            } else if index < 2 {
+                made.l = value;
+            } else if index < 3 {
+                made.g = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
         }
     }
 };

@@ -42,8 +42,8 @@ const _: () = {
         };
         /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
-            let g = t.like(self.g);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let m = t.parameter(0, self.m);
             let t0 = g * q[1];
             let t1 = z[0] * z[0];
             let t2 = z[1] * z[1];
@@ -60,8 +60,8 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            let g = t.like(self.g);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let m = t.parameter(0, self.m);
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
             let t0 = g * m;
@@ -76,8 +76,8 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            let g = t.like(self.g);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let m = t.parameter(0, self.m);
             zz[0][0] = m;
             zz[1][1] = m;
             first.z[0] = m * z[0];
@@ -94,8 +94,8 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             second: &mut __tfe::Second<R, 2>,
         ) {
-            let g = t.like(self.g);
-            let m = t.like(self.m);
+            let g = t.parameter(2, self.g);
+            let m = t.parameter(0, self.m);
             second.zz[0][0] = m;
             second.zz[1][1] = m;
             first.z[0] = m * z[0];
@@ -123,7 +123,7 @@ const _: () = {
             else {
                 return;
             };
-            let l = t.like(self.l);
+            let l = t.parameter(1, self.l);
             let t0 = q[0] * q[0];
             let t1 = q[1] * q[1];
             let t2 = t0 + t1;
@@ -174,6 +174,50 @@ const _: () = {
             second.bend[1][1] = t2;
             second.rate_v[0][0] = t2;
             second.rate_v[1][1] = t2;
+        }
+        fn parameters(&self) -> usize {
+            3
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("m");
+            }
+            if index < 2 {
+                return __tfe::CoordinateName::single("l");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::single("g");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.m;
+            }
+            if index < 2 {
+                return self.l;
+            }
+            if index < 3 {
+                return self.g;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.m = value;
+            } else if index < 2 {
+                made.l = value;
+            } else if index < 3 {
+                made.g = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
         }
     }
 };

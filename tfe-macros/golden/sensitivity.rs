@@ -46,14 +46,14 @@ const _: () = {
         };
         /// L(q, v, t): 2 +−, 8 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 1], z: &[R; 1]) -> R {
-            let m = t.like(self.m);
+            let m = t.parameter(0, self.m);
             let t0 = z[0] * z[0];
             let t1 = m * t0;
             let t2 = q[0] * q[0];
-            let t3 = t.like(self.k[0]) * t2;
+            let t3 = t.parameter(1, self.k[0]) * t2;
             let t4 = t1 - t3;
             let t5 = t.like(0.5) * t4;
-            let t6 = t.like(0.25) * t.like(self.k[1]);
+            let t6 = t.like(0.25) * t.parameter(2, self.k[1]);
             let t7 = t2 * t2;
             let t8 = t6 * t7;
             t5 - t8
@@ -68,10 +68,10 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            let amplitude = t.like(self.amplitude);
-            let c = t.like(self.c);
-            let m = t.like(self.m);
-            let omega = t.like(self.omega);
+            let amplitude = t.parameter(4, self.amplitude);
+            let c = t.parameter(3, self.c);
+            let m = t.parameter(0, self.m);
+            let omega = t.parameter(5, self.omega);
             let t0 = t * omega;
             let t1 = t0.cos();
             let t2 = amplitude * t1;
@@ -79,8 +79,8 @@ const _: () = {
             let t3 = c * z[0];
             first.force[0] = t2 - t3;
             let t4 = q[0] * q[0];
-            let t5 = t.like(self.k[1]) * t4;
-            let t6 = t.like(self.k[0]) + t5;
+            let t5 = t.parameter(2, self.k[1]) * t4;
+            let t6 = t.parameter(1, self.k[0]) + t5;
             let t7 = q[0] * t6;
             first.q[0] = -t7;
         }
@@ -94,10 +94,10 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            let amplitude = t.like(self.amplitude);
-            let c = t.like(self.c);
-            let m = t.like(self.m);
-            let omega = t.like(self.omega);
+            let amplitude = t.parameter(4, self.amplitude);
+            let c = t.parameter(3, self.c);
+            let m = t.parameter(0, self.m);
+            let omega = t.parameter(5, self.omega);
             let t0 = t * omega;
             let t1 = t0.cos();
             zz[0][0] = m;
@@ -106,8 +106,8 @@ const _: () = {
             let t3 = c * z[0];
             first.force[0] = t2 - t3;
             let t4 = q[0] * q[0];
-            let t5 = t.like(self.k[1]) * t4;
-            let t6 = t.like(self.k[0]) + t5;
+            let t5 = t.parameter(2, self.k[1]) * t4;
+            let t6 = t.parameter(1, self.k[0]) + t5;
             let t7 = q[0] * t6;
             first.q[0] = -t7;
         }
@@ -139,10 +139,10 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             second: &mut __tfe::Second<R, 1>,
         ) {
-            let amplitude = t.like(self.amplitude);
-            let c = t.like(self.c);
-            let m = t.like(self.m);
-            let omega = t.like(self.omega);
+            let amplitude = t.parameter(4, self.amplitude);
+            let c = t.parameter(3, self.c);
+            let m = t.parameter(0, self.m);
+            let omega = t.parameter(5, self.omega);
             let t0 = t * omega;
             let t1 = t0.cos();
             second.zz[0][0] = m;
@@ -152,12 +152,12 @@ const _: () = {
             first.force[0] = t2 - t3;
             second.force_z[0][0] = -c;
             let t4 = q[0] * q[0];
-            let t5 = t.like(self.k[1]) * t4;
-            let t6 = t.like(self.k[0]) + t5;
+            let t5 = t.parameter(2, self.k[1]) * t4;
+            let t6 = t.parameter(1, self.k[0]) + t5;
             let t7 = q[0] * t6;
             first.q[0] = -t7;
             let t8 = t.like(3.0) * t5;
-            let t9 = t.like(self.k[0]) + t8;
+            let t9 = t.parameter(1, self.k[0]) + t8;
             second.qq[0][0] = -t9;
         }
         fn first_by<R: __tfe::Real>(
@@ -170,8 +170,8 @@ const _: () = {
         ) {
             match by {
                 __tfe::By::Time => {
-                    let amplitude = t.like(self.amplitude);
-                    let omega = t.like(self.omega);
+                    let amplitude = t.parameter(4, self.amplitude);
+                    let omega = t.parameter(5, self.omega);
                     let t0 = t * omega;
                     let t1 = t0.sin();
                     let t2 = amplitude * omega;
@@ -179,8 +179,8 @@ const _: () = {
                     first.force[0] = -t3;
                 }
                 __tfe::By::Parameter(0) => {
-                    let amplitude = t.like(self.amplitude);
-                    let omega = t.like(self.omega);
+                    let amplitude = t.parameter(4, self.amplitude);
+                    let omega = t.parameter(5, self.omega);
                     let t0 = t * omega;
                     let t1 = t0.sin();
                     let t2 = amplitude * t1;
@@ -203,6 +203,66 @@ const _: () = {
                 0 => __tfe::CoordinateName::single("x"),
                 _ => __tfe::CoordinateName::element("", index),
             }
+        }
+        fn parameters(&self) -> usize {
+            6
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("m");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::element("k", index - 1);
+            }
+            if index < 4 {
+                return __tfe::CoordinateName::single("c");
+            }
+            if index < 5 {
+                return __tfe::CoordinateName::single("amplitude");
+            }
+            if index < 6 {
+                return __tfe::CoordinateName::single("omega");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.m;
+            }
+            if index < 3 {
+                return self.k[index - 1];
+            }
+            if index < 4 {
+                return self.c;
+            }
+            if index < 5 {
+                return self.amplitude;
+            }
+            if index < 6 {
+                return self.omega;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.m = value;
+            } else if index < 3 {
+                made.k[index - 1] = value;
+            } else if index < 4 {
+                made.c = value;
+            } else if index < 5 {
+                made.amplitude = value;
+            } else if index < 6 {
+                made.omega = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
         }
         const SENSITIVITIES: &'static [&'static str] = &["omega", "k[1]", "c"];
         fn sensitivity_parameter(&self, index: usize) -> f64 {

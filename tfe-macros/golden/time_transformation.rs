@@ -45,8 +45,8 @@ const _: () = {
         };
         /// H(q, p, t): 4 +−, 6 ×, 1 ÷, 2 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
-            let a = t.like(self.a);
-            let omega = t.like(self.omega);
+            let a = t.parameter(0, self.a);
+            let omega = t.parameter(1, self.omega);
             let cos_q = q[0].cos();
             let t0 = omega * q[1];
             let t1 = t0.cos();
@@ -71,9 +71,9 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            let a = t.like(self.a);
-            let c = t.like(self.c);
-            let omega = t.like(self.omega);
+            let a = t.parameter(0, self.a);
+            let c = t.parameter(2, self.c);
+            let omega = t.parameter(1, self.omega);
             let (sin_q, cos_q) = q[0].sin_cos();
             let t0 = omega * q[1];
             let (t1, t2) = t0.sin_cos();
@@ -112,9 +112,9 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            let a = t.like(self.a);
-            let c = t.like(self.c);
-            let omega = t.like(self.omega);
+            let a = t.parameter(0, self.a);
+            let c = t.parameter(2, self.c);
+            let omega = t.parameter(1, self.omega);
             let (sin_q, cos_q) = q[0].sin_cos();
             let t0 = omega * q[1];
             let (t1, t2) = t0.sin_cos();
@@ -172,9 +172,9 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             second: &mut __tfe::Second<R, 2>,
         ) {
-            let a = t.like(self.a);
-            let c = t.like(self.c);
-            let omega = t.like(self.omega);
+            let a = t.parameter(0, self.a);
+            let c = t.parameter(2, self.c);
+            let omega = t.parameter(1, self.omega);
             let (sin_q, cos_q) = q[0].sin_cos();
             let t0 = omega * q[1];
             let (t1, t2) = t0.sin_cos();
@@ -252,6 +252,50 @@ const _: () = {
             }
         }
         const OBSERVABLES: &'static [&'static str] = &["energy"];
+        fn parameters(&self) -> usize {
+            3
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < 1 {
+                return __tfe::CoordinateName::single("a");
+            }
+            if index < 2 {
+                return __tfe::CoordinateName::single("omega");
+            }
+            if index < 3 {
+                return __tfe::CoordinateName::single("c");
+            }
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < 1 {
+                return self.a;
+            }
+            if index < 2 {
+                return self.omega;
+            }
+            if index < 3 {
+                return self.c;
+            }
+            ::core::primitive::f64::NAN
+        }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self { ..*self };
+            if index < 1 {
+                made.a = value;
+            } else if index < 2 {
+                made.omega = value;
+            } else if index < 3 {
+                made.c = value;
+            } else {
+                return ::core::option::Option::None;
+            }
+            ::core::option::Option::Some(made)
+        }
     }
 };
 #[automatically_derived]

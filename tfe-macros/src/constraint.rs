@@ -4,7 +4,9 @@ use crate::emit::Emitter;
 use crate::indices;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
+use std::collections::BTreeMap;
 use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::model::declared::{Constraint, ConstraintKind, Declared};
 use tfe_symbolic::program::{Array, Program, Request, Statement};
 
@@ -12,7 +14,7 @@ use tfe_symbolic::program::{Array, Program, Request, Statement};
 pub(crate) fn members(
     declared: &Declared,
     derivation: &Derivation,
-    coordinates: &[String],
+    (coordinates, places): (&[String], &BTreeMap<String, Affine>),
 ) -> TokenStream {
     if declared.constraints.is_empty() {
         return TokenStream::new();
@@ -20,6 +22,7 @@ pub(crate) fn members(
     let kernels = Kernels {
         derivation,
         coordinates,
+        places,
         dof: indices::index(&declared.dof),
         count: Literal::usize_unsuffixed(declared.constraints.len()),
     };
@@ -46,6 +49,8 @@ fn constant(constraint: &Constraint) -> TokenStream {
 struct Kernels<'a> {
     derivation: &'a Derivation,
     coordinates: &'a [String],
+    /// The numbers of the parameters.
+    places: &'a BTreeMap<String, Affine>,
     dof: TokenStream,
     count: Literal,
 }
@@ -54,6 +59,7 @@ impl Kernels<'_> {
     fn emitted(&self, program: &Program) -> TokenStream {
         Emitter::new(self.coordinates, quote!(second.))
             .with_velocity()
+            .with_parameters(self.places)
             .body(program)
             .statements
     }

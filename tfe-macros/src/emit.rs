@@ -8,7 +8,7 @@ use quote::{format_ident, quote};
 use std::collections::{BTreeMap, BTreeSet};
 use tfe_symbolic::expr::comparison::Comparison;
 use tfe_symbolic::expr::function::Function;
-use tfe_symbolic::expr::input::Input;
+use tfe_symbolic::expr::input::{Affine, Input};
 use tfe_symbolic::program::{Array, Operand, Operation, Place, Program, Statement, Temporary};
 
 /// Writes programs of one model.
@@ -17,6 +17,8 @@ pub(crate) struct Emitter<'a> {
     coordinates: &'a [String],
     /// The names of the inputs, in order.
     inputs: &'a [String],
+    /// The numbers of parameters, of arrays that of the first element, by their fields.
+    places: &'a BTreeMap<String, Affine>,
     /// Where second derivatives go: `second.`, or nothing where the mass matrix alone is an argument.
     second: TokenStream,
     /// Second derivatives are told entry by entry, as those of models of run-time length are.
@@ -65,9 +67,11 @@ pub(crate) struct Body {
 impl<'a> Emitter<'a> {
     /// An emitter for a model with these coordinates.
     pub(crate) fn new(coordinates: &'a [String], second: TokenStream) -> Self {
+        static NONE: BTreeMap<String, Affine> = BTreeMap::new();
         Self {
             coordinates,
             inputs: &[],
+            places: &NONE,
             second,
             by_entries: false,
             onto_zeros: false,
@@ -87,6 +91,12 @@ impl<'a> Emitter<'a> {
     /// The same for a model with these inputs.
     pub(crate) fn with_inputs(mut self, inputs: &'a [String]) -> Self {
         self.inputs = inputs;
+        self
+    }
+
+    /// The same for a model whose parameters have numbers.
+    pub(crate) fn with_parameters(mut self, places: &'a BTreeMap<String, Affine>) -> Self {
+        self.places = places;
         self
     }
 
@@ -211,8 +221,11 @@ impl<'a> Emitter<'a> {
     /// The parameters that have been read so far.
     pub(crate) fn parameters(&self) -> TokenStream {
         let parameters = self.parameters.iter().map(|(field, local)| {
-            let field = identifier(field);
-            quote!(let #local = t.like(self.#field);)
+            let (place, field) = (self.places.get(field).map(index), identifier(field));
+            match place {
+                Some(place) => quote!(let #local = t.parameter(#place, self.#field);),
+                None => quote!(let #local = t.like(self.#field);),
+            }
         });
         quote!(#(#parameters)*)
     }
@@ -550,7 +563,14 @@ impl<'a> Emitter<'a> {
             Input::ParameterElement(name, a) => {
                 let field = identifier(name);
                 let element = at(&quote!(self.#field), &[a]);
-                quote!(t.like(#element))
+                let first = self.places.get(name);
+                match first.and_then(|first| first.plus_scaled(a, 1)) {
+                    Some(place) => {
+                        let place = index(&place);
+                        quote!(t.parameter(#place, #element))
+                    }
+                    None => quote!(t.like(#element)),
+                }
             }
             // Entries of lists may be any numbers.
             Input::Integer(a) if a.holds_entry() => {

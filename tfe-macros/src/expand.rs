@@ -4,10 +4,12 @@ use crate::docs::Docs;
 use crate::emit::{self, Emitter, Signature};
 use crate::indices;
 use crate::lengths::Lengths;
+use crate::parameters::Parameters;
 use crate::source_map::SourceMap;
 use crate::{constraint, fallback, family, input, page, solver, state, variant};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
+use std::collections::BTreeMap;
 use syn::ItemStruct;
 use tfe_symbolic::compile;
 use tfe_symbolic::derive::derivation::Derivation;
@@ -137,6 +139,9 @@ struct Kernels<'a> {
     dof: TokenStream,
     /// The names of the coordinates where their number is known.
     coordinates: Vec<String>,
+    parameters: Parameters,
+    /// The numbers of the parameters.
+    places: BTreeMap<String, Affine>,
 }
 
 impl<'a> Kernels<'a> {
@@ -146,6 +151,7 @@ impl<'a> Kernels<'a> {
         item: &'a ItemStruct,
         path: &'a TokenStream,
     ) -> Self {
+        let parameters = Parameters::of(item);
         Self {
             declared,
             derivation,
@@ -153,6 +159,8 @@ impl<'a> Kernels<'a> {
             path,
             dof: indices::index(&declared.dof),
             coordinates: names(&declared.coordinates),
+            places: parameters.places(),
+            parameters,
         }
     }
 
@@ -170,12 +178,14 @@ impl<'a> Kernels<'a> {
     ) -> emit::Body {
         Emitter::new(&self.coordinates, second)
             .with_inputs(&self.declared.inputs)
+            .with_parameters(&self.places)
             .body_in_parts(&self.derivation.program(request), signature)
     }
 
     fn emitted(&self, program: &Program, second: TokenStream) -> emit::Body {
         Emitter::new(&self.coordinates, second)
             .with_inputs(&self.declared.inputs)
+            .with_parameters(&self.places)
             .body(program)
     }
 
@@ -326,7 +336,9 @@ impl<'a> Kernels<'a> {
         let facts = page::facts(self.derivation, &quote!(__tfe));
         let coordinate_name = self.coordinate_name();
         let (observable_names, observables) = self.observables();
-        let constraints = constraint::members(self.declared, self.derivation, &self.coordinates);
+        let names = (self.coordinates.as_slice(), &self.places);
+        let constraints = constraint::members(self.declared, self.derivation, names);
+        let parameters = self.parameters.members(item);
         let (sensitivity_values, first_by) = self.sensitivities();
         let kernels = quote! {
             #[doc = #value_doc]
@@ -389,6 +401,7 @@ impl<'a> Kernels<'a> {
                     #coordinate_name
                     #observable_names
                     #constraints
+                    #parameters
                     #sensitivity_values
                 }
 

@@ -16,6 +16,7 @@ mod indices;
 mod input;
 mod lengths;
 mod page;
+mod parameters;
 mod parts;
 mod solver;
 mod source_map;

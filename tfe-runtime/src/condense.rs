@@ -9,6 +9,7 @@
 //! The rows are solved for x given the start; the interior block of a primal element, singular at isolated steps, is never
 //! inverted.
 
+use crate::dual::{Dual, duals};
 use crate::error::StepError;
 use crate::lu;
 use crate::model::{By, First, Form, Model, Second};
@@ -23,10 +24,30 @@ pub struct Direction {
     pub time: f64,
     /// dh/dγ of its length.
     pub length: f64,
-    /// The parameter, by its index in [`Model::SENSITIVITIES`], that γ is.
-    pub parameter: Option<usize>,
+    /// The parameter that γ is.
+    pub parameter: Option<Parameter>,
     /// Its part of the additional force along the velocities, Q += damping · γ v.
     pub damping: f64,
+}
+
+/// A parameter of a model by which is differentiated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parameter {
+    /// By its index in [`Model::SENSITIVITIES`], with the kernel [`Model::first_by`].
+    Named(usize),
+    /// By its index among all, [`Model::parameter_name`], with dual numbers in the place of numbers.
+    Any(usize),
+}
+
+impl Parameter {
+    /// By its index among all.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn any<M: Model<N>, const N: usize>(self, model: &M) -> Option<usize> {
+        match self {
+            Self::Named(index) => model.find_parameter(M::SENSITIVITIES.get(index)?),
+            Self::Any(index) => Some(index),
+        }
+    }
 }
 
 /// The linear system of one element: tangent, residual, and the right sides, later the solutions: a row for each interior unknown, a column
@@ -299,17 +320,35 @@ where
     M: Model<N>,
 {
     let mut sum = First::ZERO;
-    if let Some(parameter) = direction.parameter {
-        model.first_by(By::Parameter(parameter), t, q, z, &mut sum);
-    }
-    let rate = direction.time + node * direction.length;
-    if M::FACTS.time_dependent && rate != 0.0 {
+    let rate = if M::FACTS.time_dependent {
+        direction.time + node * direction.length
+    } else {
+        0.0
+    };
+    let by_dual = match direction.parameter {
+        Some(Parameter::Any(index)) => Some(index),
+        Some(Parameter::Named(index)) => {
+            model.first_by(By::Parameter(index), t, q, z, &mut sum);
+            None
+        }
+        None => None,
+    };
+    if rate != 0.0 && by_dual.is_none() && const { !M::SENSITIVITIES.is_empty() } {
         let mut by_time = First::ZERO;
         model.first_by(By::Time, t, q, z, &mut by_time);
         for a in 0..N {
             sum.z[a] += rate * by_time.z[a];
             sum.q[a] += rate * by_time.q[a];
             sum.force[a] += rate * by_time.force[a];
+        }
+    } else if rate != 0.0 || by_dual.is_some() {
+        let mut first = First::zero();
+        let time = Dual::new(t, rate).by_parameter(by_dual);
+        model.first(time, &duals(q, &[0.0; N]), &duals(z, &[0.0; N]), &mut first);
+        for a in 0..N {
+            sum.z[a] += first.z[a].slope;
+            sum.q[a] += first.q[a].slope;
+            sum.force[a] += first.force[a].slope;
         }
     }
     sum

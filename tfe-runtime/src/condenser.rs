@@ -30,7 +30,7 @@ use crate::step::{Interval, Last, Memory, end_of, may_be_phase};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Workspace, interior_len, numbers_len, pivots_len};
 
-pub use crate::condense::Direction;
+pub use crate::condense::{Direction, Parameter};
 
 /// One element of an assembled problem at the current iterate.
 #[derive(Clone, Copy, Debug)]

@@ -1,25 +1,53 @@
 //! Numbers with a derivative: one kernel call gives the values and their derivative along one direction.
 //!
-//! Constraints and forces may depend on the time in any way; what a moving instant changes comes from here, so that generated code needs no
-//! kernels for it.
+//! Constraints and forces may depend on the time and on parameters in any way; what a moving instant or another parameter changes comes from here, so that generated
+//! code needs no kernels for it.
 
 use crate::real::Real;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// x + ε x′ with ε² = 0.
+///
+/// Kernels given such numbers for t, q and z differentiate along the slopes of their arguments. The time may carry a [parameter](Self::by_parameter) besides: kernels
+/// make their parameters of it, and that one of slope 1.
+///
+/// ```
+/// use tfe_runtime::Real;
+/// use tfe_runtime::dual::Dual;
+///
+/// // d(x sin x)/dx at x = 2
+/// let x = Dual::new(2.0, 1.0);
+/// let slope = (x * x.sin()).slope;
+/// assert!((slope - (2.0_f64.sin() + 2.0 * 2.0_f64.cos())).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Dual {
+pub struct Dual {
     /// x
-    pub(crate) value: f64,
+    pub value: f64,
     /// x′
-    pub(crate) slope: f64,
+    pub slope: f64,
+    /// The parameter of slope 1, on the time that a kernel is given.
+    parameter: Option<usize>,
 }
 
 impl Dual {
-    pub(crate) const ZERO: Self = Self::new(0.0, 0.0);
+    /// 0 + ε 0
+    pub const ZERO: Self = Self::new(0.0, 0.0);
 
-    pub(crate) const fn new(value: f64, slope: f64) -> Self {
-        Self { value, slope }
+    /// value + ε slope
+    #[must_use]
+    pub const fn new(value: f64, slope: f64) -> Self {
+        Self {
+            value,
+            slope,
+            parameter: None,
+        }
+    }
+
+    /// A time with which kernels differentiate by the parameter of this index, [`Model::parameter_name`](crate::Model::parameter_name), besides.
+    #[must_use]
+    pub const fn by_parameter(self, parameter: Option<usize>) -> Self {
+        Self { parameter, ..self }
     }
 
     /// f(x) and f′(x) x′.
@@ -30,12 +58,13 @@ impl Dual {
         } else {
             derivative * self.slope
         };
-        Self { value, slope }
+        Self::new(value, slope)
     }
 }
 
 /// A vector whose slopes are given.
-pub(crate) fn duals<const N: usize>(values: &[f64; N], slopes: &[f64; N]) -> [Dual; N] {
+#[must_use]
+pub fn duals<const N: usize>(values: &[f64; N], slopes: &[f64; N]) -> [Dual; N] {
     let mut duals = [Dual::ZERO; N];
     for a in 0..N {
         duals[a] = Dual::new(values[a], slopes[a]);
@@ -97,6 +126,10 @@ impl Real for Dual {
 
     fn from_f64(value: f64) -> Self {
         Self::new(value, 0.0)
+    }
+    fn parameter(self, index: usize, value: f64) -> Self {
+        let is_it = self.parameter == Some(index);
+        Self::new(value, f64::from(u8::from(is_it)))
     }
     /// The slope is that of a difference over a distance at which its two errors, of second order and of rounding, are alike: good to some 1e-10 of what the function
     /// does in a unit of its argument.

@@ -81,7 +81,8 @@ pub enum ConstraintError {
     SingularMass,
     /// The number of independent constraints is not the same at all nodes.
     RankChanged,
-    /// The derivative by a parameter was asked for; constraints have none.
+    /// The derivative by a parameter was asked for that the model does not tell: see [`Model::parameters`](crate::Model::parameters). At events the model must be one
+    /// whose fields can be copied, too.
     Parameter,
 }
 
@@ -126,7 +127,7 @@ impl fmt::Display for ConstraintError {
                 f.write_str("the number of independent constraints changes along the motion")
             }
             Self::Parameter => {
-                f.write_str("models with constraints are not differentiated by parameters")
+                f.write_str("the model cannot be made again with another value of this parameter")
             }
         }
     }

@@ -27,8 +27,7 @@ mod cut;
 #[cfg(feature = "alloc")]
 mod dense;
 mod double_double;
-#[cfg(feature = "alloc")]
-mod dual;
+pub mod dual;
 pub mod element;
 mod equations;
 pub mod error;
@@ -71,6 +70,7 @@ mod velocity_form;
 pub mod weak_form;
 pub mod workspace;
 
+pub use condense::{Direction, Parameter};
 pub use controlled::{Controlled, MAX_INPUTS};
 pub use element::{
     Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule, ThreeField,

@@ -256,6 +256,35 @@ pub trait Model<const N: usize> {
     ) {
     }
 
+    /// The number of parameters: fields that are numbers, and the elements of fields that are arrays of numbers, in the order of the struct. Zero for models of hand-written
+    /// kernels that do not say.
+    fn parameters(&self) -> usize {
+        0
+    }
+
+    /// The name of a parameter, `m` or `k[2]`.
+    fn parameter_name(&self, index: usize) -> CoordinateName {
+        CoordinateName::element("", index)
+    }
+
+    /// The value of a parameter; NaN beyond them.
+    fn parameter(&self, _index: usize) -> f64 {
+        f64::NAN
+    }
+
+    /// The same model with another value of one parameter; none where a field of some other type cannot be copied, and beyond the parameters.
+    fn with_parameter(&self, _index: usize, _value: f64) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+
+    /// The index of the parameter of this name.
+    fn find_parameter(&self, name: &str) -> Option<usize> {
+        (0..self.parameters()).find(|index| self.parameter_name(*index).is(name))
+    }
+
     /// The constraints, in order.
     const CONSTRAINTS: &'static [Constraint] = &[];
 
@@ -333,6 +362,22 @@ impl CoordinateName {
             name,
             index: Some(index),
         }
+    }
+
+    /// Whether it is printed like this.
+    #[must_use]
+    pub fn is(&self, text: &str) -> bool {
+        struct Rest<'a>(&'a str);
+
+        impl core::fmt::Write for Rest<'_> {
+            fn write_str(&mut self, part: &str) -> core::fmt::Result {
+                self.0 = self.0.strip_prefix(part).ok_or(core::fmt::Error)?;
+                Ok(())
+            }
+        }
+
+        let mut rest = Rest(text);
+        core::fmt::write(&mut rest, format_args!("{self}")).is_ok() && rest.0.is_empty()
     }
 }
 

@@ -30,6 +30,13 @@ pub trait Real:
     fn like(self, value: f64) -> Self {
         Self::from_f64(value)
     }
+    /// The parameter `index` of a model ([`Model::parameter_name`](crate::Model::parameter_name)), of this value, as a number of the same kind as `self`: what kernels
+    /// make of the fields of a model. A number that carries a derivative by a parameter knows from `self` by which.
+    #[inline(always)]
+    #[must_use]
+    fn parameter(self, _index: usize, value: f64) -> Self {
+        self.like(value)
+    }
     /// sin x and cos x together.
     fn sin_cos(self) -> (Self, Self);
     /// sin x.

@@ -5,6 +5,7 @@ mod over;
 use alloc::vec;
 use alloc::vec::Vec;
 
+use crate::condense::Direction;
 use crate::constrained::rows::Independence;
 use crate::cut::{Halving, Instant, in_halves, may_be_cut};
 use crate::dense::DenseElement;
@@ -20,7 +21,7 @@ use crate::share::Share;
 use crate::statistics::{Contraction, Statistics};
 use crate::step::{Impulse, Interval, Last, Memory, Method, may_be_phase};
 use crate::transition::TransitionError;
-use crate::workspace::{Workspace, interior_len, numbers_len, pivots_len, transition_len, width};
+use crate::workspace::{Workspace, interior_len, linearised_len, numbers_len, pivots_len, width};
 use over::Ahead;
 
 /// Steps a model with one element, on memory of its own.
@@ -632,33 +633,65 @@ where
     /// [`TransitionError`] if there is no last step, its tangent
     /// is singular, or `matrix` is too short.
     pub fn transition(&mut self, matrix: &mut [f64]) -> Result<(), TransitionError> {
+        self.linearise(&[], matrix)
+    }
+
+    /// Writes the derivative of the end of the last step by its start and by g directions, 2N × (2N + g), row by row, the first columns and all rows ordered (p, q).
+    ///
+    /// Impulses stay at their times, and the crossings of kinks at which the step was cut at theirs.
+    ///
+    /// # Errors
+    /// As [`transition`](Self::transition).
+    pub fn linearise(
+        &mut self,
+        directions: &[Direction],
+        matrix: &mut [f64],
+    ) -> Result<(), TransitionError> {
         if self.passes_node {
             // Where constraints lose rank the tangents of the motion are open.
             return Err(StepError::from(ConstraintError::RankChanged).into());
         }
         if self.pieces.is_empty() {
-            return self.transition_of_last(matrix);
+            return self.linearise_last(directions, matrix);
         }
         let width = 2 * N;
-        let needed = width * width;
+        let columns = width + directions.len();
+        let needed = width * columns;
         if matrix.len() < needed {
             let given = matrix.len();
             return Err(TransitionError::Shape { needed, given });
         }
         let mut product = vec![0.0; needed];
         for row in 0..width {
-            product[row * width + row] = 1.0;
+            product[row * columns + row] = 1.0;
         }
         let (mut factor, mut next) = (vec![0.0; needed], vec![0.0; needed]);
+        let begin = self.pieces[0].last.t;
+        let length: f64 = self.pieces.iter().map(|piece| piece.last.h).sum();
         // The last one leaves the stepper as the step has left it.
         for piece in 0..self.pieces.len() {
+            let Last { t, h, .. } = self.pieces[piece].last;
+            let own: Vec<_> = directions
+                .iter()
+                .map(|direction| Direction {
+                    time: direction.time + (t - begin) / length * direction.length,
+                    length: h / length * direction.length,
+                    ..*direction
+                })
+                .collect();
             self.recall(piece);
-            self.transition_of_last(&mut factor)?;
+            self.linearise_last(&own, &mut factor)?;
             for row in 0..width {
-                for column in 0..width {
-                    next[row * width + column] = (0..width)
-                        .map(|k| factor[row * width + k] * product[k * width + column])
-                        .sum();
+                for column in 0..columns {
+                    let own = if column < width {
+                        0.0
+                    } else {
+                        factor[row * columns + column]
+                    };
+                    next[row * columns + column] = (0..width)
+                        .map(|k| factor[row * columns + k] * product[k * columns + column])
+                        .sum::<f64>()
+                        + own;
                 }
             }
             core::mem::swap(&mut product, &mut next);
@@ -678,9 +711,14 @@ where
         self.skipped = false;
     }
 
-    fn transition_of_last(&mut self, matrix: &mut [f64]) -> Result<(), TransitionError> {
+    fn linearise_last(
+        &mut self,
+        directions: &[Direction],
+        matrix: &mut [f64],
+    ) -> Result<(), TransitionError> {
         let element = self.table.view().element;
-        let length = transition_len(element, M::FORM, N, M::CONSTRAINTS.len());
+        let constraints = M::CONSTRAINTS.len();
+        let length = linearised_len(element, M::FORM, N, constraints, directions.len());
         let mut extra = vec![0.0; length];
         self.make_room();
         if let Some(numbers) = self.retrace() {
@@ -696,11 +734,11 @@ where
             tables: &self.table,
             control: self.control,
         };
-        method.transition(
+        method.linearise(
             &mut self.memory,
             workspace,
             &mut extra,
-            &self.impulses,
+            (&self.impulses, directions),
             matrix,
         )
     }

@@ -5,7 +5,7 @@
 
 use core::fmt;
 
-use crate::condense::{EndForces, System, phase_ends, velocity_ends};
+use crate::condense::{Direction, EndForces, System, phase_ends, velocity_ends};
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
 use crate::constrained::linearise;
@@ -20,7 +20,7 @@ use crate::phase_form::PhaseForm;
 use crate::scheme::Tables;
 use crate::step::{Impulse, Interval, Memory, Method, may_be_phase, set_kicks, total};
 use crate::velocity_form::VelocityForm;
-use crate::workspace::{Parts, Workspace, transition_len};
+use crate::workspace::{Parts, Workspace, linearised_len};
 
 /// Why there is no transition matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,7 +110,7 @@ where
 {
     /// Writes the transition matrix of the last step, 2N × 2N, row by row, ordered (p, q).
     ///
-    /// `extra` needs [`transition_len`] numbers; `impulses` are those of the step.
+    /// `extra` needs [`transition_len`](crate::workspace::transition_len) numbers; `impulses` are those of the step.
     ///
     /// # Errors
     /// [`TransitionError`] if there is no last step, its tangent is singular, or memory is short.
@@ -125,12 +125,34 @@ where
     where
         M: Model<N>,
     {
+        self.linearise(memory, workspace, extra, (impulses, &[]), matrix)
+    }
+
+    /// Writes the derivative of the end of the last step by its start and by g directions, 2N × (2N + g), row by row.
+    ///
+    /// `extra` needs [`linearised_len`] numbers; `impulses` are those of the step, and do not move with directions that move its time.
+    ///
+    /// # Errors
+    /// As [`transition`](Self::transition).
+    pub fn linearise<const N: usize>(
+        &self,
+        memory: &mut Memory<N>,
+        workspace: Workspace<'_>,
+        extra: &mut [f64],
+        (impulses, directions): (&[Impulse<N>], &[Direction]),
+        matrix: &mut [f64],
+    ) -> Result<(), TransitionError>
+    where
+        M: Model<N>,
+    {
         let Some(last) = memory.last else {
             return Err(TransitionError::NoStep);
         };
         let scheme = self.tables.view();
         let parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
-        let needed = transition_len(scheme.element, M::FORM, N, M::CONSTRAINTS.len());
+        let columns = 2 * N + directions.len();
+        let constraints = M::CONSTRAINTS.len();
+        let needed = linearised_len(scheme.element, M::FORM, N, constraints, directions.len());
         if extra.len() < needed {
             return Err(StepError::Workspace {
                 needed,
@@ -138,12 +160,13 @@ where
             }
             .into());
         }
-        if matrix.len() < 4 * N * N {
+        if matrix.len() < 2 * N * columns {
             return Err(TransitionError::Shape {
-                needed: 4 * N * N,
+                needed: 2 * N * columns,
                 given: matrix.len(),
             });
         }
+        let matrix = &mut matrix[..2 * N * columns];
         let interval = Interval {
             start: last.t,
             length: last.h,
@@ -161,9 +184,9 @@ where
             kicks,
             damping: 0.0,
         };
-        // One right side, or solution, for each of the 2N directions of the start.
+        // One right side, or solution, for each of the 2N directions of the start, and of the others.
         let m = parts.unknowns.len();
-        let (sides, forces) = extra[..needed].split_at_mut(2 * N * m);
+        let (sides, forces) = extra[..needed].split_at_mut(columns * m);
         let mut system = System {
             tangent: parts.tangent,
             pivots: parts.tangent_pivots,
@@ -197,14 +220,8 @@ where
                 active: parts.active,
                 impulse: total(impulses),
             };
-            let linearised = linearise(
-                &mut form,
-                parts.unknowns,
-                &[],
-                false,
-                system,
-                &mut matrix[..4 * N * N],
-            );
+            let linearised =
+                linearise(&mut form, parts.unknowns, directions, false, system, matrix);
             if is_combined {
                 for place in layout.multipliers() {
                     form.rows.declared_multipliers(&mut parts.unknowns[place]);
@@ -223,13 +240,13 @@ where
                 swept: false,
                 statistics: &mut memory.statistics,
             };
-            system.of_phase(&mut equations, parts.unknowns, &[]);
+            system.of_phase(&mut equations, parts.unknowns, directions);
             let sides = system.solve()?.sides;
             phase_ends::<N>(
                 &equations.scheme,
                 span.h,
                 parts.unknowns,
-                &[],
+                directions,
                 sides,
                 matrix,
             );
@@ -246,9 +263,17 @@ where
                 statistics: &mut memory.statistics,
             };
             let mut forces = EndForces::of(forces, m);
-            system.of_velocities(&mut equations, parts.unknowns, &[], &mut forces)?;
+            system.of_velocities(&mut equations, parts.unknowns, directions, &mut forces)?;
             let (sides, h) = (system.solve()?.sides, span.h);
-            velocity_ends(&scheme, h, parts.unknowns, &[], &forces, sides, matrix);
+            velocity_ends(
+                &scheme,
+                h,
+                parts.unknowns,
+                directions,
+                &forces,
+                sides,
+                matrix,
+            );
         }
         Ok(())
     }

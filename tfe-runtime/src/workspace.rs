@@ -80,9 +80,21 @@ pub const fn transition_len(
     coordinates: usize,
     constraints: usize,
 ) -> usize {
+    linearised_len(element, form, coordinates, constraints, 0)
+}
+
+/// The same with derivatives by so many directions besides.
+#[must_use]
+pub const fn linearised_len(
+    element: Element,
+    form: Form,
+    coordinates: usize,
+    constraints: usize,
+    directions: usize,
+) -> usize {
     let m = interior_len(&element, form, coordinates, constraints);
-    // A side for each direction of the start, and the derivatives of the momentum at the end.
-    2 * coordinates * m + coordinates * (m + coordinates)
+    // A side for each direction, and the derivatives of the momentum at the end.
+    (2 * coordinates + directions) * m + coordinates * (m + coordinates + directions)
 }
 
 /// The workspace cut into its parts.

@@ -1,6 +1,6 @@
 //! Linearised elements against differences of steps: by their start, by time, by length and by parameters.
 
-use tfe_runtime::condenser::{Condensed, Condenser, Direction, Placed};
+use tfe_runtime::condenser::{Condensed, Condenser, Direction, Parameter, Placed};
 use tfe_runtime::model::By;
 use tfe_runtime::{
     CoordinateName, Element, Facts, First, Form, Model, Real, Second, State, transition,
@@ -278,11 +278,11 @@ fn check<M: Movable>(model: &M) {
             ..Direction::default()
         },
         Direction {
-            parameter: Some(0),
+            parameter: Some(Parameter::Named(0)),
             ..Direction::default()
         },
         Direction {
-            parameter: Some(1),
+            parameter: Some(Parameter::Named(1)),
             time: 0.5,
             ..Direction::default()
         },

@@ -2,11 +2,14 @@
 
 use crate::condense::{Direction, System};
 use crate::constrained::element::{ConstrainedForm, Derivatives};
-use crate::error::{ConstraintError, StepError};
+#[cfg(feature = "alloc")]
+use crate::error::ConstraintError;
+use crate::error::StepError;
 use crate::model::Model;
 #[cfg(feature = "alloc")]
 use crate::{
     constrained::element::slopes,
+    constrained::rows::Rows,
     dual::{Dual, duals},
     legendre::conjugate,
     lu::Block,
@@ -62,9 +65,6 @@ where
     let rates = x[..layout.rates()].as_chunks::<N>().0;
     ends.fill(0.0);
     for (k, direction) in directions.iter().enumerate() {
-        if direction.parameter.is_some() {
-            return Err(ConstraintError::Parameter.into());
-        }
         let column = 2 * N + k;
         let momentum = along(form, x, direction, |row, value| {
             system.sides[row * columns + column] = -value;
@@ -147,6 +147,13 @@ where
     let layout = form.layout;
     let (scheme, h) = (form.inner.scheme, form.inner.span.h);
     let (points, unknowns) = (scheme.points(), scheme.unknowns());
+    let parameter = match direction.parameter {
+        None => None,
+        Some(parameter) => {
+            let found = parameter.any(form.inner.model);
+            Some(found.ok_or(ConstraintError::Parameter)?)
+        }
+    };
     let rates = x[..layout.rates()].as_chunks::<N>().0;
     let stretch = direction.length / h;
     let mut rows = DualRows::<N>::new(M::CONSTRAINTS.len());
@@ -157,12 +164,13 @@ where
         let node = scheme.nodes[l];
         let weights = &scheme.position[l * unknowns..(l + 1) * unknowns];
         let (time, q_dual) = moving(direction, node, t, &q, weights, rates);
+        let time = time.by_parameter(parameter);
         let guess = form.inner.momenta[l];
         let (mut momentum, mut force) = explicit(form.inner.model, time, &q_dual, &v, &guess)?;
         for a in 0..N {
             force[a] += direction.damping * v[a];
         }
-        rows.evaluate(form.inner.model, time, &q_dual, &v);
+        rows.evaluate_like(&form.rows, form.inner.model, (time, &q_dual), &v);
         let slopes = slopes(node, layout.degree());
         for holonomic in [true, false] {
             form.set_mu(l, x, &slopes, holonomic);
@@ -200,8 +208,8 @@ where
     }
     let span = form.inner.span;
     let still = duals(&span.start.q, &[0.0; N]);
-    let start = Dual::new(span.t, direction.time);
-    rows.evaluate(form.inner.model, start, &still, &[0.0; N]);
+    let start = Dual::new(span.t, direction.time).by_parameter(parameter);
+    rows.evaluate_like(&form.rows, form.inner.model, (start, &still), &[0.0; N]);
     form.set_node_mu(x, true);
     let kick = rows.stretched(form.rows.mu, stretch);
     for row in residual[..layout.rates()].as_chunks_mut::<N>().0 {
@@ -211,8 +219,9 @@ where
     }
     let (t, q, v) = form.end_place(x);
     let (time, q_dual) = moving(direction, 1.0, t, &q, scheme.advance, rates);
+    let time = time.by_parameter(parameter);
     let (momentum, _) = explicit(form.inner.model, time, &q_dual, &v, &span.start.p)?;
-    rows.evaluate(form.inner.model, time, &q_dual, &v);
+    rows.evaluate_like(&form.rows, form.inner.model, (time, &q_dual), &v);
     form.set_node_mu(x, false);
     let reaction = rows.stretched(form.rows.mu, stretch);
     for a in 0..N {
@@ -347,6 +356,39 @@ impl<const N: usize> DualRows<N> {
         model.constraint_second(t, q, &duals(v, &[0.0; N]), &self.mu, &mut second);
     }
 
+    /// The same, combined as the rows of an element are.
+    fn evaluate_like<M: Model<N>>(
+        &mut self,
+        element: &Rows<'_, N>,
+        model: &M,
+        (t, q): (Dual, &[Dual; N]),
+        v: &[f64; N],
+    ) {
+        let Some(weights) = element.combination() else {
+            return self.evaluate(model, t, q, v);
+        };
+        // Kernels write only what can be non-zero.
+        for matrix in [&mut self.rows, &mut self.rates, &mut self.psi_q] {
+            matrix.fill([Dual::ZERO; N]);
+        }
+        self.drift.fill(Dual::ZERO);
+        self.values.fill(Dual::ZERO);
+        self.evaluate(model, t, q, v);
+        let count = self.values.len();
+        for matrix in [&mut self.rows, &mut self.rates, &mut self.psi_q] {
+            let declared = matrix.clone();
+            for (row, weights) in matrix.iter_mut().zip(weights.chunks_exact(count)) {
+                *row = core::array::from_fn(|a| combined(weights, declared.iter().map(|r| r[a])));
+            }
+        }
+        for numbers in [&mut self.drift, &mut self.values] {
+            let declared = numbers.clone();
+            for (number, weights) in numbers.iter_mut().zip(weights.chunks_exact(count)) {
+                *number = combined(weights, declared.iter().copied());
+            }
+        }
+    }
+
     /// d(A v + a), v constant.
     pub(crate) fn psi_slope(&self, c: usize, v: &[f64; N]) -> f64 {
         let mut sum = self.drift[c].slope;
@@ -371,4 +413,15 @@ impl<const N: usize> DualRows<N> {
         }
         sum
     }
+}
+
+/// Σ weight · number
+#[cfg(feature = "alloc")]
+fn combined(weights: &[f64], numbers: impl Iterator<Item = Dual>) -> Dual {
+    weights
+        .iter()
+        .zip(numbers)
+        .fold(Dual::ZERO, |sum, (weight, number)| {
+            sum + Dual::new(*weight, 0.0) * number
+        })
 }

@@ -153,6 +153,12 @@ impl<'a, const N: usize> Rows<'a, N> {
         self.is_combined
     }
 
+    /// The weights of the constraints as declared in the rows, a row for each, where they are combinations.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn combination(&self) -> Option<&[f64]> {
+        self.is_combined.then_some(&*self.weights)
+    }
+
     /// Replaces the rows of holonomic constraints that depend on one another by as many combinations as are independent, functions W φ with W constant in the element
     /// (T-118): vectors that span what the columns of A span in the middle of the element, with the rows of A scaled to the length one. Those combinations are left out
     /// whose gradients vanish there, so that the others stay independent for as long as can be, and rows that were permuted or scaled give the same motion.

@@ -1,0 +1,162 @@
+//! The parameters of a model by number: fields that are numbers, and the elements of fields that are arrays of numbers.
+
+use crate::indices::{identifier, index};
+use crate::input;
+use proc_macro2::TokenStream;
+use quote::quote;
+use std::collections::BTreeMap;
+use syn::ItemStruct;
+use tfe_symbolic::expr::input::{Affine, IndexSymbol};
+use tfe_symbolic::syntax::context::{Field, FieldKind, Length};
+
+/// The number of the parameter that a field is, or that its first element is.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Parameters {
+    fields: Vec<Place>,
+    /// Whether every field can be copied, or cloned.
+    all_cloned: bool,
+    /// Whether every field is `Copy`.
+    all_copies: bool,
+}
+
+#[derive(Clone, Debug)]
+struct Place {
+    name: String,
+    is_array: bool,
+    first: Affine,
+    /// Beyond its last one.
+    end: Affine,
+}
+
+impl Parameters {
+    pub(crate) fn of(item: &ItemStruct) -> Self {
+        let context = input::context(item);
+        let mut first = Affine::constant(0);
+        let mut fields = Vec::new();
+        for Field { name, kind } in &context.fields {
+            let length = match kind {
+                FieldKind::Scalar => Some(Affine::constant(1)),
+                FieldKind::Array(Length::Literal(length)) => {
+                    i64::try_from(*length).ok().map(Affine::constant)
+                }
+                FieldKind::Array(Length::ConstParameter(name)) => {
+                    Some(Affine::symbol(IndexSymbol::ConstParameter(name.clone())))
+                }
+                _ => None,
+            };
+            let end = length.and_then(|length| first.plus_scaled(&length, 1));
+            if let Some(end) = end {
+                fields.push(Place {
+                    name: name.clone(),
+                    is_array: *kind != FieldKind::Scalar,
+                    first: std::mem::replace(&mut first, end.clone()),
+                    end,
+                });
+            }
+        }
+        let is_copy = |field: &Field| {
+            matches!(
+                field.kind,
+                FieldKind::Scalar | FieldKind::Array(_) | FieldKind::Length
+            )
+        };
+        let is_other = |field: &Field| matches!(field.kind, FieldKind::Other(_));
+        Self {
+            fields,
+            all_cloned: !context.fields.iter().any(is_other),
+            all_copies: context.fields.iter().all(is_copy),
+        }
+    }
+
+    /// The places of first numbers by the name of their field.
+    pub(crate) fn places(&self) -> BTreeMap<String, Affine> {
+        let place = |one: &Place| (one.name.clone(), one.first.clone());
+        self.fields.iter().map(place).collect()
+    }
+
+    /// `parameters`, `parameter_name`, `parameter` and `with_parameter` of an implementation of `Model`.
+    pub(crate) fn members(&self, item: &ItemStruct) -> TokenStream {
+        let Some(last) = self.fields.last() else {
+            return TokenStream::new();
+        };
+        let count = index(&last.end);
+        let arms = |of: &dyn Fn(&Place) -> TokenStream| -> TokenStream {
+            self.fields
+                .iter()
+                .map(|one| {
+                    let (end, value) = (index(&one.end), of(one));
+                    quote!(if index < #end { return #value; })
+                })
+                .collect()
+        };
+        let element = |one: &Place| {
+            let first = index(&one.first);
+            match one.first.as_constant() {
+                Some(0) => quote!(index),
+                Some(_) => quote!(index - #first),
+                None => quote!(index - (#first)),
+            }
+        };
+        let names = arms(&|one| {
+            let name = &one.name;
+            if !one.is_array {
+                return quote!(__tfe::CoordinateName::single(#name));
+            }
+            let element = element(one);
+            quote!(__tfe::CoordinateName::element(#name, #element))
+        });
+        let place = |one: &Place| {
+            let field = identifier(&one.name);
+            if !one.is_array {
+                return quote!(#field);
+            }
+            let element = element(one);
+            quote!(#field[#element])
+        };
+        let values = arms(&|one| {
+            let place = place(one);
+            quote!(self.#place)
+        });
+        let with_parameter = self.all_cloned.then(|| {
+            let fields: Vec<_> = item.fields.iter().map(|field| &field.ident).collect();
+            let made = match self.all_copies {
+                true => quote!(Self { ..*self }),
+                false => {
+                    quote!(Self { #(#fields: ::core::clone::Clone::clone(&self.#fields)),* })
+                }
+            };
+            let set: TokenStream = self
+                .fields
+                .iter()
+                .map(|one| {
+                    let (end, place) = (index(&one.end), place(one));
+                    quote!(if index < #end { made.#place = value; } else)
+                })
+                .collect();
+            quote! {
+                fn with_parameter(&self, index: usize, value: f64) -> ::core::option::Option<Self> {
+                    let mut made = #made;
+                    #set { return ::core::option::Option::None; }
+                    ::core::option::Option::Some(made)
+                }
+            }
+        });
+        quote! {
+            fn parameters(&self) -> usize {
+                #count
+            }
+
+            fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+                #names
+                __tfe::CoordinateName::element("", index)
+            }
+
+            fn parameter(&self, index: usize) -> f64 {
+                #values
+                ::core::primitive::f64::NAN
+            }
+
+            #with_parameter
+        }
+    }
+}
