@@ -15,11 +15,14 @@ pub mod ensemble;
 pub mod error;
 pub mod family;
 pub mod fidelity;
+#[cfg(feature = "fit")]
+pub mod fit;
 pub mod linearised;
 pub mod modal;
 pub mod motion;
 pub mod periodic;
 pub mod periodic_schur;
+pub mod sensitivity;
 pub mod simulation;
 pub mod stability;
 mod velocity;
@@ -35,10 +38,13 @@ pub use driven::{Driven, InputError, Interpolation};
 pub use ensemble::Ensemble;
 pub use error::{AtError, RunError, RunErrorKind};
 pub use fidelity::Fidelity;
+#[cfg(feature = "fit")]
+pub use fit::Fit;
 pub use linearised::Linearised;
 pub use modal::Modal;
 pub use motion::{Motion, Node, Outputs};
 pub use periodic::{Orbit, PeriodicOrbit};
+pub use sensitivity::Sensitive;
 pub use simulation::{
     Act, Checkpoint, Crossing, Event, Held, HeldNode, Occurrence, Simulation, Steps, Warning,
 };
@@ -54,6 +60,8 @@ pub use work_precision::WorkPrecision;
 
 /// What a program that simulates needs: `use tfe::prelude::*;`.
 pub mod prelude {
+    #[cfg(feature = "fit")]
+    pub use crate::Fit;
     pub use crate::stability::Blocks;
     pub use crate::{
         Act, BoundaryValue, ConsistentState, Continuation, Crossing, Element, EnergyConserving,

@@ -5,10 +5,12 @@ mod checkpoint;
 mod course;
 mod events;
 pub(crate) mod family;
+mod follow;
 mod held;
 mod inputs;
 pub(crate) mod mesh;
 mod progress;
+mod sensitive;
 mod steps;
 mod watch;
 
@@ -17,6 +19,7 @@ use crate::linearised::Linearised;
 use crate::motion::Motion;
 use events::{Cut, Events, On, Passage};
 use family::Runs;
+use follow::{Follow, Nobody, Passed};
 use mesh::{Endless, Mesh};
 use nalgebra::DMatrix;
 use std::convert::identity;
@@ -25,7 +28,7 @@ use std::sync::Arc;
 use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::length::Declared;
 use tfe_runtime::step::{Control, Impulse, Stepper};
-use tfe_runtime::transition::TransitionError;
+
 use tfe_runtime::{Element, Mixed, Model, Share, Solve, State};
 use watch::resolution::{Examined, Resolution};
 use watch::{Recorded, Watch};
@@ -108,7 +111,7 @@ impl<'m, M, const N: usize> Simulation<'m, M, N> {
 }
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
-    fn with_defaults(model: &'m M) -> Self {
+    pub(crate) fn with_defaults(model: &'m M) -> Self {
         Self {
             model: Share::Borrowed(model),
             element: None,
@@ -339,7 +342,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 stepper
             }
         };
-        self.drive(start, &span, ready, |_, _| Ok(()))
+        self.drive(start, &span, ready, Nobody)
     }
 
     /// A stepper that cuts steps at kinks, if that was asked for.
@@ -371,24 +374,25 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let mut transitions = Vec::new();
         let mut entries = vec![0.0; 4 * N * N];
         let mut starts = Vec::new();
-        let motion = self.drive(start, &span, identity, |stepper, passed| {
+        let follower = |stepper: &mut Stepper<'m, M, N>, passed: &Passed<'_, N>| {
             stepper.transition(&mut entries)?;
             transitions.push(DMatrix::from_row_slice(2 * N, 2 * N, &entries));
             if const { !M::CONSTRAINTS.is_empty() } {
                 starts.push((passed.start, *passed.before));
             }
             Ok(())
-        })?;
+        };
+        let motion = self.drive(start, &span, identity, follower)?;
         Ok(Linearised::new(&*self.model, motion, transitions, &starts))
     }
 
-    /// Runs over the span and shows every finished element to `finished`.
+    /// Runs over the span, followed by `follower`.
     fn drive(
         &self,
         start: State<N>,
         span: &Range<f64>,
         ready: impl FnOnce(Stepper<'m, M, N>) -> Stepper<'m, M, N>,
-        finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
+        follower: impl Follow<'m, M, N>,
     ) -> Result<Motion<N>, RunError<N>> {
         let (mesh, stepper) = match self.prepare(&start, span) {
             Ok(prepared) => prepared,
@@ -399,7 +403,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         };
         let motion = Motion::from_start(&*self.model, span.start, &start);
         let place = (&mesh, 0, span.start);
-        self.drive_on(motion, &start, place, ready(stepper), finished)
+        self.drive_on(motion, &start, place, ready(stepper), follower)
     }
 
     /// Goes on from the only node of `motion` over a mesh of which some elements are done, and leaves a checkpoint.
@@ -409,9 +413,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         start: &State<N>,
         (mesh, done, origin): (&Mesh<N>, usize, f64),
         mut stepper: Stepper<'m, M, N>,
-        finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
+        follower: impl Follow<'m, M, N>,
     ) -> Result<Motion<N>, RunError<N>> {
-        let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, finished)?;
+        let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, follower)?;
         let last = *motion.last();
         // A run that was stopped has no grid to go on with.
         if mesh.end().is_some_and(|end| end != last.t) {
@@ -433,10 +437,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         t0: f64,
         mesh: &Mesh<N>,
         stepper: &mut Stepper<'m, M, N>,
-        finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
+        follower: impl Follow<'m, M, N>,
     ) -> Result<Motion<N>, RunError<N>> {
         let motion = Motion::from_start(&*self.model, t0, &start);
-        self.drive_from(motion, &start, (mesh, 0), stepper, finished)
+        self.drive_from(motion, &start, (mesh, 0), stepper, follower)
     }
 
     /// The same from the only node of `motion`, after the elements that are done.
@@ -446,8 +450,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         start: &State<N>,
         (mesh, done): (&Mesh<N>, usize),
         stepper: &mut Stepper<'m, M, N>,
-        mut finished: impl FnMut(&mut Stepper<'m, M, N>, Passed<'_, N>) -> Result<(), TransitionError>,
+        mut follower: impl Follow<'m, M, N>,
     ) -> Result<Motion<N>, RunError<N>> {
+        follower.recorded(motion.last());
         let mut watch = Watch::new(self.chosen_element());
         let mut resolution = Resolution::new(&*self.model, self.chosen_element(), self.control);
         let conserves = const { conserves_energy::<M, N>() };
@@ -497,26 +502,35 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                     end: next,
                     after: &state,
                 };
-                let step = step.and_then(|()| {
-                    finished(stepper, passed).map_err(|source| RunErrorKind::Transition {
+                let arc = dense.as_ref().map(|dense| Passage {
+                    t: from,
+                    h: length,
+                    before: &before,
+                    after: &state,
+                    dense,
+                    impulses,
+                });
+                let looked = step.and_then(|()| match &arc {
+                    Some(arc) if !events.is_empty() => events.look(arc),
+                    _ => Ok(None),
+                });
+                let followed = looked.and_then(|cut| {
+                    let followed = match (&cut, &arc) {
+                        (Some(cut), Some(arc)) => match events.severed(arc, cut, impulses) {
+                            Some(severed) => follower.cut(&severed),
+                            None => Ok(()),
+                        },
+                        _ => follower.passed(stepper, &passed),
+                    };
+                    followed.map_err(|source| RunErrorKind::Transition {
                         element,
                         time: from,
                         step: length,
                         source,
-                    })
+                    })?;
+                    Ok(cut)
                 });
-                let looked = step.and_then(|()| match &dense {
-                    Some(dense) if !events.is_empty() => events.look(&Passage {
-                        t: from,
-                        h: length,
-                        before: &before,
-                        after: &state,
-                        dense,
-                        impulses,
-                    }),
-                    _ => Ok(None),
-                });
-                let cut = match looked {
+                let cut = match followed {
                     Ok(cut) => cut,
                     Err(kind) => {
                         watch.examine(&*self.model, element, (from, length), &before);
@@ -542,6 +556,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                     }
                     if last || (element + 1) % self.record_every == 0 {
                         motion.record(&*self.model, next, &state);
+                        follower.recorded(motion.last());
                         watch.pass(recorded(&motion, is_conserved));
                         is_conserved = conserves;
                     }
@@ -553,13 +568,16 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                     at,
                     inside,
                     after,
+                    ..
                 } = cut;
                 if let Some(dense) = inside.filter(|_| keeps) {
                     motion.keep_element(dense);
                 }
                 if motion.last().t != time {
                     motion.record(&*self.model, time, &at);
+                    follower.recorded(motion.last());
                 }
+                follower.acted();
                 let Some(after) = after else {
                     state = at;
                     break 'run;
@@ -569,6 +587,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                     break 'run;
                 }
                 motion.record(&*self.model, time, &after);
+                follower.recorded(motion.last());
                 state = after;
                 if time == next {
                     break;
@@ -677,14 +696,6 @@ fn recorded<const N: usize>(motion: &Motion<N>, is_conserved: bool) -> Recorded 
         action,
         is_conserved,
     }
-}
-
-/// An element that a run has passed.
-struct Passed<'a, const N: usize> {
-    start: f64,
-    before: &'a State<N>,
-    end: f64,
-    after: &'a State<N>,
 }
 
 /// Refuses start values that are not finite.

@@ -5,6 +5,7 @@ mod family;
 pub use family::FamilyCheckpoint;
 
 use super::Simulation;
+use super::follow::Nobody;
 use super::mesh::Mesh;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
@@ -149,7 +150,7 @@ impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
                 &checkpoint.state,
                 (&mesh, done, origin),
                 stepper,
-                |_, _| Ok(()),
+                Nobody,
             ),
             Err(kind) => Err(RunError::new(kind, motion)),
         }

@@ -3,6 +3,7 @@
 mod search;
 
 use crate::error::RunErrorKind;
+use crate::velocity::velocity_from;
 use std::cell::RefCell;
 use std::fmt;
 use std::ops::Deref;
@@ -150,12 +151,76 @@ pub(super) struct Passage<'a, const N: usize> {
 }
 
 /// An element that ends at an event.
-pub(super) struct Cut<const N: usize> {
+pub(super) struct Cut<'a, 'm, const N: usize> {
     pub(super) t: f64,
     pub(super) at: State<N>,
     pub(super) inside: Option<DenseElement<N>>,
     /// None where the run ends there.
     pub(super) after: Option<State<N>>,
+    /// Its length.
+    length: f64,
+    on: &'a On<'m, N>,
+    /// The output, among all.
+    column: usize,
+}
+
+/// The same beside the element that was to be.
+pub(super) struct Severed<'a, 'm, const N: usize> {
+    /// Where the element begins.
+    pub(super) start: f64,
+    pub(super) length: f64,
+    /// What its length was to be.
+    pub(super) step: f64,
+    pub(super) before: &'a State<N>,
+    pub(super) impulses: &'a [Impulse<N>],
+    /// False where the event is at the start.
+    pub(super) inside: bool,
+    pub(super) on: &'a On<'m, N>,
+    pub(super) column: usize,
+    pub(super) event: &'a Event<N>,
+    /// The place of the event among all.
+    pub(super) number: usize,
+    pub(super) goes_on: bool,
+}
+
+/// What an act makes of a state near that of its event; none where it lets the run end or go on as it was.
+pub(super) fn state_after<M: Model<N>, const N: usize>(
+    model: &M,
+    on: &On<'_, N>,
+    near: &Event<N>,
+    (t, state): (f64, &State<N>),
+) -> Option<State<N>> {
+    let event = Event {
+        name: near.name.clone(),
+        t,
+        q: state.q,
+        p: state.p,
+        v: velocity_from(model, t, state, &near.v),
+        rises: near.rises,
+    };
+    match act(model, on, &event) {
+        Act::Restart(state) => Some(state),
+        Act::Impulse(impulse) => Some(kicked(state, &impulse)),
+        Act::Record | Act::Stop => None,
+    }
+}
+
+/// What is to be done at an event.
+fn act<M: Model<N>, const N: usize>(model: &M, on: &On<'_, N>, event: &Event<N>) -> Act<N> {
+    let momenta = |v: [f64; N]| tfe_runtime::__private::state(model, event.t, event.q, v).p;
+    (on.act)(&Occurrence {
+        event,
+        momenta: &momenta,
+    })
+}
+
+/// The state with momenta that are larger by an impulse.
+fn kicked<const N: usize>(state: &State<N>, impulse: &[f64; N]) -> State<N> {
+    let mut kicked = *state;
+    for (p, more) in kicked.p.iter_mut().zip(impulse) {
+        *p += more;
+    }
+    kicked
 }
 
 /// What has come of a search for the time of an event.
@@ -224,7 +289,10 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
     }
 
     /// Does what is to be done at the events inside an element, in their order, up to the first that ends it.
-    pub(super) fn look(&mut self, arc: &Passage<'_, N>) -> Result<Option<Cut<N>>, RunErrorKind> {
+    pub(super) fn look(
+        &mut self,
+        arc: &Passage<'_, N>,
+    ) -> Result<Option<Cut<'a, 'm, N>>, RunErrorKind> {
         let Passage { t, h, dense, .. } = *arc;
         let resolution = 4.0 * f64::EPSILON * t.abs().max((t + h).abs()).max(h.abs());
         let samples = (2 * dense.degree()).clamp(8, 24);
@@ -252,7 +320,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
         }
         let (found, sides) = search::crossings(&self.sides, samples, resolution / h.abs(), value);
         for (number, root) in found.iter().enumerate() {
-            let (_, on) = self.watched[root.function];
+            let (column, on) = self.watched[root.function];
             if !on.crossing.counts(root.rises) {
                 continue;
             }
@@ -271,25 +339,14 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
                 p: met.state.p,
                 rises: root.rises,
             };
-            let momenta =
-                |v: [f64; N]| tfe_runtime::__private::state(self.model, time, event.q, v).p;
-            let act = (on.act)(&Occurrence {
-                event: &event,
-                momenta: &momenta,
-            });
-            let mut after = met.state;
+            let act = act(self.model, on, &event);
             let name = event.name.clone();
             self.met.push(event);
             let after = match act {
                 Act::Record => continue,
                 Act::Stop => None,
                 Act::Restart(state) => Some(state),
-                Act::Impulse(impulse) => {
-                    for (p, more) in after.p.iter_mut().zip(impulse) {
-                        *p += more;
-                    }
-                    Some(after)
-                }
+                Act::Impulse(impulse) => Some(kicked(&met.state, &impulse)),
             };
             self.cuts += 1;
             let is_soon = |(last, function): (f64, usize)| {
@@ -306,10 +363,38 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
                 at: met.state,
                 inside: met.inside,
                 after,
+                length: met.length,
+                on,
+                column,
             }));
         }
         self.sides = sides;
         Ok(None)
+    }
+
+    /// The last cut, with all that derivatives need.
+    pub(super) fn severed<'c>(
+        &'c self,
+        arc: &Passage<'c, N>,
+        cut: &Cut<'c, 'm, N>,
+        impulses: &'c [Impulse<N>],
+    ) -> Option<Severed<'c, 'm, N>> {
+        let event = self.met.last()?;
+        let before = |impulse: &&Impulse<N>| (impulse.time - arc.t).abs() < cut.length.abs();
+        let count = impulses.iter().take_while(before).count();
+        Some(Severed {
+            start: arc.t,
+            length: cut.length,
+            step: self.step,
+            before: arc.before,
+            impulses: &impulses[..count],
+            inside: cut.inside.is_some(),
+            on: cut.on,
+            column: cut.column,
+            event,
+            number: self.met.len() - 1,
+            goes_on: cut.after.is_some(),
+        })
     }
 
     /// After a jump of the state outputs are on new sides, but for those that are to cross at the same time.

@@ -1,5 +1,6 @@
 //! Runs of models of fixed size with an estimate of their error.
 
+use super::super::follow::Passed;
 use super::super::mesh::Mesh;
 use super::super::{Simulation, check_constraints};
 use super::{
@@ -262,11 +263,12 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         (t, start): (f64, &State<N>),
         passed: &mut Passing<'_, Stepper<'m, M, N>, State<N>>,
     ) -> Result<Motion<N>, Broken<Motion<N>>> {
-        self.drive_over(*start, t, mesh, stepper, |stepper, element| {
+        let follower = |stepper: &mut Stepper<'m, M, N>, element: &Passed<'_, N>| {
             passed(stepper, element.end, element.after);
             Ok(())
-        })
-        .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))
+        };
+        self.drive_over(*start, t, mesh, stepper, follower)
+            .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))
     }
 
     fn part(&self, (t0, start): (f64, &State<N>), (t, end): (f64, &State<N>)) -> Motion<N> {

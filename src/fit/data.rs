@@ -1,0 +1,82 @@
+//! What was measured.
+
+use super::FitError;
+use tfe_runtime::Model;
+
+/// Values of one output, as given.
+#[derive(Clone, Debug)]
+pub(super) struct Measured {
+    pub(super) name: String,
+    pub(super) times: Vec<f64>,
+    pub(super) values: Vec<f64>,
+    pub(super) deviation: f64,
+}
+
+/// The same of a model that has such an output.
+#[derive(Debug)]
+pub(super) struct Column<'a> {
+    pub(super) place: Observed,
+    pub(super) times: &'a [f64],
+    pub(super) values: &'a [f64],
+    pub(super) deviation: f64,
+}
+
+/// What is observed of a motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Observed {
+    /// An output, by its place.
+    Output(usize),
+    /// A coordinate.
+    Coordinate(usize),
+}
+
+impl<'a> Column<'a> {
+    pub(super) fn new<M: Model<N>, const N: usize>(
+        model: &M,
+        measured: &'a Measured,
+    ) -> Result<Self, FitError> {
+        let Measured {
+            name,
+            times,
+            values,
+            deviation,
+        } = measured;
+        let output = (0..model.columns()).find(|at| model.column_name(*at).is(name));
+        let coordinate = || (0..N).find(|a| M::coordinate_name(*a).is(name));
+        let place = match output {
+            Some(output) => Observed::Output(output),
+            None => Observed::Coordinate(coordinate().ok_or_else(|| {
+                FitError::NoOutput {
+                    name: name.clone(),
+                    known: (0..model.columns())
+                        .map(|at| model.column_name(at).to_string())
+                        .chain((0..N).map(|a| M::coordinate_name(a).to_string()))
+                        .collect(),
+                }
+            })?),
+        };
+        let why = if times.len() != values.len() {
+            Some("there are not as many times as values")
+        } else if times.is_empty() {
+            Some("there is none")
+        } else if !times.iter().chain(values).all(|number| number.is_finite()) {
+            Some("not all times and values are finite")
+        } else if !(*deviation > 0.0 && deviation.is_finite()) {
+            Some("the deviation is no positive number")
+        } else {
+            None
+        };
+        match why {
+            Some(why) => Err(FitError::Measured {
+                name: name.clone(),
+                why,
+            }),
+            None => Ok(Self {
+                place,
+                times,
+                values,
+                deviation: *deviation,
+            }),
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! A motion with its derivatives by parameters and by its start.
+
+pub(crate) mod slopes;
+
+use crate::motion::{Motion, Node};
+use nalgebra::DMatrix;
+use std::fmt;
+use tfe_runtime::State;
+
+/// A motion together with its derivatives by the parameters of its model and by its start, from [`Simulation::run_sensitive`](crate::Simulation::run_sensitive).
+///
+/// With y = (p, q), A_e the derivative of the step over element e by its start and C_e by the parameters a,
+///
+/// ```text
+/// ∂y_{e+1}/∂a = A_e ∂y_e/∂a + C_e ,      ∂y_{e+1}/∂y₀ = A_e ∂y_e/∂y₀                              (T-123)
+/// ```
+///
+/// They are derivatives of the numbers that the run computes, by implicit differentiation of its elements, not approximations of a differential equation. Where an
+/// [event](crate::Simulation::on) cuts an element, its time moves with parameters and start, and what is done there is differentiated too (T-124).
+///
+/// The start is the state (q, p): by a parameter it stays as it is, also where it was made of velocities, whose momenta depend on the parameter.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(y), lagrangian = m/2*dot(y)^2 - m*g*y, force(y) = -c*dot(y), output(height) = y)]
+/// struct Ball { m: f64, g: f64, c: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let ball = Ball { m: 1.0, g: 9.81, c: 0.0 };
+/// let s = Simulation::new(&ball).step(0.1).run_sensitive(ball.state([1.0], [0.5]), 0.0..2.0)?;
+/// // y = 1 + v₀ t − g t²/2,   p = m v₀ − m g t
+/// assert!((s.by("g").last().q[0] + 2.0).abs() < 1e-13);
+/// assert!((s.by("g").last().p[0] + 2.0).abs() < 1e-13);
+/// assert!((s.by_start().last().q_by_p()[(0, 0)] - 2.0).abs() < 1e-13);
+/// assert_eq!(s.by("g").output("height").map(|values| values.len()), Some(21));
+/// // Without drag the mass does not matter to a velocity, but it does to a momentum.
+/// assert!((s.by("m").last().q[0] + 1.0).abs() < 1e-13); // the momentum 0.5 is kept
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone)]
+pub struct Sensitive<const N: usize> {
+    motion: Motion<N>,
+    parameters: Vec<String>,
+    nodes: Vec<Slopes>,
+    events: Vec<(usize, Vec<f64>)>,
+}
+
+/// The derivatives at a node: a column for each of the 2N numbers of the start, ordered (p, q), then for each parameter.
+#[derive(Clone, Debug)]
+pub(crate) struct Slopes {
+    /// Of (p, q).
+    pub(crate) state: DMatrix<f64>,
+    /// Of velocities.
+    pub(crate) velocity: DMatrix<f64>,
+    /// Of outputs.
+    pub(crate) outputs: DMatrix<f64>,
+}
+
+impl<const N: usize> Sensitive<N> {
+    pub(crate) fn new(
+        motion: Motion<N>,
+        parameters: Vec<String>,
+        nodes: Vec<Slopes>,
+        events: Vec<(usize, Vec<f64>)>,
+    ) -> Self {
+        Self {
+            motion,
+            parameters,
+            nodes,
+            events,
+        }
+    }
+
+    /// The motion.
+    pub fn motion(&self) -> &Motion<N> {
+        &self.motion
+    }
+
+    /// The names of the parameters, `m` or `k[2]`, in the order of the struct.
+    pub fn parameters(&self) -> &[String] {
+        &self.parameters
+    }
+
+    /// The derivatives by a parameter.
+    ///
+    /// # Panics
+    /// Where no parameter has this name, as an index out of bounds does; [`get`](Self::get) does not.
+    #[track_caller]
+    pub fn by(&self, name: &str) -> ByParameter<'_, N> {
+        self.get(name).unwrap_or_else(|| {
+            panic!(
+                "the model has no parameter `{name}`, only `{}`",
+                self.parameters.join("`, `")
+            )
+        })
+    }
+
+    /// The derivatives by a parameter; `None` where none has this name.
+    pub fn get(&self, name: &str) -> Option<ByParameter<'_, N>> {
+        let place = self.parameters.iter().position(|own| own == name)?;
+        Some(ByParameter {
+            of: self,
+            column: 2 * N + place,
+        })
+    }
+
+    /// The derivatives by the start.
+    pub fn by_start(&self) -> ByStart<'_, N> {
+        ByStart { of: self }
+    }
+
+    /// An output at a node, with its derivatives by the parameters and by the start, ordered (p, q).
+    #[cfg(feature = "fit")]
+    pub(crate) fn output_at(&self, node: usize, output: usize) -> (f64, Vec<f64>, Vec<f64>) {
+        let values = self.motion.outputs().row(node);
+        let value = values.and_then(|row| row.get(output)).copied();
+        let slopes = &self.nodes[node].outputs;
+        Self::parted(value.unwrap_or(f64::NAN), slopes, output)
+    }
+
+    /// The same of a coordinate.
+    #[cfg(feature = "fit")]
+    pub(crate) fn coordinate_at(&self, node: usize, a: usize) -> (f64, Vec<f64>, Vec<f64>) {
+        let value = self.motion.states()[node].q[a];
+        Self::parted(value, &self.nodes[node].state, N + a)
+    }
+
+    #[cfg(feature = "fit")]
+    fn parted(value: f64, slopes: &DMatrix<f64>, row: usize) -> (f64, Vec<f64>, Vec<f64>) {
+        let all: Vec<f64> = slopes.row(row).iter().copied().collect();
+        let (by_start, by_parameters) = all.split_at(2 * N);
+        (value, by_parameters.to_vec(), by_start.to_vec())
+    }
+
+    /// The derivatives at the last node.
+    fn last(&self) -> &Slopes {
+        self.nodes.last().expect("a run is recorded from its start")
+    }
+
+    /// The row of an output.
+    fn output(&self, name: &str) -> Option<usize> {
+        let names = self.motion.outputs().names();
+        names.iter().position(|own| own.is(name))
+    }
+}
+
+impl<const N: usize> fmt::Debug for Sensitive<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Sensitive")
+            .field("parameters", &self.parameters)
+            .field("nodes", &self.nodes.len())
+            .finish_non_exhaustive()
+    }
+}
+
+/// The derivatives of a motion by one parameter a.
+#[derive(Clone, Copy, Debug)]
+pub struct ByParameter<'s, const N: usize> {
+    of: &'s Sensitive<N>,
+    column: usize,
+}
+
+impl<const N: usize> ByParameter<'_, N> {
+    /// ∂q/∂a, ∂p/∂a and ∂v/∂a at the last node, with its time.
+    pub fn last(&self) -> Node<N> {
+        self.at(self.of.motion.last().t, self.of.last())
+    }
+
+    /// The same at all recorded nodes, in the order of [`Motion::states`].
+    pub fn states(&self) -> Vec<Node<N>> {
+        let nodes = self.of.motion.states().iter().zip(&self.of.nodes);
+        nodes
+            .map(|(node, slopes)| self.at(node.t, slopes))
+            .collect()
+    }
+
+    /// The derivatives of an output at all recorded nodes; `None` where the model declares no such name.
+    pub fn output(&self, name: &str) -> Option<Vec<f64>> {
+        let row = self.of.output(name)?;
+        let values = (self.of.nodes.iter()).map(|one| one.outputs[(row, self.column)]);
+        Some(values.collect())
+    }
+
+    /// The derivative of the time of an event, by its place in [`Motion::events`]; `None` for those that are only recorded.
+    pub fn event_time(&self, event: usize) -> Option<f64> {
+        let found = self.of.events.iter().find(|(own, _)| *own == event);
+        found.and_then(|(_, slopes)| slopes.get(self.column).copied())
+    }
+
+    fn at(&self, t: f64, slopes: &Slopes) -> Node<N> {
+        let state = |row: usize| slopes.state[(row, self.column)];
+        let velocity = |row: usize| slopes.velocity[(row, self.column)];
+        Node {
+            t,
+            q: std::array::from_fn(|a| state(N + a)),
+            p: std::array::from_fn(state),
+            v: std::array::from_fn(velocity),
+        }
+    }
+}
+
+/// The derivatives of a motion by its start: matrices of 2N × 2N, ordered (p, q), whose blocks have names ([`Blocks`](crate::stability::Blocks)).
+#[derive(Clone, Copy, Debug)]
+pub struct ByStart<'s, const N: usize> {
+    of: &'s Sensitive<N>,
+}
+
+impl<const N: usize> ByStart<'_, N> {
+    /// ∂(p, q)/∂(p₀, q₀) at the last node.
+    pub fn last(&self) -> DMatrix<f64> {
+        Self::of(self.of.last())
+    }
+
+    /// The same at all recorded nodes, in the order of [`Motion::states`].
+    pub fn matrices(&self) -> Vec<DMatrix<f64>> {
+        self.of.nodes.iter().map(Self::of).collect()
+    }
+
+    /// The gradients of an output at all recorded nodes, by q₀ and p₀; `None` where the model declares no such name.
+    pub fn output(&self, name: &str) -> Option<Vec<State<N>>> {
+        let row = self.of.output(name)?;
+        let gradient = |slopes: &Slopes| State {
+            q: std::array::from_fn(|a| slopes.outputs[(row, N + a)]),
+            p: std::array::from_fn(|a| slopes.outputs[(row, a)]),
+        };
+        Some(self.of.nodes.iter().map(gradient).collect())
+    }
+
+    fn of(slopes: &Slopes) -> DMatrix<f64> {
+        slopes.state.columns(0, 2 * N).into_owned()
+    }
+}

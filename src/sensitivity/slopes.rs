@@ -1,0 +1,96 @@
+//! Velocities and outputs differentiated along changes of states, times and parameters.
+
+use nalgebra::{DMatrix, DVector};
+use tfe_runtime::dual::{Dual, duals};
+use tfe_runtime::{First, Form, Model, State};
+
+/// A place of a motion, with its velocity.
+#[derive(Clone, Copy)]
+pub(crate) struct Place<'a, const N: usize> {
+    pub(crate) t: f64,
+    pub(crate) state: &'a State<N>,
+    pub(crate) v: &'a [f64; N],
+}
+
+/// A change of it.
+#[derive(Clone, Copy)]
+pub(crate) struct Change<const N: usize> {
+    pub(crate) t: f64,
+    pub(crate) q: [f64; N],
+    pub(crate) p: [f64; N],
+    /// The parameter that changes by one, by its index among all.
+    pub(crate) parameter: Option<usize>,
+}
+
+impl<const N: usize> Change<N> {
+    /// A column of a matrix whose rows are ordered (p, q).
+    pub(crate) fn of_column(matrix: &DMatrix<f64>, column: usize) -> Self {
+        Self {
+            t: 0.0,
+            q: std::array::from_fn(|a| matrix[(N + a, column)]),
+            p: std::array::from_fn(|a| matrix[(a, column)]),
+            parameter: None,
+        }
+    }
+}
+
+/// What velocities and outputs of a model do when a place changes.
+pub(crate) struct Along<'a, M, const N: usize> {
+    model: &'a M,
+    place: Place<'a, N>,
+    /// L_vv⁻¹ of a Lagrangian.
+    inverse: Option<DMatrix<f64>>,
+}
+
+impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
+    pub(crate) fn new(model: &'a M, place: Place<'a, N>) -> Self {
+        let inverse = match M::FORM {
+            Form::Hamiltonian => None,
+            Form::Lagrangian => {
+                let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
+                let Place { t, state, v } = place;
+                model.first_and_mass(t, &state.q, v, &mut first, &mut zz);
+                let mass = DMatrix::from_fn(N, N, |a, b| zz[a][b]);
+                let unknown = || DMatrix::from_element(N, N, f64::NAN);
+                Some(mass.try_inverse().unwrap_or_else(unknown))
+            }
+        };
+        Self {
+            model,
+            place,
+            inverse,
+        }
+    }
+
+    /// δv; NaN where the mass matrix is singular.
+    pub(crate) fn velocity(&self, change: &Change<N>) -> [f64; N] {
+        let Place { t, state, v } = self.place;
+        let time = Dual::new(t, change.t).by_parameter(change.parameter);
+        let q = duals(&state.q, &change.q);
+        let mut first = First::zero();
+        let Some(inverse) = &self.inverse else {
+            let p = duals(&state.p, &change.p);
+            self.model.first(time, &q, &p, &mut first);
+            return first.z.map(|one| one.slope);
+        };
+        // p = L_v(q, v, t): L_vv δv = δp − ∂L_v/∂(t, q, a).
+        self.model.first(time, &q, &duals(v, &[0.0; N]), &mut first);
+        let right = DVector::from_fn(N, |a, _| change.p[a] - first.z[a].slope);
+        let found = inverse * right;
+        std::array::from_fn(|a| found[a])
+    }
+
+    /// The change of every output, where the velocity changes by `velocity`.
+    pub(crate) fn outputs(&self, change: &Change<N>, velocity: &[f64; N]) -> Vec<f64> {
+        let Place { t, state, v } = self.place;
+        let time = Dual::new(t, change.t).by_parameter(change.parameter);
+        let q = duals(&state.q, &change.q);
+        let z = match M::FORM {
+            Form::Lagrangian => duals(v, velocity),
+            Form::Hamiltonian => duals(&state.p, &change.p),
+        };
+        let mut values = vec![Dual::ZERO; self.model.columns()];
+        self.model.observables(time, &q, &z, &mut values);
+        values.iter().map(|value| value.slope).collect()
+    }
+}

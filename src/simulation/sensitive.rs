@@ -1,0 +1,364 @@
+//! Runs with derivatives by parameters and by the start (T-123, T-124).
+
+use super::Simulation;
+use super::events::{Severed, state_after};
+use super::follow::{Follow, Passed};
+use crate::error::RunError;
+use crate::motion::{Motion, Node};
+use crate::sensitivity::slopes::{Along, Change, Place};
+use crate::sensitivity::{Sensitive, Slopes};
+use nalgebra::DMatrix;
+use std::convert::identity;
+use std::ops::Range;
+use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::transition::TransitionError;
+use tfe_runtime::{
+    ConstraintError, Direction, Element, First, Form, Model, Parameter, Share, State, StepError,
+};
+
+impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
+    /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node by all parameters of the model and by the start.
+    ///
+    /// Those of `sensitivity(…)` have kernels of their own, others are differentiated by dual numbers in the same kernels; both are exact. A step costs a factorisation of its
+    /// tangent besides, a solution for each number of the start and each parameter, and as many products of matrices. Steps are not cut at
+    /// [kinks](Self::at_kinks). Acts of [events](Self::on) are called several times with states nearby, whose differences of sixth order are their derivatives.
+    ///
+    /// The example is at [`Sensitive`].
+    ///
+    /// # Errors
+    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`](crate::RunErrorKind::Transition) too where an element or an event has no derivative.
+    pub fn run_sensitive(
+        &self,
+        start: State<N>,
+        span: Range<f64>,
+    ) -> Result<Sensitive<N>, RunError<N>> {
+        let all: Vec<_> = (0..self.model.parameters()).collect();
+        self.run_sensitive_by(start, span, &all)
+    }
+
+    /// The same by some of the parameters.
+    pub(crate) fn run_sensitive_by(
+        &self,
+        start: State<N>,
+        span: Range<f64>,
+        parameters: &[usize],
+    ) -> Result<Sensitive<N>, RunError<N>> {
+        let chosen = (self.chosen_element(), self.control);
+        let mut tangents = Tangents::new(self.model.clone(), chosen, parameters);
+        let motion = self.drive(start, &span, identity, &mut tangents)?;
+        Ok(tangents.into_sensitive(motion))
+    }
+}
+
+/// Derivatives on their way along a run.
+struct Tangents<'m, M, const N: usize> {
+    model: Share<'m, M>,
+    chosen: (Element, Control),
+    /// The parameters, among all, and as directions.
+    indices: Vec<usize>,
+    parameters: Vec<Direction>,
+    /// ∂(p, q)/∂(start, parameters), where the run is.
+    current: DMatrix<f64>,
+    /// The same after an act that is to come.
+    acted: Option<DMatrix<f64>>,
+    /// dt of the place where the next element begins, if that moves.
+    moved: Option<Vec<f64>>,
+    nodes: Vec<Slopes>,
+    events: Vec<(usize, Vec<f64>)>,
+    /// Solves elements that events have cut.
+    probe: Option<Stepper<'m, M, N>>,
+}
+
+/// The start of an element moves, its end does not.
+const START: Direction = Direction {
+    time: 1.0,
+    length: -1.0,
+    parameter: None,
+    damping: 0.0,
+};
+
+/// The end moves alone.
+const END: Direction = Direction {
+    time: 0.0,
+    length: 1.0,
+    parameter: None,
+    damping: 0.0,
+};
+
+impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
+    fn new(model: Share<'m, M>, chosen: (Element, Control), indices: &[usize]) -> Self {
+        let parameter = |&index: &usize| {
+            let name = model.parameter_name(index);
+            let named = M::SENSITIVITIES.iter().position(|own| name.is(own));
+            Direction {
+                parameter: Some(named.map_or(Parameter::Any(index), Parameter::Named)),
+                ..Direction::default()
+            }
+        };
+        let parameters: Vec<_> = indices.iter().map(parameter).collect();
+        let columns = 2 * N + parameters.len();
+        Self {
+            model,
+            chosen,
+            indices: indices.to_vec(),
+            parameters,
+            current: DMatrix::identity(2 * N, columns),
+            acted: None,
+            moved: None,
+            nodes: Vec::new(),
+            events: Vec::new(),
+            probe: None,
+        }
+    }
+
+    fn into_sensitive(self, motion: Motion<N>) -> Sensitive<N> {
+        let names = self.indices.iter();
+        let names = names.map(|index| self.model.parameter_name(*index).to_string());
+        Sensitive::new(motion, names.collect(), self.nodes, self.events)
+    }
+
+    fn columns(&self) -> usize {
+        self.current.ncols()
+    }
+
+    /// The parameter that a column is by, among all.
+    fn parameter(&self, column: usize) -> Option<usize> {
+        self.indices.get(column.checked_sub(2 * N)?).copied()
+    }
+
+    /// The derivatives at the end of an element that `stepper` has done last, and the columns of more directions.
+    fn across(
+        &self,
+        stepper: &mut Stepper<'m, M, N>,
+        more: &[Direction],
+    ) -> Result<(DMatrix<f64>, DMatrix<f64>), TransitionError> {
+        let mut directions = self.parameters.clone();
+        directions.extend(self.moved.as_ref().map(|_| START));
+        directions.extend_from_slice(more);
+        let (own, all) = (self.columns(), 2 * N + directions.len());
+        let mut entries = vec![0.0; 2 * N * all];
+        stepper.linearise(&directions, &mut entries)?;
+        let matrix = DMatrix::from_row_slice(2 * N, all, &entries);
+        let mut next = matrix.columns(0, 2 * N) * &self.current;
+        let mut by_parameters = next.columns_mut(2 * N, self.parameters.len());
+        by_parameters += matrix.columns(2 * N, self.parameters.len());
+        if let Some(moved) = &self.moved {
+            for (mut column, dt) in next.column_iter_mut().zip(moved) {
+                column.axpy(*dt, &matrix.column(own), 1.0);
+            }
+        }
+        let more = matrix.columns(all - more.len(), more.len()).into_owned();
+        Ok((next, more))
+    }
+
+    /// The derivatives where an event has cut an element, before anything is done, at a fixed time; and the rate of the state there.
+    fn up_to(
+        &mut self,
+        severed: &Severed<'_, '_, N>,
+    ) -> Result<(DMatrix<f64>, DMatrix<f64>), TransitionError> {
+        if severed.inside {
+            let (element, control) = self.chosen;
+            let mut probe = match self.probe.take() {
+                Some(probe) => probe,
+                None => Stepper::sharing(self.model.clone(), element, control)?,
+            };
+            let mut state = *severed.before;
+            let length = severed.length;
+            probe.advance(severed.start, length, &mut state, severed.impulses)?;
+            let found = self.across(&mut probe, &[END]);
+            self.probe = Some(probe);
+            return found;
+        }
+        // Where the element begins.
+        if const { !M::CONSTRAINTS.is_empty() } {
+            return Err(TransitionError::NoStep);
+        }
+        let event = severed.event;
+        let (z, mut first) = (
+            match M::FORM {
+                Form::Lagrangian => &event.v,
+                Form::Hamiltonian => &event.p,
+            },
+            First::ZERO,
+        );
+        self.model.first(event.t, &event.q, z, &mut first);
+        let sign = match M::FORM {
+            Form::Lagrangian => 1.0,
+            Form::Hamiltonian => -1.0,
+        };
+        let mut rate = DMatrix::zeros(2 * N, 1);
+        for a in 0..N {
+            rate[a] = sign * first.q[a] + first.force[a];
+            rate[N + a] = event.v[a];
+        }
+        let mut next = self.current.clone();
+        if let Some(moved) = &self.moved {
+            // Time to the fixed place is what the start gains.
+            for (mut column, dt) in next.column_iter_mut().zip(moved) {
+                column.axpy(-dt, &rate.column(0), 1.0);
+            }
+        }
+        Ok((next, rate))
+    }
+
+    /// The derivatives after the act of an event, from those of the state and the time before it.
+    fn through(
+        &self,
+        severed: &Severed<'_, '_, N>,
+        (at, rate): (&DMatrix<f64>, &DMatrix<f64>),
+        times: &[f64],
+    ) -> Result<DMatrix<f64>, TransitionError> {
+        /// Weights of the values at 1, 2 and 3 distances: of sixth order.
+        const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
+        /// Distances relative to the state: the error of the formula is below roundings, and these are some 1e-13.
+        const DISTANCE: f64 = 2e-3;
+
+        let event = severed.event;
+        let largest = |values: &[f64; N]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let scale = |size: f64| if size > 0.0 { size } else { 1.0 };
+        // An event is where something vanishes, and be it the only coordinate: what it does in a step tells more.
+        let rate = Change::<N>::of_column(rate, 0);
+        let step = severed.step.abs();
+        let q = scale(largest(&event.q).max(step * largest(&rate.q)));
+        let p = scale(largest(&event.p).max(step * largest(&rate.p)));
+        let mut after = at.clone();
+        for (column, dt) in times.iter().enumerate() {
+            let change = Change::<N>::of_column(at, column);
+            let parameter = self.parameter(column);
+            let value = parameter.map_or(0.0, |index| self.model.parameter(index));
+            let mut size = (largest(&change.q) / q).max(largest(&change.p) / p);
+            if parameter.is_some() {
+                size = size.max(1.0 / scale(value.abs()));
+            }
+            if size == 0.0 && *dt == 0.0 {
+                continue;
+            }
+            let distance = DISTANCE / scale(size);
+            let moved = |s: f64| {
+                let state = State {
+                    q: std::array::from_fn(|a| event.q[a] + s * change.q[a]),
+                    p: std::array::from_fn(|a| event.p[a] + s * change.p[a]),
+                };
+                let t = event.t + s * dt;
+                let found = match parameter {
+                    None => state_after(&*self.model, severed.on, event, (t, &state)),
+                    Some(index) => {
+                        let other = self.model.with_parameter(index, value + s);
+                        let other = other.ok_or(StepError::from(ConstraintError::Parameter))?;
+                        state_after(&other, severed.on, event, (t, &state))
+                    }
+                };
+                let found = found.filter(|found| super::check_start(found).is_ok());
+                found.ok_or(TransitionError::from(StepError::NonFinite))
+            };
+            after.column_mut(column).fill(0.0);
+            for (k, weight) in (1..).zip(WEIGHTS) {
+                let s = f64::from(k) * distance;
+                let (high, low) = (moved(s)?, moved(-s)?);
+                for a in 0..N {
+                    after[(a, column)] += weight * (high.p[a] - low.p[a]) / distance;
+                    after[(N + a, column)] += weight * (high.q[a] - low.q[a]) / distance;
+                }
+            }
+        }
+        Ok(after)
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Tangents<'m, M, N> {
+    fn passed(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        _: &Passed<'_, N>,
+    ) -> Result<(), TransitionError> {
+        let (next, _) = self.across(stepper, &[])?;
+        (self.current, self.moved) = (next, None);
+        Ok(())
+    }
+
+    fn cut(&mut self, severed: &Severed<'_, '_, N>) -> Result<(), TransitionError> {
+        let (mut at, rate) = self.up_to(severed)?;
+        let event = severed.event;
+        let state = event.state();
+        let along = Along::new(
+            &*self.model,
+            Place {
+                t: event.t,
+                state: &state,
+                v: &event.v,
+            },
+        );
+        let slope = |change: &Change<N>| {
+            let velocity = along.velocity(change);
+            along.outputs(change, &velocity)[severed.column]
+        };
+        let by_time = slope(&Change {
+            t: 1.0,
+            ..Change::of_column(&rate, 0)
+        });
+        // g(t*, y(t*)) = 0: ġ dt* = −δg.
+        let times: Vec<f64> = (0..self.columns())
+            .map(|column| {
+                let change = Change {
+                    parameter: self.parameter(column),
+                    ..Change::of_column(&at, column)
+                };
+                -slope(&change) / by_time
+            })
+            .collect();
+        if !times.iter().all(|dt| dt.is_finite()) {
+            return Err(StepError::NonFinite.into());
+        }
+        for (mut column, dt) in at.column_iter_mut().zip(&times) {
+            column.axpy(*dt, &rate.column(0), 1.0);
+        }
+        self.acted = match severed.goes_on {
+            true => Some(self.through(severed, (&at, &rate), &times)?),
+            false => None,
+        };
+        self.current = at;
+        self.events.push((severed.number, times.clone()));
+        self.moved = Some(times);
+        Ok(())
+    }
+
+    fn acted(&mut self) {
+        if let Some(acted) = self.acted.take() {
+            self.current = acted;
+        }
+    }
+
+    fn recorded(&mut self, node: &Node<N>) {
+        let state = node.state();
+        let place = Place {
+            t: node.t,
+            state: &state,
+            v: &node.v,
+        };
+        let along = Along::new(&*self.model, place);
+        let columns = self.columns();
+        let mut slopes = Slopes {
+            state: self.current.clone(),
+            velocity: DMatrix::zeros(N, columns),
+            outputs: DMatrix::zeros(self.model.columns(), columns),
+        };
+        for column in 0..columns {
+            let change = Change {
+                // At an event the time moves, too.
+                t: self.moved.as_ref().map_or(0.0, |moved| moved[column]),
+                parameter: self.parameter(column),
+                ..Change::of_column(&self.current, column)
+            };
+            let velocity = along.velocity(&change);
+            slopes
+                .velocity
+                .column_mut(column)
+                .copy_from_slice(&velocity);
+            if slopes.outputs.nrows() > 0 {
+                let outputs = along.outputs(&change, &velocity);
+                slopes.outputs.column_mut(column).copy_from_slice(&outputs);
+            }
+        }
+        self.nodes.push(slopes);
+    }
+}

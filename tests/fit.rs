@@ -1,0 +1,336 @@
+//! Parameters found from measured motions.
+
+use tfe::fit::FitError;
+use tfe::prelude::*;
+use tfe::runtime::Model;
+use tfe::{RunErrorKind, runtime};
+
+/// A ball that falls through air.
+#[dynamics(
+    coordinates(y),
+    lagrangian = m/2*dot(y)^2 - m*g*y,
+    force(y) = -c*dot(y),
+    output(height) = y,
+    output(speed) = dot(y),
+)]
+struct Ball {
+    m: f64,
+    g: f64,
+    c: f64,
+}
+
+const TRUE: Ball = Ball {
+    m: 1.0,
+    g: 9.81,
+    c: 0.3,
+};
+
+fn times() -> Vec<f64> {
+    (0..=40).map(|k| 0.05 * f64::from(k)).collect()
+}
+
+/// Heights of the true ball, thrown upwards.
+fn heights() -> Vec<f64> {
+    let simulation = Simulation::new(&TRUE).step(0.05);
+    let motion = simulation
+        .run(TRUE.state([1.0], [4.0]), 0.0..2.0)
+        .expect("a throw");
+    motion.outputs().column("height").expect("declared")
+}
+
+/// Normal numbers with the deviation one, always the same.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        let mut uniform = || {
+            self.0 ^= self.0 << 13;
+            self.0 ^= self.0 >> 7;
+            self.0 ^= self.0 << 17;
+            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        // The sum of twelve uniform numbers has the variance one.
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+}
+
+#[test]
+fn exact_measurements_give_exact_parameters() {
+    let guess = Ball {
+        m: 1.0,
+        g: 8.0,
+        c: 0.0,
+    };
+    let fit = Fit::new(&guess)
+        .start(guess.state([1.0], [4.0]), 0.0)
+        .step(0.05)
+        .parameters(["g", "c"])
+        .output("height", times(), heights())
+        .solve()
+        .expect("a fit");
+    assert!((fit.value("g").expect("named") - 9.81).abs() < 1e-11);
+    assert!((fit.value("c").expect("named") - 0.3).abs() < 1e-11);
+    assert_eq!((fit.value("m"), fit.model().m), (None, 1.0));
+    assert_eq!(fit.model().g, fit.values()[0]);
+    assert!(fit.residuals().iter().all(|r| r.abs() < 1e-12));
+    assert_eq!(fit.residuals().len(), 41);
+    assert!(fit.trials().len() < 12, "{} runs", fit.trials().len());
+    assert_eq!(fit.trials()[0].values, [8.0, 0.0]);
+    assert!(fit.to_string().contains("g") && fit.to_string().contains("runs"));
+}
+
+/// As short as it can be: the start is found, too.
+#[test]
+fn a_start_that_is_not_told_is_found() {
+    let guess = Ball {
+        m: 1.0,
+        g: 8.0,
+        c: 0.1,
+    };
+    let (times, measured) = (times(), heights());
+    let fit = Fit::new(&guess)
+        .parameters(["g", "c"])
+        .output("height", &times, &measured)
+        .solve()
+        .expect("a fit");
+    assert!((fit.value("g").expect("named") - 9.81).abs() < 1e-9);
+    assert!((fit.value("c").expect("named") - 0.3).abs() < 1e-9);
+    assert!((fit.start().q[0] - 1.0).abs() < 1e-10 && (fit.start().p[0] - 4.0).abs() < 1e-9);
+    assert_eq!(fit.names().len(), 4);
+    // A coordinate by its name, from near by, with nothing else looked for.
+    let only_start = Fit::new(&TRUE)
+        .start_near(TRUE.state([0.5], [3.0]), 0.0)
+        .step(0.05)
+        .output("y", &times, &measured)
+        .solve()
+        .expect("a fit");
+    assert!((only_start.start().p[0] - 4.0).abs() < 1e-11);
+}
+
+/// Two links with friction in both joints and a spring in the second.
+#[dynamics(
+    coordinates(theta[2]),
+    let x1 = l1*sin(theta[0]), let y1 = -l1*cos(theta[0]),
+    let x2 = x1 + l2*sin(theta[1]), let y2 = y1 - l2*cos(theta[1]),
+    let bend = theta[1] - theta[0],
+    lagrangian = (dot(x1)^2 + dot(y1)^2)/2 + m2/2*(dot(x2)^2 + dot(y2)^2) - g*(y1 + m2*y2) - k/2*bend^2,
+    force(theta[0]) = -c1*dot(theta[0]) + c2*dot(bend),
+    force(theta[1]) = -c2*dot(bend),
+)]
+struct Links {
+    l1: f64,
+    l2: f64,
+    m2: f64,
+    g: f64,
+    k: f64,
+    c1: f64,
+    c2: f64,
+}
+
+/// Six parameters of a double pendulum from noisy angles: what is found is off by what the covariance says.
+#[test]
+fn noise_moves_parameters_by_their_covariance() {
+    const NAMES: [&str; 6] = ["l1", "l2", "m2", "k", "c1", "c2"];
+    let truth = Links {
+        l1: 1.0,
+        l2: 0.8,
+        m2: 0.6,
+        g: 9.81,
+        k: 0.5,
+        c1: 0.08,
+        c2: 0.05,
+    };
+    let start = truth.state([1.1, -0.7], [0.0, 0.0]);
+    let simulation = Simulation::new(&truth).step(0.025);
+    let motion = simulation.run(start, 0.0..5.0).expect("a motion");
+    let times: Vec<f64> = motion.states().iter().map(|node| node.t).collect();
+    let guess = Links {
+        l1: 1.05,
+        l2: 0.75,
+        m2: 0.7,
+        k: 0.3,
+        c1: 0.0,
+        c2: 0.1,
+        ..truth
+    };
+    let mut squares = Vec::new();
+    for seed in 1..=10 {
+        let mut noise = Noise(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let angles = [0, 1].map(|a| {
+            let nodes = motion.states().iter();
+            nodes
+                .map(|node| node.q[a] + 0.01 * noise.next())
+                .collect::<Vec<_>>()
+        });
+        let fit = Fit::new(&guess)
+            .start(start, 0.0)
+            .step(0.025)
+            .parameters(NAMES)
+            .bounds("c1", 0.0..)
+            .bounds("c2", 0.0..=1.0)
+            .output_within("theta[0]", &times, &angles[0], 0.01)
+            .output_within("theta[1]", &times, &angles[1], 0.01)
+            .solve()
+            .expect("a fit");
+        assert!(fit.trials().len() < 40, "{} runs", fit.trials().len());
+        let off: Vec<f64> = NAMES
+            .iter()
+            .zip(fit.values())
+            .map(|(name, value)| {
+                let index = truth.find_parameter(name).expect("a parameter");
+                value - truth.parameter(index)
+            })
+            .collect();
+        let inverse = fit.covariance().clone().try_inverse().expect("regular");
+        let mut square = 0.0;
+        for a in 0..6 {
+            for b in 0..6 {
+                square += off[a] * inverse[(a, b)] * off[b];
+            }
+        }
+        squares.push(square);
+        // Of (y − m)/σ the mean square is one.
+        let mean =
+            fit.residuals().iter().map(|r| r * r).sum::<f64>() / fit.residuals().len() as f64;
+        assert!((mean - 1.0).abs() < 0.2, "{mean}");
+    }
+    // χ² of six: the mean of ten is 6 ± 1.1, and one in a thousand is above 22.5.
+    let mean = squares.iter().sum::<f64>() / 10.0;
+    assert!(mean > 2.5 && mean < 10.0, "{squares:?}");
+    assert!(squares.iter().all(|one| *one < 22.5), "{squares:?}");
+}
+
+/// A bound that the truth lies beyond is where the parameter ends.
+#[test]
+fn bounds_hold() {
+    let guess = Ball {
+        m: 1.0,
+        g: 8.0,
+        c: 0.0,
+    };
+    let fit = Fit::new(&guess)
+        .start(guess.state([1.0], [4.0]), 0.0)
+        .step(0.05)
+        .parameters(["g", "c"])
+        .bounds("g", ..=9.5)
+        .output("height", times(), heights())
+        .solve()
+        .expect("a fit");
+    let g = fit.value("g").expect("named");
+    assert!(g <= 9.5 && g > 9.499, "{g}");
+}
+
+#[test]
+fn what_cannot_be_fitted_is_told() {
+    let (times, measured) = (times(), heights());
+    let start = TRUE.state([1.0], [4.0]);
+    let fit = || Fit::new(&TRUE).start(start, 0.0).step(0.05);
+    let with = |fit: Fit<'_, Ball, 1>| fit.output("height", &times, &measured).solve().map(|_| ());
+    let error = |fit: Fit<'_, Ball, 1>| fit.solve().map(|_| ()).expect_err("no fit");
+    assert_eq!(with(fit()), Err(FitError::NothingUnknown));
+    assert_eq!(error(fit().parameters(["g"])), FitError::NothingMeasured);
+    for names in [["g", "h"], ["g", "g"]] {
+        let told = with(fit().parameters(names)).expect_err("no fit");
+        assert!(matches!(&told, FitError::NoParameter { known, .. } if known.len() == 3));
+        assert!(told.to_string().contains("`m`, `g`, `c`"));
+    }
+    let told = error(fit().parameters(["g"]).output("hight", &times, &measured));
+    assert!(told.to_string().contains("`height`"), "{told}");
+    let too_few = fit()
+        .parameters(["g"])
+        .output("height", &times[1..], &measured);
+    assert!(matches!(error(too_few), FitError::Measured { .. }));
+    let odd = fit().parameters(["g"]).output("height", [1.0], [f64::NAN]);
+    assert!(matches!(error(odd), FitError::Measured { .. }));
+    let odd = fit()
+        .parameters(["g"])
+        .output_within("height", [1.0], [0.5], 0.0);
+    assert!(matches!(error(odd), FitError::Measured { .. }));
+    let early = fit().parameters(["g"]).output("height", [-1.0], [0.5]);
+    assert_eq!(
+        error(early),
+        FitError::Early {
+            time: -1.0,
+            start: 0.0
+        }
+    );
+    let few = fit().parameters(["g", "c"]).output("height", [1.0], [0.5]);
+    assert!(matches!(
+        error(few),
+        FitError::TooFew {
+            values: 1,
+            unknowns: 2
+        }
+    ));
+    let outside = with(fit().parameters(["c"]).bounds("c", 1.0..2.0));
+    assert!(matches!(outside, Err(FitError::Bounds { value: 0.3, .. })));
+    let stray = with(fit().parameters(["c"]).bounds("g", 1.0..2.0));
+    assert!(
+        stray
+            .expect_err("no fit")
+            .to_string()
+            .contains("not looked for")
+    );
+    // A motion that does not depend on the mass for itself, only on c/m: both cannot be told.
+    let rest = TRUE.state([1.0], [0.0]);
+    let both = Fit::new(&TRUE)
+        .start(rest, 0.0)
+        .step(0.05)
+        .parameters(["m", "c"]);
+    let told = with(both).expect_err("no fit");
+    assert!(
+        matches!(told, FitError::Undetermined { .. }),
+        "{told:?} {told}"
+    );
+    // The first run fails.
+    let broken = Fit::new(&TRUE)
+        .start(start, 0.0)
+        .step(f64::NAN)
+        .parameters(["g"]);
+    assert!(matches!(
+        with(broken),
+        Err(FitError::Run(RunErrorKind::Step { .. }))
+    ));
+    let nowhere = Fit::new(&TRUE).start(start, f64::NAN).parameters(["g"]);
+    assert!(matches!(with(nowhere), Err(FitError::Early { .. })));
+}
+
+/// The start of a model with constraints must be told; the parameter of a constraint can be found.
+#[test]
+fn constrained_models_are_fitted() {
+    #[dynamics(
+        coordinates(x, y),
+        lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+        constraint(rod) = x^2 + y^2 - l^2,
+    )]
+    struct Rod {
+        m: f64,
+        g: f64,
+        l: f64,
+    }
+    let rod = Rod {
+        m: 1.0,
+        g: 9.81,
+        l: 1.0,
+    };
+    let start = rod.state([0.6, -0.8], [0.0, 0.0]);
+    let simulation = Simulation::new(&rod).step(0.02);
+    let motion = simulation.run(start, 0.0..2.0).expect("a motion");
+    let times: Vec<f64> = motion.states().iter().map(|node| node.t).collect();
+    let measured: Vec<f64> = motion.states().iter().map(|node| node.q[0]).collect();
+    let guess = Rod { g: 9.0, ..rod };
+    let fit = |guess: &Rod| {
+        let fit = Fit::new(guess).step(0.02).parameters(["g"]);
+        fit.output("x", &times, &measured)
+            .solve()
+            .map(|fit| fit.values()[0])
+    };
+    assert_eq!(fit(&guess), Err(FitError::StartOfConstraints));
+    let fit = Fit::new(&guess)
+        .start(start, 0.0)
+        .step(0.02)
+        .parameters(["g"]);
+    let found = fit.output("x", &times, &measured).solve().expect("a fit");
+    assert!((found.values()[0] - 9.81).abs() < 1e-10);
+    let _: &runtime::Statistics = found.motion().statistics();
+}
