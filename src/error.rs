@@ -37,6 +37,20 @@ pub enum RunErrorKind {
         /// The last time up to which it is as small as asked; `None` where it is larger from the first comparison on.
         until: Option<f64>,
     },
+    /// A loss names an output that the model does not declare.
+    NoOutput {
+        /// The name asked for.
+        name: String,
+        /// Those that there are.
+        known: Vec<String>,
+    },
+    /// Values of a loss that cannot be used.
+    Loss {
+        /// Their output.
+        name: String,
+        /// What is wrong with them.
+        why: &'static str,
+    },
     /// The ends of the span are not finite.
     Span {
         /// The start asked for.
@@ -220,6 +234,14 @@ impl fmt::Display for RunErrorKind {
                     "a step of {step} is not resolved at t = {time}, where the least is {least:.1e}: count time from an origin near the motion"
                 )
             }
+            Self::NoOutput { name, known } => {
+                let known = match known.is_empty() {
+                    true => "none".to_owned(),
+                    false => known.join(", "),
+                };
+                write!(f, "there is no output `{name}`: the model declares {known}")
+            }
+            Self::Loss { name, why } => write!(f, "the values of `{name}` in the loss: {why}"),
             Self::NoEvent { name, known } if known.is_empty() => {
                 write!(
                     f,

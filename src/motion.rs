@@ -235,6 +235,27 @@ impl<const N: usize> Motion<N> {
         self.nodes.last().expect("a motion is made with its start")
     }
 
+    /// The place of the recorded node that is nearest to a time.
+    pub(crate) fn nearest(&self, time: f64) -> usize {
+        let direction = if self.last().t < self.nodes[0].t {
+            -1.0
+        } else {
+            1.0
+        };
+        let after = (self.nodes).partition_point(|node| direction * node.t < direction * time);
+        let before = after.saturating_sub(1);
+        let far = |node: usize| {
+            self.nodes
+                .get(node)
+                .map_or(f64::INFINITY, |n| (n.t - time).abs())
+        };
+        if far(before) < far(after) {
+            before
+        } else {
+            after
+        }
+    }
+
     /// The recorded nodes, in the order of time.
     pub fn states(&self) -> &[Node<N>] {
         &self.nodes

@@ -1,11 +1,14 @@
 //! A motion with its derivatives by parameters and by its start.
 
+pub(crate) mod loss;
 pub(crate) mod slopes;
 
 use crate::motion::{Motion, Node};
 use nalgebra::DMatrix;
 use std::fmt;
 use tfe_runtime::State;
+
+pub use loss::{Loss, LossGradient};
 
 /// A motion together with its derivatives by the parameters of its model and by its start, from [`Simulation::run_sensitive`](crate::Simulation::run_sensitive).
 ///
@@ -132,6 +135,11 @@ impl<const N: usize> Sensitive<N> {
         let all: Vec<f64> = slopes.row(row).iter().copied().collect();
         let (by_start, by_parameters) = all.split_at(2 * N);
         (value, by_parameters.to_vec(), by_start.to_vec())
+    }
+
+    /// The derivatives of (p, q) at a node, a column for each number of the start and each parameter.
+    pub(crate) fn state_slopes(&self, node: usize) -> &DMatrix<f64> {
+        &self.nodes[node].state
     }
 
     /// The derivatives at the last node.

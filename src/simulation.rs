@@ -6,6 +6,7 @@ mod course;
 mod events;
 pub(crate) mod family;
 mod follow;
+mod gradient;
 mod held;
 mod inputs;
 pub(crate) mod mesh;

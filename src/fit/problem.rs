@@ -315,18 +315,11 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
         let count = self.columns.iter().map(|one| one.times.len()).sum();
         let mut residuals = Vec::with_capacity(count);
         let mut slopes = DMatrix::zeros(count, self.unknowns.len());
-        let nodes = sensitive.motion().states();
+        let motion = sensitive.motion();
         for column in &self.columns {
             for (t, measured) in column.times.iter().zip(column.values) {
                 // Elements end there.
-                let after = nodes.partition_point(|node| node.t < *t);
-                let before = after.saturating_sub(1);
-                let far = |node: usize| nodes.get(node).map_or(f64::INFINITY, |n| (n.t - t).abs());
-                let node = if far(before) < far(after) {
-                    before
-                } else {
-                    after
-                };
+                let node = motion.nearest(*t);
                 let (value, by_parameters, by_start) = match column.place {
                     Observed::Output(place) => sensitive.output_at(node, place),
                     Observed::Coordinate(a) => sensitive.coordinate_at(node, a),

@@ -23,6 +23,14 @@ pub(crate) struct Change<const N: usize> {
 }
 
 impl<const N: usize> Change<N> {
+    /// No change.
+    pub(crate) const ZERO: Self = Self {
+        t: 0.0,
+        q: [0.0; N],
+        p: [0.0; N],
+        parameter: None,
+    };
+
     /// A column of a matrix whose rows are ordered (p, q).
     pub(crate) fn of_column(matrix: &DMatrix<f64>, column: usize) -> Self {
         Self {

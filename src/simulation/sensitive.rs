@@ -69,6 +69,22 @@ struct Tangents<'m, M, const N: usize> {
     probe: Option<Stepper<'m, M, N>>,
 }
 
+/// Parameters, by their index among all, as directions: with kernels of their own where the model has them.
+pub(super) fn directions<M: Model<N>, const N: usize>(
+    model: &M,
+    indices: &[usize],
+) -> Vec<Direction> {
+    let parameter = |&index: &usize| {
+        let name = model.parameter_name(index);
+        let named = M::SENSITIVITIES.iter().position(|own| name.is(own));
+        Direction {
+            parameter: Some(named.map_or(Parameter::Any(index), Parameter::Named)),
+            ..Direction::default()
+        }
+    };
+    indices.iter().map(parameter).collect()
+}
+
 /// The start of an element moves, its end does not.
 const START: Direction = Direction {
     time: 1.0,
@@ -87,15 +103,7 @@ const END: Direction = Direction {
 
 impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
     fn new(model: Share<'m, M>, chosen: (Element, Control), indices: &[usize]) -> Self {
-        let parameter = |&index: &usize| {
-            let name = model.parameter_name(index);
-            let named = M::SENSITIVITIES.iter().position(|own| name.is(own));
-            Direction {
-                parameter: Some(named.map_or(Parameter::Any(index), Parameter::Named)),
-                ..Direction::default()
-            }
-        };
-        let parameters: Vec<_> = indices.iter().map(parameter).collect();
+        let parameters = directions(&*model, indices);
         let columns = 2 * N + parameters.len();
         Self {
             model,

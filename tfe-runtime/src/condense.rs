@@ -249,6 +249,92 @@ impl System<'_> {
     }
 }
 
+/// What is made of the linear system of an element.
+pub(crate) enum Asked<'a> {
+    /// The derivatives of the end, row by row, with the columns of the sides.
+    Matrix(&'a mut [f64]),
+    /// Their product with λ, from the left: that with the columns of the start takes the place of λ, those of the directions are added to others.
+    Product(&'a mut [f64], &'a mut [f64]),
+}
+
+impl System<'_> {
+    /// The product (T-127): one solution with the transposed factors, whatever the number of columns. The residual holds λᵀ ∂(end)/∂(interior).
+    pub(crate) fn product(
+        self,
+        lambda: &mut [f64],
+        by_direction: &mut [f64],
+    ) -> Result<(), StepError> {
+        let (size, columns) = (self.residual.len(), self.columns());
+        lu::factor(size, self.tangent, self.pivots).map_err(|singular| {
+            StepError::SingularTangent {
+                unknown: singular.column,
+            }
+        })?;
+        lu::solve_transposed(size, self.tangent, self.pivots, self.residual);
+        for (weight, side) in self.residual.iter().zip(self.sides.chunks_exact(columns)) {
+            let sums = lambda.iter_mut().chain(by_direction.iter_mut());
+            for (sum, entry) in sums.zip(side) {
+                *sum += weight * entry;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// λᵀ ∂(end)/∂(interior) into `weights`, and what λ has of directions at a fixed interior, in phase space.
+pub(crate) fn phase_weights<const N: usize>(
+    scheme: &SchemeRef<'_>,
+    h: f64,
+    x: &[f64],
+    directions: &[Direction],
+    (lambda, by_direction, weights): (&[f64], &mut [f64], &mut [f64]),
+) {
+    let half = scheme.points() * N;
+    weights.fill(0.0);
+    for (row, lambda) in lambda.iter().enumerate() {
+        let (block, a) = (row / N, row % N);
+        for (l, weight) in scheme.weights.iter().enumerate() {
+            let at = block * half + l * N + a;
+            weights[at] += h * weight * lambda;
+            for (sum, direction) in by_direction.iter_mut().zip(directions) {
+                *sum += direction.length * weight * x[at] * lambda;
+            }
+        }
+    }
+}
+
+/// The same for velocities, with what λ has of the coordinates at the start.
+pub(crate) fn velocity_weights<const N: usize>(
+    scheme: &SchemeRef<'_>,
+    h: f64,
+    x: &[f64],
+    (directions, forces): (&[Direction], &EndForces<'_, N>),
+    (lambda, by_direction, weights): (&mut [f64], &mut [f64], &mut [f64]),
+) {
+    weights.fill(0.0);
+    let (of_p, of_q) = lambda.split_at_mut(N);
+    for (a, of_q) in of_q.iter().enumerate() {
+        for (j, weight) in scheme.advance.iter().enumerate() {
+            let at = j * N + a;
+            weights[at] += h * weight * of_q;
+            for (sum, direction) in by_direction.iter_mut().zip(directions) {
+                *sum += direction.length * weight * x[at] * of_q;
+            }
+        }
+    }
+    for (a, of_p) in of_p.iter().enumerate() {
+        add(
+            weights,
+            *of_p,
+            &forces.by_interior[a * x.len()..][..x.len()],
+        );
+        add(of_q, *of_p, &forces.by_start[a]);
+        for (sum, by_direction) in by_direction.iter_mut().zip(&*forces.by_direction) {
+            *sum += by_direction[a] * of_p;
+        }
+    }
+}
+
 impl<M, const N: usize> VelocityForm<'_, M, N>
 where
     M: Model<N>,

@@ -19,7 +19,7 @@ pub use instant::{Gradients, gradients, reactions};
 pub use node::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
 
 pub(crate) use advance::advance;
-pub(crate) use derivative::linearise;
+pub(crate) use derivative::{linearise, product};
 pub(crate) use layout::refused;
 
 use rows::{Rows, norm};

@@ -71,6 +71,27 @@ pub fn solve(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64])
     }
 }
 
+/// Solves Aᵀ x = b in place with the factors of A.
+pub(crate) fn solve_transposed(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64]) {
+    for row in 0..size {
+        let mut sum = vector[row];
+        for j in 0..row {
+            sum -= factors[j * size + row] * vector[j];
+        }
+        vector[row] = sum / factors[row * size + row];
+    }
+    for row in (0..size).rev() {
+        let mut sum = vector[row];
+        for j in row + 1..size {
+            sum -= factors[j * size + row] * vector[j];
+        }
+        vector[row] = sum;
+    }
+    for k in (0..size).rev() {
+        vector.swap(k, pivots[k]);
+    }
+}
+
 /// Solves A X = B in place with the factors of A, `columns` right sides at once, B row by row.
 pub(crate) fn solve_columns(factors: &[f64], pivots: &[usize], columns: usize, sides: &mut [f64]) {
     let size = pivots.len();

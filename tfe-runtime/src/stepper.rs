@@ -666,19 +666,9 @@ where
             product[row * columns + row] = 1.0;
         }
         let (mut factor, mut next) = (vec![0.0; needed], vec![0.0; needed]);
-        let begin = self.pieces[0].last.t;
-        let length: f64 = self.pieces.iter().map(|piece| piece.last.h).sum();
         // The last one leaves the stepper as the step has left it.
         for piece in 0..self.pieces.len() {
-            let Last { t, h, .. } = self.pieces[piece].last;
-            let own: Vec<_> = directions
-                .iter()
-                .map(|direction| Direction {
-                    time: direction.time + (t - begin) / length * direction.length,
-                    length: h / length * direction.length,
-                    ..*direction
-                })
-                .collect();
+            let own = self.of_piece(directions, piece);
             self.recall(piece);
             self.linearise_last(&own, &mut factor)?;
             for row in 0..width {
@@ -700,6 +690,46 @@ where
         Ok(())
     }
 
+    /// Multiplies the matrix of [`linearise`](Self::linearise) with `lambda`, 2N numbers ordered (p, q), from the left: its columns of the start take the place of `lambda`,
+    /// those of the directions are added to `by_direction`. Without constraints the cost does not grow with the number of directions but for their explicit derivatives.
+    ///
+    /// # Errors
+    /// As [`transition`](Self::transition).
+    pub fn adjoint(
+        &mut self,
+        directions: &[Direction],
+        lambda: &mut [f64],
+        by_direction: &mut [f64],
+    ) -> Result<(), TransitionError> {
+        if self.passes_node {
+            return Err(StepError::from(ConstraintError::RankChanged).into());
+        }
+        if self.pieces.is_empty() {
+            return self.adjoint_of_last(directions, lambda, by_direction);
+        }
+        for piece in (0..self.pieces.len()).rev() {
+            let own = self.of_piece(directions, piece);
+            self.recall(piece);
+            self.adjoint_of_last(&own, lambda, by_direction)?;
+        }
+        // The stepper is where the step has left it.
+        self.recall(self.pieces.len() - 1);
+        Ok(())
+    }
+
+    /// The directions of a piece of the last step, as parts of those of the whole.
+    fn of_piece(&self, directions: &[Direction], piece: usize) -> Vec<Direction> {
+        let begin = self.pieces[0].last.t;
+        let length: f64 = self.pieces.iter().map(|piece| piece.last.h).sum();
+        let Last { t, h, .. } = self.pieces[piece].last;
+        let own = |direction: &Direction| Direction {
+            time: direction.time + (t - begin) / length * direction.length,
+            length: h / length * direction.length,
+            ..*direction
+        };
+        directions.iter().map(own).collect()
+    }
+
     /// Goes back to where a piece of the last step has ended.
     fn recall(&mut self, piece: usize) {
         let piece = &self.pieces[piece];
@@ -715,6 +745,34 @@ where
         &mut self,
         directions: &[Direction],
         matrix: &mut [f64],
+    ) -> Result<(), TransitionError> {
+        self.of_last(directions, |method, memory, workspace, extra, given| {
+            method.linearise(memory, workspace, extra, given, matrix)
+        })
+    }
+
+    fn adjoint_of_last(
+        &mut self,
+        directions: &[Direction],
+        lambda: &mut [f64],
+        by_direction: &mut [f64],
+    ) -> Result<(), TransitionError> {
+        self.of_last(directions, |method, memory, workspace, extra, given| {
+            method.adjoint(memory, workspace, extra, given, (lambda, by_direction))
+        })
+    }
+
+    /// Differentiates the last step with what is known of it.
+    fn of_last(
+        &mut self,
+        directions: &[Direction],
+        differentiate: impl FnOnce(
+            Method<'_, M, SchemeTable>,
+            &mut Memory<N>,
+            Workspace<'_>,
+            &mut [f64],
+            (&[Impulse<N>], &[Direction]),
+        ) -> Result<(), TransitionError>,
     ) -> Result<(), TransitionError> {
         let element = self.table.view().element;
         let constraints = M::CONSTRAINTS.len();
@@ -734,13 +792,8 @@ where
             tables: &self.table,
             control: self.control,
         };
-        method.linearise(
-            &mut self.memory,
-            workspace,
-            &mut extra,
-            (&self.impulses, directions),
-            matrix,
-        )
+        let given = (self.impulses.as_slice(), directions);
+        differentiate(method, &mut self.memory, workspace, &mut extra, given)
     }
 
     /// The model that is stepped.

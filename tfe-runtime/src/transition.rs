@@ -5,11 +5,13 @@
 
 use core::fmt;
 
-use crate::condense::{Direction, EndForces, System, phase_ends, velocity_ends};
+use crate::condense::{
+    Asked, Direction, EndForces, System, phase_ends, phase_weights, velocity_ends, velocity_weights,
+};
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
-use crate::constrained::linearise;
 use crate::constrained::rows::Rows;
+use crate::constrained::{linearise, product as constrained_product};
 use crate::element::ElementError;
 use crate::equations::Span;
 use crate::error::StepError;
@@ -145,6 +147,53 @@ where
     where
         M: Model<N>,
     {
+        let needed = 2 * N * (2 * N + directions.len());
+        if matrix.len() < needed {
+            let given = matrix.len();
+            return Err(TransitionError::Shape { needed, given });
+        }
+        let asked = Asked::Matrix(&mut matrix[..needed]);
+        self.differentiate(memory, workspace, extra, (impulses, directions), asked)
+    }
+
+    /// Multiplies that matrix with `lambda`, 2N numbers, from the left: its first 2N columns take the place of `lambda`, the others are added to the g numbers `by_direction`. Without
+    /// constraints it costs one solution with the factors of the tangent, whatever the number of directions.
+    ///
+    /// # Errors
+    /// As [`transition`](Self::transition).
+    pub fn adjoint<const N: usize>(
+        &self,
+        memory: &mut Memory<N>,
+        workspace: Workspace<'_>,
+        extra: &mut [f64],
+        (impulses, directions): (&[Impulse<N>], &[Direction]),
+        (lambda, by_direction): (&mut [f64], &mut [f64]),
+    ) -> Result<(), TransitionError>
+    where
+        M: Model<N>,
+    {
+        let (needed, given) = (
+            2 * N + directions.len(),
+            lambda.len().min(2 * N) + by_direction.len(),
+        );
+        if lambda.len() != 2 * N || by_direction.len() != directions.len() {
+            return Err(TransitionError::Shape { needed, given });
+        }
+        let asked = Asked::Product(lambda, by_direction);
+        self.differentiate(memory, workspace, extra, (impulses, directions), asked)
+    }
+
+    fn differentiate<const N: usize>(
+        &self,
+        memory: &mut Memory<N>,
+        workspace: Workspace<'_>,
+        extra: &mut [f64],
+        (impulses, directions): (&[Impulse<N>], &[Direction]),
+        asked: Asked<'_>,
+    ) -> Result<(), TransitionError>
+    where
+        M: Model<N>,
+    {
         let Some(last) = memory.last else {
             return Err(TransitionError::NoStep);
         };
@@ -160,13 +209,6 @@ where
             }
             .into());
         }
-        if matrix.len() < 2 * N * columns {
-            return Err(TransitionError::Shape {
-                needed: 2 * N * columns,
-                given: matrix.len(),
-            });
-        }
-        let matrix = &mut matrix[..2 * N * columns];
         let interval = Interval {
             start: last.t,
             length: last.h,
@@ -220,8 +262,14 @@ where
                 active: parts.active,
                 impulse: total(impulses),
             };
-            let linearised =
-                linearise(&mut form, parts.unknowns, directions, false, system, matrix);
+            let x = &*parts.unknowns;
+            let linearised = match asked {
+                Asked::Matrix(matrix) => linearise(&mut form, x, directions, false, system, matrix),
+                Asked::Product(lambda, by_direction) => {
+                    let sums = (lambda, by_direction);
+                    constrained_product(&mut form, x, directions, system, sums)
+                }
+            };
             if is_combined {
                 for place in layout.multipliers() {
                     form.rows.declared_multipliers(&mut parts.unknowns[place]);
@@ -241,15 +289,18 @@ where
                 statistics: &mut memory.statistics,
             };
             system.of_phase(&mut equations, parts.unknowns, directions);
-            let sides = system.solve()?.sides;
-            phase_ends::<N>(
-                &equations.scheme,
-                span.h,
-                parts.unknowns,
-                directions,
-                sides,
-                matrix,
-            );
+            let (scheme, x) = (&equations.scheme, &*parts.unknowns);
+            match asked {
+                Asked::Matrix(matrix) => {
+                    let sides = system.solve()?.sides;
+                    phase_ends::<N>(scheme, span.h, x, directions, sides, matrix);
+                }
+                Asked::Product(lambda, by_direction) => {
+                    let sums = (&*lambda, &mut *by_direction, &mut *system.residual);
+                    phase_weights::<N>(scheme, span.h, x, directions, sums);
+                    system.product(lambda, by_direction)?;
+                }
+            }
         } else {
             let mut equations = VelocityForm {
                 model: self.model,
@@ -264,16 +315,18 @@ where
             };
             let mut forces = EndForces::of(forces, m);
             system.of_velocities(&mut equations, parts.unknowns, directions, &mut forces)?;
-            let (sides, h) = (system.solve()?.sides, span.h);
-            velocity_ends(
-                &scheme,
-                h,
-                parts.unknowns,
-                directions,
-                &forces,
-                sides,
-                matrix,
-            );
+            let (x, h) = (&*parts.unknowns, span.h);
+            match asked {
+                Asked::Matrix(matrix) => {
+                    let sides = system.solve()?.sides;
+                    velocity_ends(&scheme, h, x, directions, &forces, sides, matrix);
+                }
+                Asked::Product(lambda, by_direction) => {
+                    let sums = (&mut *lambda, &mut *by_direction, &mut *system.residual);
+                    velocity_weights(&scheme, h, x, (directions, &forces), sums);
+                    system.product(lambda, by_direction)?;
+                }
+            }
         }
         Ok(())
     }

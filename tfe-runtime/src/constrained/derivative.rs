@@ -119,6 +119,47 @@ where
     Ok(())
 }
 
+/// The product of what [`linearise`] writes with λ from the left: that with the columns of the start takes the place of λ, those of the directions are added to others.
+#[cfg(feature = "alloc")]
+pub(crate) fn product<M, const N: usize>(
+    form: &mut ConstrainedForm<'_, M, N>,
+    x: &[f64],
+    directions: &[Direction],
+    system: System<'_>,
+    (lambda, by_direction): (&mut [f64], &mut [f64]),
+) -> Result<(), StepError>
+where
+    M: Model<N>,
+{
+    let columns = 2 * N + directions.len();
+    let mut ends = vec![0.0; 2 * N * columns];
+    linearise(form, x, directions, false, system, &mut ends)?;
+    let weights = lambda.to_vec();
+    lambda.fill(0.0);
+    for (weight, row) in weights.iter().zip(ends.chunks_exact(columns)) {
+        let sums = lambda.iter_mut().chain(by_direction.iter_mut());
+        for (sum, entry) in sums.zip(row) {
+            *sum += weight * entry;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "alloc"))]
+pub(crate) fn product<M, const N: usize>(
+    _: &mut ConstrainedForm<'_, M, N>,
+    _: &[f64],
+    _: &[Direction],
+    _: System<'_>,
+    _: (&mut [f64], &mut [f64]),
+) -> Result<(), StepError>
+where
+    M: Model<N>,
+{
+    // Gradients are asked for where there is an allocator.
+    Err(StepError::NonFinite)
+}
+
 #[cfg(not(feature = "alloc"))]
 fn along<M, const N: usize>(
     _: &mut ConstrainedForm<'_, M, N>,
