@@ -50,6 +50,9 @@ pub use fitted::{Fitted, Trial};
 /// # }
 /// ```
 ///
+/// Least squares find the nearest minimum: where motions oscillate, the first parameters must keep their phase over the measurements. If they do not, a fit of the first few swings makes better
+/// ones for a fit of all, as in `examples/pendulum_fit.rs`.
+///
 /// Without a [`start`](Self::start) the state at the first time is unknown, too, and looked for from rest at zero on; [`start_near`](Self::start_near) tells a better guess.
 #[derive(Debug)]
 pub struct Fit<'m, M, const N: usize> {

@@ -267,7 +267,9 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
         let method = LevenbergMarquardt::new()
             .with_ftol(TOLERANCE)
             .with_xtol(TOLERANCE)
-            .with_gtol(TOLERANCE);
+            .with_gtol(TOLERANCE)
+            // First steps of the size of the unknowns, not a hundred times as long.
+            .with_stepbound(1.0);
         let (done, report) = method.minimize(self);
         use TerminationReason::{Converged, NoImprovementPossible, Orthogonal, ResidualsZero};
         let values = done.unknowns.values(done.numbers.as_slice()).0;
