@@ -113,3 +113,36 @@ fn specialised_solvers_do_not_allocate() {
     });
     assert_eq!(count.count_total, 0);
 }
+
+/// A loop of control: what is set before every step, and the node after it.
+#[test]
+fn loops_of_control_do_not_allocate() {
+    #[dynamics(
+        coordinates(x, theta),
+        lagrangian = dot(x)^2/2 + l*dot(x)*dot(theta)*cos(theta)/2 + l^2*dot(theta)^2/2 - 9.81*l*cos(theta),
+        input(u),
+        force(x) = u,
+        output(tip) = x + l*sin(theta),
+    )]
+    struct Cart {
+        l: f64,
+    }
+    let cart = Cart { l: 0.5 };
+    let start = cart.state([0.0, 0.05], [0.0; 2]);
+    let run = Simulation::new(&cart).step(0.005).hold(start, 0.0);
+    let mut run = run.expect("a loop");
+    let mut steps = |count: u32| {
+        for _ in 0..count {
+            let node = run.node();
+            let u = 2.0 * node.q[0] + 3.0 * node.v[0] + 60.0 * node.q[1] + 12.0 * node.v[1];
+            run.set("u", u);
+            run.advance().expect("a step");
+        }
+        run.node().q[1]
+    };
+    steps(10);
+    let mut angle = f64::NAN;
+    let used = measure(|| angle = steps(1000));
+    assert!(angle.abs() < 0.05, "{angle}");
+    assert_eq!(used.count_total, 0);
+}
