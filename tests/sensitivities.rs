@@ -505,6 +505,89 @@ fn derivatives_go_through_bounces() {
     assert!((speeds[at] + rate).abs() < 1e-13 && (speeds[at + 1] - 0.8 * rate).abs() < 1e-12);
 }
 
+/// The same ball with an input, whose model belongs to the run; and in velocities of a Hamiltonian, whose mass the momentum after the bounce depends on.
+#[test]
+fn derivatives_go_through_events_of_other_models() {
+    #[dynamics(
+        coordinates(y),
+        lagrangian = m/2*dot(y)^2 - m*g*y,
+        input(u),
+        force(y) = u,
+        event(impact) = y,
+    )]
+    struct Pushed {
+        m: f64,
+        g: f64,
+    }
+    #[dynamics(
+        coordinates(y),
+        momenta(p),
+        hamiltonian = p^2/(2*m) + m*g*y,
+        event(impact) = y,
+    )]
+    struct Canonical {
+        m: f64,
+        g: f64,
+    }
+    fn bounce<const N: usize>(event: &tfe::simulation::Occurrence<'_, N>) -> Act<N> {
+        // Faster the faster it comes: not linear.
+        Act::Restart(event.state_with_velocity(event.v.map(|v| -0.8 * v - 0.02 * v * v)))
+    }
+    fn pushed(model: &Pushed) -> Simulation<'_, tfe::Driven<'_, Pushed>, 1> {
+        Simulation::new(model)
+            .step(0.1)
+            .on("impact", Crossing::Falling, bounce)
+            .input("u", |t| 0.3 * t)
+    }
+    fn canonical(model: &Canonical) -> Simulation<'_, Canonical, 1> {
+        Simulation::new(model)
+            .step(0.1)
+            .on("impact", Crossing::Falling, bounce)
+    }
+    let start = State { q: [1.0], p: [0.4] };
+    let ends = |motion: &Motion<1>| [motion.last().q[0], motion.last().p[0]];
+    let model = Pushed { m: 1.3, g: 9.81 };
+    let s = pushed(&model)
+        .run_sensitive(start, 0.0..1.1)
+        .expect("derivatives");
+    assert_eq!(s.motion().events().len(), 1);
+    let other = Canonical { m: 1.3, g: 9.81 };
+    let h = canonical(&other)
+        .run_sensitive(start, 0.0..1.1)
+        .expect("derivatives");
+    for (name, by) in [("m", 1.3), ("g", 9.81)] {
+        let with = |x: f64| if name == "m" { (x, 9.81) } else { (1.3, x) };
+        let expected = difference(
+            |x| {
+                let (m, g) = with(x);
+                ends(
+                    &pushed(&Pushed { m, g })
+                        .run(start, 0.0..1.1)
+                        .expect("a run"),
+                )
+            },
+            by,
+        );
+        let found = s.by(name).last();
+        assert!((found.q[0] - expected[0]).abs() < 1e-11, "{name}");
+        assert!((found.p[0] - expected[1]).abs() < 1e-10, "{name}");
+        let expected = difference(
+            |x| {
+                let (m, g) = with(x);
+                ends(
+                    &canonical(&Canonical { m, g })
+                        .run(start, 0.0..1.1)
+                        .expect("a run"),
+                )
+            },
+            by,
+        );
+        let found = h.by(name).last();
+        assert!((found.q[0] - expected[0]).abs() < 1e-11, "{name}");
+        assert!((found.p[0] - expected[1]).abs() < 1e-10, "{name}");
+    }
+}
+
 /// Two pendulums that hit a wall, several times, with an impulse along the normal of the wall; and the derivative where the run stops at the next one.
 #[test]
 fn derivatives_go_through_impacts() {

@@ -102,3 +102,30 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
         values.iter().map(|value| value.slope).collect()
     }
 }
+
+/// What a parameter does to the momentum at fixed coordinates and velocities; NaN where the mass matrix is singular.
+pub(crate) fn momentum_by<M: Model<N>, const N: usize>(
+    model: &M,
+    t: f64,
+    (q, v, p): (&[f64; N], &[f64; N], &[f64; N]),
+    parameter: usize,
+) -> [f64; N] {
+    let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
+    let still = |values| duals(values, &[0.0; N]);
+    let mut first = First::zero();
+    match M::FORM {
+        Form::Lagrangian => {
+            model.first(time, &still(q), &still(v), &mut first);
+            first.z.map(|one| one.slope)
+        }
+        // H_p = v stays: H_pp δp = −∂H_p/∂a.
+        Form::Hamiltonian => {
+            model.first(time, &still(q), &still(p), &mut first);
+            let (mut plain, mut zz) = (First::ZERO, [[0.0; N]; N]);
+            model.first_and_mass(t, q, p, &mut plain, &mut zz);
+            let right = DVector::from_fn(N, |a, _| -first.z[a].slope);
+            let found = DMatrix::from_fn(N, N, |a, b| zz[a][b]).lu().solve(&right);
+            found.map_or([f64::NAN; N], |found| std::array::from_fn(|a| found[a]))
+        }
+    }
+}

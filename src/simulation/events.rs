@@ -3,6 +3,7 @@
 mod search;
 
 use crate::error::RunErrorKind;
+use crate::sensitivity::slopes::momentum_by;
 use crate::velocity::velocity_from;
 use std::cell::RefCell;
 use std::fmt;
@@ -183,22 +184,51 @@ pub(super) struct Severed<'a, 'm, const N: usize> {
     pub(super) goes_on: bool,
 }
 
+/// A place near an event, and a parameter that is a little larger there.
+pub(super) struct Near<const N: usize> {
+    pub(super) t: f64,
+    pub(super) state: State<N>,
+    /// What the parameter adds to the velocity.
+    pub(super) velocity: [f64; N],
+    /// The parameter, among all, and by how much it is larger.
+    pub(super) parameter: Option<(usize, f64)>,
+}
+
 /// What an act makes of a state near that of its event; none where it lets the run end or go on as it was.
 pub(super) fn state_after<M: Model<N>, const N: usize>(
     model: &M,
     on: &On<'_, N>,
-    near: &Event<N>,
-    (t, state): (f64, &State<N>),
+    event: &Event<N>,
+    near: &Near<N>,
 ) -> Option<State<N>> {
+    let (t, state) = (near.t, &near.state);
+    let mut velocity = velocity_from(model, t, state, &event.v);
+    for (v, more) in velocity.iter_mut().zip(near.velocity) {
+        *v += more;
+    }
     let event = Event {
-        name: near.name.clone(),
+        name: event.name.clone(),
         t,
         q: state.q,
         p: state.p,
-        v: velocity_from(model, t, state, &near.v),
-        rises: near.rises,
+        v: velocity,
+        rises: event.rises,
     };
-    match act(model, on, &event) {
+    let momenta = |v: [f64; N]| {
+        let mut p = momenta_of(model, &event, v);
+        if let Some((parameter, larger)) = near.parameter {
+            let slopes = momentum_by(model, t, (&event.q, &v, &p), parameter);
+            for (p, slope) in p.iter_mut().zip(slopes) {
+                *p += larger * slope;
+            }
+        }
+        p
+    };
+    let act = (on.act)(&Occurrence {
+        event: &event,
+        momenta: &momenta,
+    });
+    match act {
         Act::Restart(state) => Some(state),
         Act::Impulse(impulse) => Some(kicked(state, &impulse)),
         Act::Record | Act::Stop => None,
@@ -207,11 +237,16 @@ pub(super) fn state_after<M: Model<N>, const N: usize>(
 
 /// What is to be done at an event.
 fn act<M: Model<N>, const N: usize>(model: &M, on: &On<'_, N>, event: &Event<N>) -> Act<N> {
-    let momenta = |v: [f64; N]| tfe_runtime::__private::state(model, event.t, event.q, v).p;
+    let momenta = |v: [f64; N]| momenta_of(model, event, v);
     (on.act)(&Occurrence {
         event,
         momenta: &momenta,
     })
+}
+
+/// The momenta of velocities at an event; NaN where there are none.
+fn momenta_of<M: Model<N>, const N: usize>(model: &M, event: &Event<N>, v: [f64; N]) -> [f64; N] {
+    tfe_runtime::__private::state(model, event.t, event.q, v).p
 }
 
 /// The state with momenta that are larger by an impulse.

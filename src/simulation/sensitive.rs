@@ -1,7 +1,7 @@
 //! Runs with derivatives by parameters and by the start (T-123, T-124).
 
 use super::Simulation;
-use super::events::{Severed, state_after};
+use super::events::{Near, Severed, state_after};
 use super::follow::{Follow, Passed};
 use crate::error::RunError;
 use crate::motion::{Motion, Node};
@@ -12,9 +12,7 @@ use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{
-    ConstraintError, Direction, Element, First, Form, Model, Parameter, Share, State, StepError,
-};
+use tfe_runtime::{Direction, Element, First, Form, Model, Parameter, Share, State, StepError};
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node by all parameters of the model and by the start.
@@ -213,6 +211,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
     fn through(
         &self,
         severed: &Severed<'_, '_, N>,
+        along: &Along<'_, M, N>,
         (at, rate): (&DMatrix<f64>, &DMatrix<f64>),
         times: &[f64],
     ) -> Result<DMatrix<f64>, TransitionError> {
@@ -242,20 +241,23 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
                 continue;
             }
             let distance = DISTANCE / scale(size);
+            let by_parameter = along.velocity(&Change {
+                parameter,
+                ..Change::ZERO
+            });
             let moved = |s: f64| {
                 let state = State {
                     q: std::array::from_fn(|a| event.q[a] + s * change.q[a]),
                     p: std::array::from_fn(|a| event.p[a] + s * change.p[a]),
                 };
                 let t = event.t + s * dt;
-                let found = match parameter {
-                    None => state_after(&*self.model, severed.on, event, (t, &state)),
-                    Some(index) => {
-                        let other = self.model.with_parameter(index, value + s);
-                        let other = other.ok_or(StepError::from(ConstraintError::Parameter))?;
-                        state_after(&other, severed.on, event, (t, &state))
-                    }
+                let near = Near {
+                    t,
+                    state,
+                    velocity: by_parameter.map(|v| s * v),
+                    parameter: parameter.map(|index| (index, s)),
                 };
+                let found = state_after(&*self.model, severed.on, event, &near);
                 let found = found.filter(|found| super::check_start(found).is_ok());
                 found.ok_or(TransitionError::from(StepError::NonFinite))
             };
@@ -321,7 +323,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Tangents<'m, M, 
             column.axpy(*dt, &rate.column(0), 1.0);
         }
         self.acted = match severed.goes_on {
-            true => Some(self.through(severed, (&at, &rate), &times)?),
+            true => Some(self.through(severed, &along, (&at, &rate), &times)?),
             false => None,
         };
         self.current = at;

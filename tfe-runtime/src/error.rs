@@ -81,8 +81,7 @@ pub enum ConstraintError {
     SingularMass,
     /// The number of independent constraints is not the same at all nodes.
     RankChanged,
-    /// The derivative by a parameter was asked for that the model does not tell: see [`Model::parameters`](crate::Model::parameters). At events the model must be one
-    /// whose fields can be copied, too.
+    /// The derivative by a parameter was asked for that the model does not tell: see [`Model::parameters`](crate::Model::parameters).
     Parameter,
 }
 
@@ -126,9 +125,9 @@ impl fmt::Display for ConstraintError {
             Self::RankChanged => {
                 f.write_str("the number of independent constraints changes along the motion")
             }
-            Self::Parameter => {
-                f.write_str("the model cannot be made again with another value of this parameter")
-            }
+            Self::Parameter => f.write_str(
+                "the model does not number the parameter by which it is to be differentiated",
+            ),
         }
     }
 }
