@@ -357,32 +357,52 @@ impl Contact {
 /// Steps [`Contact`] with one element, `Primal::<3>.reduced()`: no generics, no allocation, tables and sizes constant.
 struct Fast {
     model: Contact,
-    start: f64,
-    step: f64,
-    steps: u64,
-    memory: ::tfe::__private::Memory<2>,
-    numbers: [f64; ::tfe::__private::numbers_len(
-        Fast::ELEMENT,
-        ::tfe::__private::Form::Lagrangian,
+    engine: ::tfe::__private::Specialised<
         2,
-        0,
-    )],
-    pivots: [usize; ::tfe::__private::pivots_len(
-        Fast::ELEMENT,
-        ::tfe::__private::Form::Lagrangian,
-        2,
-        0,
-    )],
+        ::tfe::__private::Inline<
+            { Fast::SIZES[0usize] },
+            { Fast::SIZES[1usize] },
+            { Fast::SIZES[2usize] },
+            { Fast::SIZES[3usize] },
+            { Fast::SIZES[4usize] },
+        >,
+        {
+            ::tfe::__private::numbers_len(
+                Fast::ELEMENT,
+                ::tfe::__private::Form::Lagrangian,
+                2,
+                0,
+            )
+        },
+        {
+            ::tfe::__private::pivots_len(
+                Fast::ELEMENT,
+                ::tfe::__private::Form::Lagrangian,
+                2,
+                0,
+            )
+        },
+    >,
 }
 #[automatically_derived]
 #[allow(dead_code)]
 impl Fast {
     const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::primal(3)
         .reduced();
-    const TABLES: ::tfe::__private::Scheme<
+    const SIZES: [usize; 5] = ::tfe::__private::sizes::<Contact, 2>(Fast::ELEMENT);
+    const SCHEME: ::tfe::__private::Scheme<
         { Fast::ELEMENT.points() },
         { Fast::ELEMENT.unknowns() },
     > = ::tfe::__private::Scheme::new(Fast::ELEMENT);
+    const TABLES: ::tfe::__private::Fixed<
+        ::tfe::__private::Inline<
+            { Fast::SIZES[0usize] },
+            { Fast::SIZES[1usize] },
+            { Fast::SIZES[2usize] },
+            { Fast::SIZES[3usize] },
+            { Fast::SIZES[4usize] },
+        >,
+    > = ::tfe::__private::Fixed::new(&Self::SCHEME);
     /// The size of the stepper, all its memory included.
     const BYTES: usize = ::core::mem::size_of::<Self>();
     /// A stepper of length `h` that begins at time zero. It keeps a copy of the parameters.
@@ -395,36 +415,20 @@ impl Fast {
                 k: ::core::clone::Clone::clone(&model.k),
                 c: ::core::clone::Clone::clone(&model.c),
             },
-            start: 0.0,
-            step: h,
-            steps: 0,
-            memory: ::tfe::__private::Memory::new(),
-            numbers: [0.0; ::tfe::__private::numbers_len(
-                Fast::ELEMENT,
-                ::tfe::__private::Form::Lagrangian,
-                2,
-                0,
-            )],
-            pivots: [0; ::tfe::__private::pivots_len(
-                Fast::ELEMENT,
-                ::tfe::__private::Form::Lagrangian,
-                2,
-                0,
-            )],
+            engine: ::tfe::__private::Specialised::new(model, &Self::TABLES, h),
         }
     }
     /// The time of the next step's start.
     fn time(&self) -> f64 {
-        self.start + self.steps as f64 * self.step
+        self.engine.time()
     }
     /// Makes the next step start at `time`.
     fn set_time(&mut self, time: f64) {
-        self.start = time;
-        self.steps = 0;
+        self.engine.set_time(time);
     }
     /// What the steps so far have cost.
     fn statistics(&self) -> &::tfe::__private::Statistics {
-        self.memory.statistics()
+        self.engine.statistics()
     }
     /// Moves `state` over one element.
     ///
@@ -434,33 +438,16 @@ impl Fast {
         &mut self,
         state: &mut ::tfe::__private::State<2>,
     ) -> ::core::result::Result<(), ::tfe::__private::StepError> {
-        let method = ::tfe::__private::Method {
-            model: &self.model,
-            tables: &Self::TABLES,
-            control: ::core::default::Default::default(),
-        };
-        let workspace = ::tfe::__private::Workspace {
-            numbers: &mut self.numbers,
-            pivots: &mut self.pivots,
-        };
-        let start = self.start + self.steps as f64 * self.step;
-        let interval = ::tfe::__private::Interval {
-            start,
-            length: self.step,
-            impulses: &[],
-        };
-        method.advance(&mut self.memory, workspace, interval, state)?;
-        self.steps += 1;
-        ::core::result::Result::Ok(())
+        self.engine.advance(&self.model, &Self::SCHEME, state)
     }
 }
 #[automatically_derived]
 impl ::core::fmt::Debug for Fast {
     fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
         f.debug_struct("Fast")
-            .field("time", &self.time())
-            .field("step", &self.step)
-            .field("statistics", self.memory.statistics())
+            .field("time", &self.engine.time())
+            .field("step", &self.engine.step())
+            .field("statistics", self.engine.statistics())
             .finish_non_exhaustive()
     }
 }

@@ -35,25 +35,29 @@ pub(crate) fn expand(
     );
     let text = name.to_string();
     let own = docs.attributes("solver", &solver.name);
+    let sizes = (0..5_usize).map(|size| quote!({ #name::SIZES[#size] }));
+    let inline = quote!(#path::Inline<#(#sizes),*>);
     quote! {
         #own
         #[doc = #title]
         #vis struct #name {
             model: #model,
-            start: f64,
-            step: f64,
-            steps: u64,
-            memory: #path::Memory<#dof>,
-            numbers: [f64; #path::numbers_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints)],
-            pivots: [usize; #path::pivots_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints)],
+            engine: #path::Specialised<
+                #dof,
+                #inline,
+                { #path::numbers_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints) },
+                { #path::pivots_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints) },
+            >,
         }
 
         #[automatically_derived]
         #[allow(dead_code)]
         impl #name {
             const ELEMENT: #path::Element = #element;
-            const TABLES: #path::Scheme<{ #name::ELEMENT.points() }, { #name::ELEMENT.unknowns() }> =
+            const SIZES: [usize; 5] = #path::sizes::<#model, #dof>(#name::ELEMENT);
+            const SCHEME: #path::Scheme<{ #name::ELEMENT.points() }, { #name::ELEMENT.unknowns() }> =
                 #path::Scheme::new(#name::ELEMENT);
+            const TABLES: #path::Fixed<#inline> = #path::Fixed::new(&Self::SCHEME);
             /// The size of the stepper, all its memory included.
             #vis const BYTES: usize = ::core::mem::size_of::<Self>();
 
@@ -61,29 +65,23 @@ pub(crate) fn expand(
             #vis fn new(model: &#model, h: f64) -> Self {
                 Self {
                     model: #model { #(#fields: ::core::clone::Clone::clone(&model.#fields)),* },
-                    start: 0.0,
-                    step: h,
-                    steps: 0,
-                    memory: #path::Memory::new(),
-                    numbers: [0.0; #path::numbers_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints)],
-                    pivots: [0; #path::pivots_len(#name::ELEMENT, #path::Form::#form, #dof, #constraints)],
+                    engine: #path::Specialised::new(model, &Self::TABLES, h),
                 }
             }
 
             /// The time of the next step's start.
             #vis fn time(&self) -> f64 {
-                self.start + self.steps as f64 * self.step
+                self.engine.time()
             }
 
             /// Makes the next step start at `time`.
             #vis fn set_time(&mut self, time: f64) {
-                self.start = time;
-                self.steps = 0;
+                self.engine.set_time(time);
             }
 
             /// What the steps so far have cost.
             #vis fn statistics(&self) -> &#path::Statistics {
-                self.memory.statistics()
+                self.engine.statistics()
             }
 
             /// Moves `state` over one element.
@@ -94,17 +92,7 @@ pub(crate) fn expand(
                 &mut self,
                 state: &mut #path::State<#dof>,
             ) -> ::core::result::Result<(), #path::StepError> {
-                let method = #path::Method {
-                    model: &self.model,
-                    tables: &Self::TABLES,
-                    control: ::core::default::Default::default(),
-                };
-                let workspace = #path::Workspace { numbers: &mut self.numbers, pivots: &mut self.pivots };
-                let start = self.start + self.steps as f64 * self.step;
-                let interval = #path::Interval { start, length: self.step, impulses: &[] };
-                method.advance(&mut self.memory, workspace, interval, state)?;
-                self.steps += 1;
-                ::core::result::Result::Ok(())
+                self.engine.advance(&self.model, &Self::SCHEME, state)
             }
         }
 
@@ -112,9 +100,9 @@ pub(crate) fn expand(
         impl ::core::fmt::Debug for #name {
             fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
                 f.debug_struct(#text)
-                    .field("time", &self.time())
-                    .field("step", &self.step)
-                    .field("statistics", self.memory.statistics())
+                    .field("time", &self.engine.time())
+                    .field("step", &self.engine.step())
+                    .field("statistics", self.engine.statistics())
                     .finish_non_exhaustive()
             }
         }

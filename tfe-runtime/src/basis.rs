@@ -10,15 +10,17 @@ use crate::double_double::DoubleDouble;
 pub const MAX_NODES: usize = 12;
 
 /// Fills `values[j]` with P_j(2τ − 1).
-pub fn legendre(tau: f64, values: &mut [f64]) {
+pub const fn legendre(tau: f64, values: &mut [f64]) {
     let x = 2.0 * tau - 1.0;
     let (mut before, mut value) = (0.0, 1.0);
-    for (j, slot) in values.iter_mut().enumerate() {
-        *slot = value;
+    let mut j = 0;
+    while j < values.len() {
+        values[j] = value;
         let degree = j as f64;
         let next = ((2.0 * degree + 1.0) * x * value - degree * before) / (degree + 1.0);
         before = value;
         value = next;
+        j += 1;
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::StepError;
 use crate::newton::Solve;
-use alloc::vec::Vec;
+use core::convert::Infallible;
 
 /// A step is halved so many times before it fails.
 const MAX_HALVINGS: u32 = 10;
@@ -13,9 +13,29 @@ pub(crate) trait Instant: Clone {
 }
 
 /// Nothing acts.
-impl Instant for core::convert::Infallible {
+impl Instant for Infallible {
     fn time(&self) -> f64 {
         match *self {}
+    }
+}
+
+/// Some of what acts.
+pub(crate) trait Kicks<K>: AsRef<[K]> {
+    /// Those that are chosen.
+    fn chosen(from: &[K], choice: impl Fn(&K) -> bool) -> Self;
+}
+
+#[cfg(feature = "alloc")]
+impl<K: Clone> Kicks<K> for alloc::vec::Vec<K> {
+    fn chosen(from: &[K], choice: impl Fn(&K) -> bool) -> Self {
+        from.iter().filter(|kick| choice(kick)).cloned().collect()
+    }
+}
+
+/// None, without an allocator.
+impl Kicks<Infallible> for [Infallible; 0] {
+    fn chosen(_: &[Infallible], _: impl Fn(&Infallible) -> bool) -> Self {
+        []
     }
 }
 
@@ -23,6 +43,7 @@ impl Instant for core::convert::Infallible {
 pub(crate) trait Halving {
     type State;
     type Kick: Instant;
+    type Kicks: Kicks<Self::Kick>;
 
     /// Moves `state` from t to t + h by one element; leaves it where it is if that fails.
     fn whole(
@@ -34,7 +55,7 @@ pub(crate) trait Halving {
     ) -> Result<(), StepError>;
 
     /// A piece that went well.
-    fn passed(&mut self, t: f64, h: f64, kicks: Vec<Self::Kick>);
+    fn passed(&mut self, t: f64, h: f64, kicks: Self::Kicks);
 }
 
 /// Whether a shorter step may go well where one has failed with `error`.
@@ -72,15 +93,16 @@ pub(crate) fn in_halves<S: Halving>(
             kick.time() <= middle
         }
     };
-    let (late, early): (Vec<_>, Vec<_>) = kicks.iter().cloned().partition(is_late);
+    let early = S::Kicks::chosen(kicks, |kick| !is_late(kick));
+    let late = S::Kicks::chosen(kicks, is_late);
     for (start, kicks) in [(t, early), (middle, late)] {
-        let done = match stepper.whole(start, half, state, &kicks) {
+        let done = match stepper.whole(start, half, state, kicks.as_ref()) {
             Ok(()) => {
                 stepper.passed(start, half, kicks);
                 true
             }
             Err(_) if depth == MAX_HALVINGS => false,
-            Err(_) => in_halves(stepper, (start, half), state, &kicks, depth + 1),
+            Err(_) => in_halves(stepper, (start, half), state, kicks.as_ref(), depth + 1),
         };
         if !done {
             return false;

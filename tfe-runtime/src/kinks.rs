@@ -32,7 +32,9 @@ const SHORTEST: f64 = 1e-6;
 const BEYOND: f64 = 1e-3;
 
 /// What moves over elements and can be looked into.
-pub(crate) trait Kinked: Halving<State: Clone> {
+pub(crate) trait Kinked:
+    Halving<State: Clone, Kicks = Vec<<Self as Halving>::Kick>>
+{
     /// The inside of a step.
     type Inside;
 

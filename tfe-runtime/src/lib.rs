@@ -22,7 +22,6 @@ mod condense;
 pub mod condenser;
 pub mod constrained;
 mod controlled;
-#[cfg(feature = "alloc")]
 mod cut;
 #[cfg(feature = "alloc")]
 mod dense;
@@ -44,7 +43,6 @@ mod newton;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 mod octet;
 mod phase_form;
-#[cfg(feature = "alloc")]
 mod points;
 #[cfg(feature = "alloc")]
 mod propagator;
@@ -57,6 +55,7 @@ mod root;
 pub mod scheme;
 #[cfg(feature = "alloc")]
 mod share;
+mod specialised;
 pub mod statistics;
 pub mod step;
 #[cfg(feature = "alloc")]
@@ -104,10 +103,13 @@ pub mod __private {
         Model, Second, State,
     };
     pub use crate::newton::{Control, Solve};
+    pub use crate::points::storage::Inline;
+    pub use crate::points::tables::Fixed;
     pub use crate::real::Real;
     #[cfg(feature = "alloc")]
     pub use crate::root::root;
     pub use crate::scheme::{Scheme, SchemeRef, Tables};
+    pub use crate::specialised::{Specialised, sizes};
     pub use crate::statistics::Statistics;
     pub use crate::step::{Impulse, Interval, Memory, Method};
     pub use crate::structure::{Operations, Structure};

@@ -49,10 +49,8 @@ impl Control {
 }
 
 /// Steps whose iteration may end above it need no more than the working precision.
-#[cfg(feature = "alloc")]
 const ROUGH: f64 = 1e-14;
 
-#[cfg(feature = "alloc")]
 impl Control {
     pub(crate) fn is_rough(&self) -> bool {
         self.tolerance > ROUGH

@@ -16,129 +16,126 @@ pub(crate) mod end;
 pub(crate) mod four;
 mod second_order;
 mod step;
+pub(crate) mod storage;
 pub(crate) mod sweep;
 pub(crate) mod tables;
 
 use crate::double_double::DoubleDouble;
 use crate::element::Element;
+use crate::error::StepError;
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
-use crate::newton::Control;
-use crate::scheme::{SchemeRef, SchemeTable};
-use crate::step::{cold_rate, cold_rates};
-use alloc::vec;
-use alloc::vec::Vec;
+use crate::newton::{Control, Solve};
+use crate::real::Lanes;
+use crate::scheme::Tables;
+use crate::statistics::Contraction;
+use crate::step::{Last, Memory, cold_rate, cold_rates, may_be_phase};
+use crate::workspace::width;
 use step::Job;
-use tables::Tables;
+use storage::{Keep, List, Storage};
+use tables::Fixed;
 
 /// A number for every coordinate at each of four points.
 type Row<const N: usize> = [[f64; 4]; N];
 
-/// The unknowns of an element and everything that their iteration needs: rows for groups of four points.
+/// What steps with all points at once carry from one to the next: rows for groups of four points.
 #[derive(Clone, Debug)]
-pub(crate) struct Points<const N: usize> {
-    tables: Tables,
-    /// L_q + Q, or π: rates of the momenta.
-    forces: Vec<Row<N>>,
+pub(crate) struct Points<const N: usize, S: Storage> {
+    tables: tables::Tables<S>,
+    inertia: Inertia<N, S>,
+    /// Of the last step: L_q + Q, or π, rates of the momenta.
+    forces: S::Groups<Row<N>>,
     /// ν, or κ: rates of the coordinates.
-    /// In equations of second order only where somebody has asked for them.
-    rates: Vec<Row<N>>,
-    momenta: Vec<Row<N>>,
-    velocities: Vec<Row<N>>,
-    /// Products with the tables.
-    products: Vec<Row<N>>,
-    more_products: Vec<Row<N>>,
-    /// How far the velocity at the start reaches, in equations of second order.
-    drift: Vec<Row<N>>,
-    /// What low words of state and tables add at the points.
-    low_position: Vec<Row<N>>,
-    low_momentum: Vec<Row<N>>,
-    /// Factors of L_vv, or H_pp, where they are not constant.
-    masses: Vec<[Row<N>; N]>,
-    inertia: Inertia<N>,
-    velocity_low: [f64; N],
+    rates: S::FirstOrder<Row<N>>,
+    /// The velocity at its start, in equations of second order.
     velocity: [f64; N],
-    /// The largest coordinate at the start, and the largest velocity or momentum.
-    distance: f64,
-    speed: f64,
-    /// The end of the last step, and what rounding took from it.
-    pub(crate) end: State<N>,
-    pub(crate) end_low: State<N>,
+    work: S::Kept<Work<N, S>>,
     is_warm: bool,
     last_step: f64,
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     isa: Option<pulp::x86::V3>,
 }
 
+/// The unknowns of an element and everything that their iteration needs.
+#[derive(Clone, Debug)]
+struct Work<const N: usize, S: Storage> {
+    forces: S::Groups<Row<N>>,
+    rates: S::FirstOrder<Row<N>>,
+    momenta: S::FirstOrder<Row<N>>,
+    velocities: S::FirstOrder<Row<N>>,
+    /// Products with the tables.
+    products: S::Groups<Row<N>>,
+    more_products: S::Groups<Row<N>>,
+    /// How far the velocity at the start reaches, in equations of second order.
+    drift: S::Groups<Row<N>>,
+    /// What low words of state and tables add at the points.
+    low_position: S::FirstOrder<Row<N>>,
+    low_momentum: S::FirstOrder<Row<N>>,
+    /// Factors of L_vv, or H_pp, where they are not constant.
+    masses: S::Varying<[Row<N>; N]>,
+    velocity: [f64; N],
+    velocity_low: [f64; N],
+    /// The largest coordinate at the start, and the largest velocity or momentum.
+    distance: f64,
+    speed: f64,
+}
+
 /// A constant mass matrix.
 #[derive(Clone, Debug)]
-pub(crate) struct Inertia<const N: usize> {
+pub(crate) struct Inertia<const N: usize, S: Storage> {
     /// Its diagonal, if it has nothing else.
     pub(crate) diagonal: Option<[f64; N]>,
     /// The diagonal of the inverse; ones where that is not constant.
     pub(crate) inverse_diagonal: [f64; N],
     /// What rounding took from the inverse of the diagonal.
     pub(crate) inverse_low: [f64; N],
-    /// M⁻¹ (or H_pp), row by row; nothing where it is not constant, or diagonal.
-    pub(crate) inverse: Vec<[f64; N]>,
+    /// M⁻¹ (or H_pp), row by row; of no meaning where it is not constant, or diagonal.
+    pub(crate) inverse: S::Square<N>,
 }
 
-/// Where and from where.
-#[derive(Clone, Copy)]
-pub(crate) struct Leg<'a, const N: usize> {
-    pub(crate) t: f64,
-    pub(crate) h: f64,
-    pub(crate) start: &'a State<N>,
-    pub(crate) low: &'a State<N>,
+/// Where and from where, and by what.
+struct Leg<'a, const N: usize, S: Storage> {
+    t: f64,
+    h: f64,
+    start: &'a State<N>,
+    low: &'a State<N>,
+    tables: &'a Fixed<S>,
+    inertia: &'a Inertia<N, S>,
 }
 
-/// What has come of a step.
-pub(crate) struct Outcome {
-    /// The iteration has converged: the end of the step is there.
-    pub(crate) arrived: bool,
-    pub(crate) iterations: u32,
+/// How a step with all points at once has ended.
+pub(crate) enum Together {
+    Arrived,
+    Stalled(StepError),
+    LeftToOthers,
+}
+
+/// What has come of its iteration.
+struct Outcome<const N: usize> {
+    /// The end of the step, if the iteration has converged, and what rounding took from it.
+    end: Option<(State<N>, State<N>)>,
+    iterations: u32,
     /// The last increment, relative, and its ratio to that before.
-    pub(crate) residual: f64,
-    pub(crate) contraction: f64,
+    residual: f64,
+    contraction: f64,
 }
 
-impl<const N: usize> Points<N> {
+impl<const N: usize, S: Storage> Points<N, S> {
     /// For a nonlinear model without constraints, and an element that is a Runge–Kutta method of no more than 16 points.
-    pub(crate) fn new<M>(model: &M, scheme: &SchemeRef<'_>) -> Option<Self>
+    pub(crate) fn new<M>(model: &M, tables: tables::Tables<S>) -> Option<Self>
     where
         M: Model<N>,
     {
-        let element = &scheme.element;
-        let is_large = scheme.points() > 4 * tables::MAX_GROUPS;
-        if N == 0 || is_large || !has_form::<M, N>(element) {
-            return None;
-        }
         let inertia = Inertia::of(model)?;
-        let tables = Tables::of(scheme);
         let groups = tables.groups;
-        // Short runs notice how much memory is asked for.
-        let rows = |if_needed: bool| vec![[[0.0; 4]; N]; if if_needed { groups } else { 0 }];
-        let is_second = is_second_order::<M, N>();
-        let varied = if M::FACTS.constant_mass { 0 } else { groups };
+        let first = if is_second_order::<M, N>() { 0 } else { groups };
         Some(Self {
-            forces: rows(true),
-            rates: rows(!is_second),
-            momenta: rows(!is_second),
-            velocities: rows(is_phase::<M, N>()),
-            products: rows(true),
-            more_products: rows(true),
-            drift: rows(is_second),
-            low_position: rows(!is_second),
-            low_momentum: rows(!is_second),
-            masses: vec![[[[0.0; 4]; N]; N]; varied],
-            tables,
             inertia,
-            velocity_low: [0.0; N],
+            forces: List::filled([[0.0; 4]; N], groups),
+            rates: List::filled([[0.0; 4]; N], first),
             velocity: [0.0; N],
-            distance: 0.0,
-            speed: 0.0,
-            end: State::ZERO,
-            end_low: State::ZERO,
+            work: Keep::keep(|| Work::new::<M>(groups)),
+            tables,
             is_warm: false,
             last_step: 0.0,
             #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -150,53 +147,112 @@ impl<const N: usize> Points<N> {
         })
     }
 
-    /// At how many points the model is evaluated.
-    pub(crate) fn len(&self) -> usize {
-        self.tables.points
-    }
-
     /// Says that the next step does not continue the last one.
     pub(crate) fn forget(&mut self) {
         self.is_warm = false;
     }
 
-    /// The end of a step.
-    pub(crate) fn advance<M>(
+    /// A step of a stepper, with what it remembers.
+    pub(crate) fn step<M>(
         &mut self,
-        model: &M,
-        table: &SchemeTable,
-        control: &Control,
-        leg: Leg<'_, N>,
-        yielding: bool,
-    ) -> Outcome
+        (model, tables, control): (&M, &impl Tables, &Control),
+        memory: &mut Memory<N>,
+        (t, h): (f64, f64),
+        state: &mut State<N>,
+    ) -> Together
     where
         M: Model<N>,
     {
-        if self.is_warm {
-            self.tables.set_ratio(table, leg.h / self.last_step);
-        } else {
-            self.start_cold(model, &leg);
+        let yielding = control.solve != Solve::FixedPoint;
+        if yielding && !memory.preference.is_fixed_point() {
+            self.forget();
+            return Together::LeftToOthers;
         }
-        self.last_step = leg.h;
+        let last = memory.last.as_ref();
+        if !last.is_some_and(|last| last.end.is_same(state)) {
+            self.forget();
+            memory.low = State::ZERO;
+        }
+        if self.is_warm {
+            self.tables.set_ratio(tables, h / self.last_step);
+        } else {
+            self.start_cold(model, t, state);
+        }
         let job = Job {
             points: self,
             model,
             control,
-            leg,
+            place: (t, h),
+            start: (state, &memory.low),
             yielding,
         };
         let outcome = job.run();
-        self.is_warm = outcome.arrived;
-        outcome
+        let statistics = &mut memory.statistics;
+        let iterations = u64::from(outcome.iterations);
+        statistics.iterations += iterations;
+        statistics.fixed_point_iterations += iterations;
+        statistics.residual_evaluations += iterations * self.tables.points as u64;
+        statistics.contraction = Contraction::of(outcome.contraction);
+        let Some((end, end_low)) = outcome.end else {
+            if yielding {
+                memory.preference.leave_fixed_point();
+                memory.statistics.fallbacks += 1;
+                return Together::LeftToOthers;
+            }
+            memory.last = None;
+            return Together::Stalled(if outcome.residual.is_finite() {
+                StepError::FixedPointStalled {
+                    iterations: outcome.iterations,
+                    residual: outcome.residual,
+                    tolerance: control.tolerance,
+                }
+            } else {
+                StepError::NonFinite
+            });
+        };
+        (self.is_warm, self.last_step) = (true, h);
+        memory.last = Some(Last {
+            t,
+            h,
+            start: *state,
+            start_low: memory.low,
+            end,
+        });
+        (*state, memory.low) = (end, end_low);
+        memory.preference.confirm_fixed_point();
+        memory.statistics.steps += 1;
+        memory.forget_factors();
+        Together::Arrived
+    }
+
+    /// Rates and forces of the last step to where an ordinary step has them; false if there is none.
+    pub(crate) fn write_back<M>(&mut self, tables: &impl Tables, numbers: &mut [f64]) -> bool
+    where
+        M: Model<N>,
+    {
+        if !self.is_warm {
+            return false;
+        }
+        let scheme = tables.view();
+        let length = scheme.points() * N;
+        let unknowns = scheme.unknowns() * width(&scheme.element, M::FORM, N);
+        let (first, rest) = numbers.split_at_mut(length);
+        if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
+            self.unknowns::<M>(&mut rest[..length], first);
+        } else {
+            let start = 3 * unknowns - length;
+            self.unknowns::<M>(first, &mut rest[start..start + length]);
+        }
+        true
     }
 
     /// Constant rates.
     #[cold]
-    fn start_cold<M>(&mut self, model: &M, leg: &Leg<'_, N>)
+    fn start_cold<M>(&mut self, model: &M, t: f64, start: &State<N>)
     where
         M: Model<N>,
     {
-        let (force, rate) = constant_rates(model, leg.t, leg.start);
+        let (force, rate) = constant_rates(model, t, start);
         for a in 0..N {
             (self.forces.iter_mut()).for_each(|forces| forces[a] = [force[a]; 4]);
             (self.rates.iter_mut()).for_each(|rates| rates[a] = [rate[a]; 4]);
@@ -204,21 +260,93 @@ impl<const N: usize> Points<N> {
     }
 
     /// Rates of coordinates and momenta at the points of the last step, a row of N for each point.
-    pub(crate) fn unknowns<M>(&mut self, h: f64, rates: &mut [f64], forces: &mut [f64])
+    fn unknowns<M>(&mut self, rates: &mut [f64], forces: &mut [f64])
     where
         M: Model<N>,
     {
         if is_second_order::<M, N>() {
-            self.set_rates(h);
+            self.set_rates::<M>(rates);
         }
         for l in 0..self.tables.points {
             let (group, lane) = (l / 4, l % 4);
             for a in 0..N {
-                rates[l * N + a] = self.rates[group][a][lane];
+                if !is_second_order::<M, N>() {
+                    rates[l * N + a] = self.rates[group][a][lane];
+                }
                 forces[l * N + a] = self.forces[group][a][lane];
             }
         }
     }
+
+    /// Velocities at the points of equations of second order, which their iteration does not need, a row of N for each.
+    fn set_rates<M>(&mut self, rates: &mut [f64])
+    where
+        M: Model<N>,
+    {
+        let (like, mut local) = (Lanes([0.0; 4]), None);
+        let groups = self.tables.groups;
+        let work = Work::<N, S>::of::<M>(&mut self.work, &mut local, groups);
+        (self.tables.once).apply(like, &self.forces, &mut work.products);
+        for l in 0..self.tables.points {
+            for a in 0..N {
+                let change = self.inertia.row(like, &work.products[l / 4], a).0[l % 4];
+                rates[l * N + a] = self.velocity[a] + self.last_step * change;
+            }
+        }
+    }
+}
+
+impl<const N: usize, S: Storage> Work<N, S> {
+    #[inline(always)]
+    fn new<M>(groups: usize) -> Self
+    where
+        M: Model<N>,
+    {
+        let zero = [[0.0; 4]; N];
+        // Short runs notice how much memory is asked for.
+        let first = if is_second_order::<M, N>() { 0 } else { groups };
+        Self {
+            forces: List::filled(zero, groups),
+            rates: List::filled(zero, first),
+            momenta: List::filled(zero, first),
+            velocities: List::filled(zero, if is_phase::<M, N>() { first } else { 0 }),
+            products: List::filled(zero, groups),
+            more_products: List::filled(zero, groups),
+            drift: List::filled(zero, groups - first),
+            low_position: List::filled(zero, first),
+            low_momentum: List::filled(zero, first),
+            masses: List::filled([zero; N], if M::FACTS.constant_mass { 0 } else { groups }),
+            velocity: [0.0; N],
+            velocity_low: [0.0; N],
+            distance: 0.0,
+            speed: 0.0,
+        }
+    }
+
+    /// What is kept, or what is made here.
+    #[inline(always)]
+    fn of<'a, M>(
+        kept: &'a mut S::Kept<Self>,
+        local: &'a mut Option<Self>,
+        groups: usize,
+    ) -> &'a mut Self
+    where
+        M: Model<N>,
+    {
+        match kept.kept() {
+            Some(work) => work,
+            None => local.insert(Self::new::<M>(groups)),
+        }
+    }
+}
+
+/// Whether there are points of that kind: for a nonlinear model without constraints, and an element that is a Runge–Kutta method of no more than 16 points.
+pub(crate) const fn are_possible<M, const N: usize>(element: &Element) -> bool
+where
+    M: Model<N>,
+{
+    let is_small = element.points() <= 4 * tables::MAX_GROUPS;
+    N > 0 && is_small && !M::FACTS.linear && M::CONSTRAINTS.is_empty() && has_form::<M, N>(element)
 }
 
 /// Rates of momenta and coordinates at the start, for a first iteration that continues nothing; those of momenta are zero where they are no unknowns.
@@ -244,7 +372,7 @@ where
     (force, rate)
 }
 
-impl<const N: usize> Inertia<N> {
+impl<const N: usize, S: Storage> Inertia<N, S> {
     /// M⁻¹ of a model, empty unless its mass matrix is constant; nothing if that is singular, or if momenta are no multiples of velocities
     /// where they have to be.
     pub(crate) fn of<M>(model: &M) -> Option<Self>
@@ -256,7 +384,7 @@ impl<const N: usize> Inertia<N> {
                 diagonal: None,
                 inverse_diagonal: [1.0; N],
                 inverse_low: [0.0; N],
-                inverse: Vec::new(),
+                inverse: List::filled([0.0; N], 0),
             });
         }
         let (mut first, mut mass) = (First::ZERO, [[0.0; N]; N]);
@@ -272,15 +400,15 @@ impl<const N: usize> Inertia<N> {
             Form::Lagrangian => inverse,
             Form::Hamiltonian => mass,
         };
-        let mut inverse_diagonal = [0.0; N];
+        let (mut inverse_diagonal, mut rows) = ([0.0; N], S::Square::filled([0.0; N], N));
         for a in 0..N {
-            inverse_diagonal[a] = inverse[a][a];
+            (inverse_diagonal[a], rows[a]) = (inverse[a][a], inverse[a]);
         }
         Some(Self {
             diagonal: None,
             inverse_diagonal,
             inverse_low: [0.0; N],
-            inverse: inverse.to_vec(),
+            inverse: rows,
         })
     }
 
@@ -303,7 +431,7 @@ impl<const N: usize> Inertia<N> {
             diagonal: Some(masses),
             inverse_diagonal: inverse,
             inverse_low,
-            inverse: Vec::new(),
+            inverse: List::filled([0.0; N], 0),
         })
     }
 }
@@ -339,7 +467,7 @@ where
 }
 
 /// Whether the element is a Runge–Kutta method for the model as it was declared.
-pub(crate) fn has_form<M, const N: usize>(element: &Element) -> bool
+pub(crate) const fn has_form<M, const N: usize>(element: &Element) -> bool
 where
     M: Model<N>,
 {
@@ -375,7 +503,7 @@ pub(crate) mod tests {
     use crate::bundle::Pendulums;
     use crate::model::{CoordinateName, Facts, Second};
     use crate::real::Real;
-    use crate::scheme::Tables as _;
+    use crate::scheme::SchemeTable;
     use crate::{Mixed, Radau};
 
     /// Two bodies, an angle, a force: products, quotients, roots, sines.
@@ -466,7 +594,8 @@ pub(crate) mod tests {
     {
         for element in [Mixed::<4>.into(), Mixed::<9>.into(), Radau::<11>.into()] {
             let table = SchemeTable::new(element).unwrap();
-            let with = Points::new(model, &table.view()).unwrap();
+            let tables = tables::Tables::of(&table.view());
+            let with = Points::<N, storage::Heap>::new(model, tables).unwrap();
             if with.isa.is_none() {
                 return; // Nothing to compare with on this processor.
             }
@@ -478,20 +607,16 @@ pub(crate) mod tests {
                     ..Control::default()
                 };
                 let ends = [&with, &without].map(|points| {
-                    let (mut points, mut state, mut low) = (points.clone(), start, State::ZERO);
+                    let (mut points, mut state) = (points.clone(), start);
+                    let mut memory = Memory::new();
                     for step in 0..200 {
-                        let leg = Leg {
-                            t: 0.02 * f64::from(step),
-                            h: 0.02,
-                            start: &state,
-                            low: &low,
-                        };
-                        let outcome = points.advance(model, &table, &control, leg, true);
-                        assert!(outcome.arrived);
-                        (state, low) = (points.end, points.end_low);
+                        let place = (0.02 * f64::from(step), 0.02);
+                        let method = (model, &table, &control);
+                        let outcome = points.step(method, &mut memory, place, &mut state);
+                        assert!(matches!(outcome, Together::Arrived));
                         turn(step, &mut state);
                     }
-                    (state, low)
+                    (state, memory.low)
                 });
                 assert_eq!(ends[0], ends[1], "{element}, {tolerance:.0e}");
                 assert!(ends[0].0.q[0].is_finite());

@@ -211,11 +211,10 @@ impl<const K: usize, const U: usize> Scheme<K, U> {
         target.fill(element);
         scheme
     }
-}
 
-impl<const K: usize, const U: usize> Tables for Scheme<K, U> {
+    /// The same as [`view`](Tables::view), in constants.
     #[inline(always)]
-    fn view(&self) -> SchemeRef<'_> {
+    pub(crate) const fn as_view(&self) -> SchemeRef<'_> {
         SchemeRef {
             element: self.element,
             collocated: self.element.is_collocated(),
@@ -235,6 +234,13 @@ impl<const K: usize, const U: usize> Tables for Scheme<K, U> {
             rate: self.rate.as_flattened(),
             force_rate: self.force_rate.as_flattened(),
         }
+    }
+}
+
+impl<const K: usize, const U: usize> Tables for Scheme<K, U> {
+    #[inline(always)]
+    fn view(&self) -> SchemeRef<'_> {
+        self.as_view()
     }
 }
 

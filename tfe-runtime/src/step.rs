@@ -382,25 +382,23 @@ pub(crate) fn continued_ratio(ratio: f64) -> f64 {
 }
 
 /// Old unknown rates to new ones: the polynomial of the last element, continued (T-65).
-pub(crate) fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix: &mut [f64]) {
-    let (unknowns, rates) = (scheme.unknowns(), scheme.rates());
-    for (node, row) in scheme
-        .unknown_nodes
-        .iter()
-        .zip(matrix.chunks_exact_mut(unknowns))
-    {
+pub(crate) const fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix: &mut [f64]) {
+    let (unknowns, rates) = (scheme.unknown_nodes.len(), scheme.element.degree());
+    let mut i = 0;
+    while i < unknowns {
         let mut values = [0.0; MAX_NODES];
-        legendre(1.0 + node * ratio, &mut values);
-        row.fill(0.0);
-        for (value, rate) in values
-            .iter()
-            .take(rates)
-            .zip(scheme.rate.chunks_exact(unknowns))
-        {
-            for (entry, rate) in row.iter_mut().zip(rate) {
-                *entry += value * rate;
+        legendre(1.0 + scheme.unknown_nodes[i] * ratio, &mut values);
+        let mut j = 0;
+        while j < unknowns {
+            let (mut entry, mut degree) = (0.0, 0);
+            while degree < rates {
+                entry += values[degree] * scheme.rate[degree * unknowns + j];
+                degree += 1;
             }
+            matrix[i * unknowns + j] = entry;
+            j += 1;
         }
+        i += 1;
     }
 }
 

@@ -14,11 +14,13 @@ use crate::error::{ConstraintError, StepError};
 use crate::kinks::{Kinked, in_arcs, switches};
 use crate::model::{Model, State};
 use crate::newton::{Control, Solve};
-use crate::points::{Leg, Points};
+use crate::points::storage::Heap;
+use crate::points::tables;
+use crate::points::{Points, Together, are_possible};
 use crate::propagator::Propagator;
 use crate::scheme::{SchemeTable, Tables};
 use crate::share::Share;
-use crate::statistics::{Contraction, Statistics};
+use crate::statistics::Statistics;
 use crate::step::{Impulse, Interval, Last, Memory, Method, may_be_phase};
 use crate::transition::TransitionError;
 use crate::workspace::{Workspace, interior_len, linearised_len, numbers_len, pivots_len, width};
@@ -81,7 +83,7 @@ pub struct Stepper<'m, M, const N: usize> {
     /// Of a linear model, once it has paid.
     propagator: Option<Propagator<N>>,
     /// All points at once, where model and element allow it.
-    points: Option<Points<N>>,
+    points: Option<Points<N, Heap>>,
     /// Steps of one length so far.
     alike: (f64, usize),
     /// The workspace does not hold the last step.
@@ -145,7 +147,7 @@ pub struct Suspended<const N: usize> {
     impulses: Vec<Impulse<N>>,
     ends_only: bool,
     propagator: Option<Propagator<N>>,
-    points: Option<Points<N>>,
+    points: Option<Points<N, Heap>>,
     alike: (f64, usize),
     skipped: bool,
     pieces: Vec<Piece<N>>,
@@ -246,8 +248,10 @@ where
         control: Control,
     ) -> Result<Self, ElementError> {
         let table = SchemeTable::new(element)?;
-        let points = if Self::MAY_HAVE_POINTS && control.solve != Solve::Newton {
-            Points::new(&*model, &table.view())
+        let scheme = table.view();
+        let is_possible = are_possible::<M, N>(&scheme.element) && control.solve != Solve::Newton;
+        let points = if Self::MAY_HAVE_POINTS && is_possible {
+            Points::new(&*model, tables::Tables::of(&scheme))
         } else {
             None
         };
@@ -451,85 +455,38 @@ where
         let Some(points) = &mut self.points else {
             return Together::LeftToOthers;
         };
-        let yielding = self.control.solve != Solve::FixedPoint;
-        if yielding && !self.memory.preference.is_fixed_point() {
-            points.forget();
-            return Together::LeftToOthers;
-        }
-        let last = self.memory.last.as_ref();
-        if !last.is_some_and(|last| last.end.is_same(state)) {
-            points.forget();
-            self.memory.low = State::ZERO;
-        }
-        let leg = Leg {
-            t,
-            h,
-            start: state,
-            low: &self.memory.low,
-        };
-        let outcome = points.advance(&*self.model, &self.table, &self.control, leg, yielding);
-        let statistics = &mut self.memory.statistics;
-        let iterations = u64::from(outcome.iterations);
-        statistics.iterations += iterations;
-        statistics.fixed_point_iterations += iterations;
-        statistics.residual_evaluations += iterations * points.len() as u64;
-        statistics.contraction = Contraction::of(outcome.contraction);
-        if !outcome.arrived {
-            if self.skipped {
-                // Nothing there that an ordinary step could continue.
-                self.memory.last = None;
+        let method = (&*self.model, &self.table, &self.control);
+        let outcome = points.step(method, &mut self.memory, (t, h), state);
+        match outcome {
+            Together::Arrived if self.ends_only => self.skipped = true,
+            Together::Arrived => {
+                self.write_back();
+                self.skipped = false;
             }
-            if yielding {
-                self.memory.preference.leave_fixed_point();
-                self.memory.statistics.fallbacks += 1;
-                return Together::LeftToOthers;
-            }
-            self.memory.last = None;
-            return Together::Stalled(if outcome.residual.is_finite() {
-                StepError::FixedPointStalled {
-                    iterations: outcome.iterations,
-                    residual: outcome.residual,
-                    tolerance: self.control.tolerance,
+            Together::LeftToOthers => {
+                // An ordinary step continues what is in its workspace.
+                if self.skipped && !self.write_back() {
+                    self.memory.last = None;
                 }
-            } else {
-                StepError::NonFinite
-            });
+                self.forget_points();
+            }
+            Together::Stalled(_) => {}
         }
-        self.memory.last = Some(Last {
-            t,
-            h,
-            start: *state,
-            start_low: self.memory.low,
-            end: points.end,
-        });
-        *state = points.end;
-        self.memory.low = points.end_low;
-        self.memory.preference.confirm_fixed_point();
-        self.memory.statistics.steps += 1;
-        self.memory.forget_factors();
-        self.skipped = self.ends_only;
-        if !self.ends_only {
-            self.write_back(h);
-        }
-        Together::Arrived
+        outcome
     }
 
-    /// Rates and forces of the last step to where an ordinary step has them.
-    fn write_back(&mut self, h: f64) {
-        self.make_room();
-        let Some(points) = &mut self.points else {
-            return;
-        };
-        let scheme = self.table.view();
-        let length = scheme.points() * N;
-        let unknowns = scheme.unknowns() * width(&scheme.element, M::FORM, N);
-        let (first, rest) = self.numbers.split_at_mut(length);
-        if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
-            points.unknowns::<M>(h, &mut rest[..length], first);
-        } else {
-            let start = 3 * unknowns - length;
-            points.unknowns::<M>(h, first, &mut rest[start..start + length]);
+    /// Says that the next step with all points at once continues nothing.
+    fn forget_points(&mut self) {
+        if let Some(points) = &mut self.points {
+            points.forget();
         }
+    }
+
+    /// Rates and forces of the last step to where an ordinary step has them; false if there is none.
+    fn write_back(&mut self) -> bool {
+        self.make_room();
+        let points = self.points.as_mut();
+        points.is_some_and(|points| points.write_back::<M>(&self.table, &mut self.numbers))
     }
 
     /// By how much an ordinary step moves a state, rounding included.
@@ -820,6 +777,7 @@ where
 {
     type State = State<N>;
     type Kick = Impulse<N>;
+    type Kicks = Vec<Impulse<N>>;
 
     fn whole(
         &mut self,
@@ -930,11 +888,4 @@ impl<const N: usize> Instant for Impulse<N> {
     fn time(&self) -> f64 {
         self.time
     }
-}
-
-/// How a step with all points at once has ended.
-enum Together {
-    Arrived,
-    Stalled(StepError),
-    LeftToOthers,
 }

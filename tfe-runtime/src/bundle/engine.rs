@@ -7,6 +7,7 @@ use crate::double_double::DoubleDouble;
 use crate::model::Model;
 use crate::newton::Control;
 use crate::points::Inertia;
+use crate::points::storage::Heap;
 use crate::points::tables::Tables;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::{Contraction, Statistics};
@@ -14,8 +15,8 @@ use crate::statistics::{Contraction, Statistics};
 /// Tables and scratch of steps side by side.
 #[derive(Clone, Debug)]
 pub(super) struct Engine<const N: usize> {
-    tables: Tables,
-    inertia: Inertia<N>,
+    tables: Tables<Heap>,
+    inertia: Inertia<N, Heap>,
     work: Work<N>,
     last_step: f64,
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]

@@ -2,13 +2,14 @@
 
 use super::group::Row;
 use super::pair::{Apart, Eight};
+use crate::points::storage::Heap;
 use crate::points::tables::{Matrix, Weights};
 
 /// The product of a K × K matrix with a vector over the points, for every coordinate.
 #[inline(always)]
 pub(super) fn apply<V: Eight, const N: usize>(
     like: V,
-    matrix: &Matrix,
+    matrix: &Matrix<Heap>,
     rows: &[Row<N>],
     products: &mut [Row<N>],
 ) {
@@ -21,7 +22,7 @@ pub(super) fn apply<V: Eight, const N: usize>(
 
 /// A product to be computed. No model is part of its type, so that all places of its call share what the compiler makes of it.
 struct Product<'a, const N: usize> {
-    matrix: &'a Matrix,
+    matrix: &'a Matrix<Heap>,
     rows: &'a [Row<N>],
     products: &'a mut [Row<N>],
 }
@@ -114,7 +115,7 @@ impl<const N: usize> Product<'_, N> {
 #[inline(always)]
 pub(super) fn sum<V: Eight, const N: usize, const EXACT: bool>(
     like: V,
-    weights: &Weights,
+    weights: &Weights<Heap>,
     rows: &[Row<N>],
     a: usize,
 ) -> (V, V) {

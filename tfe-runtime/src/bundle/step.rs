@@ -6,6 +6,7 @@ use super::pair::{Eight, LANES};
 use super::products::apply;
 use crate::model::Model;
 use crate::newton::{Control, PATIENCE, Solve};
+use crate::points::storage::Heap;
 use crate::points::tables::Tables;
 use crate::points::{Inertia, constant_rates, is_phase, is_second_order};
 use crate::statistics::{Contraction, Statistics};
@@ -14,8 +15,8 @@ use alloc::vec::Vec;
 /// What is the same for all trajectories.
 pub(super) struct Step<'a, M, const N: usize> {
     pub(super) model: &'a M,
-    pub(super) tables: &'a Tables,
-    pub(super) inertia: &'a Inertia<N>,
+    pub(super) tables: &'a Tables<Heap>,
+    pub(super) inertia: &'a Inertia<N, Heap>,
     pub(super) control: &'a Control,
     pub(super) t: f64,
     pub(super) h: f64,

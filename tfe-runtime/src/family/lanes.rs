@@ -3,6 +3,7 @@
 use super::space::{Leg, Problem, Sizes};
 use crate::equations::Increment;
 use crate::points::four::Four;
+use crate::points::storage::Heap;
 use crate::points::sweep::relative;
 use crate::points::tables::Matrix;
 
@@ -23,7 +24,7 @@ pub(super) fn at_points<V: Four, const G: usize>(
 
 /// For each group of points the columns of a matrix, zeros beyond the last.
 #[inline(always)]
-pub(super) fn rows<V: Four, const G: usize>(like: V, matrix: &Matrix) -> [[[V; 4]; G]; G] {
+pub(super) fn rows<V: Four, const G: usize>(like: V, matrix: &Matrix<Heap>) -> [[[V; 4]; G]; G] {
     let mut rows = [[[like.like(0.0); 4]; G]; G];
     for (j, column) in matrix.columns().take(4 * G).enumerate() {
         let column = column.as_chunks::<4>().0;

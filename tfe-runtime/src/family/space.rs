@@ -15,6 +15,7 @@ use crate::double_double::DoubleDouble;
 use crate::model::Form;
 use crate::points::end::moved;
 use crate::points::four::{Four, block, put};
+use crate::points::storage::Heap;
 use crate::points::sweep::Largest;
 use crate::points::tables::{MAX_GROUPS, Tables};
 use alloc::vec;
@@ -24,7 +25,7 @@ use core::ops::Range;
 /// Everything that does not depend on the kind of register.
 #[derive(Clone, Debug)]
 pub(super) struct Problem {
-    pub(super) tables: Tables,
+    pub(super) tables: Tables<Heap>,
     pub(super) inertia: Inertia,
     pub(super) velocity: Vec<f64>,
     pub(super) velocity_low: Vec<f64>,
@@ -178,7 +179,7 @@ struct Placement<V, const G: usize> {
 
 impl<V: Four, const G: usize> Placement<V, G> {
     #[inline(always)]
-    fn of(like: V, tables: &Tables, h: f64, group: usize) -> Self {
+    fn of(like: V, tables: &Tables<Heap>, h: f64, group: usize) -> Self {
         Self {
             h: like.like(h),
             once: rows::<V, G>(like, &tables.once)[group],
@@ -234,7 +235,13 @@ impl<V: Four> Space<V> {
 
     /// Coordinates and velocities (momenta) of the group at hand, a row of n for each point.
     #[cfg(feature = "sparse")]
-    pub(super) fn positions(&self, tables: &Tables, group: usize, q: &mut [f64], z: &mut [f64]) {
+    pub(super) fn positions(
+        &self,
+        tables: &Tables<Heap>,
+        group: usize,
+        q: &mut [f64],
+        z: &mut [f64],
+    ) {
         for lane in 0..4.min(tables.points - 4 * group) {
             let from = (4 * group + lane) * self.n;
             for a in 0..self.n {
@@ -315,7 +322,7 @@ impl<V: Four> Space<V> {
 
     #[cfg(feature = "sparse")]
     #[inline(always)]
-    fn rest(&mut self, tables: &Tables, group: usize, rest: &mut [f64]) {
+    fn rest(&mut self, tables: &Tables<Heap>, group: usize, rest: &mut [f64]) {
         let here = 4.min(tables.points - 4 * group);
         for a in 0..self.n {
             let rest_here = self.take(a) - self.forces[group * self.n + a];
@@ -513,7 +520,7 @@ impl<V: Four> Space<V> {
     /// Σ b f and Σ (bᵀA) f at four coordinates, each a number and what rounding took from it: weights and step are the same numbers in every
     /// step, and what their products lose is no chance.
     #[inline(always)]
-    fn integrals(&self, tables: &Tables, at: usize) -> ((V, V), (V, V)) {
+    fn integrals(&self, tables: &Tables<Heap>, at: usize) -> ((V, V), (V, V)) {
         let none = self.like.like(0.0);
         let (mut force, mut lever) = ((none, none), (none, none));
         let last = self.n.min(at + 4);

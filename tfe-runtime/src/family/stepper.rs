@@ -265,6 +265,7 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
 impl<M: FamilyModel> Halving for FamilyStepper<'_, M> {
     type State = FamilyState;
     type Kick = Infallible;
+    type Kicks = [Infallible; 0];
 
     fn whole(
         &mut self,
@@ -276,7 +277,7 @@ impl<M: FamilyModel> Halving for FamilyStepper<'_, M> {
         self.advance_whole(t, h, state)
     }
 
-    fn passed(&mut self, t: f64, h: f64, _: Vec<Infallible>) {
+    fn passed(&mut self, t: f64, h: f64, _: [Infallible; 0]) {
         let dense = self.dense_of_last(t, t + h);
         self.pieces.push(dense);
     }

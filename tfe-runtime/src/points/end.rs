@@ -1,14 +1,20 @@
 //! The end of an element, to more than the working precision where that is asked for.
 
 use super::four::{Four, Precise, block, put};
-use super::{Leg, Points};
+use super::storage::Storage;
+use super::{Leg, Work};
+use crate::model::State;
 
-impl<const N: usize> Points<N> {
+impl<const N: usize, S: Storage> Work<N, S> {
     /// Start plus h times the integrals of the rates of first-order equations.
     #[inline(always)]
-    pub(super) fn finish<V: Four, const EXACT: bool>(&mut self, like: V, leg: &Leg<'_, N>) {
-        let (end, end_low) = (&mut self.end, &mut self.end_low);
-        let (weights, h) = (&self.tables.weights, like.like(leg.h));
+    pub(super) fn finish<V: Four, const EXACT: bool>(
+        &self,
+        like: V,
+        leg: &Leg<'_, N, S>,
+    ) -> (State<N>, State<N>) {
+        let (mut end, mut end_low) = (State::ZERO, State::ZERO);
+        let (weights, h) = (&leg.tables.weights, like.like(leg.h));
         for at in (0..N).step_by(4) {
             let velocity = weights.sums::<_, N, EXACT>(like, &self.rates, at);
             let force = weights.sums::<_, N, EXACT>(like, &self.forces, at);
@@ -21,32 +27,33 @@ impl<const N: usize> Points<N> {
             put(q_low, &mut end_low.q, at);
             put(p_low, &mut end_low.p, at);
         }
+        (end, end_low)
     }
 
     /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) of second-order equations.
     #[inline(always)]
     pub(super) fn finish_second_order<V: Four, const EXACT: bool>(
-        &mut self,
+        &self,
         like: V,
-        leg: &Leg<'_, N>,
-    ) {
-        let (end, end_low) = (&mut self.end, &mut self.end_low);
+        leg: &Leg<'_, N, S>,
+    ) -> (State<N>, State<N>) {
+        let (mut end, mut end_low) = (State::ZERO, State::ZERO);
         let (mut lever, mut lever_low) = ([0.0; N], [0.0; N]);
         let (forces, h) = (&self.forces, like.like(leg.h));
         for at in (0..N).step_by(4) {
-            let (sum, low) = self.tables.lever.sums::<_, N, EXACT>(like, forces, at);
+            let (sum, low) = leg.tables.lever.sums::<_, N, EXACT>(like, forces, at);
             put(sum, &mut lever, at);
             put(low, &mut lever_low, at);
         }
-        if self.inertia.diagonal.is_none() {
-            (lever, lever_low) = self.inertia.of_both(&lever, &lever_low);
+        if leg.inertia.diagonal.is_none() {
+            (lever, lever_low) = leg.inertia.of_both(&lever, &lever_low);
         }
         for at in (0..N).step_by(4) {
             let mut acceleration = (block(like, &lever, at), block(like, &lever_low, at));
-            if self.inertia.diagonal.is_some() {
+            if leg.inertia.diagonal.is_some() {
                 // Times 1/m, which has a low word of its own: one rounding of it would be the same in every step.
-                let inverse = block(like, &self.inertia.inverse_diagonal, at);
-                let inverse_low = block(like, &self.inertia.inverse_low, at);
+                let inverse = block(like, &leg.inertia.inverse_diagonal, at);
+                let inverse_low = block(like, &leg.inertia.inverse_low, at);
                 if const { EXACT } {
                     let (product, rest) = inverse.product(acceleration.0);
                     let rest = rest + (inverse * acceleration.1 + inverse_low * acceleration.0);
@@ -55,7 +62,7 @@ impl<const N: usize> Points<N> {
                     acceleration.0 = inverse * acceleration.0;
                 }
             }
-            let force = self.tables.weights.sums::<_, N, EXACT>(like, forces, at);
+            let force = leg.tables.weights.sums::<_, N, EXACT>(like, forces, at);
             let v = (
                 block(like, &self.velocity, at),
                 block(like, &self.velocity_low, at),
@@ -69,6 +76,7 @@ impl<const N: usize> Points<N> {
             put(q_low, &mut end_low.q, at);
             put(p_low, &mut end_low.p, at);
         }
+        (end, end_low)
     }
 }
 

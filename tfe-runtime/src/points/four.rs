@@ -1,6 +1,7 @@
 //! Four points side by side.
 
 use super::Row;
+use super::storage::Storage;
 use super::tables::Matrix;
 use crate::double_double::DoubleDouble;
 use crate::model::{First, Model};
@@ -27,6 +28,7 @@ pub(crate) trait Precise: Real {
 }
 
 /// Work that is compiled apart from the places where it is called, for the instruction set of the numbers with which it computes.
+#[cfg(feature = "alloc")]
 pub(crate) trait Apart {
     fn run<V: Four>(self, like: V);
 }
@@ -40,16 +42,23 @@ pub(crate) trait Four: Precise {
     fn lanes(self) -> [f64; 4];
 
     /// Runs the work with numbers of this kind.
+    #[cfg(feature = "alloc")]
     fn apart<W: Apart>(self, work: W);
 
     /// sin and cos of `self`, and of `other`.
+    #[cfg(feature = "alloc")]
     #[inline(always)]
     fn sin_cos_of_two(self, other: Self) -> ((Self, Self), (Self, Self)) {
         (self.sin_cos(), other.sin_cos())
     }
 
     /// The product of a table with a vector over the points, for every coordinate.
-    fn apply<const N: usize>(self, matrix: &Matrix, rows: &[Row<N>], products: &mut [Row<N>]);
+    fn apply<S: Storage, const N: usize>(
+        self,
+        matrix: &Matrix<S>,
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    );
 
     /// The kernel of first derivatives at four points.
     fn first<M, const N: usize>(
@@ -121,10 +130,16 @@ impl Four for Lanes<4> {
 
     /// Called and not inlined: what few processors run need not be compiled at every place of every model.
     #[inline(never)]
-    fn apply<const N: usize>(self, matrix: &Matrix, rows: &[Row<N>], products: &mut [Row<N>]) {
+    fn apply<S: Storage, const N: usize>(
+        self,
+        matrix: &Matrix<S>,
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
         matrix.apply_inline(self, rows, products);
     }
 
+    #[cfg(feature = "alloc")]
     #[inline(never)]
     fn apart<W: Apart>(self, work: W) {
         work.run(self);
@@ -235,7 +250,12 @@ impl Four for crate::quad::Quad {
     }
 
     #[inline(always)]
-    fn apply<const N: usize>(self, matrix: &Matrix, rows: &[Row<N>], products: &mut [Row<N>]) {
+    fn apply<S: Storage, const N: usize>(
+        self,
+        matrix: &Matrix<S>,
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
         matrix.apply_inline(self, rows, products);
     }
 

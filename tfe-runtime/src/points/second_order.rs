@@ -1,17 +1,18 @@
 //! M q̈ = f(q, q̇): forces are the only unknowns.
 
 use super::four::{Four, block, put};
+use super::storage::Storage;
 use super::sweep::{Largest, no_derivatives, relative};
-use super::{Leg, Points};
+use super::{Leg, Work};
 use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
 use crate::model::{Form, Model};
 
-impl<const N: usize> Points<N> {
+impl<const N: usize, S: Storage> Work<N, S> {
     /// Velocity at the start, and what it lost by rounding.
     #[inline(always)]
-    pub(super) fn begin_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
-        let inertia = &self.inertia;
+    pub(super) fn begin_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
+        let inertia = &leg.inertia;
         if let Some(mass) = &inertia.diagonal {
             for at in (0..N).step_by(4) {
                 let p = block(like, &leg.start.p, at);
@@ -37,9 +38,9 @@ impl<const N: usize> Points<N> {
 
     /// How far the velocity at the start reaches.
     #[inline(always)]
-    pub(super) fn set_drift<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
+    pub(super) fn set_drift<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
         let h = like.like(leg.h);
-        for (drift, reach) in self.drift.iter_mut().zip(&self.tables.reach) {
+        for (drift, reach) in self.drift.iter_mut().zip(leg.tables.reach.iter()) {
             let reach = h * like.with(*reach);
             for a in 0..N {
                 drift[a] = (reach * like.like(self.velocity[a])).lanes();
@@ -49,28 +50,28 @@ impl<const N: usize> Points<N> {
 
     /// The same with what low words of state and tables add. The products are A² f, those with its low part follow here.
     #[inline(always)]
-    pub(super) fn set_exact_drift<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
+    pub(super) fn set_exact_drift<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
         let products = &mut self.more_products;
-        (self.tables.twice_low).apply(like, &self.forces, products);
-        let (groups, h) = (self.tables.groups, like.like(leg.h));
+        (leg.tables.twice_low).apply(like, &self.forces, products);
+        let (groups, h) = (leg.tables.groups, like.like(leg.h));
         // What the one rounding of h² takes, the same in every step.
         let square_low = like.like(DoubleDouble::product(leg.h, leg.h).low);
         let drift = &mut self.drift[..groups];
         let products_low = &self.more_products[..groups];
         let products = &self.products[..groups];
         for c in 0..groups {
-            let reach = like.with(self.tables.reach[c]);
-            let reach_low = like.with(self.tables.reach_low[c]);
+            let reach = like.with(leg.tables.reach[c]);
+            let reach_low = like.with(leg.tables.reach_low[c]);
             for a in 0..N {
                 let v = like.like(self.velocity[a]);
                 let v_low = reach * like.like(self.velocity_low[a]) + reach_low * v;
-                let mut rate = self.inertia.row(like, &products_low[c], a);
-                if self.inertia.diagonal.is_some() {
+                let mut rate = leg.inertia.row(like, &products_low[c], a);
+                if leg.inertia.diagonal.is_some() {
                     // What the one rounding of 1/m takes from all accelerations.
-                    rate += like.like(self.inertia.inverse_low[a]) * like.with(products[c][a]);
+                    rate += like.like(leg.inertia.inverse_low[a]) * like.with(products[c][a]);
                 }
                 let low = like.like(leg.low.q[a]) + h * (v_low + h * rate);
-                let low = low + square_low * self.inertia.row(like, &products[c], a);
+                let low = low + square_low * leg.inertia.row(like, &products[c], a);
                 drift[c][a] = (h * (reach * v) + low).lanes();
             }
         }
@@ -78,8 +79,8 @@ impl<const N: usize> Points<N> {
 
     /// A² f
     #[inline(always)]
-    pub(super) fn integrate_twice<V: Four>(&mut self, like: V) {
-        (self.tables.twice).apply(like, &self.forces, &mut self.products);
+    pub(super) fn integrate_twice<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
+        (leg.tables.twice).apply(like, &self.forces, &mut self.products);
     }
 
     /// One iteration: coordinates from products with the forces, forces at the coordinates.
@@ -88,13 +89,13 @@ impl<const N: usize> Points<N> {
         &mut self,
         like: V,
         model: &M,
-        leg: &Leg<'_, N>,
+        leg: &Leg<'_, N, S>,
     ) -> Increment
     where
         M: Model<N>,
     {
         if const { M::FACTS.forced } {
-            (self.tables.once).apply(like, &self.forces, &mut self.more_products);
+            (leg.tables.once).apply(like, &self.forces, &mut self.more_products);
         }
         let (h, square) = (like.like(leg.h), like.like(leg.h * leg.h));
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
@@ -104,13 +105,13 @@ impl<const N: usize> Points<N> {
         let products = &self.products[..count];
         let more_products = &self.more_products[..count];
         let drift = &self.drift[..count];
-        let nodes = &self.tables.nodes[..count];
+        let nodes = &leg.tables.nodes[..count];
         for c in 0..count {
-            let moved = if self.inertia.diagonal.is_some() {
-                self.inertia
+            let moved = if leg.inertia.diagonal.is_some() {
+                leg.inertia
                     .moved::<V, true>(square, &products[c], &drift[c])
             } else {
-                self.inertia
+                leg.inertia
                     .moved::<V, false>(square, &products[c], &drift[c])
             };
             let (mut q, mut z) = ([zero; N], [zero; N]);
@@ -120,7 +121,7 @@ impl<const N: usize> Points<N> {
                     z[a] = match M::FORM {
                         Form::Lagrangian => {
                             like.like(self.velocity[a])
-                                + h * self.inertia.row(like, &more_products[c], a)
+                                + h * leg.inertia.row(like, &more_products[c], a)
                         }
                         Form::Hamiltonian => {
                             like.like(leg.start.p[a]) + h * like.with(more_products[c][a])
@@ -142,7 +143,7 @@ impl<const N: usize> Points<N> {
                     given
                 };
                 // As accelerations: momenta of light and heavy bodies say nothing beside each other.
-                let inverse = like.like(self.inertia.inverse_diagonal[a]);
+                let inverse = like.like(leg.inertia.inverse_diagonal[a]);
                 changed.raise(inverse * (force - like.with(forces[c][a])));
                 // What is not finite shows in the change.
                 size.raise_finite(inverse * force);
@@ -161,20 +162,5 @@ impl<const N: usize> Points<N> {
             position
         };
         Increment { relative, position }
-    }
-
-    /// Velocities at the points, which the iteration itself does not need.
-    pub(super) fn set_rates(&mut self, h: f64) {
-        let like = crate::Lanes([0.0; 4]);
-        (self.tables.once).apply(like, &self.forces, &mut self.products);
-        self.rates.resize(self.products.len(), [[0.0; 4]; N]);
-        for (product, rate) in self.products.iter().zip(&mut self.rates) {
-            for a in 0..N {
-                let change = self.inertia.row(like, product, a).0;
-                for lane in 0..4 {
-                    rate[a][lane] = self.velocity[a] + h * change[lane];
-                }
-            }
-        }
     }
 }

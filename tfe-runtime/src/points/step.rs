@@ -1,26 +1,30 @@
 //! A step of one trajectory: start of the iteration, the iteration, the end.
 
 use super::four::Four;
-use super::{Leg, Outcome, Points, is_finite, is_phase, is_second_order, largest};
-use crate::model::Model;
+use super::storage::Storage;
+use super::{Leg, Outcome, Points, Work, is_finite, is_phase, is_second_order, largest};
+use crate::model::{Model, State};
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 
 /// A step to be done.
-pub(super) struct Job<'a, M, const N: usize> {
-    pub(super) points: &'a mut Points<N>,
+pub(super) struct Job<'a, M, S: Storage, const N: usize> {
+    pub(super) points: &'a mut Points<N, S>,
     pub(super) model: &'a M,
     pub(super) control: &'a Control,
-    pub(super) leg: Leg<'a, N>,
+    /// Time and length.
+    pub(super) place: (f64, f64),
+    /// The start, and what it is more than its rounded numbers.
+    pub(super) start: (&'a State<N>, &'a State<N>),
     /// Newton's method may follow.
     pub(super) yielding: bool,
 }
 
-impl<M, const N: usize> Job<'_, M, N>
+impl<M, S: Storage, const N: usize> Job<'_, M, S, N>
 where
     M: Model<N>,
 {
     /// In the registers of the processor.
-    pub(super) fn run(self) -> Outcome {
+    pub(super) fn run(self) -> Outcome<N> {
         // Without kernels for lanes the constant is false, and the compiler drops the call.
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
         if let (Some(isa), true) = (self.points.isa, M::LANES) {
@@ -31,15 +35,46 @@ where
 
     /// The whole step.
     #[inline(always)]
-    fn step<V: Four>(self, like: V) -> Outcome {
+    fn step<V: Four>(self, like: V) -> Outcome<N> {
         let Self {
             points,
             model,
             control,
-            leg,
             yielding,
+            ..
         } = self;
-        points.begin::<V, M>(like, &leg);
+        let mut local = None;
+        let groups = points.tables.groups;
+        let work = Work::<N, S>::of::<M>(&mut points.work, &mut local, groups);
+        if points.is_warm {
+            if const { is_second_order::<M, N>() || is_phase::<M, N>() } {
+                (points.tables.continued()).apply(like, &points.forces, &mut work.forces);
+            } else {
+                // The first iteration takes what low words of the tables make of them.
+                work.forces.copy_from_slice(&points.forces);
+            }
+            if const { !is_second_order::<M, N>() } {
+                (points.tables.continued()).apply(like, &points.rates, &mut work.rates);
+            }
+        } else {
+            work.forces.copy_from_slice(&points.forces);
+            work.rates.copy_from_slice(&points.rates);
+        }
+        let leg = Leg {
+            t: self.place.0,
+            h: self.place.1,
+            start: self.start.0,
+            low: self.start.1,
+            tables: &points.tables,
+            inertia: &points.inertia,
+        };
+        work.distance = largest(&leg.start.q);
+        if const { is_second_order::<M, N>() } {
+            work.begin_second_order(like, &leg);
+            work.speed = largest(&work.velocity);
+        } else {
+            work.speed = largest(&leg.start.p);
+        }
         let is_rough = control.is_rough();
         let mut monitor = Monitor::new(control.tolerance);
         let most = if yielding {
@@ -51,23 +86,23 @@ where
         while iterations < most {
             // Constant conditions, so that of the three iterations one is compiled.
             let increment = if const { is_second_order::<M, N>() } {
-                points.integrate_twice(like);
+                work.integrate_twice(like, &leg);
                 if iterations == 0 {
                     if is_rough {
-                        points.set_drift(like, &leg);
+                        work.set_drift(like, &leg);
                     } else {
-                        points.set_exact_drift(like, &leg);
+                        work.set_exact_drift(like, &leg);
                     }
                 }
-                points.sweep_second_order::<V, M>(like, model, &leg)
+                work.sweep_second_order::<V, M>(like, model, &leg)
             } else {
                 if iterations == 0 && !is_rough {
-                    points.set_low(like, &leg);
+                    work.set_low(like, &leg);
                 }
                 if const { is_phase::<M, N>() } {
-                    points.sweep_phase::<V, M>(like, model, &leg, iterations == 0, refresh)
+                    work.sweep_phase::<V, M>(like, model, &leg, iterations == 0, refresh)
                 } else {
-                    points.sweep_velocity::<V, M>(like, model, &leg, refresh)
+                    work.sweep_velocity::<V, M>(like, model, &leg, refresh)
                 }
             };
             iterations += 1;
@@ -88,23 +123,29 @@ where
             }
         }
         // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
-        let mut arrived = false;
+        let mut end = None;
         if converged && monitor.evidence(yielding).check(control.solve).is_ok() {
-            if const { is_second_order::<M, N>() } {
+            let (state, low) = if const { is_second_order::<M, N>() } {
                 if is_rough {
-                    points.finish_second_order::<V, false>(like, &leg);
+                    work.finish_second_order::<V, false>(like, &leg)
                 } else {
-                    points.finish_second_order::<V, true>(like, &leg);
+                    work.finish_second_order::<V, true>(like, &leg)
                 }
             } else if is_rough {
-                points.finish::<V, false>(like, &leg);
+                work.finish::<V, false>(like, &leg)
             } else {
-                points.finish::<V, true>(like, &leg);
+                work.finish::<V, true>(like, &leg)
+            };
+            if is_finite(&state) {
+                end = Some((state, low));
+                // What a failed step would have to start from is kept until here.
+                core::mem::swap(&mut points.forces, &mut work.forces);
+                core::mem::swap(&mut points.rates, &mut work.rates);
+                points.velocity = work.velocity;
             }
-            arrived = is_finite(&points.end);
         }
         Outcome {
-            arrived,
+            end,
             iterations,
             residual: monitor.last(),
             contraction: monitor.rate(),
@@ -113,43 +154,16 @@ where
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-struct InRegisters<'a, M, const N: usize> {
-    job: Job<'a, M, N>,
+struct InRegisters<'a, M, S: Storage, const N: usize> {
+    job: Job<'a, M, S, N>,
     isa: pulp::x86::V3,
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for InRegisters<'_, M, N> {
-    type Output = Outcome;
+impl<M: Model<N>, S: Storage, const N: usize> pulp::NullaryFnOnce for InRegisters<'_, M, S, N> {
+    type Output = Outcome<N>;
     #[inline(always)]
-    fn call(self) -> Outcome {
+    fn call(self) -> Outcome<N> {
         self.job.step(crate::quad::Quad::of(self.isa, [0.0; 4]))
-    }
-}
-
-impl<const N: usize> Points<N> {
-    /// Start of the iteration: the last element continued.
-    #[inline(always)]
-    fn begin<V: Four, M>(&mut self, like: V, leg: &Leg<'_, N>)
-    where
-        M: Model<N>,
-    {
-        if self.is_warm {
-            if const { is_second_order::<M, N>() || is_phase::<M, N>() } {
-                (self.tables.continued()).apply(like, &self.forces, &mut self.products);
-                core::mem::swap(&mut self.forces, &mut self.products);
-            }
-            if const { !is_second_order::<M, N>() } {
-                (self.tables.continued()).apply(like, &self.rates, &mut self.products);
-                core::mem::swap(&mut self.rates, &mut self.products);
-            }
-        }
-        self.distance = largest(&leg.start.q);
-        if const { is_second_order::<M, N>() } {
-            self.begin_second_order(like, leg);
-            self.speed = largest(&self.velocity);
-        } else {
-            self.speed = largest(&leg.start.p);
-        }
     }
 }

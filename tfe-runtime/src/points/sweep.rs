@@ -1,7 +1,8 @@
 //! First-order equations, and what all iterations share.
 
 use super::four::{Four, Precise};
-use super::{Inertia, Leg, Points, Row};
+use super::storage::Storage;
+use super::{Inertia, Leg, Row, Work};
 use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
 use crate::model::{First, Model};
@@ -67,21 +68,21 @@ pub(crate) fn relative(h: f64, start: f64, x: f64, step: f64) -> f64 {
     }
 }
 
-impl<const N: usize> Points<N> {
+impl<const N: usize, S: Storage> Work<N, S> {
     /// What low words of the start and of the tables add at the points.
     #[inline(always)]
-    pub(super) fn set_low<V: Four>(&mut self, like: V, leg: &Leg<'_, N>) {
+    pub(super) fn set_low<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
         let (products, more_products) = (&mut self.products, &mut self.more_products);
-        (self.tables.once_low).apply(like, &self.rates, products);
-        (self.tables.once_low).apply(like, &self.forces, more_products);
+        (leg.tables.once_low).apply(like, &self.rates, products);
+        (leg.tables.once_low).apply(like, &self.forces, more_products);
         let h = like.like(leg.h);
-        for (low, product) in self.low_position.iter_mut().zip(products) {
+        for (low, product) in self.low_position.iter_mut().zip(products.iter()) {
             for a in 0..N {
                 let moved = h * like.with(product[a]);
                 low[a] = (like.like(leg.low.q[a]) + moved).lanes();
             }
         }
-        for (low, product) in self.low_momentum.iter_mut().zip(more_products) {
+        for (low, product) in self.low_momentum.iter_mut().zip(more_products.iter()) {
             for a in 0..N {
                 let moved = h * like.with(product[a]);
                 low[a] = (like.like(leg.low.p[a]) + moved).lanes();
@@ -95,7 +96,7 @@ impl<const N: usize> Points<N> {
         &mut self,
         like: V,
         model: &M,
-        leg: &Leg<'_, N>,
+        leg: &Leg<'_, N, S>,
         refresh: bool,
     ) -> Increment
     where
@@ -109,9 +110,9 @@ impl<const N: usize> Points<N> {
         let products = &mut self.products[..count];
         let low_position = &self.low_position[..count];
         let low_momentum = &self.low_momentum[..count];
-        let nodes = &self.tables.nodes[..count];
+        let nodes = &leg.tables.nodes[..count];
         let masses = &mut self.masses;
-        self.tables.once.apply(like, rates, products);
+        leg.tables.once.apply(like, rates, products);
         for c in 0..count {
             let (mut q, mut v) = ([zero; N], [zero; N]);
             for a in 0..N {
@@ -134,7 +135,7 @@ impl<const N: usize> Points<N> {
                 forces[c][a] = (first.q[a] + first.force[a]).lanes();
             }
         }
-        self.tables.once.apply(like, forces, products);
+        leg.tables.once.apply(like, forces, products);
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
         for c in 0..count {
             let mut step = [zero; N];
@@ -143,7 +144,7 @@ impl<const N: usize> Points<N> {
                 step[a] = wanted - (like.with(momenta[c][a]) - like.like(leg.start.p[a]));
             }
             if const { M::FACTS.constant_mass } {
-                step = self.inertia.times(like, &step);
+                step = leg.inertia.times(like, &step);
             } else {
                 solve(like, &masses[c], &mut step);
             }
@@ -173,7 +174,7 @@ impl<const N: usize> Points<N> {
         &mut self,
         like: V,
         model: &M,
-        leg: &Leg<'_, N>,
+        leg: &Leg<'_, N, S>,
         is_first: bool,
         refresh: bool,
     ) -> Increment
@@ -189,9 +190,9 @@ impl<const N: usize> Points<N> {
         let products = &mut self.products[..count];
         let low_position = &self.low_position[..count];
         let low_momentum = &self.low_momentum[..count];
-        let nodes = &self.tables.nodes[..count];
+        let nodes = &leg.tables.nodes[..count];
         let masses = &mut self.masses;
-        self.tables.once.apply(like, forces, products);
+        leg.tables.once.apply(like, forces, products);
         for c in 0..count {
             let mut change = [zero; N];
             for a in 0..N {
@@ -203,7 +204,7 @@ impl<const N: usize> Points<N> {
             let mut by_change = [zero; N];
             if const { M::FACTS.constant_mass } {
                 if !is_first {
-                    by_change = self.inertia.times(like, &change);
+                    by_change = leg.inertia.times(like, &change);
                 }
             } else if !is_first {
                 for a in 0..N {
@@ -216,7 +217,7 @@ impl<const N: usize> Points<N> {
                 velocities[c][a] = (like.with(rates[c][a]) + by_change[a]).lanes();
             }
         }
-        self.tables.once.apply(like, velocities, products);
+        leg.tables.once.apply(like, velocities, products);
         let none = Largest::none(like);
         let (mut force_changed, mut force_size) = (none, none);
         let (mut rate_changed, mut rate_size) = (none, none);
@@ -258,7 +259,7 @@ impl<const N: usize> Points<N> {
     }
 }
 
-impl<const N: usize> Inertia<N> {
+impl<const N: usize, S: Storage> Inertia<N, S> {
     /// The constant M⁻¹ (or H_pp) times a vector for each of several points.
     #[inline(always)]
     pub(crate) fn times<V: Real>(&self, like: V, vector: &[V; N]) -> [V; N] {

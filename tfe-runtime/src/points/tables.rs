@@ -2,40 +2,38 @@
 
 use super::Row;
 use super::four::Four;
+use super::storage::{Array, Inline, Lines, Storage};
 use crate::double_double::DoubleDouble;
-use crate::scheme::{SchemeRef, SchemeTable, Tables as _};
+use crate::scheme::{self, Scheme, SchemeRef};
 use crate::step::{continued_ratio, set_extrapolation};
-use alloc::sync::Arc;
-use alloc::vec;
-use alloc::vec::Vec;
 
 /// Elements have up to 16 points at once; beyond, one point after the other.
 pub(crate) const MAX_GROUPS: usize = 4;
 
 /// A K × K matrix by columns, the rows in groups of four. Rows beyond the last are copies of it, so that nothing extraordinary happens there.
 #[derive(Clone, Debug)]
-pub(crate) struct Matrix {
+pub struct Matrix<S: Storage> {
+    #[cfg(feature = "alloc")]
     groups: usize,
-    columns: Vec<[f64; 4]>,
+    columns: S::Lines,
 }
 
-impl Matrix {
-    fn new(points: usize, row_by_row: &[f64]) -> Self {
-        let groups = points.div_ceil(4);
-        let columns = vec![[0.0; 4]; points * groups];
-        let mut matrix = Self { groups, columns };
-        matrix.set(points, row_by_row);
-        matrix
-    }
-
-    fn set(&mut self, points: usize, row_by_row: &[f64]) {
-        for (j, column) in self.columns.chunks_exact_mut(self.groups).enumerate() {
-            for (i, entry) in column.as_flattened_mut().iter_mut().enumerate() {
-                *entry = row_by_row[i.min(points - 1) * points + j];
-            }
+/// Sets the columns of a matrix given row by row.
+const fn set_columns(points: usize, row_by_row: &[f64], columns: &mut [[f64; 4]]) {
+    let groups = points.div_ceil(4);
+    let mut j = 0;
+    while j < points {
+        let mut i = 0;
+        while i < 4 * groups {
+            let row = if i < points { i } else { points - 1 };
+            columns[j * groups + i / 4][i % 4] = row_by_row[row * points + j];
+            i += 1;
         }
+        j += 1;
     }
+}
 
+impl<S: Storage> Matrix<S> {
     /// The product with a vector over the points for every coordinate.
     #[inline(always)]
     pub(crate) fn apply<V: Four, const N: usize>(
@@ -54,11 +52,15 @@ impl Matrix {
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
-        match rows.len() {
-            1 => self.apply_to::<V, N, 1>(like, rows, products),
-            2 => self.apply_to::<V, N, 2>(like, rows, products),
-            3 => self.apply_to::<V, N, 3>(like, rows, products),
-            _ => self.apply_to::<V, N, MAX_GROUPS>(like, rows, products),
+        // Conditions that are constants, so that of a known size one is compiled.
+        if const { S::GROUPS == 1 } || const { S::GROUPS == 0 } && rows.len() == 1 {
+            self.apply_to::<V, N, 1>(like, rows, products);
+        } else if const { S::GROUPS == 2 } || const { S::GROUPS == 0 } && rows.len() == 2 {
+            self.apply_to::<V, N, 2>(like, rows, products);
+        } else if const { S::GROUPS == 3 } || const { S::GROUPS == 0 } && rows.len() == 3 {
+            self.apply_to::<V, N, 3>(like, rows, products);
+        } else {
+            self.apply_to::<V, N, MAX_GROUPS>(like, rows, products);
         }
     }
 
@@ -110,12 +112,14 @@ impl Matrix {
     }
 
     /// The columns one after the other, in groups of four lines.
+    #[cfg(feature = "alloc")]
     #[inline(always)]
     pub(crate) fn groups(&self) -> &[[f64; 4]] {
         &self.columns
     }
 
     /// The columns, padded to groups of four.
+    #[cfg(feature = "alloc")]
     #[inline(always)]
     pub(crate) fn columns(&self) -> core::slice::ChunksExact<'_, f64> {
         self.columns.as_flattened().chunks_exact(4 * self.groups)
@@ -157,18 +161,18 @@ fn add<V: Four, const C: usize>(
 
 /// A weight for each point and what rounding took from it; zeros beyond the last.
 #[derive(Clone, Debug)]
-pub(crate) struct Weights(Vec<[[f64; 4]; 2]>);
+pub(crate) struct Weights<S: Storage>(S::Groups<[[f64; 4]; 2]>);
 
-impl Weights {
-    fn new(high: &[f64], low: &[f64]) -> Self {
-        let mut groups = vec![[[0.0; 4]; 2]; high.len().div_ceil(4)];
-        for (l, (high, low)) in high.iter().zip(low).enumerate() {
-            groups[l / 4][0][l % 4] = *high;
-            groups[l / 4][1][l % 4] = *low;
-        }
-        Self(groups)
+const fn set_weights(high: &[f64], low: &[f64], groups: &mut [[[f64; 4]; 2]]) {
+    let mut l = 0;
+    while l < high.len() {
+        groups[l / 4][0][l % 4] = high[l];
+        groups[l / 4][1][l % 4] = low[l];
+        l += 1;
     }
+}
 
+impl<S: Storage> Weights<S> {
     /// Σ weight · value over the points of four coordinates at most from `from` on, and what rounding takes from it.
     ///
     /// This is what all steps add up. With products of one rounding each, the energy of a Kepler orbit drifts ten times as fast: weights
@@ -213,6 +217,7 @@ impl Weights {
     }
 
     /// The weight of one point and what rounding took from it.
+    #[cfg(feature = "alloc")]
     #[inline(always)]
     pub(crate) fn of(&self, point: usize) -> (f64, f64) {
         let [weight, low] = &self.0[point / 4];
@@ -243,158 +248,304 @@ fn transposed<V: Four>(rows: [V; 4]) -> [V; 4] {
     ]
 }
 
-/// All tables of an element, and what continues the last one; clones share what no step changes.
-#[derive(Clone, Debug)]
-pub(crate) struct Tables {
-    fixed: Arc<Fixed>,
-    /// From the last element to this one, for steps of the ratio that follows; those of ratio one are among the others.
-    other: Option<Matrix>,
-    ratio: f64,
-    scratch: Vec<f64>,
-}
-
 /// What no step changes; `low` is what rounding took.
 #[derive(Clone, Debug)]
-pub(crate) struct Fixed {
+pub struct Fixed<S: Storage> {
     pub(crate) points: usize,
     pub(crate) groups: usize,
     /// c
-    pub(crate) nodes: Vec<[f64; 4]>,
+    pub(crate) nodes: S::Groups<[f64; 4]>,
     /// A 1: how far a constant velocity reaches. It is c for collocation methods only.
-    pub(crate) reach: Vec<[f64; 4]>,
-    pub(crate) reach_low: Vec<[f64; 4]>,
+    pub(crate) reach: S::Groups<[f64; 4]>,
+    pub(crate) reach_low: S::Groups<[f64; 4]>,
     /// A
-    pub(crate) once: Matrix,
-    pub(crate) once_low: Matrix,
+    pub(crate) once: Matrix<S>,
+    pub(crate) once_low: Matrix<S>,
     /// A²: what two integrations make of accelerations.
-    pub(crate) twice: Matrix,
-    pub(crate) twice_low: Matrix,
+    pub(crate) twice: Matrix<S>,
+    pub(crate) twice_low: Matrix<S>,
     /// b
-    pub(crate) weights: Weights,
+    pub(crate) weights: Weights<S>,
     /// bᵀA
-    pub(crate) lever: Weights,
+    pub(crate) lever: Weights<S>,
     /// From one element to the next that is as long.
-    continued: Matrix,
+    pub(crate) continued: Matrix<S>,
 }
 
-impl core::ops::Deref for Tables {
-    type Target = Fixed;
-    #[inline(always)]
-    fn deref(&self) -> &Fixed {
-        &self.fixed
+/// The numbers of these tables, to be filled.
+struct Target<'a> {
+    nodes: &'a mut [[f64; 4]],
+    reach: &'a mut [[f64; 4]],
+    reach_low: &'a mut [[f64; 4]],
+    once: &'a mut [[f64; 4]],
+    once_low: &'a mut [[f64; 4]],
+    twice: &'a mut [[f64; 4]],
+    twice_low: &'a mut [[f64; 4]],
+    weights: &'a mut [[[f64; 4]; 2]],
+    lever: &'a mut [[[f64; 4]; 2]],
+    continued: &'a mut [[f64; 4]],
+}
+
+/// The most points.
+const MAX_POINTS: usize = 4 * MAX_GROUPS;
+
+impl Target<'_> {
+    const fn fill(&mut self, scheme: &SchemeRef<'_>) {
+        let points = scheme.nodes.len();
+        let mut matrix = [0.0; MAX_POINTS * MAX_POINTS];
+        let mut matrix_low = [0.0; MAX_POINTS * MAX_POINTS];
+        let (mut lever, mut lever_low) = ([0.0; MAX_POINTS], [0.0; MAX_POINTS]);
+        let mut j = 0;
+        while j < points {
+            let mut i = 0;
+            while i < points {
+                let (mut sum, mut k) = (DoubleDouble::ZERO, 0);
+                while k < points {
+                    let product = coefficient(scheme, i, k).times(coefficient(scheme, k, j));
+                    sum = sum.plus(product);
+                    k += 1;
+                }
+                (matrix[i * points + j], matrix_low[i * points + j]) = (sum.high, sum.low);
+                i += 1;
+            }
+            let (mut sum, mut k) = (DoubleDouble::ZERO, 0);
+            while k < points {
+                let weight = DoubleDouble {
+                    high: scheme.weights[k],
+                    low: scheme.weights_low[k],
+                };
+                sum = sum.plus(weight.times(coefficient(scheme, k, j)));
+                k += 1;
+            }
+            (lever[j], lever_low[j]) = (sum.high, sum.low);
+            j += 1;
+        }
+        set_columns(points, &matrix, self.twice);
+        set_columns(points, &matrix_low, self.twice_low);
+        set_columns(points, scheme.position, self.once);
+        set_columns(points, scheme.position_low, self.once_low);
+        // Most steps are as long as the one before.
+        set_extrapolation(scheme, 1.0, &mut matrix);
+        set_columns(points, &matrix, self.continued);
+        set_weights(scheme.weights, scheme.weights_low, self.weights);
+        let (lever, lever_low) = (lever.split_at(points).0, lever_low.split_at(points).0);
+        set_weights(lever, lever_low, self.lever);
+        let mut i = 0;
+        while i < 4 * self.nodes.len() {
+            let l = if i < points { i } else { points - 1 };
+            let (mut sum, mut j) = (DoubleDouble::ZERO, 0);
+            while j < points {
+                sum = sum.plus(coefficient(scheme, l, j));
+                j += 1;
+            }
+            self.nodes[i / 4][i % 4] = scheme.nodes[l];
+            self.reach[i / 4][i % 4] = sum.high;
+            self.reach_low[i / 4][i % 4] = sum.low;
+            i += 1;
+        }
     }
 }
 
-/// The tables computed so far.
-#[cfg(feature = "std")]
-static KNOWN: std::sync::Mutex<Vec<(crate::Element, Arc<Fixed>)>> =
-    std::sync::Mutex::new(Vec::new());
+/// a_ij to twice the precision.
+const fn coefficient(scheme: &SchemeRef<'_>, i: usize, j: usize) -> DoubleDouble {
+    let at = i * scheme.nodes.len() + j;
+    DoubleDouble {
+        high: scheme.position[at],
+        low: scheme.position_low[at],
+    }
+}
 
-impl Tables {
-    /// Of an element that is a Runge–Kutta method. With the feature `std` they are computed once in a program.
-    pub(crate) fn of(scheme: &SchemeRef<'_>) -> Self {
+impl<const K: usize, const C: usize, const FIRST: usize, const VARYING: usize, const SQUARE: usize>
+    Fixed<Inline<K, C, FIRST, VARYING, SQUARE>>
+{
+    /// Of an element that is a Runge–Kutta method of K points; of no use where K is zero.
+    #[must_use]
+    pub const fn new<const POINTS: usize, const U: usize>(scheme: &Scheme<POINTS, U>) -> Self {
+        let (table, row) = ([[[0.0; 4]; C]; K], [[0.0; 4]; C]);
+        let (mut nodes, mut reach, mut reach_low) = (row, row, row);
+        let (mut once, mut once_low) = (table, table);
+        let (mut twice, mut twice_low, mut continued) = (table, table, table);
+        let (mut weights, mut lever) = ([[[0.0; 4]; 2]; C], [[[0.0; 4]; 2]; C]);
+        if K > 0 {
+            let mut target = Target {
+                nodes: &mut nodes,
+                reach: &mut reach,
+                reach_low: &mut reach_low,
+                once: once.as_flattened_mut(),
+                once_low: once_low.as_flattened_mut(),
+                twice: twice.as_flattened_mut(),
+                twice_low: twice_low.as_flattened_mut(),
+                weights: &mut weights,
+                lever: &mut lever,
+                continued: continued.as_flattened_mut(),
+            };
+            target.fill(&scheme.as_view());
+        }
         Self {
-            fixed: Self::fixed(scheme),
+            points: K,
+            groups: C,
+            nodes: Array(nodes),
+            reach: Array(reach),
+            reach_low: Array(reach_low),
+            once: Matrix::of(once),
+            once_low: Matrix::of(once_low),
+            twice: Matrix::of(twice),
+            twice_low: Matrix::of(twice_low),
+            weights: Weights(Array(weights)),
+            lever: Weights(Array(lever)),
+            continued: Matrix::of(continued),
+        }
+    }
+}
+
+impl<const K: usize, const C: usize, const FIRST: usize, const VARYING: usize, const SQUARE: usize>
+    Matrix<Inline<K, C, FIRST, VARYING, SQUARE>>
+{
+    const fn of(columns: [[[f64; 4]; C]; K]) -> Self {
+        Self {
+            #[cfg(feature = "alloc")]
+            groups: C,
+            columns: Lines(columns),
+        }
+    }
+}
+
+/// All tables of an element, and what continues the last one.
+#[derive(Clone, Debug)]
+pub struct Tables<S: Storage> {
+    fixed: S::Fixed,
+    /// From the last element to this one, for steps of the ratio that follows; those of ratio one are among the others.
+    other: Option<Matrix<S>>,
+    ratio: f64,
+}
+
+impl<S: Storage> Tables<S> {
+    pub(crate) fn new(fixed: S::Fixed) -> Self {
+        Self {
+            fixed,
             other: None,
             ratio: 1.0,
-            scratch: Vec::new(),
         }
-    }
-
-    #[cfg(feature = "std")]
-    fn fixed(scheme: &SchemeRef<'_>) -> Arc<Fixed> {
-        // A panic elsewhere leaves the list as good as it was.
-        let mut known = KNOWN
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some((_, fixed)) = known.iter().find(|(of, _)| *of == scheme.element) {
-            return fixed.clone();
-        }
-        let fixed = Arc::new(Fixed::computed(scheme));
-        known.push((scheme.element, fixed.clone()));
-        fixed
-    }
-
-    #[cfg(not(feature = "std"))]
-    fn fixed(scheme: &SchemeRef<'_>) -> Arc<Fixed> {
-        Arc::new(Fixed::computed(scheme))
     }
 
     /// From the last element to this one.
     #[inline(always)]
-    pub(crate) fn continued(&self) -> &Matrix {
+    pub(crate) fn continued(&self) -> &Matrix<S> {
         self.other.as_ref().unwrap_or(&self.fixed.continued)
     }
 
     /// Makes `continued` that of steps of this ratio.
-    pub(crate) fn set_ratio(&mut self, table: &SchemeTable, ratio: f64) {
+    #[inline]
+    pub(crate) fn set_ratio(&mut self, scheme: &impl scheme::Tables, ratio: f64) {
         // Far outside the last element its polynomial says nothing; backwards it may be reused.
         let ratio = continued_ratio(ratio);
         if self.ratio != ratio {
-            self.continue_by(&table.view(), ratio);
+            self.continue_by(&scheme.view(), ratio);
         }
     }
 
     #[cold]
     fn continue_by(&mut self, scheme: &SchemeRef<'_>, ratio: f64) {
-        let points = self.fixed.points;
-        self.scratch.resize(points * points, 0.0);
-        set_extrapolation(scheme, ratio, &mut self.scratch);
-        match &mut self.other {
-            Some(matrix) => matrix.set(points, &self.scratch),
-            None => self.other = Some(Matrix::new(points, &self.scratch)),
-        }
+        let mut matrix = [0.0; MAX_POINTS * MAX_POINTS];
+        set_extrapolation(scheme, ratio, &mut matrix);
+        let empty = || self.fixed.continued.clone();
+        let other = self.other.get_or_insert_with(empty);
+        set_columns(self.fixed.points, &matrix, &mut other.columns);
         self.ratio = ratio;
     }
 }
 
-impl Fixed {
-    fn computed(scheme: &SchemeRef<'_>) -> Self {
-        let points = scheme.points();
-        let coefficient = |i: usize, j: usize| DoubleDouble {
-            high: scheme.position[i * points + j],
-            low: scheme.position_low[i * points + j],
-        };
-        let weight = |j: usize| DoubleDouble {
-            high: scheme.weights[j],
-            low: scheme.weights_low[j],
-        };
-        let product = |left: &dyn Fn(usize) -> DoubleDouble, j: usize| {
-            (0..points).fold(DoubleDouble::ZERO, |sum, k| {
-                sum.plus(left(k).times(coefficient(k, j)))
-            })
-        };
-        let twice: Vec<_> = (0..points * points)
-            .map(|ij| product(&|k| coefficient(ij / points, k), ij % points))
-            .collect();
-        let lever: Vec<_> = (0..points).map(|j| product(&weight, j)).collect();
-        let high = |of: &[DoubleDouble]| of.iter().map(|x| x.high).collect::<Vec<_>>();
-        let low = |of: &[DoubleDouble]| of.iter().map(|x| x.low).collect::<Vec<_>>();
-        let mut nodes = vec![[0.0; 4]; points.div_ceil(4)];
-        let (mut reach, mut reach_low) = (nodes.clone(), nodes.clone());
-        for l in 0..4 * nodes.len() {
-            let (group, lane, l) = (l / 4, l % 4, l.min(points - 1));
-            let sum = |sum: DoubleDouble, j| sum.plus(coefficient(l, j));
-            let sum = (0..points).fold(DoubleDouble::ZERO, sum);
-            nodes[group][lane] = scheme.nodes[l];
-            (reach[group][lane], reach_low[group][lane]) = (sum.high, sum.low);
+impl<S: Storage> core::ops::Deref for Tables<S> {
+    type Target = Fixed<S>;
+    #[inline(always)]
+    fn deref(&self) -> &Fixed<S> {
+        &self.fixed
+    }
+}
+
+#[cfg(feature = "alloc")]
+mod heap {
+    use super::{Fixed, Matrix, Tables, Target, Weights};
+    use crate::points::storage::Heap;
+    use crate::scheme::SchemeRef;
+    use alloc::sync::Arc;
+    use alloc::vec;
+
+    /// The tables computed so far.
+    #[cfg(feature = "std")]
+    static KNOWN: std::sync::Mutex<std::vec::Vec<(crate::Element, Arc<Fixed<Heap>>)>> =
+        std::sync::Mutex::new(std::vec::Vec::new());
+
+    impl Tables<Heap> {
+        /// Of an element that is a Runge–Kutta method; clones share what no step changes. With the feature `std` they are computed once in a program.
+        pub(crate) fn of(scheme: &SchemeRef<'_>) -> Self {
+            Self::new(Self::shared(scheme))
         }
-        // Most steps are as long as the one before.
-        let mut continued = vec![0.0; points * points];
-        set_extrapolation(scheme, 1.0, &mut continued);
-        Self {
-            points,
-            groups: nodes.len(),
-            nodes,
-            reach,
-            reach_low,
-            once: Matrix::new(points, scheme.position),
-            once_low: Matrix::new(points, scheme.position_low),
-            twice: Matrix::new(points, &high(&twice)),
-            twice_low: Matrix::new(points, &low(&twice)),
-            weights: Weights::new(scheme.weights, scheme.weights_low),
-            lever: Weights::new(&high(&lever), &low(&lever)),
-            continued: Matrix::new(points, &continued),
+
+        #[cfg(feature = "std")]
+        fn shared(scheme: &SchemeRef<'_>) -> Arc<Fixed<Heap>> {
+            // A panic elsewhere leaves the list as good as it was.
+            let mut known = KNOWN
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner);
+            if let Some((_, fixed)) = known.iter().find(|(of, _)| *of == scheme.element) {
+                return fixed.clone();
+            }
+            let fixed = Arc::new(Fixed::computed(scheme));
+            known.push((scheme.element, fixed.clone()));
+            fixed
+        }
+
+        #[cfg(not(feature = "std"))]
+        fn shared(scheme: &SchemeRef<'_>) -> Arc<Fixed<Heap>> {
+            Arc::new(Fixed::computed(scheme))
+        }
+    }
+
+    impl Matrix<Heap> {
+        fn empty(points: usize) -> Self {
+            let groups = points.div_ceil(4);
+            Self {
+                groups,
+                columns: vec![[0.0; 4]; points * groups],
+            }
+        }
+    }
+
+    impl Fixed<Heap> {
+        fn computed(scheme: &SchemeRef<'_>) -> Self {
+            let points = scheme.points();
+            let groups = points.div_ceil(4);
+            let (row, matrix) = (vec![[0.0; 4]; groups], Matrix::empty(points));
+            let weights = Weights(vec![[[0.0; 4]; 2]; groups]);
+            let mut fixed = Self {
+                points,
+                groups,
+                nodes: row.clone(),
+                reach: row.clone(),
+                reach_low: row,
+                once: matrix.clone(),
+                once_low: matrix.clone(),
+                twice: matrix.clone(),
+                twice_low: matrix.clone(),
+                weights: weights.clone(),
+                lever: weights,
+                continued: matrix,
+            };
+            let mut target = Target {
+                nodes: &mut fixed.nodes,
+                reach: &mut fixed.reach,
+                reach_low: &mut fixed.reach_low,
+                once: &mut fixed.once.columns,
+                once_low: &mut fixed.once_low.columns,
+                twice: &mut fixed.twice.columns,
+                twice_low: &mut fixed.twice_low.columns,
+                weights: &mut fixed.weights.0,
+                lever: &mut fixed.lever.0,
+                continued: &mut fixed.continued.columns,
+            };
+            target.fill(scheme);
+            fixed
         }
     }
 }
@@ -403,6 +554,7 @@ impl Fixed {
 mod tests {
     use super::*;
     use crate::Element;
+    use crate::scheme::{SchemeTable, Tables as _};
 
     /// b_i a_ij + b_j a_ji = b_i b_j: no drift comes from the tables.
     #[test]

@@ -1,0 +1,173 @@
+//! Where the numbers of an element at its points are kept.
+
+use super::tables::Fixed;
+use core::fmt::Debug;
+use core::ops::{Deref, DerefMut};
+
+/// Memory for an element: on the heap, of any size, or in place, of a size that is part of the type.
+pub trait Storage: Clone + Debug + Sized {
+    /// The number of groups of four points; zero where it is known at run time only.
+    const GROUPS: usize;
+
+    /// An entry for each group.
+    type Groups<T: Copy + Debug>: List<T>;
+    /// An entry for each group, of equations of first order; empty of others.
+    type FirstOrder<T: Copy + Debug>: List<T>;
+    /// An entry for each group, of mass matrices that vary; empty of others.
+    type Varying<T: Copy + Debug>: List<T>;
+    /// The lines of a table: an entry for each group of each point.
+    type Lines: List<[f64; 4]>;
+    /// What is needed during a step only, if it is kept between steps.
+    type Kept<T: Clone + Debug>: Keep<T>;
+    /// The rows of a constant matrix that is not diagonal.
+    type Square<const N: usize>: List<[f64; N]>;
+    /// The tables that no step changes.
+    type Fixed: Deref<Target = Fixed<Self>> + Clone + Debug;
+}
+
+/// A list whose length was decided when it was made.
+pub trait List<T>: Deref<Target = [T]> + DerefMut + Clone + Debug {
+    /// As many entries as asked for, or as many as the type has.
+    fn filled(value: T, count: usize) -> Self;
+}
+
+/// Room for something that may be made anew where it is needed.
+pub trait Keep<T>: Clone + Debug {
+    /// Keeps it, or not.
+    fn keep(make: impl FnOnce() -> T) -> Self;
+
+    /// What is kept.
+    fn kept(&mut self) -> Option<&mut T>;
+}
+
+/// Memory on the heap.
+#[cfg(feature = "alloc")]
+#[derive(Clone, Debug)]
+pub struct Heap;
+
+#[cfg(feature = "alloc")]
+impl Storage for Heap {
+    const GROUPS: usize = 0;
+    type Groups<T: Copy + Debug> = alloc::vec::Vec<T>;
+    type FirstOrder<T: Copy + Debug> = alloc::vec::Vec<T>;
+    type Varying<T: Copy + Debug> = alloc::vec::Vec<T>;
+    type Lines = alloc::vec::Vec<[f64; 4]>;
+    type Kept<T: Clone + Debug> = Always<T>;
+    type Square<const N: usize> = alloc::vec::Vec<[f64; N]>;
+    type Fixed = alloc::sync::Arc<Fixed<Self>>;
+}
+
+#[cfg(feature = "alloc")]
+impl<T: Clone + Debug> List<T> for alloc::vec::Vec<T> {
+    fn filled(value: T, count: usize) -> Self {
+        alloc::vec![value; count]
+    }
+}
+
+/// What is on the heap is asked for once.
+#[cfg(feature = "alloc")]
+#[derive(Clone, Debug)]
+pub struct Always<T>(T);
+
+#[cfg(feature = "alloc")]
+impl<T: Clone + Debug> Keep<T> for Always<T> {
+    fn keep(make: impl FnOnce() -> T) -> Self {
+        Self(make())
+    }
+
+    #[inline(always)]
+    fn kept(&mut self) -> Option<&mut T> {
+        Some(&mut self.0)
+    }
+}
+
+/// What is in place lives as long as a step, in registers if there are enough.
+#[derive(Clone, Debug)]
+pub struct Never;
+
+impl<T> Keep<T> for Never {
+    fn keep(_: impl FnOnce() -> T) -> Self {
+        Self
+    }
+
+    #[inline(always)]
+    fn kept(&mut self) -> Option<&mut T> {
+        None
+    }
+}
+
+/// Memory in place, for K points in C groups; `FIRST`, `VARYING` and `SQUARE` are how many of the lists for equations of first order, for mass matrices that vary, and for
+/// one that does not are there: all or none.
+#[derive(Clone, Debug)]
+pub struct Inline<
+    const K: usize,
+    const C: usize,
+    const FIRST: usize,
+    const VARYING: usize,
+    const SQUARE: usize,
+>;
+
+impl<const K: usize, const C: usize, const FIRST: usize, const VARYING: usize, const SQUARE: usize>
+    Storage for Inline<K, C, FIRST, VARYING, SQUARE>
+{
+    const GROUPS: usize = C;
+    type Groups<T: Copy + Debug> = Array<T, C>;
+    type FirstOrder<T: Copy + Debug> = Array<T, FIRST>;
+    type Varying<T: Copy + Debug> = Array<T, VARYING>;
+    type Lines = Lines<K, C>;
+    type Kept<T: Clone + Debug> = Never;
+    type Square<const N: usize> = Array<[f64; N], SQUARE>;
+    type Fixed = &'static Fixed<Self>;
+}
+
+/// An array as a list.
+#[derive(Clone, Copy, Debug)]
+pub struct Array<T, const C: usize>(pub(super) [T; C]);
+
+impl<T, const C: usize> Deref for Array<T, C> {
+    type Target = [T];
+    #[inline(always)]
+    fn deref(&self) -> &[T] {
+        &self.0
+    }
+}
+
+impl<T, const C: usize> DerefMut for Array<T, C> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.0
+    }
+}
+
+impl<T: Copy + Debug, const C: usize> List<T> for Array<T, C> {
+    #[inline(always)]
+    fn filled(value: T, _: usize) -> Self {
+        Self([value; C])
+    }
+}
+
+/// The lines of a table.
+#[derive(Clone, Copy, Debug)]
+pub struct Lines<const K: usize, const C: usize>(pub(super) [[[f64; 4]; C]; K]);
+
+impl<const K: usize, const C: usize> Deref for Lines<K, C> {
+    type Target = [[f64; 4]];
+    #[inline(always)]
+    fn deref(&self) -> &[[f64; 4]] {
+        self.0.as_flattened()
+    }
+}
+
+impl<const K: usize, const C: usize> DerefMut for Lines<K, C> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [[f64; 4]] {
+        self.0.as_flattened_mut()
+    }
+}
+
+impl<const K: usize, const C: usize> List<[f64; 4]> for Lines<K, C> {
+    #[inline(always)]
+    fn filled(value: [f64; 4], _: usize) -> Self {
+        Self([[value; C]; K])
+    }
+}

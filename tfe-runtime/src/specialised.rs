@@ -1,0 +1,240 @@
+//! The engine of emitted solvers: a stepper for one element, all of its memory in place.
+
+use crate::cut::{Halving, in_halves, may_be_cut};
+use crate::element::Element;
+use crate::error::StepError;
+use crate::model::{Model, State};
+use crate::newton::{Control, Solve};
+use crate::points::storage::Storage;
+use crate::points::tables::Tables;
+use crate::points::{Points, Together, are_possible, is_second_order};
+use crate::scheme::Scheme;
+use crate::statistics::Statistics;
+use crate::step::{Interval, Memory, Method};
+use crate::workspace::Workspace;
+use core::convert::Infallible;
+
+/// Whether programs may be large: not without an allocator. There steps go one point after the other (all at once are 1.3 to 3.4 times as fast without wide registers, and take
+/// 12 kilobytes more for a pendulum) and are not cut (8 kilobytes).
+const IS_LARGE: bool = cfg!(feature = "alloc");
+
+/// The sizes of [`Inline`](crate::points::storage::Inline) for a model and an element; zeros where steps go one point after the other.
+#[must_use]
+pub const fn sizes<M, const N: usize>(element: Element) -> [usize; 5]
+where
+    M: Model<N>,
+{
+    if !IS_LARGE || !are_possible::<M, N>(&element) {
+        return [0; 5];
+    }
+    let (points, groups) = (element.points(), element.points().div_ceil(4));
+    let first = if is_second_order::<M, N>() { 0 } else { groups };
+    let (varying, square) = if M::FACTS.constant_mass {
+        (0, N)
+    } else {
+        (groups, 0)
+    };
+    [points, groups, first, varying, square]
+}
+
+/// Steps of one length, with all memory in place.
+#[derive(Clone, Debug)]
+pub struct Specialised<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize> {
+    start: f64,
+    step: f64,
+    steps: u64,
+    memory: Memory<N>,
+    /// All points at once, where model and element allow it.
+    points: Option<Points<N, S>>,
+    numbers: [f64; NUMBERS],
+    pivots: [usize; PIVOTS],
+}
+
+impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
+    Specialised<N, S, NUMBERS, PIVOTS>
+{
+    /// At rest at time zero.
+    #[must_use]
+    pub fn new<M>(model: &M, tables: S::Fixed, step: f64) -> Self
+    where
+        M: Model<N>,
+    {
+        Self {
+            start: 0.0,
+            step,
+            steps: 0,
+            memory: Memory::new(),
+            points: if const { S::GROUPS > 0 } {
+                Points::new(model, Tables::new(tables))
+            } else {
+                None
+            },
+            numbers: [0.0; NUMBERS],
+            pivots: [0; PIVOTS],
+        }
+    }
+
+    /// The time of the next step's start.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.start + self.steps as f64 * self.step
+    }
+
+    /// Makes the next step start at `time`.
+    pub fn set_time(&mut self, time: f64) {
+        (self.start, self.steps) = (time, 0);
+    }
+
+    /// The length of a step.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// What the steps so far have cost.
+    #[must_use]
+    pub fn statistics(&self) -> &Statistics {
+        self.memory.statistics()
+    }
+
+    /// Moves `state` over one element, in pieces where the whole of it fails (with an allocator in the program, though it is not used).
+    ///
+    /// # Errors
+    /// [`StepError`]; `state` is unchanged then.
+    #[inline]
+    pub fn advance<M, const P: usize, const U: usize>(
+        &mut self,
+        model: &M,
+        scheme: &Scheme<P, U>,
+        state: &mut State<N>,
+    ) -> Result<(), StepError>
+    where
+        M: Model<N>,
+    {
+        let (t, h) = (self.time(), self.step);
+        let mut run = Run {
+            engine: self,
+            model,
+            scheme,
+        };
+        match run.whole(t, h, state, &[]) {
+            Err(error) if IS_LARGE && may_be_cut(&error, M::FACTS.linear, Solve::Auto) => {
+                run.in_pieces((t, h), state, error)?;
+            }
+            outcome => outcome?,
+        }
+        self.steps += 1;
+        Ok(())
+    }
+}
+
+/// Steps with what an engine does not own.
+struct Run<'a, M, E, const P: usize, const U: usize> {
+    engine: &'a mut E,
+    model: &'a M,
+    scheme: &'a Scheme<P, U>,
+}
+
+impl<
+    M: Model<N>,
+    const P: usize,
+    const U: usize,
+    const N: usize,
+    S: Storage,
+    const NUMBERS: usize,
+    const PIVOTS: usize,
+> Halving for Run<'_, M, Specialised<N, S, NUMBERS, PIVOTS>, P, U>
+{
+    type State = State<N>;
+    type Kick = Infallible;
+    type Kicks = [Infallible; 0];
+
+    #[inline]
+    fn whole(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+        _: &[Infallible],
+    ) -> Result<(), StepError> {
+        let Self {
+            engine,
+            model,
+            scheme,
+        } = self;
+        let control = Control::default();
+        if const { S::GROUPS > 0 }
+            && let Some(points) = &mut engine.points
+            && h.is_finite()
+            && h != 0.0
+        {
+            let method = (*model, *scheme, &control);
+            match points.step(method, &mut engine.memory, (t, h), state) {
+                Together::Arrived => return Ok(()),
+                Together::Stalled(error) => return Err(error),
+                Together::LeftToOthers => {
+                    // An ordinary step continues what is in its workspace.
+                    points.write_back::<M>(*scheme, &mut engine.numbers);
+                    points.forget();
+                }
+            }
+        }
+        self.ordinary((t, h), state)
+    }
+
+    /// Nobody asks for the inside of a step.
+    fn passed(&mut self, _: f64, _: f64, _: [Infallible; 0]) {}
+}
+
+impl<
+    M: Model<N>,
+    const P: usize,
+    const U: usize,
+    const N: usize,
+    S: Storage,
+    const NUMBERS: usize,
+    const PIVOTS: usize,
+> Run<'_, M, Specialised<N, S, NUMBERS, PIVOTS>, P, U>
+{
+    /// One point after the other. Not written into the places of its call, of which there are two.
+    #[cfg_attr(feature = "alloc", inline(never))]
+    fn ordinary(&mut self, place: (f64, f64), state: &mut State<N>) -> Result<(), StepError> {
+        let engine = &mut *self.engine;
+        let workspace = Workspace {
+            numbers: &mut engine.numbers,
+            pivots: &mut engine.pivots,
+        };
+        let interval = Interval {
+            start: place.0,
+            length: place.1,
+            impulses: &[],
+        };
+        let method = Method {
+            model: self.model,
+            tables: self.scheme,
+            control: Control::default(),
+        };
+        method.advance(&mut engine.memory, workspace, interval, state)
+    }
+
+    #[cold]
+    fn in_pieces(
+        &mut self,
+        place: (f64, f64),
+        state: &mut State<N>,
+        error: StepError,
+    ) -> Result<(), StepError> {
+        let memory = &self.engine.memory;
+        let (start, low, steps) = (*state, memory.low, memory.statistics.steps);
+        let arrived = in_halves(self, place, state, &[], 1);
+        let memory = &mut self.engine.memory;
+        memory.statistics.steps = steps;
+        if !arrived {
+            (*state, memory.low, memory.last) = (start, low, None);
+            return Err(error);
+        }
+        memory.statistics.steps += 1;
+        memory.statistics.cuts += 1;
+        Ok(())
+    }
+}
