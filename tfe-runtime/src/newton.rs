@@ -263,6 +263,11 @@ impl Monitor {
         self.idle >= MAX_IDLE
     }
 
+    /// Whether the last increment is below a rounding of what it adds to: what an iteration that contracts slowly may come to before its increments stop to fall.
+    pub(crate) fn is_at_round_off(&self) -> bool {
+        self.last <= f64::EPSILON
+    }
+
     /// Whether so many more iterations would not do, at the present rate.
     #[inline(always)]
     pub(crate) fn is_hopeless(&self, remaining: u32) -> bool {
@@ -316,6 +321,9 @@ where
             iterations = iteration + 1;
             break;
         }
+    }
+    if monitor.is_at_round_off() {
+        return monitor.evidence(yielding).check(control.solve);
     }
     Err(StepError::FixedPointStalled {
         iterations,

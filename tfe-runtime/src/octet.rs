@@ -8,7 +8,7 @@ use pulp::{Simd, b8, f64x8, u64x8};
 crate::quad::register! {
     /// Eight numbers, and the proof that the processor has registers for them.
     Octet: 8 of V4,
-    f64x8, b8, u64x8, mul_sub_f64x8, shl_const_u64x8
+    f64x8, b8, u64x8, mul_sub_f64x8, mul_add_f64x8, shl_const_u64x8
 }
 
 impl Octet {

@@ -139,11 +139,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
             is_warm: false,
             last_step: 0.0,
             #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            isa: if M::LANES {
-                pulp::x86::V3::try_new()
-            } else {
-                None
-            },
+            isa: pulp::x86::V3::try_new(),
         })
     }
 

@@ -1,6 +1,7 @@
 //! Numbers in registers of the processor, chosen at run time: four with AVX2.
 //!
-//! The operations are those of IEEE 754, one rounding each and never fused, so that a kernel gives the same digits as with plain numbers; sine
+//! The operations are those of IEEE 754, so that a kernel gives the same digits as with plain numbers. Products with tables and the polynomials of sines are fused with
+//! the sums that follow, and so they are without these registers ([`fused`](crate::real::fused)), where that is a call of a function on old processors; sine
 //! and cosine are those of [`trigonometry`](crate::trigonometry). Code that computes with these numbers has to be compiled for that
 //! instruction set, hence everything is written into the place of its call, and the outermost call goes through [`pulp`].
 
@@ -16,7 +17,7 @@ macro_rules! register {
     (
         $(#[$doc:meta])*
         $name:ident: $count:literal of $isa:ident,
-        $value:ident, $mask:ident, $bits:ident, $product_less:ident, $shift:ident
+        $value:ident, $mask:ident, $bits:ident, $product_less:ident, $fused:ident, $shift:ident
     ) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
@@ -66,7 +67,7 @@ macro_rules! register {
         }
 
         impl crate::points::four::Precise for $name {
-            /// The one place where a fused instruction serves: its result is exact.
+            /// By a fused instruction the second is exact.
             #[inline(always)]
             fn product(self, other: Self) -> (Self, Self) {
                 let high = self.isa.mul_f64s(self.value, other.value);
@@ -78,6 +79,12 @@ macro_rules! register {
                     },
                     Self { value: low, ..self },
                 )
+            }
+
+            #[inline(always)]
+            fn times_plus(self, factor: Self, term: Self) -> Self {
+                let value = self.isa.$fused(self.value, factor.value, term.value);
+                Self { value, ..self }
             }
 
             /// Of a NaN and a number, the second.
@@ -201,6 +208,11 @@ macro_rules! register {
 
         impl crate::trigonometry::Turn for $name {
             #[inline(always)]
+            fn fused(self, factor: Self, term: Self) -> Self {
+                crate::points::four::Precise::times_plus(self, factor, term)
+            }
+
+            #[inline(always)]
             fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self) {
                 let isa = sin.isa;
                 let (sin, cos, quadrant): ($bits, $bits, $bits) = (
@@ -252,7 +264,7 @@ pub(crate) use {lane_by_lane, operators, register};
 register! {
     /// Four numbers, and the proof that the processor has registers for them.
     Quad: 4 of V3,
-    f64x4, m64x4, u64x4, mul_sub_f64x4, shl_const_u64x4
+    f64x4, m64x4, u64x4, mul_sub_f64x4, mul_add_f64x4, shl_const_u64x4
 }
 
 impl Quad {
@@ -298,6 +310,14 @@ impl<W: Apart> pulp::NullaryFnOnce for Call<W> {
 }
 
 impl Turn for Pair<Quad> {
+    #[inline(always)]
+    fn fused(self, factor: Self, term: Self) -> Self {
+        Self(
+            self.0.fused(factor.0, term.0),
+            self.1.fused(factor.1, term.1),
+        )
+    }
+
     #[inline(always)]
     fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self) {
         let first = Quad::turned(sin.0, cos.0, quadrant.0);

@@ -98,6 +98,24 @@ pub trait Real:
     }
 }
 
+/// x y + z with one rounding, as an instruction of processors does it that have registers for lanes; without the feature `simd`, where it would be a call of a function, with
+/// two. Programs give the same digits on every processor.
+#[inline(always)]
+pub(crate) fn fused(x: f64, y: f64, z: f64) -> f64 {
+    #[cfg(all(feature = "simd", feature = "std"))]
+    {
+        x.mul_add(y, z)
+    }
+    #[cfg(all(feature = "simd", not(feature = "std")))]
+    {
+        libm::fma(x, y, z)
+    }
+    #[cfg(not(feature = "simd"))]
+    {
+        x * y + z
+    }
+}
+
 /// The elementary functions of `f64` and `f32`: from `std`, or from `libm` without it.
 macro_rules! elementary {
     ($($(#[$doc:meta])* $name:ident($($argument:ident),*) = $std:ident, $libm:ident, $libm32:ident;)*) => {

@@ -6,14 +6,14 @@
 //!
 //! π/2 is taken in four parts of 33 bits and more, so that n times the first three is exact and y keeps its digits near the zeros, with a
 //! second word for what rounding takes. The parts and the minimax polynomials are those of fdlibm (S. Moshier's and K. C. Ng's forms of the
-//! remainder), which are accurate to 2⁻⁵⁸. The loops have no calls and no branches, so that the compiler makes vector instructions of them
+//! remainder), which are accurate to 2⁻⁵⁸; products and sums in a row are fused. The loops have no calls and no branches, so that the compiler makes vector instructions of them
 //! on every target.
 //! Arguments beyond [`LIMIT`] and those that are not finite are rare and go to the functions of the system.
 //!
 //! Measured over two million arguments they differ from those functions, which are good to less than a unit in the last place, by one such unit
 //! at most, and at one argument in twenty. A single number is left to those functions: alone, it is faster there.
 
-use crate::real::Real;
+use crate::real::{Real, fused};
 
 /// The largest argument that is reduced here.
 pub(crate) const LIMIT: f64 = 1e5;
@@ -77,6 +77,9 @@ fn are_small<const W: usize>(x: &[f64; W]) -> bool {
 pub(crate) trait Turn: Real {
     /// sin x and cos x from those of x − n π/2; n is in the last bits of `quadrant`.
     fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self);
+
+    /// `self` · `factor` + `term` with one rounding ([`fused`]).
+    fn fused(self, factor: Self, term: Self) -> Self;
 }
 
 impl Turn for f64 {
@@ -93,39 +96,45 @@ impl Turn for f64 {
             Self::from_bits((cos ^ difference) ^ cos_sign),
         )
     }
+
+    #[inline(always)]
+    fn fused(self, factor: Self, term: Self) -> Self {
+        fused(self, factor, term)
+    }
 }
 
 /// sin x and cos x for |x| ≤ [`LIMIT`].
 #[inline(always)]
 pub(crate) fn reduced<R: Turn>(x: R) -> (R, R) {
     // Written out: closures would be compiled for the instruction set of the crate, not for that of the place of the call.
-    let shifted = x * x.like(TWO_OVER_PI) + x.like(ROUNDER);
+    let shifted = x.fused(x.like(TWO_OVER_PI), x.like(ROUNDER));
     let n = shifted - x.like(ROUNDER);
 
-    let first = x - n * x.like(PART_1);
+    let first = n.fused(x.like(-PART_1), x);
     let part = n * x.like(PART_2);
     let second = first - part;
     let lost_2 = (first - second) - part;
     let part = n * x.like(PART_3);
     let third = second - part;
     let lost_3 = (second - third) - part;
-    let rest = n * x.like(PART_4) - (lost_2 + lost_3);
+    let rest = n.fused(x.like(PART_4), -(lost_2 + lost_3));
     let y = third - rest;
     let low = (third - y) - rest;
 
+    // Polynomials by halves (Estrin), so that no chain of operations is long.
     let z = y * y;
-    let cube = z * y;
-    let mut tail = x.like(SIN[5]);
-    for k in (1..5).rev() {
-        tail = x.like(SIN[k]) + z * tail;
-    }
-    let sin = y - ((z * (x.like(0.5) * low - cube * tail) - low) - cube * x.like(SIN[0]));
-    let mut tail = x.like(COS[5]);
-    for k in (0..5).rev() {
-        tail = x.like(COS[k]) + z * tail;
-    }
+    let (square, cube) = (z * z, z * y);
+    let upper = square.fused(x.like(SIN[5]), z.fused(x.like(SIN[4]), x.like(SIN[3])));
+    let tail = square.fused(upper, z.fused(x.like(SIN[2]), x.like(SIN[1])));
+    let bend = z.fused((-cube).fused(tail, x.like(0.5) * low), -low);
+    let sin = y - cube.fused(x.like(-SIN[0]), bend);
+    let upper = square.fused(
+        z.fused(x.like(COS[5]), x.like(COS[4])),
+        z.fused(x.like(COS[3]), x.like(COS[2])),
+    );
+    let tail = square.fused(upper, z.fused(x.like(COS[1]), x.like(COS[0])));
     let (half, one) = (x.like(0.5) * z, x.like(1.0));
     let most = one - half;
-    let cos = most + (((one - most) - half) + (z * (z * tail) - y * low));
+    let cos = most + (((one - most) - half) + square.fused(tail, -(y * low)));
     R::turned(sin, cos, shifted)
 }

@@ -75,6 +75,14 @@ impl<V: Four> Precise for Pair<V> {
     }
 
     #[inline(always)]
+    fn times_plus(self, factor: Self, term: Self) -> Self {
+        Self(
+            self.0.times_plus(factor.0, term.0),
+            self.1.times_plus(factor.1, term.1),
+        )
+    }
+
+    #[inline(always)]
     fn larger(self, other: Self) -> Self {
         Self(self.0.larger(other.0), self.1.larger(other.1))
     }

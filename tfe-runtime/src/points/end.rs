@@ -86,7 +86,7 @@ pub(crate) fn moved<V: Precise, const EXACT: bool>(h: V, rate: (V, V), start: (V
     if const { EXACT } {
         moved_exactly(h, rate, start)
     } else {
-        (start.0 + h * rate.0, h.like(0.0))
+        (h.times_plus(rate.0, start.0), h.like(0.0))
     }
 }
 

@@ -5,12 +5,15 @@ use super::storage::Storage;
 use super::tables::Matrix;
 use crate::double_double::DoubleDouble;
 use crate::model::{First, Model};
-use crate::real::{Lanes, Real};
+use crate::real::{Lanes, Real, fused};
 
 /// Numbers whose products and sums can be had exactly.
 pub(crate) trait Precise: Real {
     /// The product and what rounding takes from it, exactly.
     fn product(self, other: Self) -> (Self, Self);
+
+    /// `self` · `factor` + `term` with one rounding ([`fused`]).
+    fn times_plus(self, factor: Self, term: Self) -> Self;
 
     /// The sum and what rounding takes from it, exactly.
     #[inline(always)]
@@ -113,6 +116,14 @@ impl Precise for Lanes<4> {
             (high.0[lane], low.0[lane]) = (product.high, product.low);
         }
         (high, low)
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, mut term: Self) -> Self {
+        for lane in 0..4 {
+            term.0[lane] = fused(self.0[lane], factor.0[lane], term.0[lane]);
+        }
+        term
     }
 }
 
@@ -279,7 +290,11 @@ impl Four for crate::quad::Quad {
     ) where
         M: Model<N>,
     {
-        model.first_inline(t, q, z, first);
+        if M::LANES {
+            model.first_inline(t, q, z, first);
+        } else {
+            in_turn(t, model, q, z, first, None);
+        }
     }
 
     #[inline(always)]
@@ -293,6 +308,46 @@ impl Four for crate::quad::Quad {
     ) where
         M: Model<N>,
     {
-        model.first_and_mass_inline(t, q, z, first, mass);
+        if M::LANES {
+            model.first_and_mass_inline(t, q, z, first, mass);
+        } else {
+            in_turn(t, model, q, z, first, Some(mass));
+        }
+    }
+}
+
+/// A kernel that is not made for registers, for one point after the other.
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+#[inline(always)]
+fn in_turn<V: Four, M, const N: usize>(
+    t: V,
+    model: &M,
+    q: &[V; N],
+    z: &[V; N],
+    first: &mut First<V, N>,
+    mass: Option<&mut [[V; N]; N]>,
+) where
+    M: Model<N>,
+{
+    let none = Lanes([0.0; 4]);
+    let (mut q_lanes, mut z_lanes) = ([none; N], [none; N]);
+    for a in 0..N {
+        (q_lanes[a], z_lanes[a]) = (Lanes(q[a].lanes()), Lanes(z[a].lanes()));
+    }
+    let mut first_lanes = First::zero();
+    let (time, mut mass_lanes) = (Lanes(t.lanes()), [[none; N]; N]);
+    let wanted = mass.is_some().then_some(&mut mass_lanes);
+    each_point::<f64, M, N>(model, time, &q_lanes, &z_lanes, &mut first_lanes, wanted);
+    for a in 0..N {
+        first.z[a] = t.with(first_lanes.z[a].0);
+        first.q[a] = t.with(first_lanes.q[a].0);
+        first.force[a] = t.with(first_lanes.force[a].0);
+    }
+    if let Some(mass) = mass {
+        for a in 0..N {
+            for b in 0..N {
+                mass[a][b] = t.with(mass_lanes[a][b].0);
+            }
+        }
     }
 }

@@ -120,11 +120,12 @@ impl<const N: usize, S: Storage> Work<N, S> {
                 if const { M::FACTS.forced } {
                     z[a] = match M::FORM {
                         Form::Lagrangian => {
-                            like.like(self.velocity[a])
-                                + h * leg.inertia.row(like, &more_products[c], a)
+                            let rate = leg.inertia.row(like, &more_products[c], a);
+                            h.times_plus(rate, like.like(self.velocity[a]))
                         }
                         Form::Hamiltonian => {
-                            like.like(leg.start.p[a]) + h * like.with(more_products[c][a])
+                            let rate = like.with(more_products[c][a]);
+                            h.times_plus(rate, like.like(leg.start.p[a]))
                         }
                     };
                 }

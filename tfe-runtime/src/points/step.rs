@@ -25,9 +25,8 @@ where
 {
     /// In the registers of the processor.
     pub(super) fn run(self) -> Outcome<N> {
-        // Without kernels for lanes the constant is false, and the compiler drops the call.
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-        if let (Some(isa), true) = (self.points.isa, M::LANES) {
+        if let Some(isa) = self.points.isa {
             return isa.vectorize(InRegisters { job: self, isa });
         }
         self.step(crate::Lanes([0.0; 4]))
@@ -83,27 +82,24 @@ where
             control.max_iterations
         };
         let (mut iterations, mut refresh, mut converged) = (0, true, false);
+        if const { is_second_order::<M, N>() } {
+            work.integrate_twice(like, &leg);
+            if is_rough {
+                work.set_drift(like, &leg);
+            } else {
+                work.set_exact_drift(like, &leg);
+            }
+        } else if !is_rough {
+            work.set_low(like, &leg);
+        }
         while iterations < most {
             // Constant conditions, so that of the three iterations one is compiled.
             let increment = if const { is_second_order::<M, N>() } {
-                work.integrate_twice(like, &leg);
-                if iterations == 0 {
-                    if is_rough {
-                        work.set_drift(like, &leg);
-                    } else {
-                        work.set_exact_drift(like, &leg);
-                    }
-                }
                 work.sweep_second_order::<V, M>(like, model, &leg)
+            } else if const { is_phase::<M, N>() } {
+                work.sweep_phase::<V, M>(like, model, &leg, iterations == 0, refresh)
             } else {
-                if iterations == 0 && !is_rough {
-                    work.set_low(like, &leg);
-                }
-                if const { is_phase::<M, N>() } {
-                    work.sweep_phase::<V, M>(like, model, &leg, iterations == 0, refresh)
-                } else {
-                    work.sweep_velocity::<V, M>(like, model, &leg, refresh)
-                }
+                work.sweep_velocity::<V, M>(like, model, &leg, refresh)
             };
             iterations += 1;
             match monitor.judge(increment) {
@@ -121,7 +117,11 @@ where
             if is_hopeless || monitor.is_stuck() {
                 break;
             }
+            if const { is_second_order::<M, N>() } {
+                work.integrate_twice(like, &leg);
+            }
         }
+        converged |= monitor.is_at_round_off();
         // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
         let mut end = None;
         if converged && monitor.evidence(yielding).check(control.solve).is_ok() {

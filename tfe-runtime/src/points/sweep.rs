@@ -116,7 +116,8 @@ impl<const N: usize, S: Storage> Work<N, S> {
         for c in 0..count {
             let (mut q, mut v) = ([zero; N], [zero; N]);
             for a in 0..N {
-                let moved = h * like.with(products[c][a]) + like.with(low_position[c][a]);
+                let low = like.with(low_position[c][a]);
+                let moved = h.times_plus(like.with(products[c][a]), low);
                 q[a] = like.like(leg.start.q[a]) + moved;
                 v[a] = like.with(rates[c][a]);
             }
@@ -140,7 +141,8 @@ impl<const N: usize, S: Storage> Work<N, S> {
         for c in 0..count {
             let mut step = [zero; N];
             for a in 0..N {
-                let wanted = h * like.with(products[c][a]) + like.with(low_momentum[c][a]);
+                let low = like.with(low_momentum[c][a]);
+                let wanted = h.times_plus(like.with(products[c][a]), low);
                 step[a] = wanted - (like.with(momenta[c][a]) - like.like(leg.start.p[a]));
             }
             if const { M::FACTS.constant_mass } {
@@ -196,7 +198,8 @@ impl<const N: usize, S: Storage> Work<N, S> {
         for c in 0..count {
             let mut change = [zero; N];
             for a in 0..N {
-                let moved = h * like.with(products[c][a]) + like.with(low_momentum[c][a]);
+                let low = like.with(low_momentum[c][a]);
+                let moved = h.times_plus(like.with(products[c][a]), low);
                 let p = like.like(leg.start.p[a]) + moved;
                 change[a] = p - like.with(momenta[c][a]);
                 momenta[c][a] = p.lanes();
@@ -224,7 +227,8 @@ impl<const N: usize, S: Storage> Work<N, S> {
         for c in 0..count {
             let (mut q, mut p) = ([zero; N], [zero; N]);
             for a in 0..N {
-                let moved = h * like.with(products[c][a]) + like.with(low_position[c][a]);
+                let low = like.with(low_position[c][a]);
+                let moved = h.times_plus(like.with(products[c][a]), low);
                 q[a] = like.like(leg.start.q[a]) + moved;
                 p[a] = like.with(momenta[c][a]);
             }
@@ -293,7 +297,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
             } else {
                 self.row(square, products, a)
             };
-            moved[a] = square.with(drift[a]) + square * rate;
+            moved[a] = square.times_plus(rate, square.with(drift[a]));
         }
         moved
     }

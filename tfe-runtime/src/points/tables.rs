@@ -101,7 +101,7 @@ impl<S: Storage> Matrix<S> {
                 for (column, value) in rest.iter().zip(&row[a]) {
                     let value = like.like(*value);
                     for c in 0..C {
-                        sums[0][c] += like.with(column[c]) * value;
+                        sums[0][c] = like.with(column[c]).times_plus(value, sums[0][c]);
                     }
                 }
             }
@@ -154,7 +154,8 @@ fn add<V: Four, const C: usize>(
     for (lane, (column, value)) in columns.iter().zip(values).enumerate() {
         let value = like.like(*value);
         for c in 0..C {
-            sums[lane % 2][c] += like.with(column[c]) * value;
+            let sum = &mut sums[lane % 2][c];
+            *sum = like.with(column[c]).times_plus(value, *sum);
         }
     }
 }
@@ -190,11 +191,11 @@ impl<S: Storage> Weights<S> {
             for a in 0..4.min(N - from) {
                 let value = like.with(row[from + a]);
                 if const { !EXACT } {
-                    high[a] += weight * value;
+                    high[a] = weight.times_plus(value, high[a]);
                     continue;
                 }
                 let (product, rest) = weight.product(value);
-                let rest = rest + weight_low * value;
+                let rest = weight_low.times_plus(value, rest);
                 if group == 0 {
                     (high[a], low[a]) = (product, rest);
                 } else {
