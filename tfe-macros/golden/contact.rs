@@ -365,6 +365,7 @@ struct Fast {
             { Fast::SIZES[2usize] },
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
+            { Fast::SIZES[5usize] },
         >,
         {
             ::tfe::__private::numbers_len(
@@ -389,7 +390,7 @@ struct Fast {
 impl Fast {
     const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::primal(3)
         .reduced();
-    const SIZES: [usize; 5] = ::tfe::__private::sizes::<Contact, 2>(Fast::ELEMENT);
+    const SIZES: [usize; 6] = ::tfe::__private::sizes::<Contact, 2>(Fast::ELEMENT);
     const SCHEME: ::tfe::__private::Scheme<
         { Fast::ELEMENT.points() },
         { Fast::ELEMENT.unknowns() },
@@ -401,6 +402,7 @@ impl Fast {
             { Fast::SIZES[2usize] },
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
+            { Fast::SIZES[5usize] },
         >,
     > = ::tfe::__private::Fixed::new(&Self::SCHEME);
     /// The size of the stepper, all its memory included.

@@ -240,6 +240,7 @@ struct Fast {
             { Fast::SIZES[2usize] },
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
+            { Fast::SIZES[5usize] },
         >,
         {
             ::tfe::__private::numbers_len(
@@ -263,7 +264,7 @@ struct Fast {
 #[allow(dead_code)]
 impl Fast {
     const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::mixed(2);
-    const SIZES: [usize; 5] = ::tfe::__private::sizes::<Spring, 1>(Fast::ELEMENT);
+    const SIZES: [usize; 6] = ::tfe::__private::sizes::<Spring, 1>(Fast::ELEMENT);
     const SCHEME: ::tfe::__private::Scheme<
         { Fast::ELEMENT.points() },
         { Fast::ELEMENT.unknowns() },
@@ -275,6 +276,7 @@ impl Fast {
             { Fast::SIZES[2usize] },
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
+            { Fast::SIZES[5usize] },
         >,
     > = ::tfe::__private::Fixed::new(&Self::SCHEME);
     /// The size of the stepper, all its memory included.

@@ -311,6 +311,7 @@ struct Fast {
             { Fast::SIZES[2usize] },
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
+            { Fast::SIZES[5usize] },
         >,
         {
             ::tfe::__private::numbers_len(
@@ -334,7 +335,7 @@ struct Fast {
 #[allow(dead_code)]
 impl Fast {
     const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::mixed(3);
-    const SIZES: [usize; 5] = ::tfe::__private::sizes::<KnifeEdge, 3>(Fast::ELEMENT);
+    const SIZES: [usize; 6] = ::tfe::__private::sizes::<KnifeEdge, 3>(Fast::ELEMENT);
     const SCHEME: ::tfe::__private::Scheme<
         { Fast::ELEMENT.points() },
         { Fast::ELEMENT.unknowns() },
@@ -346,6 +347,7 @@ impl Fast {
             { Fast::SIZES[2usize] },
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
+            { Fast::SIZES[5usize] },
         >,
     > = ::tfe::__private::Fixed::new(&Self::SCHEME);
     /// The size of the stepper, all its memory included.

@@ -224,12 +224,13 @@ impl Monitor {
         if converged {
             return Ok(Verdict::Converged);
         }
-        self.risen = if size >= last { self.risen + 1 } else { 0 };
         if size < 0.5 * self.best {
-            (self.best, self.idle) = (size, 0);
-        } else {
-            self.idle += 1;
+            // Then it is smaller than the last one, too, and nothing stalls.
+            (self.best, self.idle, self.risen) = (size, 0, 0);
+            return Ok(Verdict::GoOn);
         }
+        self.risen = if size >= last { self.risen + 1 } else { 0 };
+        self.idle += 1;
         // Near rest the velocities are noise themselves, and increments beside them say nothing.
         let settled = increment.position <= 4.0 * f64::EPSILON;
         let stalled = (self.risen >= 1 && size <= ROUND_OFF)
@@ -275,8 +276,14 @@ impl Monitor {
         if self.last <= target {
             return false;
         }
-        // It falls all the way, or it never does.
         let exponent = i32::try_from(remaining).unwrap_or(i32::MAX);
+        // Few iterations do where increments shrink well: most steps end here, with half of the target for roundings.
+        let squared = self.rate * self.rate;
+        let eighth = (squared * squared) * (squared * squared);
+        if exponent >= 8 && self.rate < 1.0 && self.last * eighth < 0.5 * target {
+            return false;
+        }
+        // It falls all the way, or it never does.
         self.last * integer_power(self.rate, exponent) > target
     }
 }
@@ -410,4 +417,31 @@ where
         residual: monitor.last(),
         tolerance: control.tolerance,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The cheap way out decides as the power itself does.
+    #[test]
+    fn hopeless_is_what_the_rate_never_brings_to_the_target() {
+        for remaining in [0, 1, 7, 8, 9, 40, 100] {
+            for tenths in 0..=25 {
+                let rate = f64::from(tenths) / 20.0;
+                for exponent in -60..=10 {
+                    let last = 1.7 * 2.0_f64.powi(exponent);
+                    let mut monitor = Monitor::new(1e-13);
+                    (monitor.last, monitor.rate) = (last, rate);
+                    let target = 1e-13;
+                    let by_power = last > target && last * integer_power(rate, remaining) > target;
+                    assert_eq!(
+                        monitor.is_hopeless(remaining as u32),
+                        by_power,
+                        "{last} · {rate}^{remaining}"
+                    );
+                }
+            }
+        }
+    }
 }

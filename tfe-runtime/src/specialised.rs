@@ -18,14 +18,17 @@ use core::convert::Infallible;
 /// 12 kilobytes more for a pendulum) and are not cut (8 kilobytes).
 const IS_LARGE: bool = cfg!(feature = "alloc");
 
+/// A step of so many registers of unknowns is made anew; more are kept, as they live in memory anyway.
+const MOST_IN_REGISTERS: usize = 8;
+
 /// The sizes of [`Inline`](crate::points::storage::Inline) for a model and an element; zeros where steps go one point after the other.
 #[must_use]
-pub const fn sizes<M, const N: usize>(element: Element) -> [usize; 5]
+pub const fn sizes<M, const N: usize>(element: Element) -> [usize; 6]
 where
     M: Model<N>,
 {
     if !IS_LARGE || !are_possible::<M, N>(&element) {
-        return [0; 5];
+        return [0; 6];
     }
     let (points, groups) = (element.points(), element.points().div_ceil(4));
     let first = if is_second_order::<M, N>() { 0 } else { groups };
@@ -34,7 +37,8 @@ where
     } else {
         (groups, 0)
     };
-    [points, groups, first, varying, square]
+    let kept = if N * groups > MOST_IN_REGISTERS { 1 } else { 0 };
+    [points, groups, first, varying, square, kept]
 }
 
 /// Steps of one length, with all memory in place.

@@ -34,7 +34,7 @@ pub trait List<T>: Deref<Target = [T]> + DerefMut + Clone + Debug {
 /// Room for something that may be made anew where it is needed.
 pub trait Keep<T>: Clone + Debug {
     /// Keeps it, or not.
-    fn keep(make: impl FnOnce() -> T) -> Self;
+    fn keep(make: impl Fn() -> T) -> Self;
 
     /// What is kept.
     fn kept(&mut self) -> Option<&mut T>;
@@ -71,7 +71,7 @@ pub struct Always<T>(T);
 
 #[cfg(feature = "alloc")]
 impl<T: Clone + Debug> Keep<T> for Always<T> {
-    fn keep(make: impl FnOnce() -> T) -> Self {
+    fn keep(make: impl Fn() -> T) -> Self {
         Self(make())
     }
 
@@ -81,23 +81,20 @@ impl<T: Clone + Debug> Keep<T> for Always<T> {
     }
 }
 
-/// What is in place lives as long as a step, in registers if there are enough.
-#[derive(Clone, Debug)]
-pub struct Never;
-
-impl<T> Keep<T> for Never {
-    fn keep(_: impl FnOnce() -> T) -> Self {
-        Self
+/// Kept if there is room (`KEPT` is one); otherwise it is made anew in each step, and lives in registers if there are enough.
+impl<T: Clone + Debug, const KEPT: usize> Keep<T> for Array<T, KEPT> {
+    fn keep(make: impl Fn() -> T) -> Self {
+        Self(core::array::from_fn(|_| make()))
     }
 
     #[inline(always)]
     fn kept(&mut self) -> Option<&mut T> {
-        None
+        self.0.first_mut()
     }
 }
 
 /// Memory in place, for K points in C groups; `FIRST`, `VARYING` and `SQUARE` are how many of the lists for equations of first order, for mass matrices that vary, and for
-/// one that does not are there: all or none.
+/// one that does not are there: all or none. `KEPT` is one for models so large that making the memory of a step anew takes time.
 #[derive(Clone, Debug)]
 pub struct Inline<
     const K: usize,
@@ -105,17 +102,24 @@ pub struct Inline<
     const FIRST: usize,
     const VARYING: usize,
     const SQUARE: usize,
+    const KEPT: usize,
 >;
 
-impl<const K: usize, const C: usize, const FIRST: usize, const VARYING: usize, const SQUARE: usize>
-    Storage for Inline<K, C, FIRST, VARYING, SQUARE>
+impl<
+    const K: usize,
+    const C: usize,
+    const FIRST: usize,
+    const VARYING: usize,
+    const SQUARE: usize,
+    const KEPT: usize,
+> Storage for Inline<K, C, FIRST, VARYING, SQUARE, KEPT>
 {
     const GROUPS: usize = C;
     type Groups<T: Copy + Debug> = Array<T, C>;
     type FirstOrder<T: Copy + Debug> = Array<T, FIRST>;
     type Varying<T: Copy + Debug> = Array<T, VARYING>;
     type Lines = Lines<K, C>;
-    type Kept<T: Clone + Debug> = Never;
+    type Kept<T: Clone + Debug> = Array<T, KEPT>;
     type Square<const N: usize> = Array<[f64; N], SQUARE>;
     type Fixed = &'static Fixed<Self>;
 }

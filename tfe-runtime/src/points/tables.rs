@@ -356,8 +356,14 @@ const fn coefficient(scheme: &SchemeRef<'_>, i: usize, j: usize) -> DoubleDouble
     }
 }
 
-impl<const K: usize, const C: usize, const FIRST: usize, const VARYING: usize, const SQUARE: usize>
-    Fixed<Inline<K, C, FIRST, VARYING, SQUARE>>
+impl<
+    const K: usize,
+    const C: usize,
+    const FIRST: usize,
+    const VARYING: usize,
+    const SQUARE: usize,
+    const KEPT: usize,
+> Fixed<Inline<K, C, FIRST, VARYING, SQUARE, KEPT>>
 {
     /// Of an element that is a Runge–Kutta method of K points; of no use where K is zero.
     #[must_use]
@@ -399,8 +405,14 @@ impl<const K: usize, const C: usize, const FIRST: usize, const VARYING: usize, c
     }
 }
 
-impl<const K: usize, const C: usize, const FIRST: usize, const VARYING: usize, const SQUARE: usize>
-    Matrix<Inline<K, C, FIRST, VARYING, SQUARE>>
+impl<
+    const K: usize,
+    const C: usize,
+    const FIRST: usize,
+    const VARYING: usize,
+    const SQUARE: usize,
+    const KEPT: usize,
+> Matrix<Inline<K, C, FIRST, VARYING, SQUARE, KEPT>>
 {
     const fn of(columns: [[[f64; 4]; C]; K]) -> Self {
         Self {
