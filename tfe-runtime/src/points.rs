@@ -31,6 +31,8 @@ use crate::scheme::Tables;
 use crate::statistics::Contraction;
 use crate::step::{Last, Memory, cold_rate, cold_rates, may_be_phase};
 use crate::workspace::width;
+use core::marker::PhantomData;
+use four::{Apart, Four};
 use step::Job;
 use storage::{Keep, List, Storage};
 use tables::Fixed;
@@ -229,11 +231,11 @@ impl<const N: usize, S: Storage> Points<N, S> {
         if !self.is_warm {
             return false;
         }
-        let scheme = tables.view();
-        let length = scheme.points() * N;
-        let unknowns = scheme.unknowns() * width(&scheme.element, M::FORM, N);
+        let element = tables.element();
+        let length = element.points() * N;
+        let unknowns = element.unknowns() * width(&element, M::FORM, N);
         let (first, rest) = numbers.split_at_mut(length);
-        if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
+        if const { may_be_phase::<M, N>() } && element.has_phase_form() {
             self.unknowns::<M>(&mut rest[..length], first);
         } else {
             let start = 3 * unknowns - length;
@@ -279,14 +281,48 @@ impl<const N: usize, S: Storage> Points<N, S> {
     where
         M: Model<N>,
     {
-        let (like, mut local) = (Lanes([0.0; 4]), None);
-        let groups = self.tables.groups;
-        let work = Work::<N, S>::of::<M>(&mut self.work, &mut local, groups);
-        (self.tables.once).apply(like, &self.forces, &mut work.products);
-        for l in 0..self.tables.points {
+        #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+        if let Some(isa) = self.isa {
+            let like = crate::quad::Quad::of(isa, [0.0; 4]);
+            return like.apart(Velocities::<M, S, N>::of(self, rates));
+        }
+        Velocities::<M, S, N>::of(self, rates).run(Lanes([0.0; 4]));
+    }
+}
+
+/// Writes velocities at the points of equations of second order.
+struct Velocities<'a, M, S: Storage, const N: usize> {
+    points: &'a mut Points<N, S>,
+    rates: &'a mut [f64],
+    model: PhantomData<M>,
+}
+
+impl<'a, M, S: Storage, const N: usize> Velocities<'a, M, S, N> {
+    fn of(points: &'a mut Points<N, S>, rates: &'a mut [f64]) -> Self {
+        Self {
+            points,
+            rates,
+            model: PhantomData,
+        }
+    }
+}
+
+impl<M: Model<N>, S: Storage, const N: usize> Apart for Velocities<'_, M, S, N> {
+    #[inline(always)]
+    fn run<V: Four>(self, like: V) {
+        let Self { points, rates, .. } = self;
+        let mut local = None;
+        let groups = points.tables.groups;
+        let work = Work::<N, S>::of::<M>(&mut points.work, &mut local, groups);
+        (points.tables.once).apply(like, &points.forces, &mut work.products);
+        let (rows, step) = (rates.as_chunks_mut::<N>().0, like.like(points.last_step));
+        for (products, rows) in work.products.iter().zip(rows.chunks_mut(4)) {
             for a in 0..N {
-                let change = self.inertia.row(like, &work.products[l / 4], a).0[l % 4];
-                rates[l * N + a] = self.velocity[a] + self.last_step * change;
+                let change = points.inertia.row(like, products, a);
+                let velocity = (like.like(points.velocity[a]) + step * change).lanes();
+                for (row, velocity) in rows.iter_mut().zip(velocity) {
+                    row[a] = velocity;
+                }
             }
         }
     }

@@ -112,6 +112,12 @@ impl SchemeRef<'_> {
 pub trait Tables {
     /// The tables.
     fn view(&self) -> SchemeRef<'_>;
+
+    /// The element.
+    #[inline(always)]
+    fn element(&self) -> Element {
+        self.view().element
+    }
 }
 
 impl Tables for SchemeRef<'_> {
@@ -252,7 +258,15 @@ impl<const K: usize, const U: usize> Tables for Scheme<K, U> {
 #[derive(Clone, Debug)]
 pub struct SchemeTable {
     element: Element,
-    numbers: alloc::sync::Arc<[f64]>,
+    parts: alloc::sync::Arc<Parts>,
+}
+
+/// The numbers of all tables one after the other, and where each begins and the last ends.
+#[cfg(feature = "alloc")]
+#[derive(Debug)]
+struct Parts {
+    offsets: [usize; SchemeTable::PARTS + 1],
+    numbers: alloc::boxed::Box<[f64]>,
 }
 
 /// The tables computed so far. There are a few hundred elements in all.
@@ -288,9 +302,9 @@ impl SchemeTable {
     /// The tables of a valid element.
     fn computed(element: Element) -> Self {
         let (k, u, s) = (element.points(), element.unknowns(), element.degree());
-        let length = Self::offsets(k, u, s)[Self::PARTS];
-        let mut numbers = alloc::vec![0.0; length];
-        let mut rest = numbers.as_mut_slice();
+        let offsets = Self::offsets(k, u, s);
+        let mut numbers = alloc::vec![0.0; offsets[Self::PARTS]].into_boxed_slice();
+        let mut rest = &mut numbers[..];
         let mut take = |length: usize| {
             let (part, tail) = core::mem::take(&mut rest).split_at_mut(length);
             rest = tail;
@@ -316,14 +330,13 @@ impl SchemeTable {
         target.fill(element);
         Self {
             element,
-            numbers: numbers.into(),
+            parts: alloc::sync::Arc::new(Parts { offsets, numbers }),
         }
     }
 
     const PARTS: usize = 15;
 
     /// Where each part begins, and where the last ends.
-    #[inline]
     fn offsets(k: usize, u: usize, s: usize) -> [usize; Self::PARTS + 1] {
         let ku = k * u;
         let lengths = [
@@ -354,10 +367,15 @@ impl SchemeTable {
 #[cfg(feature = "alloc")]
 impl Tables for SchemeTable {
     #[inline]
+    fn element(&self) -> Element {
+        self.element
+    }
+
+    #[inline]
     fn view(&self) -> SchemeRef<'_> {
         let element = self.element;
-        let at = Self::offsets(element.points(), element.unknowns(), element.degree());
-        let part = |index: usize| &self.numbers[at[index]..at[index + 1]];
+        let Parts { offsets, numbers } = &*self.parts;
+        let part = |index: usize| &numbers[offsets[index]..offsets[index + 1]];
         SchemeRef {
             element,
             collocated: element.is_collocated(),

@@ -31,7 +31,6 @@ pub(crate) trait Precise: Real {
 }
 
 /// Work that is compiled apart from the places where it is called, for the instruction set of the numbers with which it computes.
-#[cfg(feature = "alloc")]
 pub(crate) trait Apart {
     fn run<V: Four>(self, like: V);
 }
@@ -45,7 +44,10 @@ pub(crate) trait Four: Precise {
     fn lanes(self) -> [f64; 4];
 
     /// Runs the work with numbers of this kind.
-    #[cfg(feature = "alloc")]
+    #[cfg_attr(
+        not(feature = "alloc"),
+        allow(dead_code, reason = "bundles of trajectories and registers need it")
+    )]
     fn apart<W: Apart>(self, work: W);
 
     /// sin and cos of `self`, and of `other`.
@@ -150,7 +152,6 @@ impl Four for Lanes<4> {
         matrix.apply_inline(self, rows, products);
     }
 
-    #[cfg(feature = "alloc")]
     #[inline(never)]
     fn apart<W: Apart>(self, work: W) {
         work.run(self);
