@@ -224,8 +224,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// what is to be done in the order of time.
     ///
     /// Times are those of an element that ends at the event, so that they are as accurate as nodes. An element ends there too where the state changes: two nodes have that
-    /// time then, with the states before and after. The signs of outputs are looked at in 8 to 24 parts of an element and where a parabola through them comes near zero: a
-    /// pair of changes within such a part may be missed, and a value that touches zero without changing its sign is no event.
+    /// time then, with the states before and after. None is missed: where an output cannot change its sign on an element's polynomial is proved by interval arithmetic, and what is left is
+    /// searched (`docs/theory.md` §10.8). Pairs closer than 10⁻⁶ of an element may be, and those of functions given to [inputs](Self::input), which are known at samples. A value that
+    /// touches zero without changing its sign is no event.
     ///
     /// [`run`](Self::run) looks for events; [`steps`](Self::steps), [`run_linearised`](Self::run_linearised) and runs with an [`accuracy`](Self::accuracy) refuse them.
     ///
@@ -471,6 +472,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
         let keeps = self.record_every == 1;
+        // Of an element that was looked into and is not kept.
+        let mut spare = None;
         'run: for (element, (t, next, h)) in mesh.elements().enumerate().skip(done) {
             let last = element + 1 == mesh.steps();
             watch.look(&*self.model, element, (t, h), &state);
@@ -496,7 +499,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 });
                 // Before the matrix, which needs the same memory.
                 let dense = ((keeps || !events.is_empty()) && step.is_ok())
-                    .then(|| stepper.dense(from, next));
+                    .then(|| stepper.dense_in(spare.take(), from, next));
                 let passed = Passed {
                     start: from,
                     before: &before,
@@ -552,8 +555,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                         };
                         resolution.look(stepper.statistics(), examined);
                     }
-                    if let Some(dense) = dense.filter(|_| keeps) {
-                        motion.keep_element(dense);
+                    match dense {
+                        Some(dense) if keeps => motion.keep_element(dense),
+                        unneeded => spare = unneeded,
                     }
                     if last || (element + 1) % self.record_every == 0 {
                         motion.record(&*self.model, next, &state);

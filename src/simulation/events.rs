@@ -5,12 +5,15 @@ mod search;
 use crate::error::RunErrorKind;
 use crate::sensitivity::slopes::momentum_by;
 use crate::velocity::velocity_from;
+use search::Course;
 use std::cell::RefCell;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
+use tfe_runtime::dual::Dual;
+use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper};
-use tfe_runtime::{Element, Form, Model, State, constrained};
+use tfe_runtime::{Arguments, Element, Form, Model, Real, State, constrained};
 
 /// Which changes of sign count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,8 +131,7 @@ pub(super) struct Events<'a, 'm, M, const N: usize> {
     sides: Vec<f64>,
     element: Element,
     control: Control,
-    /// Room for all outputs.
-    values: RefCell<Vec<f64>>,
+    rooms: Rooms,
     /// Finds the times of events, apart from the run.
     probe: Option<Stepper<'m, M, N>>,
     pub(super) met: Vec<Event<N>>,
@@ -139,6 +141,24 @@ pub(super) struct Events<'a, 'm, M, const N: usize> {
     step: f64,
     /// When an event last cut an element, and which.
     last: Option<(f64, usize)>,
+}
+
+/// Room for all outputs: numbers, bounds, and bounds with their slopes.
+struct Rooms {
+    values: RefCell<Vec<f64>>,
+    bounds: RefCell<Vec<Enclosure>>,
+    slopes: RefCell<Vec<Dual<Enclosure>>>,
+}
+
+impl Rooms {
+    fn new(columns: usize) -> Self {
+        let zero = Dual::new(Enclosure::ZERO, Enclosure::ZERO);
+        Self {
+            values: RefCell::new(vec![0.0; columns]),
+            bounds: RefCell::new(vec![Enclosure::ZERO; columns]),
+            slopes: RefCell::new(vec![zero; columns]),
+        }
+    }
 }
 
 /// An element that is to be looked into.
@@ -305,7 +325,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             watched,
             element,
             control,
-            values: RefCell::new(vec![0.0; model.columns()]),
+            rooms: Rooms::new(model.columns()),
             probe: None,
             met: Vec::new(),
             cuts: 0,
@@ -329,6 +349,9 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
         arc: &Passage<'_, N>,
     ) -> Result<Option<Cut<'a, 'm, N>>, RunErrorKind> {
         let Passage { t, h, dense, .. } = *arc;
+        if self.stays_off(dense) {
+            return Ok(None);
+        }
         let resolution = 4.0 * f64::EPSILON * t.abs().max((t + h).abs()).max(h.abs());
         let samples = (2 * dense.degree()).clamp(8, 24);
         let value = |tau: f64, row: &mut Vec<f64>| {
@@ -350,10 +373,10 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             };
             self.outputs(time, &state, &v, row);
         };
-        if search::stays_off(&self.sides, &value) {
-            return Ok(None);
-        }
-        let (found, sides) = search::crossings(&self.sides, samples, resolution / h.abs(), value);
+        let course = |function, part| self.course(dense, function, part);
+        let resolution_of_tau = resolution / h.abs();
+        let (found, sides) =
+            search::crossings(&self.sides, samples, resolution_of_tau, value, course);
         for (number, root) in found.iter().enumerate() {
             let (column, on) = self.watched[root.function];
             if !on.crossing.counts(root.rises) {
@@ -392,7 +415,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             if returns || self.cuts > Self::MAX_CUTS {
                 return Err(RunErrorKind::EventsWithoutEnd { name, time });
             }
-            self.forget_sides(&found[number..], root.tau, resolution / h.abs());
+            self.forget_sides(&found[number..], root.tau, resolution_of_tau);
             return Ok(Some(Cut {
                 t: time,
                 at: met.state,
@@ -449,9 +472,60 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             Form::Lagrangian => v,
             Form::Hamiltonian => &state.p,
         };
-        let mut values = self.values.borrow_mut();
+        let mut values = self.rooms.values.borrow_mut();
         self.model.observables(t, &state.q, z, &mut values);
         row.extend(self.watched.iter().map(|(column, _)| values[*column]));
+    }
+
+    /// All outputs of bounds of what they are functions of.
+    fn bounded<R: Real>(&self, over: &Arguments<R, N>, values: &mut [R]) {
+        let z = match M::FORM {
+            Form::Lagrangian => &over.v,
+            Form::Hamiltonian => &over.p,
+        };
+        self.model.observables(over.t, &over.q, z, values);
+    }
+
+    /// Whether it is proved that nothing that is watched comes to zero in an element. Sides that were not known are known then.
+    fn stays_off(&mut self, dense: &DenseElement<N>) -> bool {
+        for piece in dense.pieces() {
+            let mut values = self.rooms.bounds.borrow_mut();
+            self.bounded(&piece.bounds(M::FORM), &mut values);
+            for ((column, _), known) in self.watched.iter().zip(&mut self.sides) {
+                let side = values[*column].side();
+                if side == 0.0 || *known == -side {
+                    return false;
+                }
+                *known = side;
+            }
+        }
+        true
+    }
+
+    /// What is known of an output that is watched in a part of an element.
+    fn course(&self, dense: &DenseElement<N>, function: usize, part: (f64, f64)) -> Course {
+        let length = dense.end() - dense.start();
+        // The piece that holds the part, if one holds all of it.
+        let place = |piece: &DenseElement<N>| {
+            let from = (piece.start() - dense.start()) / length;
+            let to = (piece.end() - dense.start()) / length;
+            ((part.0 - from) / (to - from), (part.1 - from) / (to - from))
+        };
+        let holds = |(from, to): &(f64, f64)| *from >= 0.0 && *to <= 1.0;
+        let mut pieces = dense.pieces().iter().map(|piece| (piece, place(piece)));
+        let Some((piece, within)) = pieces.find(|(_, within)| holds(within)) else {
+            return Course::Bent;
+        };
+        let mut values = self.rooms.slopes.borrow_mut();
+        self.bounded(&piece.bounds_over(within), &mut values);
+        let Dual { value, slope, .. } = values[self.watched[function].0];
+        if value.side() != 0.0 || slope.side() != 0.0 {
+            Course::Plain
+        } else if value == Enclosure::WHOLE {
+            Course::Unknown
+        } else {
+            Course::Bent
+        }
     }
 
     /// The length of the element that ends at the event: nodes are more accurate than the polynomial between them, which tells where to begin. None where such an element

@@ -400,6 +400,7 @@ impl<const N: usize> Condenser<N> {
             rates,
             forces,
             &interval,
+            None,
         )
     }
 }

@@ -1,5 +1,8 @@
 //! The solution between the nodes: integrated rates (T-69).
 
+#[cfg(feature = "std")]
+pub(crate) mod bounds;
+
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -71,9 +74,17 @@ impl<const N: usize> DenseElement<N> {
         rates: &[[f64; N]],
         forces: &[[f64; N]],
         interval: &Interval<'_, N>,
+        spare: Option<Self>,
     ) -> Self {
         let count = scheme.rates();
-        let mut coefficients = vec![[0.0; N]; 2 * count].into_boxed_slice();
+        let room = spare.map(|spare| spare.rates);
+        let mut coefficients = match room.filter(|room| room.len() == 2 * count) {
+            Some(mut room) => {
+                room.fill([0.0; N]);
+                room
+            }
+            None => vec![[0.0; N]; 2 * count].into_boxed_slice(),
+        };
         let (q, p) = coefficients.split_at_mut(count);
         project(scheme.rate, rates, last.h, q);
         project(scheme.force_rate, forces, last.h, p);
@@ -295,10 +306,13 @@ fn project<const N: usize>(
         .iter_mut()
         .zip(matrix.chunks_exact(values.len()))
     {
+        // Apart from the row, so that the sum stays in registers.
+        let mut sum = *row;
         for (weight, value) in weights.iter().zip(values) {
             for a in 0..N {
-                row[a] += h * weight * value[a];
+                sum[a] += h * weight * value[a];
             }
         }
+        *row = sum;
     }
 }

@@ -21,22 +21,35 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 /// assert!((slope - (2.0_f64.sin() + 2.0 * 2.0_f64.cos())).abs() < 1e-15);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dual {
+pub struct Dual<S = f64> {
     /// x
-    pub value: f64,
+    pub value: S,
     /// x′
-    pub slope: f64,
+    pub slope: S,
     /// The parameter of slope 1, on the time that a kernel is given.
     parameter: Option<usize>,
 }
 
+/// Numbers over which there are [dual numbers](Dual).
+pub trait Differentiable: Real {
+    /// The slope of a choice between two branches, from theirs.
+    #[must_use]
+    fn slope_of_choice(mask: Self::Mask, then: Self, otherwise: Self) -> Self {
+        Self::select(mask, then, otherwise)
+    }
+}
+
+impl Differentiable for f64 {}
+
 impl Dual {
     /// 0 + ε 0
     pub const ZERO: Self = Self::new(0.0, 0.0);
+}
 
+impl<S: Copy> Dual<S> {
     /// value + ε slope
     #[must_use]
-    pub const fn new(value: f64, slope: f64) -> Self {
+    pub const fn new(value: S, slope: S) -> Self {
         Self {
             value,
             slope,
@@ -49,17 +62,24 @@ impl Dual {
     pub const fn by_parameter(self, parameter: Option<usize>) -> Self {
         Self { parameter, ..self }
     }
+}
 
+impl<S: Differentiable> Dual<S> {
     /// f(x) and f′(x) x′.
-    fn chain(self, value: f64, derivative: f64) -> Self {
-        // At x′ = 0 an infinite derivative (√0) is no derivative along this direction.
-        let slope = if self.slope == 0.0 {
-            0.0
-        } else {
-            derivative * self.slope
-        };
-        Self::new(value, slope)
+    fn chain(self, value: S, derivative: S) -> Self {
+        Self::new(value, unless_zero(self.slope, derivative * self.slope))
     }
+}
+
+/// A product with a slope; zero where the slope is: an infinite derivative (√0) is no derivative along such a direction.
+fn unless_zero<S: Real>(slope: S, product: S) -> S {
+    let zero = S::from_f64(0.0);
+    S::select(slope.abs().less_or_equal(zero), zero, product)
+}
+
+/// A number without slope.
+fn number<S: Real>(value: f64) -> S {
+    S::from_f64(value)
 }
 
 /// A vector whose slopes are given.
@@ -72,21 +92,21 @@ pub fn duals<const N: usize>(values: &[f64; N], slopes: &[f64; N]) -> [Dual; N] 
     duals
 }
 
-impl Add for Dual {
+impl<S: Differentiable> Add for Dual<S> {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Self::new(self.value + other.value, self.slope + other.slope)
     }
 }
 
-impl Sub for Dual {
+impl<S: Differentiable> Sub for Dual<S> {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
         Self::new(self.value - other.value, self.slope - other.slope)
     }
 }
 
-impl Mul for Dual {
+impl<S: Differentiable> Mul for Dual<S> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         let slope = self.slope * other.value + self.value * other.slope;
@@ -94,7 +114,7 @@ impl Mul for Dual {
     }
 }
 
-impl Div for Dual {
+impl<S: Differentiable> Div for Dual<S> {
     type Output = Self;
     fn div(self, other: Self) -> Self {
         let value = self.value / other.value;
@@ -102,46 +122,43 @@ impl Div for Dual {
     }
 }
 
-impl Neg for Dual {
+impl<S: Differentiable> Neg for Dual<S> {
     type Output = Self;
     fn neg(self) -> Self {
         Self::new(-self.value, -self.slope)
     }
 }
 
-impl AddAssign for Dual {
+impl<S: Differentiable> AddAssign for Dual<S> {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl SubAssign for Dual {
+impl<S: Differentiable> SubAssign for Dual<S> {
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
 
-impl Real for Dual {
-    type Mask = bool;
+impl<S: Differentiable> Real for Dual<S> {
+    type Mask = S::Mask;
 
     fn from_f64(value: f64) -> Self {
-        Self::new(value, 0.0)
+        Self::new(number(value), number(0.0))
     }
     fn parameter(self, index: usize, value: f64) -> Self {
         let is_it = self.parameter == Some(index);
-        Self::new(value, f64::from(u8::from(is_it)))
+        Self::new(number(value), number(f64::from(u8::from(is_it))))
     }
     /// The slope is that of a difference over a distance at which its two errors, of second order and of rounding, are alike: good to some 1e-10 of what the function
     /// does in a unit of its argument.
     fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
         const DISTANCE: f64 = 6e-6;
-        let value = function(self.value);
-        if self.slope == 0.0 {
-            return Self::new(value, 0.0);
-        }
-        let distance = DISTANCE * Real::max(self.value.abs(), 1.0);
+        let value = self.value.map(function);
+        let distance = self.value.map(&mut |x| DISTANCE * x.abs().max(1.0));
         let (before, after) = (self.value - distance, self.value + distance);
-        let rate = (function(after) - function(before)) / (after - before);
+        let rate = (after.map(function) - before.map(function)) / (after - before);
         self.chain(value, rate)
     }
     fn sin_cos(self) -> (Self, Self) {
@@ -156,23 +173,33 @@ impl Real for Dual {
     }
     fn tan(self) -> Self {
         let tan = Real::tan(self.value);
-        self.chain(tan, 1.0 + tan * tan)
+        self.chain(tan, number::<S>(1.0) + tan * tan)
     }
     fn asin(self) -> Self {
         let x = self.value;
-        self.chain(Real::asin(x), 1.0 / Real::sqrt(1.0 - x * x))
+        self.chain(
+            Real::asin(x),
+            number::<S>(1.0) / (number::<S>(1.0) - x * x).sqrt(),
+        )
     }
     fn acos(self) -> Self {
         let x = self.value;
-        self.chain(Real::acos(x), -1.0 / Real::sqrt(1.0 - x * x))
+        self.chain(
+            Real::acos(x),
+            -(number::<S>(1.0)) / (number::<S>(1.0) - x * x).sqrt(),
+        )
     }
     fn atan(self) -> Self {
         let x = self.value;
-        self.chain(Real::atan(x), 1.0 / (1.0 + x * x))
+        self.chain(Real::atan(x), number::<S>(1.0) / (number::<S>(1.0) + x * x))
     }
     fn atan2(self, x: Self) -> Self {
         let square = x.value * x.value + self.value * self.value;
         let slope = (x.value * self.slope - self.value * x.slope) / square;
+        // Left of the origin there is a jump.
+        let zero = number(0.0);
+        let across = S::slope_of_choice(self.value.less(zero), slope, slope);
+        let slope = S::slope_of_choice(x.value.less(zero), across, slope);
         Self::new(Real::atan2(self.value, x.value), slope)
     }
     fn sinh(self) -> Self {
@@ -183,81 +210,90 @@ impl Real for Dual {
     }
     fn tanh(self) -> Self {
         let tanh = Real::tanh(self.value);
-        self.chain(tanh, 1.0 - tanh * tanh)
+        self.chain(tanh, number::<S>(1.0) - tanh * tanh)
     }
     fn asinh(self) -> Self {
         let x = self.value;
-        self.chain(Real::asinh(x), 1.0 / Real::sqrt(x * x + 1.0))
+        self.chain(
+            Real::asinh(x),
+            number::<S>(1.0) / (x * x + number(1.0)).sqrt(),
+        )
     }
     fn acosh(self) -> Self {
         let x = self.value;
-        self.chain(Real::acosh(x), 1.0 / Real::sqrt(x * x - 1.0))
+        self.chain(
+            Real::acosh(x),
+            number::<S>(1.0) / (x * x - number(1.0)).sqrt(),
+        )
     }
     fn atanh(self) -> Self {
         let x = self.value;
-        self.chain(Real::atanh(x), 1.0 / (1.0 - x * x))
+        self.chain(
+            Real::atanh(x),
+            number::<S>(1.0) / (number::<S>(1.0) - x * x),
+        )
     }
     fn exp(self) -> Self {
         let exp = Real::exp(self.value);
         self.chain(exp, exp)
     }
     fn ln(self) -> Self {
-        self.chain(Real::ln(self.value), 1.0 / self.value)
+        self.chain(Real::ln(self.value), number::<S>(1.0) / self.value)
     }
     fn sqrt(self) -> Self {
         let root = Real::sqrt(self.value);
-        self.chain(root, 0.5 / root)
+        self.chain(root, number::<S>(0.5) / root)
     }
     fn abs(self) -> Self {
         self.chain(self.value.abs(), Real::sign(self.value))
     }
     fn sign(self) -> Self {
-        self.chain(Real::sign(self.value), 0.0)
+        let zero = number(0.0);
+        let slope = S::slope_of_choice(self.value.less(zero), zero, zero);
+        Self::new(self.value.sign(), slope)
     }
     fn min(self, other: Self) -> Self {
-        if other.value < self.value || other.value.is_nan() {
-            other
-        } else {
-            self
-        }
+        let is_less = other.value.less(self.value);
+        let slope = S::select(is_less, other.slope, self.slope);
+        Self::new(self.value.min(other.value), slope)
     }
     fn max(self, other: Self) -> Self {
-        if other.value > self.value || other.value.is_nan() {
-            other
-        } else {
-            self
-        }
+        let is_larger = self.value.less(other.value);
+        let slope = S::select(is_larger, other.slope, self.slope);
+        Self::new(self.value.max(other.value), slope)
     }
     fn hypot(self, other: Self) -> Self {
         let root = Real::hypot(self.value, other.value);
         let slope = self.value * self.slope + other.value * other.slope;
-        Self::new(root, if slope == 0.0 { 0.0 } else { slope / root })
+        Self::new(root, unless_zero(slope, slope / root))
     }
     fn powi(self, exponent: i32) -> Self {
         let derivative = if exponent == 0 {
-            0.0
+            number(0.0)
         } else {
-            f64::from(exponent) * Real::powi(self.value, exponent.saturating_sub(1))
+            number::<S>(f64::from(exponent)) * Real::powi(self.value, exponent.saturating_sub(1))
         };
         self.chain(Real::powi(self.value, exponent), derivative)
     }
     fn powf(self, exponent: Self) -> Self {
         let value = Real::powf(self.value, exponent.value);
-        let by_base = exponent.value * Real::powf(self.value, exponent.value - 1.0);
+        let by_base = exponent.value * Real::powf(self.value, exponent.value - number(1.0));
         let mut result = self.chain(value, by_base);
-        if exponent.slope != 0.0 {
-            result.slope += value * Real::ln(self.value) * exponent.slope;
-        }
+        let by_exponent = value * Real::ln(self.value) * exponent.slope;
+        result.slope += unless_zero(exponent.slope, by_exponent);
         result
     }
-    fn less(self, other: Self) -> bool {
-        self.value < other.value
+    fn less(self, other: Self) -> S::Mask {
+        self.value.less(other.value)
     }
-    fn less_or_equal(self, other: Self) -> bool {
-        self.value <= other.value
+    fn less_or_equal(self, other: Self) -> S::Mask {
+        self.value.less_or_equal(other.value)
     }
-    fn select(mask: bool, then: Self, otherwise: Self) -> Self {
-        if mask { then } else { otherwise }
+    fn select(mask: S::Mask, then: Self, otherwise: Self) -> Self {
+        Self::new(
+            S::select(mask, then.value, otherwise.value),
+            S::slope_of_choice(mask, then.slope, otherwise.slope),
+        )
     }
 }
 

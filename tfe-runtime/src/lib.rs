@@ -28,6 +28,8 @@ mod dense;
 mod double_double;
 pub mod dual;
 pub mod element;
+#[cfg(feature = "std")]
+pub mod enclosure;
 mod equations;
 pub mod error;
 mod evidence;
@@ -71,6 +73,8 @@ pub mod workspace;
 
 pub use condense::{Direction, Parameter};
 pub use controlled::{Controlled, MAX_INPUTS};
+#[cfg(feature = "std")]
+pub use dense::bounds::Arguments;
 pub use element::{
     Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule, ThreeField,
 };

@@ -171,7 +171,7 @@ where
     #[must_use]
     pub fn suspend(self) -> Suspended<N> {
         Suspended {
-            element: self.table.view().element,
+            element: self.table.element(),
             memory: self.memory,
             numbers: self.numbers,
             pivots: self.pivots,
@@ -288,7 +288,7 @@ where
     }
 
     fn room(&self) -> (Vec<f64>, Vec<usize>) {
-        let element = self.table.view().element;
+        let element = self.table.element();
         let numbers = numbers_len(element, M::FORM, N, M::CONSTRAINTS.len());
         let pivots = pivots_len(element, M::FORM, N, M::CONSTRAINTS.len());
         (vec![0.0; numbers], vec![0; pivots])
@@ -542,12 +542,28 @@ where
     /// Before the first step, and after a failed one, it is the constant zero.
     #[must_use]
     pub fn dense(&self, start: f64, end: f64) -> DenseElement<N> {
-        let pieces = self.pieces.iter().map(|piece| piece.dense.clone());
-        DenseElement::of_pieces((start, end), pieces.collect())
-            .unwrap_or_else(|| self.dense_of_last(start, end))
+        self.dense_in(None, start, end)
     }
 
-    fn dense_of_last(&self, start: f64, end: f64) -> DenseElement<N> {
+    /// The same in the memory of one that is not needed any more.
+    #[must_use]
+    pub fn dense_in(
+        &self,
+        spare: Option<DenseElement<N>>,
+        start: f64,
+        end: f64,
+    ) -> DenseElement<N> {
+        let pieces = self.pieces.iter().map(|piece| piece.dense.clone());
+        DenseElement::of_pieces((start, end), pieces.collect())
+            .unwrap_or_else(|| self.dense_of_last(spare, start, end))
+    }
+
+    fn dense_of_last(
+        &self,
+        spare: Option<DenseElement<N>>,
+        start: f64,
+        end: f64,
+    ) -> DenseElement<N> {
         let scheme = self.table.view();
         let Some(last) = self.memory.last else {
             return DenseElement::constant(start, end, State::ZERO);
@@ -581,7 +597,8 @@ where
             length: last.h,
             impulses: &self.impulses,
         };
-        DenseElement::of(&scheme, (start, end), &last, rates, forces, &interval)
+        let times = (start, end);
+        DenseElement::of(&scheme, times, &last, rates, forces, &interval, spare)
     }
 
     /// Writes the transition matrix of the last step, 2N × 2N, row by row, ordered (p, q).
@@ -731,7 +748,7 @@ where
             (&[Impulse<N>], &[Direction]),
         ) -> Result<(), TransitionError>,
     ) -> Result<(), TransitionError> {
-        let element = self.table.view().element;
+        let element = self.table.element();
         let constraints = M::CONSTRAINTS.len();
         let length = linearised_len(element, M::FORM, N, constraints, directions.len());
         let mut extra = vec![0.0; length];
@@ -826,7 +843,7 @@ where
             self.numbers = numbers;
             self.skipped = false;
         }
-        let dense = self.dense_of_last(t, t + h);
+        let dense = self.dense_of_last(None, t, t + h);
         if let Some(last) = self.memory.last {
             self.pieces.push(Piece {
                 last,
@@ -847,7 +864,7 @@ where
     type Inside = DenseElement<N>;
 
     fn inside(&self) -> DenseElement<N> {
-        self.dense_of_last(0.0, 1.0)
+        self.dense_of_last(None, 0.0, 1.0)
     }
 
     fn at(inside: &DenseElement<N>, tau: f64) -> State<N> {

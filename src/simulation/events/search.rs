@@ -16,52 +16,86 @@ pub(super) struct Root {
 /// Where a function is on no side at first it is looked at closer to the start, in parts of the first sample of 4⁻¹, 4⁻², …
 const CLOSER: i32 = 12;
 
-/// Whether all functions stay on their sides: in five places they are further from zero than they move along the element.
-pub(super) fn stays_off(sides: &[f64], values: &impl Fn(f64, &mut Vec<f64>)) -> bool {
-    const PLACES: [f64; 5] = [1.0, 0.0, 0.5, 0.25, 0.75];
-    let mut row = Vec::with_capacity(sides.len());
-    let mut bounds = vec![(f64::INFINITY, f64::NEG_INFINITY); sides.len()];
-    for tau in PLACES {
-        row.clear();
-        values(tau, &mut row);
-        for ((side, value), (least, largest)) in sides.iter().zip(&row).zip(&mut bounds) {
-            let value = side * value;
-            *least = value.min(*least);
-            *largest = value.max(*largest);
-            if !(value > 0.0 && *largest < 2.0 * *least) {
-                return false;
+/// Parts of an element that are not cut further.
+const NARROWEST: f64 = 1.0 / 1_048_576.0;
+
+/// How often a function may be asked what it does in parts of an element.
+const MAX_QUESTIONS: u32 = 128;
+
+/// What an answer costs of these that says nothing at all.
+const COST_OF_SILENCE: u32 = 8;
+
+/// What is known of a function in a part of an element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Course {
+    /// It is proved not to vanish, or to rise or fall throughout: its signs at the ends tell all.
+    Plain,
+    /// Neither.
+    Bent,
+    /// Nothing.
+    Unknown,
+}
+
+/// The ends of parts of an element in each of which a function changes its sign once at most: that is proved for all but the narrowest, and for those that are left when
+/// too many questions have been asked. These are no wider than one of `samples` equal parts.
+fn places(samples: usize, course: &mut impl FnMut((f64, f64)) -> Course) -> Vec<f64> {
+    let wide = 1.0 / samples as f64;
+    let (mut ends, mut level) = (Vec::new(), vec![(0.0, 1.0)]);
+    let mut questions = MAX_QUESTIONS;
+    while !level.is_empty() {
+        let mut next = Vec::new();
+        for (from, to) in level {
+            let answer = match (to - from <= NARROWEST, questions) {
+                (true, _) => Course::Plain,
+                (false, 0) if to - from <= wide => Course::Plain,
+                (false, 0) => Course::Unknown,
+                (false, _) => course((from, to)),
+            };
+            let cost = match answer {
+                Course::Unknown => COST_OF_SILENCE,
+                _ => 1,
+            };
+            questions = questions.saturating_sub(cost);
+            if answer == Course::Plain {
+                ends.push(to);
+            } else {
+                let middle = 0.5 * (from + to);
+                next.extend([(from, middle), (middle, to)]);
             }
         }
+        level = next;
     }
-    true
+    ends.sort_by(f64::total_cmp);
+    ends
 }
 
 /// The changes of sign of the functions that `values` gives at τ, and the sides on which they are at the end. Each is on one of `sides` at the start; zero where that is
-/// not known. The signs are looked at in `samples` equal parts, and at the vertex of a parabola where a function comes near zero between them; a change between two parts
-/// belongs to the later one.
+/// not known. The signs are looked at between parts of which `course` tells what a function does there, and where it says nothing in about as many parts as `samples`, and
+/// at the vertex of a parabola where a function comes near zero between them; a change between two parts belongs to the later one.
 pub(super) fn crossings(
     sides: &[f64],
     samples: usize,
     resolution: f64,
     values: impl Fn(f64, &mut Vec<f64>),
+    mut course: impl FnMut(usize, (f64, f64)) -> Course,
 ) -> (Vec<Root>, Vec<f64>) {
-    let part = 1.0 / samples as f64;
-    let mut times = vec![0.0];
-    if sides.contains(&0.0) {
-        times.extend((1..=CLOSER).rev().map(|k| part * 4.0_f64.powi(-k)));
-    }
-    times.extend((1..samples).map(|k| k as f64 * part));
-    times.push(1.0);
     let row = |tau: &f64| {
         let mut row = Vec::with_capacity(sides.len());
         values(*tau, &mut row);
         row
     };
-    let rows: Vec<Vec<f64>> = times.iter().map(row).collect();
     let (mut roots, mut ends) = (Vec::new(), Vec::new());
     for (function, side) in sides.iter().enumerate() {
-        let column: Vec<f64> = rows.iter().map(|row| row[function]).collect();
+        let mut times = vec![0.0];
+        if *side == 0.0 {
+            let part = 1.0 / samples as f64;
+            times.extend((1..=CLOSER).map(|k| part * 4.0_f64.powi(-k)));
+        }
+        times.extend(places(samples, &mut |part| course(function, part)));
+        times.sort_by(f64::total_cmp);
+        times.dedup();
         let mut value = |tau: f64| row(&tau)[function];
+        let column: Vec<f64> = times.iter().map(|tau| value(*tau)).collect();
         let mut side = *side;
         let mut from = 0.0;
         let mut change = |from: f64, to: f64, side: &mut f64| {
@@ -132,7 +166,7 @@ mod tests {
 
     fn taus(side: f64, f: impl Fn(f64) -> f64) -> Vec<f64> {
         let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
-        let (roots, _) = crossings(&[side], 8, 1e-15, values);
+        let (roots, _) = crossings(&[side], 8, 1e-15, values, |_, _| Course::Unknown);
         roots.iter().map(|root| root.tau).collect()
     }
 
@@ -172,14 +206,40 @@ mod tests {
         assert!(is_near(&hop, &[1e-3]), "{hop:?}");
     }
 
+    /// A pair that no sampling would find, by bounds of the function's derivative 2 (τ − 0.3).
     #[test]
-    fn what_is_far_from_zero_is_not_searched() {
-        let off = |side: f64, f: fn(f64) -> f64| {
-            stays_off(&[side], &|tau: f64, row: &mut Vec<f64>| row.push(f(tau)))
+    fn what_is_proved_is_found() {
+        let near = 0.3 + 1e-7;
+        let f = |tau: f64| (tau - 0.3) * (tau - near);
+        let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
+        let mut questions = 0;
+        let course = |_, (from, to): (f64, f64)| {
+            questions += 1;
+            let turn = 0.5 * (0.3 + near);
+            if to < turn || from > turn {
+                Course::Plain
+            } else {
+                Course::Bent
+            }
         };
-        assert!(off(1.0, |tau| 3.0 + tau) && off(-1.0, |tau| tau - 3.0));
-        assert!(!off(1.0, |tau| 0.5 + tau) && !off(-1.0, |tau| 3.0 + tau));
-        assert!(!off(0.0, |_| 1.0) && !off(1.0, |_| f64::NAN));
+        let (roots, sides) = crossings(&[1.0], 8, 1e-15, values, course);
+        let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
+        assert!(is_near(&found, &[0.3, near]), "{found:?}");
+        assert_eq!((sides, questions), (vec![1.0], 39));
+    }
+
+    #[test]
+    fn parts_are_as_narrow_as_need_be() {
+        let plain = places(8, &mut |_| Course::Plain);
+        assert_eq!(plain, [1.0]);
+        let unknown = places(10, &mut |_| Course::Unknown);
+        assert!(unknown.len() == 17 && unknown.windows(2).all(|two| two[0] < two[1]));
+        let bent = places(10, &mut |_| Course::Bent);
+        assert!(
+            bent.len() >= 64 && bent.last() == Some(&1.0),
+            "{}",
+            bent.len()
+        );
     }
 
     #[test]
