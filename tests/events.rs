@@ -221,7 +221,7 @@ fn section(start: State<2>, element: Element, step: f64, end: f64) -> Vec<[f64; 
     motion.events().iter().map(point).collect()
 }
 
-/// Regular motion, so that errors grow with the time alone: a section against one of half the step.
+/// Regular motion, so that errors grow with the time alone: a section against one of a tenth of the step.
 #[test]
 fn a_thousand_points_of_a_section_are_those_of_finer_runs() {
     let start = State {
@@ -229,21 +229,19 @@ fn a_thousand_points_of_a_section_are_those_of_finer_runs() {
         p: [0.25, 0.1],
     };
     let points = section(start, Element::mixed(9), 0.25, 6400.0);
-    let finer = section(start, Element::mixed(9), 0.125, 6400.0);
+    let finer = section(start, Element::mixed(9), 0.025, 6400.0);
     assert!(
         points.len() >= 1000 && points.len() == finer.len(),
         "{}",
         points.len()
     );
-    let mut worst = 0.0_f64;
     for (point, fine) in points.iter().zip(&finer) {
-        for (a, b) in point.iter().zip(fine) {
-            let off = (a - b).abs();
-            assert!(off.is_finite());
-            worst = worst.max(off);
+        // Two roundings of the time, which is 9e-13 apart at the end.
+        let most = [2.0 * fine[0] * f64::EPSILON, 1e-12, 1e-12];
+        for ((a, b), most) in point.iter().zip(fine).zip(most) {
+            assert!((a - b).abs() <= most, "{point:?} for {fine:?}");
         }
     }
-    assert!(worst < 1e-10, "{worst:e}");
 }
 
 /// Random events of random motions, among them pairs closer than a scan sees, products, waves, jumps and functions of the time, beside scans in 8000 places.
