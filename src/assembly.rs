@@ -14,11 +14,10 @@ mod solution;
 pub use mesh::MeshError;
 pub use newton::AssemblyError;
 
+pub(crate) use chain::{Chain, ClosureMut, DenseMut};
 #[cfg(feature = "sparse")]
-pub(crate) use chain::Chain;
-pub(crate) use chain::{ClosureMut, DenseMut};
-#[cfg(feature = "sparse")]
-pub(crate) use convergence::{Convergence, size};
+pub(crate) use convergence::Convergence;
+pub(crate) use convergence::size;
 pub(crate) use mesh::Mesh;
 pub(crate) use newton::{Assembly, Control, Iterate, Problem};
 pub(crate) use solution::Solution;

@@ -24,7 +24,7 @@ pub enum Component {
 
 impl Component {
     /// Its place in the order (p, q).
-    fn place<const N: usize>(self) -> Option<usize> {
+    pub(crate) fn place<const N: usize>(self) -> Option<usize> {
         match self {
             Self::Momentum(index) if index < N => Some(index),
             Self::Coordinate(index) if index < N => Some(N + index),
@@ -40,11 +40,66 @@ impl Component {
     }
 }
 
+/// A given value of a component at one end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Condition {
-    at_end: bool,
-    component: Component,
-    value: f64,
+pub(crate) struct Condition {
+    pub(crate) at_end: bool,
+    pub(crate) component: Component,
+    pub(crate) value: f64,
+}
+
+/// Whether a span has a length.
+pub(crate) fn check_span(span: &Range<f64>) -> Result<(), BoundaryError> {
+    let Range { start, end } = *span;
+    if start.is_finite() && end.is_finite() && start != end {
+        return Ok(());
+    }
+    Err(BoundaryError::Span { start, end })
+}
+
+/// Whether each condition is one by itself.
+pub(crate) fn check_conditions<const N: usize>(
+    conditions: &[Condition],
+) -> Result<(), BoundaryError> {
+    for (at, condition) in conditions.iter().enumerate() {
+        let Condition {
+            component,
+            value,
+            at_end,
+        } = *condition;
+        if component.place::<N>().is_none() {
+            return Err(BoundaryError::Component { component });
+        }
+        if !value.is_finite() {
+            return Err(BoundaryError::Value { component, value });
+        }
+        let same = |other: &Condition| other.component == component && other.at_end == at_end;
+        if conditions[..at].iter().any(same) {
+            return Err(BoundaryError::Twice { component });
+        }
+    }
+    Ok(())
+}
+
+/// The straight line between the coordinates that are given; where only one end is, a constant.
+pub(crate) fn straight<const N: usize>(
+    conditions: &[Condition],
+    span: &Range<f64>,
+) -> impl Fn(f64) -> ([f64; N], [f64; N]) + use<N> {
+    let value = |index: usize, at_end: bool| {
+        let found = conditions.iter().find(|condition| {
+            condition.at_end == at_end && condition.component == Component::Coordinate(index)
+        });
+        found.map(|condition| condition.value)
+    };
+    let mut line = [(0.0, 0.0); N];
+    let Range { start, end } = *span;
+    for (index, entry) in line.iter_mut().enumerate() {
+        let (first, last) = (value(index, false), value(index, true));
+        let from = first.or(last).unwrap_or(0.0);
+        *entry = (from, (last.unwrap_or(from) - from) / (end - start));
+    }
+    move |t| (line.map(|(q, v)| q + v * (t - start)), line.map(|(_, v)| v))
 }
 
 /// A motion with given values at both ends of a span, to be found: 2N conditions in all, coordinates and momenta mixed at will.
@@ -217,7 +272,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
             (None, Some(motion)) => {
                 &(Box::new(move |t| along_motion(self.model, &motion, t)) as Curve<'_, N>)
             }
-            (None, None) => &(Box::new(self.straight()) as Curve<'_, N>),
+            (None, None) => &(Box::new(straight(&self.conditions, &self.span)) as Curve<'_, N>),
         };
         let mut iterate = assembly
             .along(&problem, curve, Vec::new())
@@ -239,34 +294,14 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
     }
 
     fn check(&self) -> Result<(), BoundaryError> {
-        let Range { start, end } = self.span;
-        if !(start.is_finite() && end.is_finite() && start != end) {
-            return Err(BoundaryError::Span { start, end });
-        }
+        check_span(&self.span)?;
         if self.conditions.len() != 2 * N {
             return Err(BoundaryError::Count {
                 needed: 2 * N,
                 given: self.conditions.len(),
             });
         }
-        for (at, condition) in self.conditions.iter().enumerate() {
-            let Condition {
-                component,
-                value,
-                at_end,
-            } = *condition;
-            if component.place::<N>().is_none() {
-                return Err(BoundaryError::Component { component });
-            }
-            if !value.is_finite() {
-                return Err(BoundaryError::Value { component, value });
-            }
-            let same = |other: &Condition| other.component == component && other.at_end == at_end;
-            if self.conditions[..at].iter().any(same) {
-                return Err(BoundaryError::Twice { component });
-            }
-        }
-        Ok(())
+        check_conditions::<N>(&self.conditions)
     }
 
     /// Where all is given at the start, and no guess: the motion that steps of second order give, as long as the elements.
@@ -292,24 +327,6 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
             .element(Mixed::<2>)
             .step((to - from) / self.elements as f64);
         initial.then(|| simulation.run(start, from..to).ok())?
-    }
-
-    /// The straight line between the coordinates that are given; where only one end is, a constant.
-    fn straight(&self) -> impl Fn(f64) -> ([f64; N], [f64; N]) + use<M, N> {
-        let value = |index: usize, at_end: bool| {
-            let found = self.conditions.iter().find(|condition| {
-                condition.at_end == at_end && condition.component == Component::Coordinate(index)
-            });
-            found.map(|condition| condition.value)
-        };
-        let mut line = [(0.0, 0.0); N];
-        let Range { start, end } = self.span;
-        for (index, entry) in line.iter_mut().enumerate() {
-            let (first, last) = (value(index, false), value(index, true));
-            let from = first.or(last).unwrap_or(0.0);
-            *entry = (from, (last.unwrap_or(from) - from) / (end - start));
-        }
-        move |t| (line.map(|(q, v)| q + v * (t - start)), line.map(|(_, v)| v))
     }
 }
 

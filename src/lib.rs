@@ -20,6 +20,7 @@ pub mod fit;
 pub mod linearised;
 pub mod modal;
 pub mod motion;
+pub mod optimal_control;
 pub mod periodic;
 pub mod periodic_schur;
 pub mod sensitivity;
@@ -43,6 +44,7 @@ pub use fit::Fit;
 pub use linearised::Linearised;
 pub use modal::Modal;
 pub use motion::{Motion, Node, Outputs};
+pub use optimal_control::{OptimalControl, Optimum};
 pub use periodic::{Orbit, PeriodicOrbit};
 pub use sensitivity::Sensitive;
 pub use simulation::{
@@ -66,8 +68,8 @@ pub mod prelude {
     pub use crate::{
         Act, BoundaryValue, ConsistentState, Continuation, Crossing, Element, EnergyConserving,
         Ensemble, FamilyVelocity, Fidelity, Interpolation, Mixed, Modal, Model, Motion, Node,
-        PeriodicOrbit, Primal, Radau, Simulation, Solve, State, ThreeField, Velocity,
-        WorkPrecision, dynamics, stability,
+        OptimalControl, PeriodicOrbit, Primal, Radau, Simulation, Solve, State, ThreeField,
+        Velocity, WorkPrecision, dynamics, stability,
     };
 }
 

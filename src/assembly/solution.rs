@@ -92,6 +92,12 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
 
     /// The motion with the polynomials of the elements.
     pub(crate) fn motion(&self) -> Motion<N> {
+        self.motion_told(|_| {})
+    }
+
+    /// The same, where the model is told which element comes.
+    pub(crate) fn motion_told(&self, mut tell: impl FnMut(usize)) -> Motion<N> {
+        tell(0);
         let mut motion = Motion::from_start(self.model, self.start, &self.start());
         motion.set_statistics(self.statistics);
         let Ok(mut condenser) = Condenser::new::<M>(self.element) else {
@@ -102,6 +108,7 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
         let (mut ends, mut response) = (vec![0.0; 2 * N * columns], vec![0.0; m * columns]);
         let times: Vec<f64> = self.mesh.times(self.start, self.length).collect();
         for (element, pair) in self.iterate.nodes.windows(2).enumerate() {
+            tell(element);
             let (time, length) = self.mesh.place(element, self.start, self.length);
             let placed = Placed {
                 time,

@@ -41,6 +41,27 @@ pub trait Differentiable: Real {
 
 impl Differentiable for f64 {}
 
+/// Dual numbers over dual numbers have second derivatives: with slopes along x and along y, the slope of the slope is ∂²/∂x∂y.
+///
+/// ```
+/// use tfe_runtime::Real;
+/// use tfe_runtime::dual::Dual;
+///
+/// // ∂²(x² sin y)/∂x∂y = 2 x cos y
+/// let x = Dual::new(Dual::new(3.0, 1.0), Dual::new(0.0, 0.0));
+/// let y = Dual::new(Dual::new(0.5, 0.0), Dual::new(1.0, 0.0));
+/// let second = (x * x * y.sin()).slope.slope;
+/// assert!((second - 6.0 * 0.5_f64.cos()).abs() < 1e-15);
+/// ```
+impl<S: Differentiable> Differentiable for Dual<S> {
+    fn slope_of_choice(mask: Self::Mask, then: Self, otherwise: Self) -> Self {
+        Self::new(
+            S::slope_of_choice(mask, then.value, otherwise.value),
+            S::slope_of_choice(mask, then.slope, otherwise.slope),
+        )
+    }
+}
+
 impl Dual {
     /// 0 + ε 0
     pub const ZERO: Self = Self::new(0.0, 0.0);

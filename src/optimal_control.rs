@@ -1,0 +1,479 @@
+//! Optimal control: the inputs of least cost, by direct transcription with the elements of the model.
+
+mod block;
+mod condensed;
+mod error;
+mod optimum;
+mod search;
+mod transcription;
+
+use crate::assembly::{Curve, Mesh};
+use crate::boundary::{
+    BoundaryError, Component, Condition, check_conditions, check_span, straight,
+};
+use crate::driven::place;
+use nalgebra::DVector;
+use search::{Control, Ends, Failure, Iterate, Problem};
+use std::ops::Range;
+use std::sync::Arc;
+use tfe_runtime::basis::{MAX_NODES, legendre};
+use tfe_runtime::scheme::{SchemeTable, Tables};
+use tfe_runtime::{Controlled, Element, Form, Mixed, State};
+use transcription::Sizes;
+
+pub use error::{OptimalControlError, OptimalControlErrorKind};
+pub use optimum::{Costate, Optimum};
+pub use search::Iteration;
+
+/// The inputs of least cost over a span of time, to be found.
+///
+/// ```text
+/// ∫ Σ running costs (t, q, v, u) dt + Σ end costs (t, q, v) → min
+/// ```
+///
+/// under the equations of motion, and what is given of the start and of the end. Costs are outputs of the declaration, so that their derivatives are exact as those of the
+/// model are. Each input is a polynomial in each element; the state is what the element makes of it, so that the solution is a motion of the model as every run is, with its
+/// order and its momentum maps. Unknown are nodes, interiors and inputs of all elements together, with multipliers: sequential quadratic programming with the second
+/// derivatives of the Lagrangian of the problem, (T-144) to (T-148) in `docs/theory.md`. The work of an iteration is linear in the number of elements.
+///
+/// Defaults: `Mixed::<4>` (order 6, of states, inputs' integrals and multipliers alike), 40 equal elements, inputs with as many coefficients in an element as it has rates, a guess of
+/// straight lines between the coordinates that are given, with inputs that are zero.
+///
+/// The minimum is one among neighbours: which one, the guess decides.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(
+///     coordinates(x), lagrangian = dot(x)^2/2,
+///     input(u), force(x) = u, output(effort) = u^2,
+/// )]
+/// struct Sled;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // From rest to rest over a unit of length in a unit of time: u = 6 − 12 t, ∫ u² dt = 12.
+/// let best = OptimalControl::of(&Sled)
+///     .elements(4)
+///     .from_to(Sled.state([0.0], [0.0]), Sled.state([1.0], [0.0]), 0.0..1.0)
+///     .running_cost("effort")
+///     .solve()?;
+/// assert!((best.cost() - 12.0).abs() < 1e-12);
+/// assert!((best.input("u", 0.3)? - 2.4).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
+pub struct OptimalControl<'m, M, const N: usize> {
+    model: &'m M,
+    element: Element,
+    elements: usize,
+    weights: Vec<f64>,
+    degree: Option<usize>,
+    span: Range<f64>,
+    conditions: Vec<Condition>,
+    running: Vec<String>,
+    end: Vec<String>,
+    guess: Option<Curve<'m, N>>,
+    inputs: Vec<(String, Source<'m>)>,
+    control: Control,
+}
+
+/// A function of the time.
+type Source<'m> = Box<dyn Fn(f64) -> f64 + 'm>;
+
+impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
+    /// A problem for `model`, without costs and conditions so far.
+    pub fn of(model: &'m M) -> Self {
+        Self {
+            model,
+            element: Mixed::<4>.into(),
+            elements: 40,
+            weights: Vec::new(),
+            degree: None,
+            span: f64::NAN..f64::NAN,
+            conditions: Vec::new(),
+            running: Vec::new(),
+            end: Vec::new(),
+            guess: None,
+            inputs: Vec::new(),
+            control: Control {
+                tolerance: 1e-10,
+                max_iterations: 200,
+                progress: false,
+            },
+        }
+    }
+
+    /// The element.
+    #[must_use]
+    pub fn element(mut self, element: impl Into<Element>) -> Self {
+        self.element = element.into();
+        self
+    }
+
+    /// The number of elements, equally long unless [`graded`](Self::graded).
+    #[must_use]
+    pub fn elements(mut self, elements: usize) -> Self {
+        self.elements = elements;
+        self
+    }
+
+    /// One element a weight, each as long as its weight says beside the others.
+    #[must_use]
+    pub fn graded(mut self, weights: impl IntoIterator<Item = f64>) -> Self {
+        self.weights = weights.into_iter().collect();
+        self.elements = self.weights.len();
+        self
+    }
+
+    /// The degree of the inputs in each element: 0 holds them over it. At most the number of points of the element less one.
+    #[must_use]
+    pub fn input_degree(mut self, degree: usize) -> Self {
+        self.degree = Some(degree);
+        self
+    }
+
+    /// From when to when, forwards.
+    #[must_use]
+    pub fn span(mut self, span: Range<f64>) -> Self {
+        self.span = span;
+        self
+    }
+
+    /// The state at the start; the end is free as far as it is not given.
+    #[must_use]
+    pub fn from(self, start: State<N>) -> Self {
+        (0..N).fold(self, |problem, a| {
+            problem
+                .start(Component::Coordinate(a), start.q[a])
+                .start(Component::Momentum(a), start.p[a])
+        })
+    }
+
+    /// The state at the end.
+    #[must_use]
+    pub fn to(self, end: State<N>) -> Self {
+        (0..N).fold(self, |problem, a| {
+            problem
+                .end(Component::Coordinate(a), end.q[a])
+                .end(Component::Momentum(a), end.p[a])
+        })
+    }
+
+    /// The states at both ends, and from when to when.
+    #[must_use]
+    pub fn from_to(self, start: State<N>, end: State<N>, span: Range<f64>) -> Self {
+        self.from(start).to(end).span(span)
+    }
+
+    /// Gives one component at the start; what is not given is free.
+    #[must_use]
+    pub fn start(mut self, component: Component, value: f64) -> Self {
+        self.conditions.push(Condition {
+            at_end: false,
+            component,
+            value,
+        });
+        self
+    }
+
+    /// Gives one component at the end; what is not given is free.
+    #[must_use]
+    pub fn end(mut self, component: Component, value: f64) -> Self {
+        self.conditions.push(Condition {
+            at_end: true,
+            component,
+            value,
+        });
+        self
+    }
+
+    /// Adds the integral of an output to the cost.
+    #[must_use]
+    pub fn running_cost(mut self, output: &str) -> Self {
+        self.running.push(output.to_owned());
+        self
+    }
+
+    /// Adds the value of an output at the end to the cost. It must not hold inputs.
+    #[must_use]
+    pub fn end_cost(mut self, output: &str) -> Self {
+        self.end.push(output.to_owned());
+        self
+    }
+
+    /// Where to begin: a curve t ↦ (q, dq/dt). It need not be a motion.
+    #[must_use]
+    pub fn guess(mut self, curve: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
+        self.guess = Some(Box::new(curve));
+        self
+    }
+
+    /// Where to begin with an input.
+    #[must_use]
+    pub fn guess_input(mut self, input: &str, function: impl Fn(f64) -> f64 + 'm) -> Self {
+        self.inputs.push((input.to_owned(), Box::new(function)));
+        self
+    }
+
+    /// When the iteration is done: the size of the last correction beside the solution, 10⁻¹⁰ by default. The correction that meets it is applied, and squares it.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.control.tolerance = tolerance;
+        self
+    }
+
+    /// The most iterations, 200 by default.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: usize) -> Self {
+        self.control.max_iterations = iterations;
+        self
+    }
+
+    /// Shows every iteration on standard error.
+    #[must_use]
+    pub fn progress(mut self) -> Self {
+        self.control.progress = true;
+        self
+    }
+
+    /// Looks for the inputs.
+    ///
+    /// # Errors
+    /// [`OptimalControlError`]: what is asked for makes no sense, or no minimum was found near the guess; then it holds where the search ended.
+    pub fn solve(&self) -> Result<Optimum<N>, OptimalControlError<N>> {
+        self.check()?;
+        let (running, end) = (self.columns(&self.running)?, self.columns(&self.end)?);
+        self.check_end(&end)?;
+        let mesh = Mesh::new(self.elements, &self.weights).map_err(BoundaryError::Mesh)?;
+        let table = SchemeTable::new(self.element)?;
+        let scheme = table.view();
+        let coefficients = self.degree.map_or(scheme.rates(), |degree| degree + 1);
+        if coefficients > scheme.points() {
+            return Err(OptimalControlErrorKind::Degree {
+                degree: coefficients - 1,
+                largest: scheme.points() - 1,
+            }
+            .into());
+        }
+        let sizes = Sizes::new(M::FORM, N, &scheme, M::INPUTS.len(), coefficients);
+        let length = self.span.end - self.span.start;
+        let places = (0..self.elements).map(|e| mesh.place(e, self.span.start, length));
+        let places: Vec<_> = places.collect();
+        let block = |place| transcription::element(M::FORM, &scheme, &sizes, place, &running);
+        let problem = Problem {
+            model: self.model,
+            sizes,
+            blocks: places.iter().map(|place| block(*place)).collect(),
+            end: (!end.is_empty()).then(|| transcription::end(M::FORM, N, self.span.end, &end)),
+            lengths: places.iter().map(|(_, h)| *h).collect(),
+            ends: self.ends(),
+        };
+        let mut iterate = self.first(&table, &problem, &places)?;
+        let mut history = Vec::new();
+        let searched = problem.solve(&mut iterate, self.control, &mut history);
+        let iterations = history.len();
+        let optimum = self.optimum(&problem, &table, mesh, &iterate, history);
+        let kind = match searched {
+            Ok(()) => return Ok(optimum),
+            Err(Failure::Undefined { element }) => OptimalControlErrorKind::Undefined {
+                element,
+                time: places.get(element).map_or(self.span.end, |(t, _)| *t),
+                iterations,
+            },
+            Err(Failure::Singular) => OptimalControlErrorKind::Singular { iterations },
+            Err(Failure::Stalled { correction }) => OptimalControlErrorKind::Stalled {
+                iterations,
+                correction,
+                tolerance: self.control.tolerance,
+            },
+        };
+        Err(OptimalControlError::with(kind, optimum))
+    }
+
+    fn check(&self) -> Result<(), OptimalControlErrorKind> {
+        check_span(&self.span)?;
+        if self.span.end < self.span.start {
+            return Err(OptimalControlErrorKind::Backwards);
+        }
+        check_conditions::<N>(&self.conditions)?;
+        if let Some(constraint) = M::CONSTRAINTS.first() {
+            return Err(OptimalControlErrorKind::Constrained {
+                constraint: constraint.name,
+            });
+        }
+        if self.running.is_empty() && self.end.is_empty() {
+            return Err(OptimalControlErrorKind::NoCost);
+        }
+        for (name, _) in &self.inputs {
+            place::<M, N>(name)?;
+        }
+        Ok(())
+    }
+
+    /// The columns of outputs.
+    fn columns(&self, names: &[String]) -> Result<Vec<usize>, OptimalControlErrorKind> {
+        let columns = 0..self.model.columns();
+        let find = |name: &String| {
+            let mut own = columns.clone();
+            let found = own.find(|column| self.model.column_name(*column).is(name));
+            found.ok_or_else(|| OptimalControlErrorKind::UnknownOutput {
+                name: name.clone(),
+                known: columns
+                    .clone()
+                    .map(|column| self.model.column_name(column).to_string())
+                    .collect(),
+            })
+        };
+        names.iter().map(find).collect()
+    }
+
+    /// Costs of the end do not depend on inputs, which have no value there of their own.
+    fn check_end(&self, columns: &[usize]) -> Result<(), OptimalControlErrorKind> {
+        use tfe_runtime::dual::Dual;
+        let constant = |value: f64| Dual::new(value, 0.0);
+        let (q, _) = straight::<N>(&self.conditions, &self.span)(self.span.end);
+        let z = [constant(0.0); N];
+        for (column, name) in columns.iter().zip(&self.end) {
+            for input in 0..M::INPUTS.len() {
+                let mut inputs = [constant(1.0); tfe_runtime::MAX_INPUTS];
+                inputs[input] = Dual::new(1.0, 1.0);
+                let mut values = vec![Dual::ZERO; self.model.columns()];
+                let t = constant(self.span.end);
+                (self.model).observables_with(&inputs, t, &q.map(constant), &z, &mut values);
+                if values[*column].slope != 0.0 {
+                    return Err(OptimalControlErrorKind::EndCostOfInput {
+                        output: name.clone(),
+                        input: M::INPUTS[input],
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn ends(&self) -> Ends {
+        let mut ends = Ends {
+            first: vec![false; 2 * N],
+            last: vec![false; 2 * N],
+        };
+        for condition in &self.conditions {
+            let given = match condition.at_end {
+                true => &mut ends.last,
+                false => &mut ends.first,
+            };
+            if let Some(place) = condition.component.place::<N>() {
+                given[place] = true;
+            }
+        }
+        ends
+    }
+
+    /// The guess, on the elements; what is given of the ends is met.
+    fn first(
+        &self,
+        table: &SchemeTable,
+        problem: &Problem<'_, M>,
+        places: &[(f64, f64)],
+    ) -> Result<Iterate, OptimalControlErrorKind> {
+        let line = Box::new(straight(&self.conditions, &self.span)) as Curve<'_, N>;
+        let curve = self.guess.as_ref().unwrap_or(&line);
+        let scheme = table.view();
+        let sizes = problem.sizes;
+        let state = |t: f64| {
+            let (q, v) = curve(t);
+            tfe_runtime::legendre::state(self.model, t, &q, &v)
+        };
+        let node = |t: f64| state(t).map(|s| DVector::from_vec([s.p, s.q].concat()));
+        let mut iterate = Iterate {
+            nodes: vec![node(self.span.start)?],
+            interiors: Vec::new(),
+            steering: Vec::new(),
+            multipliers: vec![DVector::zeros(sizes.interior); places.len()],
+            costates: vec![DVector::zeros(2 * N); places.len() + 1],
+        };
+        for (t, h) in places {
+            iterate.nodes.push(node(t + h)?);
+            let mut interior = Vec::with_capacity(sizes.interior);
+            for at in scheme.unknown_nodes {
+                interior.extend(curve(t + at * h).1);
+            }
+            if M::FORM == Form::Hamiltonian {
+                for at in scheme.nodes {
+                    interior.extend(state(t + at * h)?.p);
+                }
+            }
+            iterate.interiors.push(DVector::from_vec(interior));
+            let mut steering = DVector::zeros(sizes.steering());
+            for (name, function) in &self.inputs {
+                let input = place::<M, N>(name)?;
+                // ∫ P_k u over ∫ P_k².
+                let mut basis = [0.0; MAX_NODES];
+                for (at, weight) in scheme.nodes.iter().zip(scheme.weights) {
+                    legendre(*at, &mut basis);
+                    let value = weight * function(t + at * h);
+                    for k in 0..sizes.coefficients {
+                        steering[k * sizes.inputs + input] += (2 * k + 1) as f64 * basis[k] * value;
+                    }
+                }
+            }
+            iterate.steering.push(steering);
+        }
+        for condition in &self.conditions {
+            let node = match condition.at_end {
+                true => iterate.nodes.last_mut(),
+                false => iterate.nodes.first_mut(),
+            };
+            if let (Some(node), Some(place)) = (node, condition.component.place::<N>()) {
+                node[place] = condition.value;
+            }
+        }
+        if let Some(end) = &problem.end {
+            let velocity = if end.interior > 0 {
+                curve(self.span.end).1.to_vec()
+            } else {
+                Vec::new()
+            };
+            iterate.interiors.push(DVector::from_vec(velocity));
+            iterate.multipliers.push(DVector::zeros(end.interior));
+        }
+        Ok(iterate)
+    }
+
+    fn optimum(
+        &self,
+        problem: &Problem<'_, M>,
+        table: &SchemeTable,
+        mesh: Mesh,
+        iterate: &Iterate,
+        history: Vec<Iteration>,
+    ) -> Optimum<N> {
+        let length = self.span.end - self.span.start;
+        let times = mesh.times(self.span.start, length).collect();
+        let pieces = optimum::Pieces {
+            times,
+            inputs: problem.sizes.inputs,
+            coefficients: iterate
+                .steering
+                .iter()
+                .map(|part| part.as_slice().to_vec())
+                .collect(),
+        };
+        let found = optimum::Found {
+            model: self.model,
+            element: self.element,
+            span: self.span.clone(),
+            mesh,
+            pieces: Arc::new(pieces),
+            iterations: history.len(),
+        };
+        let motion = found.motion(problem, &table.view(), iterate);
+        Optimum {
+            cost: problem.cost(iterate),
+            motion,
+            names: M::INPUTS,
+            costates: found.costates(iterate),
+            pieces: found.pieces,
+            history,
+        }
+    }
+}

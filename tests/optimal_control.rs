@@ -1,0 +1,591 @@
+//! Inputs of least cost.
+
+use std::f64::consts::{PI, TAU};
+use tfe::boundary::{BoundaryError, Component};
+use tfe::optimal_control::OptimalControlErrorKind;
+use tfe::prelude::*;
+use tfe::runtime::Controlled;
+use tfe::{InputError, MeshError};
+
+/// A pole on a cart, hanging at θ = 0 (Kelly, *An introduction to trajectory optimization*, SIAM Review 59 (2017), section 6).
+#[dynamics(
+    coordinates(x, theta),
+    lagrangian = (cart + m)/2*dot(x)^2 + m*l*dot(x)*dot(theta)*cos(theta) + m*l^2/2*dot(theta)^2 + m*g*l*cos(theta),
+    input(u),
+    force(x) = u,
+    output(effort) = u^2,
+    output(power) = u*dot(x),
+    output(force) = u,
+)]
+struct CartPole {
+    cart: f64,
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
+const CART: CartPole = CartPole {
+    cart: 1.0,
+    m: 0.3,
+    l: 0.5,
+    g: 9.81,
+};
+
+fn swing_up<'m>() -> OptimalControl<'m, CartPole, 2> {
+    let (start, end) = (
+        CART.state([0.0, 0.0], [0.0, 0.0]),
+        CART.state([1.0, PI], [0.0, 0.0]),
+    );
+    OptimalControl::of(&CART)
+        .from_to(start, end, 0.0..2.0)
+        .running_cost("effort")
+}
+
+/// An arm of two equal links on a table, torques at the shoulder and at the elbow; θ₂ relative to the first link.
+#[dynamics(
+    coordinates(theta1, theta2),
+    let x1 = cos(theta1)/2,
+    let y1 = sin(theta1)/2,
+    let x2 = cos(theta1) + cos(theta1 + theta2)/2,
+    let y2 = sin(theta1) + sin(theta1 + theta2)/2,
+    lagrangian = m/2*(dot(x1)^2 + dot(y1)^2 + dot(x2)^2 + dot(y2)^2) + m/24*(dot(theta1)^2 + (dot(theta1) + dot(theta2))^2),
+    input(shoulder),
+    input(elbow),
+    force(theta1) = shoulder,
+    force(theta2) = elbow,
+    output(effort) = shoulder^2 + elbow^2,
+    output(power) = shoulder*dot(theta1) + elbow*dot(theta2),
+    output(moment) = shoulder,
+)]
+struct Arm {
+    m: f64,
+}
+
+const ARM: Arm = Arm { m: 1.0 };
+
+fn reach<'m>() -> OptimalControl<'m, Arm, 2> {
+    let (start, end) = (
+        ARM.state([0.2, 1.9], [0.0, 0.0]),
+        ARM.state([1.4, 0.4], [0.0, 0.0]),
+    );
+    OptimalControl::of(&ARM)
+        .from_to(start, end, 0.0..1.5)
+        .running_cost("effort")
+}
+
+/// A spacecraft in the plane, in polar coordinates and units of its first orbit, with a thrust along the radius and one across.
+#[dynamics(
+    coordinates(r, phi),
+    momenta(pr, pphi),
+    hamiltonian = (pr^2 + pphi^2/r^2)/2 - 1/r,
+    input(radial),
+    input(tangential),
+    force(r) = radial,
+    force(phi) = r*tangential,
+    output(effort) = radial^2 + tangential^2,
+    output(power) = radial*pr + tangential*pphi/r,
+    output(moment) = r*tangential,
+)]
+struct Spacecraft;
+
+/// The same by its Lagrangian.
+#[dynamics(
+    coordinates(r, phi),
+    lagrangian = (dot(r)^2 + r^2*dot(phi)^2)/2 + 1/r,
+    input(radial),
+    input(tangential),
+    force(r) = radial,
+    force(phi) = r*tangential,
+    output(effort) = radial^2 + tangential^2,
+)]
+struct Spaceship;
+
+/// From a circle to one of half as much radius again, in a time of one and a half revolutions on the first; where on it is free.
+fn transfer<M: Controlled<2>>(model: &M) -> OptimalControl<'_, M, 2> {
+    let circle = |r: f64| (r.sqrt(), r.powf(-1.5));
+    let (start, end) = (circle(1.0), circle(1.5));
+    OptimalControl::of(model)
+        .span(0.0..1.5 * TAU)
+        .from(State {
+            q: [1.0, 0.0],
+            p: [0.0, start.0],
+        })
+        .end(Component::Coordinate(0), 1.5)
+        .end(Component::Momentum(0), 0.0)
+        .end(Component::Momentum(1), end.0)
+        .guess(move |t| {
+            let part = t / (1.5 * TAU);
+            let rate = start.1 + (end.1 - start.1) * part;
+            ([1.0 + 0.5 * part, 0.8 * t], [0.0, rate])
+        })
+        .running_cost("effort")
+}
+
+/// Costs with E, 2 E, and many elements: the first two errors beside the cost.
+fn errors<'m, M: Controlled<2> + 'm>(
+    problem: impl Fn() -> OptimalControl<'m, M, 2>,
+    elements: usize,
+    many: usize,
+) -> (f64, [f64; 2]) {
+    let cost = |elements| {
+        let best = problem().elements(elements).solve().expect("a minimum");
+        let last = best.history().last().copied().expect("iterations");
+        assert!(last.gap < 1e-9 && last.correction < 1e-10, "{last:?}");
+        assert!(best.iterations() < 25, "{} iterations", best.iterations());
+        best.cost()
+    };
+    let finest = cost(many);
+    let beside = |elements| ((cost(elements) - finest) / finest).abs();
+    (finest, [beside(elements), beside(2 * elements)])
+}
+
+#[test]
+fn costs_are_those_of_finer_elements() {
+    let (swing, [coarse, fine]) = errors(swing_up, 40, 160);
+    assert!(coarse < 1e-6, "{coarse:e}");
+    // Order 6: 64 times.
+    assert!(
+        (40.0..110.0).contains(&(coarse / fine)),
+        "{coarse:e} {fine:e}"
+    );
+    let (arm, [coarse, fine]) = errors(reach, 10, 40);
+    assert!(coarse < 1e-5 && fine < 1e-6, "{coarse:e} {fine:e}");
+    let (space, [coarse, fine]) = errors(|| transfer(&Spacecraft), 20, 80);
+    assert!(coarse < 1e-6 && fine < 1e-7, "{coarse:e} {fine:e}");
+    let (by_lagrangian, _) = errors(|| transfer(&Spaceship), 20, 80);
+    assert!((by_lagrangian / space - 1.0).abs() < 1e-11);
+    // As they were found first: nothing published has these digits.
+    for (cost, known) in [
+        (swing, 58.807667461),
+        (arm, 5.960635913),
+        (space, 0.003745281275),
+    ] {
+        assert!((cost / known - 1.0).abs() < 1e-9, "{cost}");
+    }
+}
+
+#[test]
+fn work_is_energy_and_impulse_is_momentum_all_along() {
+    let best = swing_up().elements(80).solve().expect("a minimum");
+    let motion = best.motion();
+    let driven = best.steered(&CART);
+    let integral = |output| motion.integral(&driven, output).expect("an output");
+    let (work, impulse) = (integral("power"), integral("force"));
+    let pushed = integral("effort");
+    assert!((pushed[80] / best.cost() - 1.0).abs() < 1e-12);
+    let energies = motion.energies();
+    let range = energies
+        .iter()
+        .fold(0.0_f64, |most, e| most.max((e - energies[0]).abs()));
+    for (node, state) in motion.states().iter().enumerate() {
+        let gained = energies[node] - energies[0];
+        assert!(
+            (gained - work[node]).abs() < 1e-6 * range,
+            "{node}: {gained} {}",
+            work[node]
+        );
+        // The gravity has no horizontal part: the force alone changes the momentum, to the last digits.
+        assert!((state.p[0] - impulse[node]).abs() < 1e-12, "{node}");
+    }
+
+    let best = reach().elements(40).solve().expect("a minimum");
+    let (motion, driven) = (best.motion(), best.steered(&ARM));
+    let moment = motion.integral(&driven, "moment").expect("an output");
+    let work = motion.integral(&driven, "power").expect("an output");
+    for (node, state) in motion.states().iter().enumerate() {
+        assert!((state.p[0] - moment[node]).abs() < 1e-12, "{node}");
+        assert!(
+            (motion.energies()[node] - work[node]).abs() < 1e-6,
+            "{node}"
+        );
+    }
+
+    let best = transfer(&Spacecraft)
+        .elements(40)
+        .solve()
+        .expect("a minimum");
+    let (motion, driven) = (best.motion(), best.steered(&Spacecraft));
+    let moment = motion.integral(&driven, "moment").expect("an output");
+    let work = motion.integral(&driven, "power").expect("an output");
+    for (node, state) in motion.states().iter().enumerate() {
+        assert!((state.p[1] - 1.0 - moment[node]).abs() < 1e-12, "{node}");
+        let gained = motion.energies()[node] - motion.energies()[0];
+        assert!((gained - work[node]).abs() < 1e-8, "{node}");
+    }
+}
+
+/// What was found is a motion of the model: a run with these inputs, by steps and without any knowledge of the search.
+#[test]
+fn an_optimum_is_a_run() {
+    let best = swing_up().elements(50).solve().expect("a minimum");
+    let run = Simulation::new(&CART)
+        .element(Mixed::<4>)
+        .step(0.04)
+        .input("u", |t| best.input("u", t).expect("an input"))
+        .run(CART.state([0.0, 0.0], [0.0, 0.0]), 0.0..2.0)
+        .expect("a run");
+    for (own, other) in run.states().iter().zip(best.motion().states()) {
+        for a in 0..2 {
+            assert!((own.q[a] - other.q[a]).abs() < 1e-10 && (own.p[a] - other.p[a]).abs() < 1e-10);
+        }
+    }
+    let (a, b) = (
+        run.at(0.731).expect("inside"),
+        best.motion().at(0.731).expect("inside"),
+    );
+    assert!((a.q[1] - b.q[1]).abs() < 1e-10 && (a.v[0] - b.v[0]).abs() < 1e-10);
+    let craft = transfer(&Spacecraft)
+        .elements(30)
+        .solve()
+        .expect("a minimum");
+    let driven = craft.steered(&Spacecraft);
+    let run = Simulation::new(&driven)
+        .element(Mixed::<4>)
+        .step(1.5 * TAU / 30.0)
+        .run(
+            State {
+                q: [1.0, 0.0],
+                p: [0.0, 1.0],
+            },
+            0.0..1.5 * TAU,
+        )
+        .expect("a run");
+    let last = run.last();
+    assert!((last.q[0] - 1.5).abs() < 1e-11 && last.p[0].abs() < 1e-11);
+    let (a, b) = (
+        run.at(2.9).expect("inside"),
+        craft.motion().at(2.9).expect("inside"),
+    );
+    assert!((a.q[1] - b.q[1]).abs() < 1e-11 && (a.p[0] - b.p[0]).abs() < 1e-11);
+}
+
+/// The multipliers are derivatives of the least cost.
+#[test]
+fn multipliers_are_what_states_are_worth() {
+    let best = swing_up().elements(30).solve().expect("a minimum");
+    let worth = best.multipliers()[0];
+    let last = best.multipliers()[30];
+    let cost = |change: [f64; 4], at_end: bool| {
+        let (mut start, mut end) = (
+            CART.state([0.0, 0.0], [0.0, 0.0]),
+            CART.state([1.0, PI], [0.0, 0.0]),
+        );
+        // A shift of the state at the end is as good as the opposite one of what is asked for there.
+        let (state, sign) = if at_end {
+            (&mut end, -1.0)
+        } else {
+            (&mut start, 1.0)
+        };
+        for a in 0..2 {
+            state.q[a] += sign * change[a];
+            state.p[a] += sign * change[2 + a];
+        }
+        OptimalControl::of(&CART)
+            .elements(30)
+            .from_to(start, end, 0.0..2.0)
+            .running_cost("effort")
+            .solve()
+            .expect("a minimum")
+            .cost()
+    };
+    for (at_end, worth) in [(false, worth), (true, last)] {
+        let worth = [worth.q[0], worth.q[1], worth.p[0], worth.p[1]];
+        for at in 0..4 {
+            let moved = |distance: f64| {
+                let mut change = [0.0; 4];
+                change[at] = distance;
+                cost(change, at_end)
+            };
+            let h = 1e-4;
+            let difference =
+                (8.0 * (moved(h) - moved(-h)) - (moved(2.0 * h) - moved(-2.0 * h))) / (12.0 * h);
+            assert!(
+                (difference - worth[at]).abs() < 1e-6 * worth[at].abs().max(1.0),
+                "{at_end} {at}: {difference} {}",
+                worth[at]
+            );
+        }
+    }
+}
+
+/// A mass that is pushed.
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2,
+    input(u),
+    force(x) = u,
+    output(effort) = u^2,
+    output(miss) = 4*x^2,
+    output(energy) = dot(x)^2/2,
+)]
+struct Sled;
+
+#[test]
+fn ends_are_given_free_or_cost_something() {
+    // u = −w x₁ (1 − t) with x₁ = 1/(1 + w/3): the cost is w x₁, here with w = 4.
+    let best = OptimalControl::of(&Sled)
+        .elements(3)
+        .from(Sled.state([1.0], [0.0]))
+        .span(0.0..1.0)
+        .running_cost("effort")
+        .end_cost("miss")
+        .solve()
+        .expect("a minimum");
+    assert!((best.cost() - 12.0 / 7.0).abs() < 1e-12);
+    assert!((best.motion().last().q[0] - 3.0 / 7.0).abs() < 1e-12);
+    assert!((best.input("u", 0.25).expect("an input") + 12.0 / 7.0 * 0.75).abs() < 1e-12);
+    assert_eq!(
+        best.iterations(),
+        2,
+        "a quadratic problem, and the look that it is solved"
+    );
+    // The worth of a state at the end is the derivative of what the end costs.
+    assert!((best.multipliers()[3].q[0] - 8.0 * 3.0 / 7.0).abs() < 1e-11);
+    assert!(best.multipliers()[3].p[0].abs() < 1e-12);
+
+    // A start that is free is taken where it costs nothing: x = 1 + ½ (t − …), here v = 1 all along.
+    let best = OptimalControl::of(&Sled)
+        .elements(2)
+        .start(Component::Coordinate(0), 0.0)
+        .end(Component::Coordinate(0), 1.0)
+        .span(0.0..1.0)
+        .running_cost("effort")
+        .solve()
+        .expect("a minimum");
+    assert!(best.cost().abs() < 1e-20 && (best.motion().states()[0].p[0] - 1.0).abs() < 1e-12);
+
+    // The cost of the end by its velocity: ∫ u² + ½ v₁², from v = 1: u = −v₁/2 all along, v₁ = 2/3, cost 1/9 + 2/9.
+    let best = OptimalControl::of(&Sled)
+        .elements(2)
+        .from(Sled.state([0.0], [1.0]))
+        .span(0.0..1.0)
+        .running_cost("effort")
+        .end_cost("energy")
+        .solve()
+        .expect("a minimum");
+    // ½ v₁² has the derivative v₁ = −2 u: u = −v₁/2, v₁ = 1 − v₁/2.
+    assert!((best.cost() - 1.0 / 3.0).abs() < 1e-12, "{}", best.cost());
+}
+
+#[test]
+fn inputs_that_are_held_cost_more() {
+    let with_degree = |degree| {
+        let best = reach().elements(20).input_degree(degree).solve();
+        best.expect("a minimum")
+    };
+    let (held, linear, full) = (with_degree(0), with_degree(1), with_degree(2));
+    assert!(held.cost() > linear.cost() && linear.cost() > full.cost());
+    assert!(held.cost() / full.cost() < 1.01);
+    let (a, b) = (held.input("elbow", 0.301), held.input("elbow", 0.374));
+    assert_eq!(a, b, "one element from 0.3 to 0.375");
+    assert_ne!(a, held.input("elbow", 0.376));
+}
+
+#[test]
+fn every_element_finds_the_same() {
+    let known = 5.960635913;
+    let elements: [(Element, f64); 7] = [
+        (Mixed::<2>.into(), 1e-2),
+        (Mixed::<5>.into(), 1e-7),
+        (Primal::<4>.into(), 1e-4),
+        (Primal::<4>.reduced(), 1e-4),
+        (ThreeField::<4>.into(), 1e-4),
+        (EnergyConserving::<4>.into(), 1e-4),
+        (Radau::<4>.into(), 1e-4),
+    ];
+    for (element, error) in elements {
+        let best = reach().element(element).elements(20).solve();
+        let best = best.unwrap_or_else(|error| panic!("{element:?}: {error}"));
+        assert!(
+            (best.cost() / known - 1.0).abs() < error,
+            "{element:?}: {}",
+            best.cost()
+        );
+        let craft = transfer(&Spacecraft).element(element).elements(40).solve();
+        let craft = craft.unwrap_or_else(|error| panic!("{element:?}: {error}"));
+        assert!(
+            (craft.cost() / 0.003745281275 - 1.0).abs() < error,
+            "{element:?}: {}",
+            craft.cost()
+        );
+    }
+}
+
+#[test]
+fn graded_meshes_and_guesses_are_taken() {
+    let best = swing_up()
+        .graded((0..40).map(|e| 1.0 + f64::from(e) / 40.0))
+        .guess(|t| ([t / 2.0, PI * t / 2.0], [0.5, PI / 2.0]))
+        .guess_input("u", |t| if t < 1.0 { 1.0 } else { -1.0 })
+        .tolerance(1e-9)
+        .solve()
+        .expect("a minimum");
+    assert!(
+        (best.cost() / 58.807667461 - 1.0).abs() < 1e-5,
+        "{}",
+        best.cost()
+    );
+    assert_eq!(best.motion().states().len(), 41);
+}
+
+/// Two masses, one of which is not pushed.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2,
+    input(u),
+    force(x) = u,
+    output(effort) = u^2,
+    output(logarithm) = ln(u),
+)]
+struct Pair;
+
+/// A mass on a wire.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2,
+    constraint(wire) = y - x^2,
+    input(u),
+    force(x) = u,
+    output(effort) = u^2,
+)]
+struct Wire;
+
+#[test]
+fn what_makes_no_sense_is_an_error() {
+    use OptimalControlErrorKind as Kind;
+    let kind = |problem: OptimalControl<'_, Sled, 1>| {
+        let error = problem.solve().expect_err("an error");
+        assert!(error.partial().is_none(), "{error}");
+        assert!(!error.to_string().is_empty());
+        error.kind().clone()
+    };
+    let rest = Sled.state([0.0], [0.0]);
+    let bare = || OptimalControl::of(&Sled).from(rest);
+    let sled = || {
+        bare()
+            .to(Sled.state([1.0], [0.0]))
+            .span(0.0..1.0)
+            .running_cost("effort")
+    };
+    assert!(matches!(
+        kind(bare().running_cost("effort")),
+        Kind::Ends(BoundaryError::Span { .. })
+    ));
+    assert_eq!(kind(sled().span(1.0..0.0)), Kind::Backwards);
+    assert_eq!(
+        kind(sled().elements(0)),
+        Kind::Ends(BoundaryError::Mesh(MeshError::NoElements))
+    );
+    assert!(matches!(
+        kind(sled().graded([1.0, -1.0])),
+        Kind::Ends(BoundaryError::Mesh(_))
+    ));
+    assert!(matches!(
+        kind(sled().start(Component::Coordinate(0), 1.0)),
+        Kind::Ends(BoundaryError::Twice { .. })
+    ));
+    assert!(matches!(
+        kind(sled().start(Component::Momentum(1), 1.0)),
+        Kind::Ends(BoundaryError::Component { .. })
+    ));
+    assert!(matches!(
+        kind(
+            bare()
+                .span(0.0..1.0)
+                .running_cost("effort")
+                .end(Component::Momentum(0), f64::NAN)
+        ),
+        Kind::Ends(BoundaryError::Value { .. })
+    ));
+    assert_eq!(kind(bare().span(0.0..1.0)), Kind::NoCost);
+    assert!(
+        matches!(kind(sled().running_cost("efort")), Kind::UnknownOutput { name, known } if name == "efort" && known.len() == 3)
+    );
+    assert_eq!(
+        kind(sled().end_cost("effort")),
+        Kind::EndCostOfInput {
+            output: "effort".to_owned(),
+            input: "u"
+        }
+    );
+    assert!(matches!(
+        kind(sled().guess_input("w", |_| 0.0)),
+        Kind::Input(InputError::Unknown { .. })
+    ));
+    assert_eq!(
+        kind(sled().input_degree(3)),
+        Kind::Degree {
+            degree: 3,
+            largest: 2
+        }
+    );
+    assert!(matches!(
+        kind(sled().element(Element::mixed(40))),
+        Kind::Element(_)
+    ));
+    assert!(matches!(
+        kind(sled().guess(|_| ([f64::NAN], [f64::NAN]))),
+        Kind::Legendre(_)
+    ));
+    let wire = OptimalControl::of(&Wire)
+        .span(0.0..1.0)
+        .running_cost("effort")
+        .solve();
+    assert_eq!(
+        wire.expect_err("constraints").kind(),
+        &Kind::Constrained { constraint: "wire" }
+    );
+}
+
+#[test]
+fn searches_that_fail_keep_what_they_have() {
+    use OptimalControlErrorKind as Kind;
+    let error = swing_up()
+        .max_iterations(3)
+        .solve()
+        .expect_err("three are not enough");
+    assert!(
+        matches!(error.kind(), Kind::Stalled { iterations: 3, .. }),
+        "{error}"
+    );
+    let partial = error.partial().expect("what was done");
+    assert!(partial.history().len() == 3 && partial.cost() > 0.0);
+    assert_eq!(partial.motion().states().len(), 41);
+
+    // The second mass cannot get there.
+    let pair = |target: f64, cost: &str| {
+        OptimalControl::of(&Pair)
+            .elements(4)
+            .from_to(
+                Pair.state([0.0, 0.0], [0.0, 0.0]),
+                Pair.state([1.0, target], [0.0, 0.0]),
+                0.0..1.0,
+            )
+            .running_cost(cost)
+            .solve()
+    };
+    let error = pair(1.0, "effort").expect_err("out of reach");
+    assert!(
+        matches!(error.kind(), Kind::Singular { iterations: 0 }),
+        "{error}"
+    );
+    let error = pair(0.0, "logarithm").expect_err("ln 0");
+    assert!(
+        matches!(
+            error.kind(),
+            Kind::Undefined {
+                element: 0,
+                iterations: 0,
+                ..
+            }
+        ),
+        "{error}"
+    );
+    assert!(error.partial().is_some());
+    let unknown = swing_up()
+        .elements(20)
+        .solve()
+        .expect("a minimum")
+        .input("v", 0.0);
+    assert!(matches!(unknown, Err(InputError::Unknown { .. })));
+}
