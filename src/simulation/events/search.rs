@@ -191,16 +191,16 @@ mod tests {
         let found = taus(0.0, |tau| (tau - 0.55).powi(2) - 1e-4);
         assert!(is_near(&found, &[0.54, 0.56]), "{found:?}");
         let touching = taus(0.0, |tau| (tau - 0.55).powi(2) + 1e-9);
-        assert_eq!(touching, []);
+        assert_eq!(touching, [0.0; 0]);
     }
 
     /// A root at the start belongs to the part before, unless the side says otherwise.
     #[test]
     fn sides_carry_over() {
-        assert_eq!(taus(0.0, |tau| tau), []);
-        assert_eq!(taus(1.0, |tau| tau), []);
+        assert_eq!(taus(0.0, |tau| tau), [0.0; 0]);
+        assert_eq!(taus(1.0, |tau| tau), [0.0; 0]);
         assert_eq!(taus(-1.0, |tau| tau), [0.0]);
-        assert_eq!(taus(1.0, |tau| 1.0 - tau), []);
+        assert_eq!(taus(1.0, |tau| 1.0 - tau), [0.0; 0]);
         // A short hop from the ground, with a rounding at its start.
         let hop = taus(0.0, |tau| tau * (1e-3 - tau) - 1e-20);
         assert!(is_near(&hop, &[1e-3]), "{hop:?}");
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn what_has_no_sign_has_no_root() {
-        assert_eq!(taus(0.0, |_| 0.0), []);
-        assert_eq!(taus(0.0, |_| f64::NAN), []);
+        assert_eq!(taus(0.0, |_| 0.0), [0.0; 0]);
+        assert_eq!(taus(0.0, |_| f64::NAN), [0.0; 0]);
     }
 }

@@ -1,0 +1,673 @@
+//! What is recorded: models × elements × ways to solve, runs of every kind, ensembles, orbits, boundary values, families.
+
+use std::f64::consts::{PI, TAU};
+use tfe::ensemble::{Ends, EnsembleError};
+use tfe::prelude::*;
+use tfe::{Statistics, stability};
+
+/// The numbers that one computation gives, and what it cost.
+#[derive(Default)]
+pub struct Outcome {
+    pub numbers: Vec<f64>,
+    pub counts: Vec<u64>,
+}
+
+impl Outcome {
+    fn with(numbers: impl IntoIterator<Item = f64>, statistics: &Statistics) -> Self {
+        Self {
+            numbers: numbers.into_iter().collect(),
+            counts: vec![
+                statistics.steps,
+                statistics.fixed_point_iterations,
+                statistics.newton_iterations,
+                statistics.residual_evaluations,
+                statistics.tangent_evaluations,
+                statistics.factorizations,
+                statistics.fallbacks,
+                statistics.cuts,
+                statistics.kinks,
+                statistics.products,
+            ],
+        }
+    }
+
+    fn of<const N: usize>(motion: &Motion<N>) -> Self {
+        let end = motion.last();
+        let numbers = [end.t].into_iter().chain(end.q).chain(end.p).chain(end.v);
+        let energy = motion.energies().last().copied();
+        Self::with(numbers.chain(energy), motion.statistics())
+    }
+}
+
+/// A computation with a name.
+pub struct Case {
+    pub name: String,
+    pub run: Box<dyn Fn() -> Outcome>,
+}
+
+#[dynamics(coordinates(theta), lagrangian = m*l^2/2*dot(theta)^2 + m*g*l*cos(theta))]
+struct Pendulum {
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(a, b),
+    let x = l1*sin(a) + l2*sin(b),
+    let y = -l1*cos(a) - l2*cos(b),
+    lagrangian = m1/2*l1^2*dot(a)^2 + m2/2*(dot(x)^2 + dot(y)^2) + m1*g*l1*cos(a) - m2*g*y,
+    force(a) = -c*dot(a),
+    event(bottom) = b,
+    solver(EmittedDouble, Mixed::<4>),
+)]
+struct DoublePendulum {
+    m1: f64,
+    m2: f64,
+    l1: f64,
+    l2: f64,
+    g: f64,
+    c: f64,
+}
+
+#[dynamics(
+    coordinates(x, y),
+    momenta(px, py),
+    hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + x^2*y - y^3/3,
+    solver(EmittedGalaxy, Mixed::<5>),
+)]
+struct HenonHeiles;
+
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + 1/sqrt(x^2 + y^2))]
+struct Kepler;
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = mu*(1 - x^2)*dot(x))]
+struct VanDerPol {
+    mu: f64,
+}
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - b*x^4/4, force(x) = f*cos(w*t) - c*dot(x))]
+struct Duffing {
+    b: f64,
+    c: f64,
+    f: f64,
+    w: f64,
+}
+
+#[dynamics(
+    coordinates(x, y),
+    momenta(px, py),
+    hamiltonian = px^2/(2*(1 + x^2)) + py^2/2*(1 + x^2) + x^4/4 + y^2/2 + a*px*y,
+)]
+struct Curved {
+    a: f64,
+}
+
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + w*(x*dot(y) - y*dot(x)) - x^2 - 2*y^2)]
+struct Gyroscopic {
+    w: f64,
+}
+
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    constraint(rod) = x^2 + y^2 - l^2,
+)]
+struct Rod {
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(x, y, phi),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 + j/2*dot(phi)^2 + g*x,
+    constraint(blade) = dot(x)*sin(phi) - dot(y)*cos(phi),
+)]
+struct Blade {
+    j: f64,
+    g: f64,
+}
+
+#[dynamics(
+    coordinates(e[4]),
+    let w = body_rate(e),
+    let up = rotate(e, [0, 0, 1]),
+    lagrangian = (a*(w[0]^2 + w[1]^2) + c*w[2]^2)/2 - h*up[2],
+    constraint(unit) = inner(e, e) - 1,
+)]
+struct Top {
+    a: f64,
+    c: f64,
+    h: f64,
+}
+
+#[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y - k/2*min(y, 0)^2, event(low) = y + 0.05)]
+struct Landing {
+    g: f64,
+    k: f64,
+}
+
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3),
+)]
+struct Chain {
+    n: usize,
+    m: f64,
+    k: f64,
+    a: f64,
+}
+
+#[cfg(feature = "sparse")]
+#[dynamics(
+    coordinates(x[n], y[n]),
+    lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - g*y[i]),
+    constraint(first) = x[0]^2 + y[0]^2 - 1,
+    constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - 1,
+)]
+struct HangingChain {
+    n: usize,
+    g: f64,
+}
+
+const PENDULUM: Pendulum = Pendulum {
+    m: 1.3,
+    l: 0.7,
+    g: 9.81,
+};
+const DOUBLE: DoublePendulum = DoublePendulum {
+    m1: 1.0,
+    m2: 0.8,
+    l1: 1.0,
+    l2: 0.6,
+    g: 9.81,
+    c: 0.05,
+};
+const DUFFING: Duffing = Duffing {
+    b: 0.5,
+    c: 0.1,
+    f: 0.7,
+    w: 1.2,
+};
+const ROD: Rod = Rod {
+    m: 1.1,
+    l: 1.0,
+    g: 9.81,
+};
+const BLADE: Blade = Blade { j: 0.3, g: 2.0 };
+const TOP: Top = Top {
+    a: 1.0,
+    c: 0.4,
+    h: 1.7,
+};
+
+/// Every element family, with few and with many nodes.
+fn elements() -> Vec<Element> {
+    vec![
+        Element::mixed(2),
+        Element::mixed(4),
+        Element::mixed(6),
+        Element::mixed(9),
+        Element::primal(3),
+        Element::primal(4).reduced(),
+        Element::primal(4).lobatto(),
+        Element::from(ThreeField::<4>),
+        Element::energy_conserving(3),
+        Element::radau(3),
+        Element::radau(5),
+    ]
+}
+
+/// Those that hold constraints.
+fn elements_with_constraints() -> Vec<Element> {
+    vec![
+        Element::mixed(3),
+        Element::mixed(6),
+        Element::primal(4).reduced(),
+        Element::from(ThreeField::<4>),
+    ]
+}
+
+/// The list of cases, filled group by group.
+#[derive(Default)]
+struct List(Vec<Case>);
+
+impl List {
+    fn add(&mut self, name: impl Into<String>, run: impl Fn() -> Outcome + 'static) {
+        self.0.push(Case {
+            name: name.into(),
+            run: Box::new(run),
+        });
+    }
+
+    /// Twenty steps with every element, and the transition matrix of one.
+    fn runs<M: Model<N> + 'static, const N: usize>(
+        &mut self,
+        name: &str,
+        model: &'static M,
+        start: State<N>,
+        h: f64,
+        elements: Vec<Element>,
+    ) {
+        for element in elements {
+            let simulation = Simulation::new(model).element(element).step(h);
+            for (how, solve) in [("", Solve::Auto), (", Newton", Solve::Newton)] {
+                let simulation = simulation.clone().solver(solve);
+                self.add(format!("{name}, {element}{how}"), move || {
+                    Outcome::of(&ran(simulation.run(start, 0.0..20.0 * h)))
+                });
+            }
+            self.add(format!("{name}, {element}, transition matrix"), move || {
+                let matrix = stability::transition_matrix(model, element, &start, 0.0, h);
+                let entries = matrix.map_or_else(|_| Vec::new(), |a| a.iter().copied().collect());
+                Outcome::with(entries, &Statistics::default())
+            });
+        }
+    }
+}
+
+/// A motion, or what there is of it.
+fn ran<const N: usize>(run: Result<Motion<N>, tfe::RunError<N>>) -> Motion<N> {
+    run.unwrap_or_else(tfe::RunError::into_partial)
+}
+
+/// The same of a family.
+fn ran_family(run: Result<tfe::family::FamilyMotion, tfe::family::FamilyRunError>) -> Outcome {
+    let motion = run.unwrap_or_else(tfe::family::FamilyRunError::into_partial);
+    let end = motion.last();
+    let numbers = [end.t]
+        .into_iter()
+        .chain(end.q.clone())
+        .chain(end.p.clone());
+    Outcome::with(
+        numbers.chain(motion.energies().last().copied()),
+        motion.statistics(),
+    )
+}
+
+/// All of them.
+pub fn all() -> Vec<Case> {
+    let mut list = List::default();
+    models(&mut list);
+    ways_to_run(&mut list);
+    emitted(&mut list);
+    ensembles(&mut list);
+    assembled(&mut list);
+    families(&mut list);
+    list.0
+}
+
+fn models(list: &mut List) {
+    let start = PENDULUM.state([1.2], [0.3]);
+    list.runs("pendulum", &PENDULUM, start, 0.05, elements());
+    let start = DOUBLE.state([0.9, -0.4], [0.2, 0.5]);
+    list.runs("double pendulum", &DOUBLE, start, 0.03, elements());
+    let start = State {
+        q: [0.1, 0.2],
+        p: [0.3, 0.1],
+    };
+    list.runs("Hénon–Heiles", &HenonHeiles, start, 0.2, elements());
+    let start = Kepler.state([0.7, 0.0], [0.0, 1.3]);
+    list.runs("Kepler", &Kepler, start, 0.05, elements());
+    let start = DUFFING.state([0.5], [0.1]);
+    list.runs("Duffing", &DUFFING, start, 0.1, elements());
+    static CURVED: Curved = Curved { a: 0.3 };
+    let start = State {
+        q: [0.4, -0.2],
+        p: [0.5, 0.3],
+    };
+    list.runs("curved", &CURVED, start, 0.1, elements());
+    static GYROSCOPIC: Gyroscopic = Gyroscopic { w: 0.4 };
+    let start = GYROSCOPIC.state([1.0, 0.2], [0.0, -0.3]);
+    list.runs("gyroscopic", &GYROSCOPIC, start, 0.1, elements());
+    static STIFF: VanDerPol = VanDerPol { mu: 100.0 };
+    let start = STIFF.state([2.0], [0.0]);
+    let stable = vec![Element::mixed(3), Element::radau(3), Element::radau(5)];
+    list.runs("stiff van der Pol", &STIFF, start, 0.5, stable);
+    let start = ROD.state([0.6, -0.8], [0.4, 0.3]);
+    list.runs("rod", &ROD, start, 0.05, elements_with_constraints());
+    let start = BLADE.state([0.0, 0.0, 0.3], [0.3_f64.cos(), 0.3_f64.sin(), 0.7]);
+    list.runs("blade", &BLADE, start, 0.1, elements_with_constraints());
+    let start = TOP.state([0.8, 0.6, 0.0, 0.0], [0.0, 0.0, 0.9, 1.2]);
+    list.runs("top", &TOP, start, 0.05, elements_with_constraints());
+}
+
+/// What a simulation can do besides.
+fn ways_to_run(list: &mut List) {
+    let double = Simulation::new(&DOUBLE).element(Mixed::<4>).step(0.03);
+    let start = DOUBLE.state([0.9, -0.4], [0.2, 0.5]);
+    let simulation = double.clone();
+    list.add("steps", move || {
+        let nodes = simulation.steps(start, 0.5).take(20).flatten();
+        let last = nodes.last();
+        let numbers = last
+            .into_iter()
+            .flat_map(|end| end.q.into_iter().chain(end.p).chain(end.v));
+        Outcome::with(numbers, &Statistics::default())
+    });
+    let simulation = double.clone().record_every(7);
+    list.add("few nodes recorded", move || {
+        Outcome::of(&ran(simulation.run(start, 0.0..0.6)))
+    });
+    let simulation = double.clone().tolerance(1e-6);
+    list.add("loose tolerance", move || {
+        Outcome::of(&ran(simulation.run(start, 0.0..0.6)))
+    });
+    let simulation = double.clone().solver(Solve::FixedPoint);
+    list.add("fixed point", move || {
+        Outcome::of(&ran(simulation.run(start, 0.0..0.6)))
+    });
+    let simulation = double.clone();
+    list.add("backwards", move || {
+        Outcome::of(&ran(simulation.run(start, 0.6..0.0)))
+    });
+    let simulation = double.clone();
+    list.add("between nodes", move || {
+        let motion = ran(simulation.run(start, 0.0..0.6));
+        let inside = [0.011, 0.2, 0.433, 0.59]
+            .map(|t| motion.at(t))
+            .into_iter()
+            .flatten();
+        let numbers = inside.flat_map(|node| node.q.into_iter().chain(node.p).chain(node.v));
+        Outcome::with(numbers.collect::<Vec<_>>(), motion.statistics())
+    });
+    let simulation = double.clone().break_at(0.21).break_at(0.4);
+    list.add("breaks", move || {
+        Outcome::of(&ran(simulation.run(start, 0.0..0.6)))
+    });
+    let simulation = double
+        .clone()
+        .impulse(0.1, [0.2, -0.1])
+        .impulse(0.31, [0.0, 0.3]);
+    list.add("impulses", move || {
+        Outcome::of(&ran(simulation.run(start, 0.0..0.6)))
+    });
+    let simulation = double.clone().element(Mixed::<4>).step(0.4);
+    list.add("long steps that are cut", move || {
+        let wild = DOUBLE.state([2.8, 1.9], [0.0, 0.0]);
+        Outcome::of(&ran(simulation.run(wild, 0.0..4.0)))
+    });
+    let simulation = double.clone();
+    list.add("transition matrices of a run", move || {
+        match simulation.run_linearised(start, 0.0..0.6) {
+            Ok(linearised) => {
+                let matrix = linearised.product();
+                Outcome::with(
+                    matrix.iter().copied().collect::<Vec<_>>(),
+                    &Statistics::default(),
+                )
+            }
+            Err(_) => Outcome::default(),
+        }
+    });
+    let simulation = double.clone();
+    list.add("derivatives by parameters and start", move || {
+        let numbers = simulation.run_sensitive(start, 0.0..0.6).map(|sensitive| {
+            let by_g = sensitive.by("g").last();
+            let by_start = sensitive.by_start().last().clone();
+            let by_start: Vec<f64> = by_start.iter().copied().collect();
+            by_g.q
+                .into_iter()
+                .chain(by_g.p)
+                .chain(by_start)
+                .collect::<Vec<_>>()
+        });
+        Outcome::with(numbers.unwrap_or_default(), &Statistics::default())
+    });
+    let simulation = double.clone().on("bottom", Crossing::Rising, |event| {
+        Act::Impulse(event.v.map(|v| 0.01 * v))
+    });
+    list.add("events", move || {
+        let motion = ran(simulation.run(start, 0.0..3.0));
+        let mut outcome = Outcome::of(&motion);
+        outcome
+            .numbers
+            .extend(motion.events().iter().map(|event| event.t));
+        outcome
+    });
+    let simulation = double.clone();
+    list.add("accuracy", move || {
+        let run = simulation.clone().accuracy(1e-7).run(start, 0.0..1.0);
+        run.map_or_else(
+            |_| Outcome::default(),
+            |estimated| Outcome::of(estimated.motion()),
+        )
+    });
+    list.add("estimated error", move || {
+        let estimated = double.run_estimated(start, 0.0..0.6);
+        estimated.map_or_else(
+            |_| Outcome::default(),
+            |estimated| {
+                let numbers = [estimated.error_estimate()];
+                Outcome::with(numbers, estimated.motion().statistics())
+            },
+        )
+    });
+    static LANDING: Landing = Landing { g: 10.0, k: 1e4 };
+    let landing = Simulation::new(&LANDING).element(Mixed::<6>).step(0.02);
+    let start = LANDING.state([0.05], [0.0]);
+    let simulation = landing.clone().at_kinks(true);
+    list.add("kinks", move || {
+        Outcome::of(&ran(simulation.run(start, 0.0..0.5)))
+    });
+    list.add("uncut kinks", move || {
+        Outcome::of(&ran(landing.run(start, 0.0..0.5)))
+    });
+}
+
+fn emitted(list: &mut List) {
+    list.add("emitted double pendulum", || {
+        let mut solver = EmittedDouble::new(&DOUBLE, 0.03);
+        let mut state = DOUBLE.state([0.9, -0.4], [0.2, 0.5]);
+        for _ in 0..20 {
+            if solver.advance(&mut state).is_err() {
+                break;
+            }
+        }
+        Outcome::with(state.q.into_iter().chain(state.p), solver.statistics())
+    });
+    list.add("emitted Hénon–Heiles", || {
+        let mut solver = EmittedGalaxy::new(&HenonHeiles, 0.2);
+        let mut state = State {
+            q: [0.1, 0.2],
+            p: [0.3, 0.1],
+        };
+        for _ in 0..20 {
+            if solver.advance(&mut state).is_err() {
+                break;
+            }
+        }
+        Outcome::with(state.q.into_iter().chain(state.p), solver.statistics())
+    });
+}
+
+fn ends<const N: usize>(run: Result<Ends<N>, EnsembleError>) -> Outcome {
+    match run {
+        Ok(ends) => {
+            let nodes = ends
+                .nodes()
+                .flat_map(|node| node.q.into_iter().chain(node.p));
+            Outcome::with(nodes.collect::<Vec<_>>(), ends.statistics())
+        }
+        Err(_) => Outcome::default(),
+    }
+}
+
+fn ensembles(list: &mut List) {
+    for element in [Element::mixed(4), Element::mixed(8), Element::radau(4)] {
+        list.add(format!("ensemble of pendulums, {element}"), move || {
+            let starts: Vec<_> = (0..11)
+                .map(|k| PENDULUM.state([0.2 * f64::from(k)], [0.1]))
+                .collect();
+            ends(
+                Ensemble::new(&PENDULUM)
+                    .element(element)
+                    .step(0.05)
+                    .run(&starts, 0.0..1.0),
+            )
+        });
+        list.add(
+            format!("ensemble of double pendulums, {element}"),
+            move || {
+                let starts: Vec<_> = (0..11)
+                    .map(|k| DOUBLE.state([0.1 * f64::from(k), -0.3], [0.1, 0.2]))
+                    .collect();
+                ends(
+                    Ensemble::new(&DOUBLE)
+                        .element(element)
+                        .step(0.03)
+                        .run(&starts, 0.0..0.6),
+                )
+            },
+        );
+        list.add(
+            format!("ensemble of Hénon–Heiles, {element}"),
+            move || {
+                let start = |k: u32| State {
+                    q: [0.02 * f64::from(k), 0.1],
+                    p: [0.2, 0.1],
+                };
+                let starts: Vec<_> = (0..11).map(start).collect();
+                ends(
+                    Ensemble::new(&HenonHeiles)
+                        .element(element)
+                        .step(0.2)
+                        .run(&starts, 0.0..4.0),
+                )
+            },
+        );
+        list.add(format!("ensemble of curved, {element}"), move || {
+            let start = |k: u32| State {
+                q: [0.05 * f64::from(k), 0.1],
+                p: [0.2, 0.1],
+            };
+            let starts: Vec<_> = (0..11).map(start).collect();
+            let model = Curved { a: 0.3 };
+            ends(
+                Ensemble::new(&model)
+                    .element(element)
+                    .step(0.1)
+                    .run(&starts, 0.0..2.0),
+            )
+        });
+    }
+    list.add("ensemble of parameter sets", || {
+        let models: Vec<_> = (0..11)
+            .map(|k| DoublePendulum {
+                m2: 0.5 + 0.1 * f64::from(k),
+                ..DOUBLE
+            })
+            .collect();
+        let start = DOUBLE.state([0.9, -0.4], [0.0, 0.0]);
+        ends(
+            Ensemble::of_models(&models)
+                .element(Mixed::<4>)
+                .step(0.03)
+                .run(&[start], 0.0..0.6),
+        )
+    });
+}
+
+/// Orbits and boundary values.
+fn assembled(list: &mut List) {
+    list.add("orbit of a driven oscillator", || {
+        let orbit = PeriodicOrbit::of(&DUFFING)
+            .element(Mixed::<5>)
+            .elements(20)
+            .period(TAU / DUFFING.w)
+            .guess(|t| {
+                (
+                    [0.5 * (DUFFING.w * t).cos()],
+                    [-0.5 * DUFFING.w * (DUFFING.w * t).sin()],
+                )
+            })
+            .solve();
+        orbit.map_or_else(
+            |_| Outcome::default(),
+            |orbit| {
+                let monodromy = orbit.monodromy();
+                let numbers = monodromy.iter().copied().chain([orbit.period()]);
+                Outcome::with(numbers.collect::<Vec<_>>(), &Statistics::default())
+            },
+        )
+    });
+    list.add("limit cycle", || {
+        let model = VanDerPol { mu: 1.0 };
+        let orbit = PeriodicOrbit::of(&model)
+            .element(Mixed::<6>)
+            .elements(30)
+            .unknown_period(6.6)
+            .guess(|t| ([2.0 * t.cos()], [-2.0 * t.sin()]))
+            .solve();
+        orbit.map_or_else(
+            |_| Outcome::default(),
+            |orbit| {
+                let monodromy = orbit.monodromy();
+                let numbers = monodromy.iter().copied().chain([orbit.period()]);
+                Outcome::with(numbers.collect::<Vec<_>>(), &Statistics::default())
+            },
+        )
+    });
+    list.add("boundary values", || {
+        let arc = BoundaryValue::of(&PENDULUM)
+            .element(Mixed::<6>)
+            .elements(20)
+            .from_to([0.0], [PI / 2.0], 0.0..0.4)
+            .solve();
+        arc.map_or_else(
+            |_| Outcome::default(),
+            |arc| {
+                let numbers = arc.start().p.into_iter().chain(arc.motion().last().p);
+                Outcome::with(numbers.collect::<Vec<_>>(), &Statistics::default())
+            },
+        )
+    });
+}
+
+fn families(list: &mut List) {
+    static CHAIN: Chain = Chain {
+        n: 41,
+        m: 1.2,
+        k: 1.0,
+        a: 0.25,
+    };
+    let q: Vec<f64> = (0..CHAIN.n).map(|i| 0.4 * (0.3 * i as f64).cos()).collect();
+    let start = CHAIN.state(q, vec![0.0; CHAIN.n]);
+    let mut elements = vec![
+        Element::mixed(3),
+        Element::mixed(4),
+        Element::mixed(9),
+        Element::radau(3),
+    ];
+    if cfg!(feature = "sparse") {
+        elements.extend([Element::primal(4).lobatto(), Element::energy_conserving(3)]);
+    }
+    for element in elements {
+        let simulation = Simulation::new(&CHAIN).element(element).step(0.1);
+        let (run, start) = (simulation.clone(), start.clone());
+        list.add(format!("chain, {element}"), move || {
+            ran_family(run.run(start.clone(), 0.0..2.0))
+        });
+    }
+    #[cfg(feature = "sparse")]
+    {
+        let simulation = Simulation::new(&CHAIN).element(Mixed::<4>).step(0.1);
+        let simulation = simulation.solver(Solve::Newton);
+        list.add("chain, sparse Newton", move || {
+            ran_family(simulation.run(start.clone(), 0.0..2.0))
+        });
+        static HANGING: HangingChain = HangingChain { n: 12, g: 9.81 };
+        let x: Vec<f64> = (1..=HANGING.n).map(|i| i as f64).collect();
+        let y = vec![0.0; HANGING.n];
+        let q = [x, y].concat();
+        let start = HANGING.state(q, vec![0.0; 2 * HANGING.n]);
+        for element in [Element::mixed(3), Element::mixed(5)] {
+            let simulation = Simulation::new(&HANGING).element(element).step(0.02);
+            let start = start.clone();
+            list.add(format!("hanging chain, {element}"), move || {
+                ran_family(simulation.run(start.clone(), 0.0..0.4))
+            });
+        }
+    }
+}
