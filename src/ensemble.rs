@@ -3,6 +3,7 @@
 mod doubts;
 mod ends;
 mod error;
+mod members;
 mod plan;
 mod progress;
 mod under_way;
@@ -10,22 +11,22 @@ mod under_way;
 pub use doubts::WarningCounts;
 pub use ends::{Ends, Failure};
 pub use error::EnsembleError;
+pub use members::{ManyModels, Members, OneModel};
 pub use under_way::EnsembleRun;
 
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use crate::simulation::mesh::Mesh;
 use doubts::Energy;
-use plan::Plan;
+use members::some_starts;
+use plan::{Plan, WIDTH, bad_starts, start_of};
 use progress::Progress;
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tfe_runtime::bundle::Bundle;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
-
-/// How many trajectories are stepped side by side.
-const WIDTH: usize = 8;
 
 /// Many runs that differ in their starts, or in their parameters, of which only the ends are wanted.
 ///
@@ -51,46 +52,22 @@ const WIDTH: usize = 8;
 /// # How it runs
 /// With the feature `parallel` trajectories are shared among all processors. With one model, on each of them eight run side by side
 /// in vector instructions ([`Bundle`]), if the element is a Runge–Kutta method in the form at hand (two-field elements are) and the model has no
-/// constraints; all others run one after the other. So do parameter sets ([`of_models`](Self::of_models)): kernels read the parameters of one
-/// model, which no two lanes share.
+/// constraints; all others run one after the other. Parameter sets ([`of_models`](Self::of_models)) go side by side, too: each lane computes with the parameters of its own model.
+/// Those of hand-written models that do not number their [parameters](Model::parameters) run one after the other.
 ///
 /// Results depend neither on the number of processors nor on the order or number of the other starts, not by one bit. From a
 /// [`Simulation`](crate::Simulation) of one start they differ by rounding, if at all.
 ///
 /// Defaults are those of `Simulation`: `Mixed::<4>` (order 6), a thousandth of the span as step, iteration to round-off.
 #[derive(Debug)]
-pub struct Ensemble<'m, M, const N: usize> {
-    models: Models<'m, M>,
+pub struct Ensemble<'m, M, const N: usize, K = OneModel<'m, M>> {
+    models: K,
     element: Element,
     step: Option<f64>,
     control: Control,
     breaks: Vec<f64>,
     progress: bool,
-}
-
-#[derive(Debug)]
-enum Models<'m, M> {
-    One(&'m M),
-    Many(&'m [M]),
-}
-
-// Not derived: the models are borrowed, they need not be `Clone`.
-impl<M> Clone for Models<'_, M> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<M> Copy for Models<'_, M> {}
-
-impl<'m, M> Models<'m, M> {
-    /// The model of one run.
-    fn of(&self, index: usize) -> &'m M {
-        match self {
-            Self::One(model) => model,
-            Self::Many(models) => &models[index],
-        }
-    }
+    of: PhantomData<&'m M>,
 }
 
 /// Results as they come, in no particular order.
@@ -135,12 +112,7 @@ fn unlock<T>(place: Mutex<T>) -> T {
     place.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The start of one run; one alone serves all.
-fn start_of<const N: usize>(starts: &[State<N>], index: usize) -> &State<N> {
-    &starts[if starts.len() == 1 { 0 } else { index }]
-}
-
-impl<M, const N: usize> Clone for Ensemble<'_, M, N> {
+impl<M, const N: usize, K: Copy> Clone for Ensemble<'_, M, N, K> {
     fn clone(&self) -> Self {
         Self {
             breaks: self.breaks.clone(),
@@ -155,9 +127,14 @@ where
 {
     /// Runs of one model from many starts.
     pub fn new(model: &'m M) -> Self {
-        Self::with(Models::One(model))
+        Self::with(OneModel(model))
     }
+}
 
+impl<'m, M, const N: usize> Ensemble<'m, M, N, ManyModels<'m, M>>
+where
+    M: Model<N> + Sync,
+{
     /// Runs of many models of one kind: parameter sets, with one start for each or one for all.
     ///
     /// ```
@@ -178,11 +155,18 @@ where
     /// # }
     /// ```
     pub fn of_models(models: &'m [M]) -> Self {
-        Self::with(Models::Many(models))
+        Self::with(ManyModels(models))
     }
+}
 
-    fn with(models: Models<'m, M>) -> Self {
+impl<'m, M, const N: usize, K> Ensemble<'m, M, N, K>
+where
+    M: Model<N> + Sync,
+    K: Members<'m, M, N>,
+{
+    fn with(models: K) -> Self {
         Self {
+            of: PhantomData,
             models,
             element: Element::from(Mixed::<4>),
             step: None,
@@ -249,11 +233,11 @@ where
     /// [`EnsembleError`] where nothing can run: the element does not exist, step or span are not finite, the number of starts is not that of
     /// models. A bad start is a failure of its own run only.
     pub fn run(&self, starts: &[State<N>], span: Range<f64>) -> Result<Ends<N>, EnsembleError> {
-        let count = self.count(starts)?;
+        let count = self.models.count(starts)?;
         let results = Mutex::new(Results::new(count));
         let (from, to) = (span.start, span.end);
         let statistics = self.for_each(starts, span, |index, result| {
-            let model = self.models.of(index);
+            let model = self.models.model(index);
             let warnings = result.as_ref().map_or_else(
                 |_| WarningCounts::default(),
                 |node| {
@@ -303,7 +287,7 @@ where
     where
         F: Fn(usize, Result<Node<N>, RunErrorKind>) + Send + Sync,
     {
-        let count = self.count(starts)?;
+        let count = self.models.count(starts)?;
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
         let mesh = Mesh::new(&span, step, &self.breaks, &[])?;
         self.element.validate().map_err(RunErrorKind::Element)?;
@@ -315,58 +299,49 @@ where
             done: 0,
         };
         let progress = Progress::new(self.progress, count);
-        let statistics = match self.models {
-            Models::One(model) if self.width() == WIDTH => {
-                // Made once, and one batch after the other runs in a copy.
-                let empty = Bundle::new(model, self.element, self.control);
-                let empty = empty.map_err(RunErrorKind::Element)?;
-                let batch = |bundle: &mut Bundle<'_, M, N, WIDTH>, number: usize| {
-                    let from = number * WIDTH;
-                    let starts = &starts[from..(from + WIDTH).min(count)];
-                    let statistics = plan.run_together(bundle, starts, |lane, result| {
+        if count == 0 {
+            return Ok(Statistics::default());
+        }
+        let statistics = if self.width() == WIDTH {
+            // Made once, and one batch after the other runs in a copy.
+            let empty = self.models.bundle(self.element, self.control);
+            let empty = empty.map_err(RunErrorKind::Element)?;
+            let batch = |bundle: &mut Bundle<'m, M, N, WIDTH, K::Lanes>, number: usize| {
+                let from = number * WIDTH;
+                let starts = some_starts(starts, from, count);
+                self.models.place(bundle, from, &starts);
+                let mut failures = bad_starts(&starts);
+                let statistics =
+                    plan.drive_together(bundle, starts.len(), &mut failures, |lane, result| {
                         finished(from + lane, result);
                     });
-                    progress.advance(starts.len());
-                    statistics
-                };
-                summed(count.div_ceil(WIDTH), || empty.clone(), batch)
-            }
-            models => summed(
+                progress.advance(starts.len());
+                statistics
+            };
+            summed(count.div_ceil(WIDTH), || empty.clone(), batch)
+        } else {
+            summed(
                 count,
                 || (),
                 |_: &mut (), index| {
                     let start = start_of(starts, index);
-                    let (result, statistics) = plan.run_alone(models.of(index), start);
+                    let (result, statistics) = plan.run_alone(self.models.model(index), start);
                     finished(index, result);
                     progress.advance(1);
                     statistics
                 },
-            ),
+            )
         };
         Ok(statistics)
     }
 
     /// How many trajectories are stepped side by side: [`WIDTH`] or one.
     fn width(&self) -> usize {
-        match self.models {
-            Models::One(_) if Bundle::<M, N, WIDTH>::uses_lanes(&self.element, &self.control) => {
-                WIDTH
-            }
-            _ => 1,
-        }
-    }
-
-    /// How many runs there are.
-    fn count(&self, starts: &[State<N>]) -> Result<usize, EnsembleError> {
-        match self.models {
-            Models::Many(models) if starts.len() != 1 && starts.len() != models.len() => {
-                Err(EnsembleError::Starts {
-                    models: models.len(),
-                    starts: starts.len(),
-                })
-            }
-            Models::Many(models) => Ok(models.len()),
-            Models::One(_) => Ok(starts.len()),
+        let uses_lanes = Bundle::<M, N, WIDTH, K::Lanes>::uses_lanes(&self.element, &self.control);
+        if uses_lanes && self.models.share_kernels() {
+            WIDTH
+        } else {
+            1
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Ensembles give what single runs give, for every start, whatever happens to the others.
 
 use std::sync::Mutex;
-use tfe::ensemble::EnsembleError;
+use tfe::ensemble::{EnsembleError, Members};
 use tfe::prelude::*;
 use tfe::{RunErrorKind, StepError, Warning};
 
@@ -241,33 +241,81 @@ fn a_stiff_start_goes_its_own_way() {
     assert!(failed && ends.failures().count() == 1, "{:?}", ends[3]);
 }
 
+/// Models side by side and single runs; what a model does depends by no bit on those beside it.
+fn models_agree<M, const N: usize>(
+    models: &[M],
+    element: impl Into<Element> + Copy,
+    start: State<N>,
+) where
+    M: Model<N> + Sync,
+{
+    let span = 0.0..5.03;
+    let run = |models: &[M]| {
+        let ensemble = Ensemble::of_models(models).element(element).step(0.05);
+        let ends = ensemble.run(&[start], span.clone());
+        ends.expect("a good plan").into_results()
+    };
+    let ends = run(models);
+    let starts = vec![start; models.len()];
+    let ensemble = Ensemble::of_models(models).element(element).step(0.05);
+    let same = ensemble.run(&starts, span.clone()).expect("a good plan");
+    assert_eq!(ends, same.into_results());
+    assert_eq!(ends[3..], run(&models[3..]));
+    for (model, end) in models.iter().zip(ends) {
+        let simulation = Simulation::new(model).element(element).step(0.05);
+        let motion = simulation
+            .run(start, span.clone())
+            .expect("a regular motion");
+        // Rounding of a hundred steps, in motions that magnify it little.
+        let error = distance(&end.expect("an end"), motion.last());
+        assert!(error <= 1e-13, "{error:.1e}");
+    }
+}
+
 #[test]
 fn parameter_sets() {
+    let models: Vec<_> = fractions(19).map(|f| Driven { c: f }).collect();
+    models_agree(&models, Mixed::<4>, models[0].state([1.0], [0.0]));
+    models_agree(&models, Radau::<3>, models[0].state([1.0], [0.0]));
+    // A constant mass, another one in each lane.
+    let models: Vec<_> = fractions(11)
+        .map(|f| Pendulum {
+            m: 0.1 + f,
+            l: 1.3 - f,
+            g: 9.81 * (1.0 + f),
+        })
+        .collect();
+    let start = State {
+        q: [0.4],
+        p: [0.01],
+    };
+    models_agree(&models, Mixed::<6>, start);
+    let models: Vec<_> = fractions(9)
+        .map(|f| PendulumH {
+            m: 0.5 + f,
+            l: 1.3 - f,
+            g: 9.81,
+        })
+        .collect();
+    models_agree(&models, Mixed::<6>, start);
+    let start = State {
+        q: [0.1, 0.2],
+        p: [0.2, 0.1],
+    };
+    let models: Vec<_> = fractions(12).map(|f| HenonHeiles { lambda: f }).collect();
+    models_agree(&models, Mixed::<5>, start);
+    let models: Vec<_> = fractions(9)
+        .map(|f| DoublePendulum { g: 1.0 + f })
+        .collect();
+    models_agree(&models, Mixed::<6>, start);
+    // One after the other: full quadrature.
+    models_agree(&models[..5], Primal::<3>, start);
+
     let models: Vec<_> = fractions(7).map(|f| Driven { c: f }).collect();
     let start = models[0].state([1.0], [0.0]);
-    let ends = Ensemble::of_models(&models)
-        .step(0.1)
-        .run(&[start], 0.0..5.0)
-        .expect("a good plan");
-    let starts = [start; 7];
-    let same = Ensemble::of_models(&models)
-        .step(0.1)
-        .run(&starts, 0.0..5.0)
-        .expect("a good plan");
-    assert_eq!(ends, same);
-    for (model, end) in models.iter().zip(ends) {
-        let motion = Simulation::new(model)
-            .step(0.1)
-            .run(start, 0.0..5.0)
-            .expect("a regular motion");
-        let (end, last) = (end.as_ref().expect("an end"), motion.last());
-        assert_eq!((end.t, end.q, end.p), (last.t, last.q, last.p));
-        // Solved for from different guesses.
-        assert!((end.v[0] - last.v[0]).abs() <= f64::EPSILON);
-    }
     let two = Ensemble::of_models(&models)
         .step(0.1)
-        .run(&starts[..2], 0.0..5.0);
+        .run(&[start; 2], 0.0..5.0);
     assert_eq!(
         two,
         Err(EnsembleError::Starts {
@@ -275,6 +323,31 @@ fn parameter_sets() {
             starts: 2
         })
     );
+    let none = Ensemble::of_models(&models[..0]).run(&[start], 0.0..5.0);
+    assert_eq!(none.expect("nothing to do").len(), 0);
+}
+
+/// Of models in lanes each that does not contract goes its own way, with its own parameters; one that fails stops no other.
+#[test]
+fn some_parameter_sets_go_their_own_way() {
+    let mut models: Vec<_> = fractions(13).map(|f| Driven { c: f }).collect();
+    models[2].c = 2e3;
+    models[5].c = f64::NAN;
+    models[9].c = 5e2;
+    let start = models[0].state([1.0], [0.0]);
+    let ends = Ensemble::of_models(&models)
+        .element(Radau::<3>)
+        .step(0.1)
+        .run(&[start], 0.0..3.0)
+        .expect("a good plan");
+    assert!(ends[5].is_err() && ends.failures().count() == 1);
+    assert!(ends.statistics().newton_iterations > 0);
+    for (model, end) in models.iter().zip(&ends).filter(|(_, end)| end.is_ok()) {
+        let simulation = Simulation::new(model).element(Radau::<3>).step(0.1);
+        let motion = simulation.run(start, 0.0..3.0).expect("a regular motion");
+        let error = distance(end.as_ref().expect("an end"), motion.last());
+        assert!(error <= 1e-12, "c = {}: {error:.1e}", model.c);
+    }
 }
 
 #[test]
@@ -366,13 +439,14 @@ fn spans_of_all_kinds() {
 }
 
 /// One run, and two that are cut anywhere, on the grid; all bits and all failures.
-fn halves<M, const N: usize>(
-    ensemble: &Ensemble<'_, M, N>,
+fn halves<'m, M, K, const N: usize>(
+    ensemble: &Ensemble<'m, M, N, K>,
     starts: &[State<N>],
     (steps, h): (u32, f64),
     seed: &mut u64,
 ) where
     M: Model<N> + Sync,
+    K: Members<'m, M, N>,
 {
     const CUTS: u32 = 20;
     let ensemble = ensemble.clone().step(h);

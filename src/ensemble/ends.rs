@@ -1,6 +1,6 @@
 //! What an ensemble came to.
 
-use super::WarningCounts;
+use super::doubts::WarningCounts;
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use std::ops::Index;

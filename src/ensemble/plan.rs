@@ -1,13 +1,20 @@
 //! How one batch of an ensemble is run.
 
-use super::WIDTH;
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use crate::simulation::mesh::Mesh;
 use crate::simulation::{check_constraints, check_start};
-use tfe_runtime::bundle::Bundle;
+use tfe_runtime::bundle::{Bundle, Trajectories};
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::{Element, Model, State, Statistics};
+
+/// How many trajectories are stepped side by side.
+pub(super) const WIDTH: usize = 8;
+
+/// The start of one run; one alone serves all.
+pub(super) fn start_of<const N: usize>(starts: &[State<N>], index: usize) -> &State<N> {
+    &starts[if starts.len() == 1 { 0 } else { index }]
+}
 
 /// What all runs have in common.
 pub(super) struct Plan<const N: usize> {
@@ -27,30 +34,17 @@ impl<const N: usize> Plan<N> {
         Node::new(model, self.end, state, &[0.0; N])
     }
 
-    /// Up to [`WIDTH`] runs in lanes.
-    pub(super) fn run_together<M>(
+    /// Up to [`WIDTH`] runs in lanes, from where they are.
+    pub(super) fn drive_together<'m, M, T>(
         &self,
-        bundle: &mut Bundle<'_, M, N, WIDTH>,
-        starts: &[State<N>],
-        finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
-    ) -> Statistics
-    where
-        M: Model<N>,
-    {
-        let mut failures = begin(bundle, starts);
-        self.drive_together(bundle, starts.len(), &mut failures, finished)
-    }
-
-    /// The same from where they are.
-    pub(super) fn drive_together<M>(
-        &self,
-        bundle: &mut Bundle<'_, M, N, WIDTH>,
+        bundle: &mut Bundle<'m, M, N, WIDTH, T>,
         count: usize,
         failures: &mut Failures,
         finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
     ) -> Statistics
     where
         M: Model<N>,
+        T: Trajectories<'m, M, N>,
     {
         for (element, (time, _, step)) in self.mesh.elements().enumerate().skip(self.done) {
             if !bundle.advance(self.mesh.begin(time, step), step) {
@@ -72,7 +66,7 @@ impl<const N: usize> Plan<N> {
         }
         for (lane, failure) in failures.iter().enumerate().take(count) {
             let result = match (failure, bundle.state(lane)) {
-                (None, Ok(state)) => Ok(self.node(bundle.model(), &state)),
+                (None, Ok(state)) => Ok(self.node(bundle.model_of(lane), &state)),
                 (Some(failure), _) => Err(failure.clone()),
                 // Only a bad start fails outside a step, and it has been found.
                 (None, Err(source)) => Err(RunErrorKind::Solve {
@@ -143,15 +137,8 @@ impl<const N: usize> Plan<N> {
     }
 }
 
-/// Places trajectories in lanes; bad starts have failed already.
-pub(super) fn begin<M, const N: usize>(
-    bundle: &mut Bundle<'_, M, N, WIDTH>,
-    starts: &[State<N>],
-) -> Failures
-where
-    M: Model<N>,
-{
-    bundle.start(starts);
+/// The lanes whose starts are none.
+pub(super) fn bad_starts<const N: usize>(starts: &[State<N>]) -> Failures {
     let mut failures = [const { None }; WIDTH];
     for (start, failure) in starts.iter().zip(&mut failures) {
         *failure = check_start(start).err();

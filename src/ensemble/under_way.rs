@@ -1,15 +1,16 @@
 //! Ensembles that go on where they have got to.
 
 use super::doubts::{Energy, WarningCounts};
-use super::plan::{Failures, Plan, begin};
+use super::members::{Members, OneModel, some_starts};
+use super::plan::{Failures, Plan, WIDTH, bad_starts, start_of};
 use super::progress::Progress;
-use super::{Ends, Ensemble, EnsembleError, Results, WIDTH, lock, start_of, summed, unlock};
+use super::{Ends, Ensemble, EnsembleError, Results, lock, summed, unlock};
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use crate::simulation::Reached;
 use crate::simulation::mesh::Mesh;
 use std::sync::Mutex;
-use tfe_runtime::bundle::Bundle;
+use tfe_runtime::bundle::{Bundle, Trajectories};
 use tfe_runtime::step::Stepper;
 use tfe_runtime::{Model, State, Statistics};
 
@@ -17,16 +18,16 @@ use tfe_runtime::{Model, State, Statistics};
 ///
 /// It holds the memory of a stepper for each trajectory, or of a [`Bundle`] for eight: some kilobytes each for a few coordinates. A clone is a checkpoint.
 #[derive(Debug)]
-pub struct EnsembleRun<'m, M, const N: usize> {
-    ensemble: Ensemble<'m, M, N>,
+pub struct EnsembleRun<'m, M: Model<N>, const N: usize, K: Members<'m, M, N> = OneModel<'m, M>> {
+    ensemble: Ensemble<'m, M, N, K>,
     reached: Reached,
-    batches: Vec<Batch<'m, M, N>>,
+    batches: Vec<Batch<'m, M, N, K::Lanes>>,
     /// Of each run where it is.
     energies: Vec<Energy>,
 }
 
 // Not derived: the models are borrowed, they need not be `Clone`.
-impl<M: Model<N>, const N: usize> Clone for EnsembleRun<'_, M, N> {
+impl<'m, M: Model<N>, const N: usize, K: Members<'m, M, N>> Clone for EnsembleRun<'m, M, N, K> {
     fn clone(&self) -> Self {
         Self {
             ensemble: self.ensemble.clone(),
@@ -39,22 +40,22 @@ impl<M: Model<N>, const N: usize> Clone for EnsembleRun<'_, M, N> {
 
 /// Trajectories that are run one after the other on one processor.
 #[derive(Debug)]
-enum Batch<'m, M, const N: usize> {
+enum Batch<'m, M, const N: usize, T> {
     /// Not begun: the starts.
     At(Vec<State<N>>),
-    Lanes(Box<Lanes<'m, M, N>>),
+    Lanes(Box<Lanes<'m, M, N, T>>),
     Alone(Box<(Stepper<'m, M, N>, State<N>)>),
     Failed(RunErrorKind),
 }
 
 #[derive(Debug)]
-struct Lanes<'m, M, const N: usize> {
-    bundle: Bundle<'m, M, N, WIDTH>,
+struct Lanes<'m, M, const N: usize, T> {
+    bundle: Bundle<'m, M, N, WIDTH, T>,
     failures: Failures,
     count: usize,
 }
 
-impl<M: Model<N>, const N: usize> Clone for Batch<'_, M, N> {
+impl<M: Model<N>, const N: usize, T: Clone> Clone for Batch<'_, M, N, T> {
     fn clone(&self) -> Self {
         match self {
             Self::At(starts) => Self::At(starts.clone()),
@@ -76,9 +77,10 @@ impl<M: Model<N>, const N: usize> Clone for Batch<'_, M, N> {
     }
 }
 
-impl<'m, M, const N: usize> Ensemble<'m, M, N>
+impl<'m, M, const N: usize, K> Ensemble<'m, M, N, K>
 where
     M: Model<N> + Sync,
+    K: Members<'m, M, N>,
 {
     /// Places all trajectories at their starts, at the time `t0`; [`EnsembleRun::run_to`] moves them. For results at several times, as one run would pass them to the bit:
     ///
@@ -107,13 +109,13 @@ where
         &self,
         starts: &[State<N>],
         t0: f64,
-    ) -> Result<EnsembleRun<'m, M, N>, EnsembleError> {
-        let count = self.count(starts)?;
+    ) -> Result<EnsembleRun<'m, M, N, K>, EnsembleError> {
+        let count = self.models.count(starts)?;
         self.element.validate().map_err(RunErrorKind::Element)?;
         let batches = match self.width() {
-            WIDTH => starts
-                .chunks(WIDTH)
-                .map(|some| Batch::At(some.to_vec()))
+            WIDTH => (0..count)
+                .step_by(WIDTH)
+                .map(|first| Batch::At(some_starts(starts, first, count)))
                 .collect(),
             _ => (0..count)
                 .map(|index| Batch::At(vec![*start_of(starts, index)]))
@@ -129,15 +131,16 @@ where
             },
             batches,
             energies: (0..count)
-                .map(|index| Energy::of(self.models.of(index), t0, start_of(starts, index)))
+                .map(|index| Energy::of(self.models.model(index), t0, start_of(starts, index)))
                 .collect(),
         })
     }
 }
 
-impl<M, const N: usize> EnsembleRun<'_, M, N>
+impl<'m, M, const N: usize, K> EnsembleRun<'m, M, N, K>
 where
     M: Model<N> + Sync,
+    K: Members<'m, M, N>,
 {
     /// The time that has been reached.
     pub fn time(&self) -> f64 {
@@ -185,9 +188,9 @@ where
             || (),
             |_: &mut (), number| {
                 let mut batch = lock(&places[number]);
-                let model = ensemble.models.of(number);
                 let finished = |lane: usize, result: Result<Node<N>, RunErrorKind>| {
                     let index = number * width + lane;
+                    let model = ensemble.models.model(index);
                     let after = result.as_ref().ok();
                     let after = after.map(|node| Energy::of(model, end, &node.state()));
                     let mut results = lock(&results);
@@ -199,7 +202,8 @@ where
                     }
                     results.put(index, result, warnings);
                 };
-                let statistics = batch.drive(&plan, model, width, finished);
+                let place = (&ensemble.models, number * width, width);
+                let statistics = batch.drive(&plan, place, finished);
                 progress.advance(batch.count());
                 statistics
             },
@@ -211,7 +215,7 @@ where
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Batch<'m, M, N> {
+impl<'m, M: Model<N>, const N: usize, T: Trajectories<'m, M, N>> Batch<'m, M, N, T> {
     /// How many trajectories it has.
     fn count(&self) -> usize {
         match self {
@@ -222,15 +226,14 @@ impl<'m, M: Model<N>, const N: usize> Batch<'m, M, N> {
     }
 
     /// Over the rest of the mesh.
-    fn drive(
+    fn drive<K: Members<'m, M, N, Lanes = T>>(
         &mut self,
         plan: &Plan<N>,
-        model: &'m M,
-        width: usize,
+        place: (&K, usize, usize),
         finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
     ) -> Statistics {
         if let Self::At(starts) = self {
-            *self = Self::begin(plan, model, width, starts);
+            *self = Self::begin(plan, place, starts);
         }
         match self {
             // Made above.
@@ -260,11 +263,17 @@ impl<'m, M: Model<N>, const N: usize> Batch<'m, M, N> {
         }
     }
 
-    fn begin(plan: &Plan<N>, model: &'m M, width: usize, starts: &[State<N>]) -> Self {
+    /// The runs from `first` on, so many at a time.
+    fn begin<K: Members<'m, M, N, Lanes = T>>(
+        plan: &Plan<N>,
+        (models, first, width): (&K, usize, usize),
+        starts: &[State<N>],
+    ) -> Self {
         if width == WIDTH {
-            return match Bundle::new(model, plan.element, plan.control) {
+            return match models.bundle(plan.element, plan.control) {
                 Ok(mut bundle) => {
-                    let failures = begin(&mut bundle, starts);
+                    models.place(&mut bundle, first, starts);
+                    let failures = bad_starts(starts);
                     let count = starts.len();
                     Self::Lanes(Box::new(Lanes {
                         bundle,
@@ -278,7 +287,7 @@ impl<'m, M: Model<N>, const N: usize> Batch<'m, M, N> {
         let Some(&start) = starts.first() else {
             return Self::At(Vec::new());
         };
-        match plan.stepper(model, &start) {
+        match plan.stepper(models.model(first), &start) {
             Ok(stepper) => Self::Alone(Box::new((stepper, start))),
             Err(kind) => Self::Failed(kind),
         }

@@ -16,13 +16,14 @@ mod pair;
 mod products;
 mod second_order;
 mod step;
+mod varied;
 
 use crate::element::{Element, ElementError};
 use crate::error::StepError;
 use crate::legendre::largest;
 use crate::model::{Model, State};
 use crate::newton::{Control, Preference, Solve};
-use crate::points::has_form;
+use crate::points::{constant_rates, has_form};
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
 use crate::step::Stepper;
@@ -33,9 +34,10 @@ use engine::Engine;
 #[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
 pub(crate) use engine::tests::Pendulums;
 use group::Group;
-use pair::LANES;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 pub(crate) use pair::{Apart, Pair};
+use pair::{Eight, LANES};
+pub use varied::Varied;
 
 /// Up to W trajectories that take the same steps.
 ///
@@ -85,9 +87,11 @@ pub(crate) use pair::{Apart, Pair};
 /// # Ok(())
 /// # }
 /// ```
+///
+/// They are those of one model, or, [`of_models`](Self::of_models), of eight that differ in their parameters.
 #[derive(Debug)]
-pub struct Bundle<'m, M, const N: usize, const W: usize> {
-    model: &'m M,
+pub struct Bundle<'m, M, const N: usize, const W: usize, T = One<'m, M>> {
+    models: T,
     table: SchemeTable,
     control: Control,
     /// Of models and elements that can be stepped side by side.
@@ -100,6 +104,69 @@ pub struct Bundle<'m, M, const N: usize, const W: usize> {
     together: Statistics,
     /// Of steppers that are no more.
     past: Statistics,
+}
+
+/// What eight trajectories side by side compute with.
+pub trait Together<const N: usize>: Clone {
+    /// The kernels of all lanes.
+    type Kernels: Model<N>;
+    /// The numbers that they are given.
+    type Number<'a, V: Eight>: Eight
+    where
+        Self: 'a;
+
+    /// The kernels of all lanes.
+    fn kernels(&self) -> &Self::Kernels;
+    /// A number that kernels can be given.
+    fn number<V: Eight>(&self, like: V) -> Self::Number<'_, V>;
+    /// Rates of momenta and coordinates of one lane at a start.
+    fn constant_rates(&self, lane: usize, t: f64, start: &State<N>) -> ([f64; N], [f64; N]);
+}
+
+/// Whose trajectories they are.
+pub trait Trajectories<'m, M: Model<N>, const N: usize>: Together<N> {
+    /// The model of one lane.
+    fn model(&self, lane: usize) -> &'m M;
+}
+
+/// One model in all lanes.
+#[derive(Debug)]
+pub struct One<'m, M>(&'m M);
+
+// Not derived: the model is borrowed, it need not be `Clone`.
+impl<M> Clone for One<'_, M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for One<'_, M> {}
+
+impl<M: Model<N>, const N: usize> Together<N> for One<'_, M> {
+    type Kernels = M;
+    type Number<'a, V: Eight>
+        = V
+    where
+        Self: 'a;
+
+    fn kernels(&self) -> &M {
+        self.0
+    }
+
+    #[inline(always)]
+    fn number<V: Eight>(&self, like: V) -> V {
+        like
+    }
+
+    fn constant_rates(&self, _lane: usize, t: f64, start: &State<N>) -> ([f64; N], [f64; N]) {
+        constant_rates(self.0, t, start)
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Trajectories<'m, M, N> for One<'m, M> {
+    fn model(&self, _lane: usize) -> &'m M {
+        self.0
+    }
 }
 
 /// What has become of a trajectory.
@@ -123,9 +190,10 @@ impl<M, const N: usize> Clone for Fate<'_, M, N> {
     }
 }
 
-impl<M, const N: usize, const W: usize> Clone for Bundle<'_, M, N, W> {
+impl<M, const N: usize, const W: usize, T: Clone> Clone for Bundle<'_, M, N, W, T> {
     fn clone(&self) -> Self {
         Self {
+            models: self.models.clone(),
             table: self.table.clone(),
             engine: self.engine.clone(),
             groups: self.groups.clone(),
@@ -157,15 +225,53 @@ where
     /// # Errors
     /// [`ElementError`] if the element is none.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
+        Self::with(One(model), element, control)
+    }
+
+    /// The model that is stepped.
+    pub fn model(&self) -> &'m M {
+        self.models.0
+    }
+}
+
+impl<'m, M, const N: usize> Bundle<'m, M, N, LANES, Varied<'m, M>>
+where
+    M: Model<N>,
+{
+    /// An empty bundle of models that differ in their parameters, all of them this one at first.
+    ///
+    /// # Errors
+    /// [`ElementError`] if the element is none.
+    pub fn of_models(
+        model: &'m M,
+        element: Element,
+        control: Control,
+    ) -> Result<Self, ElementError> {
+        Self::with(Varied::new(model), element, control)
+    }
+
+    /// Begins anew with these models and states, one a lane; those beyond the eighth are left out.
+    pub fn start_with(&mut self, models: &'m [M], starts: &[State<N>]) {
+        self.models.set(models);
+        self.start(starts);
+    }
+}
+
+impl<'m, M, const N: usize, const W: usize, T> Bundle<'m, M, N, W, T>
+where
+    M: Model<N>,
+    T: Trajectories<'m, M, N>,
+{
+    fn with(models: T, element: Element, control: Control) -> Result<Self, ElementError> {
         let table = SchemeTable::new(element)?;
         let engine = if Self::uses_lanes(&element, &control) {
-            Engine::new(model, &table)
+            Engine::new(models.kernels(), &table)
         } else {
             None
         };
         let points = table.view().points();
         Ok(Self {
-            model,
+            models,
             table,
             control,
             engine,
@@ -180,7 +286,9 @@ where
     /// Whether this model with this element and control is stepped in lanes; else lane after lane, as by a [`Stepper`].
     #[must_use]
     pub fn uses_lanes(element: &Element, control: &Control) -> bool {
-        has_form::<M, N>(element) && M::CONSTRAINTS.is_empty() && control.solve != Solve::Newton
+        has_form::<T::Kernels, N>(element)
+            && M::CONSTRAINTS.is_empty()
+            && control.solve != Solve::Newton
     }
 
     /// Begins anew with these states, one a lane; those beyond W are left out. Statistics go on.
@@ -213,9 +321,9 @@ where
         }
     }
 
-    /// The model that is stepped.
-    pub fn model(&self) -> &'m M {
-        self.model
+    /// The model of a lane.
+    pub fn model_of(&self, lane: usize) -> &'m M {
+        self.models.model(lane)
     }
 
     /// Moves all trajectories from t to t + h; true if one of them failed in this step. One that has failed stays at its last good state.
@@ -235,7 +343,7 @@ where
                 }
             }
             engine.advance(
-                (self.model, &self.table, &self.control),
+                (&self.models, &self.table, &self.control),
                 (t, h),
                 &mut self.groups,
                 &mut lanes,
@@ -272,7 +380,8 @@ where
     fn advance_alone(&mut self, lane: usize, t: f64, h: f64) -> Result<(), StepError> {
         let fate = &mut self.fates[lane];
         if fate.stepper.is_none() {
-            let stepper = Stepper::new(self.model, self.table.view().element, self.control);
+            let model = self.models.model(lane);
+            let stepper = Stepper::new(model, self.table.view().element, self.control);
             // The element was good when the bundle was made.
             fate.stepper = stepper.ok().map(Box::new);
         }

@@ -257,7 +257,7 @@ pub trait Model<const N: usize> {
     }
 
     /// The number of parameters: fields that are numbers, and the elements of fields that are arrays of numbers, in the order of the struct. Zero for models of hand-written
-    /// kernels that do not say.
+    /// kernels that do not say. Kernels of those that do make each parameter by [`Real::parameter`], so that numbers may carry derivatives by it, or the values of other models.
     fn parameters(&self) -> usize {
         0
     }

@@ -1,5 +1,6 @@
 //! What all trajectories share, and the choice of the instruction set.
 
+use super::Together;
 use super::group::{Group, Work};
 use super::pair::{Eight, LANES, Pair};
 use super::step::Step;
@@ -47,20 +48,19 @@ impl Registers {
 }
 
 /// All steps of a bundle from one time to the next.
-struct Job<'a, M, const N: usize> {
-    step: Step<'a, M, N>,
+struct Job<'a, T: Together<N>, const N: usize> {
+    models: &'a T,
+    step: Step<'a, T::Kernels, N>,
     groups: &'a mut [Group<N>],
     work: &'a mut Work<N>,
     lanes: &'a mut [bool],
     statistics: &'a mut Statistics,
 }
 
-impl<M, const N: usize> Job<'_, M, N>
-where
-    M: Model<N>,
-{
+impl<T: Together<N>, const N: usize> Job<'_, T, N> {
     #[inline(always)]
     fn run<V: Eight>(self, like: V) {
+        let like = self.models.number(like);
         for (group, lanes) in self.groups.iter_mut().zip(self.lanes.chunks_mut(LANES)) {
             if lanes.contains(&true) {
                 (self.step).advance(like, group, self.work, lanes, self.statistics);
@@ -98,15 +98,15 @@ impl<const N: usize> Engine<N> {
     }
 
     /// Moves the wanted lanes from t to t + h and says which of them have arrived; the others are where they were.
-    pub(super) fn advance<M>(
+    pub(super) fn advance<T>(
         &mut self,
-        (model, table, control): (&M, &SchemeTable, &Control),
+        (models, table, control): (&T, &SchemeTable, &Control),
         (t, h): (f64, f64),
         groups: &mut [Group<N>],
         lanes: &mut [bool],
         statistics: &mut Statistics,
     ) where
-        M: Model<N>,
+        T: Together<N>,
     {
         // Without a last step there is nothing to continue, and the table for equal steps stays as it is.
         if self.last_step != 0.0 {
@@ -126,7 +126,7 @@ impl<const N: usize> Engine<N> {
             (reach[a], reach_low[a]) = (product.high, product.low);
         }
         let step = Step {
-            model,
+            model: models.kernels(),
             tables: &self.tables,
             inertia: &self.inertia,
             control,
@@ -137,10 +137,11 @@ impl<const N: usize> Engine<N> {
         };
         for (group, lanes) in groups.iter_mut().zip(lanes.chunks(LANES)) {
             if group.warm != [true; LANES] {
-                step.start_cold(group, lanes);
+                step.start_cold(models, group, lanes);
             }
         }
         let job = Job {
+            models,
             step,
             groups,
             work: &mut self.work,
@@ -150,8 +151,8 @@ impl<const N: usize> Engine<N> {
         // Without kernels for lanes the constant is false, and the compiler drops the calls.
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
         match self.registers {
-            Registers::One(isa) if M::LANES => return isa.vectorize(OfEight { job, isa }),
-            Registers::Two(isa) if M::LANES => return isa.vectorize(OfFour { job, isa }),
+            Registers::One(isa) if T::Kernels::LANES => return isa.vectorize(OfEight { job, isa }),
+            Registers::Two(isa) if T::Kernels::LANES => return isa.vectorize(OfFour { job, isa }),
             _ => {}
         }
         let like = crate::Lanes([0.0; 4]);
@@ -161,13 +162,13 @@ impl<const N: usize> Engine<N> {
 
 /// The same in registers of four.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-struct OfFour<'a, M, const N: usize> {
-    job: Job<'a, M, N>,
+struct OfFour<'a, T: Together<N>, const N: usize> {
+    job: Job<'a, T, N>,
     isa: pulp::x86::V3,
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for OfFour<'_, M, N> {
+impl<T: Together<N>, const N: usize> pulp::NullaryFnOnce for OfFour<'_, T, N> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
@@ -178,13 +179,13 @@ impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for OfFour<'_, M, N> {
 
 /// The same in registers of eight.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-struct OfEight<'a, M, const N: usize> {
-    job: Job<'a, M, N>,
+struct OfEight<'a, T: Together<N>, const N: usize> {
+    job: Job<'a, T, N>,
     isa: pulp::x86::V4,
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for OfEight<'_, M, N> {
+impl<T: Together<N>, const N: usize> pulp::NullaryFnOnce for OfEight<'_, T, N> {
     type Output = ();
     #[inline(always)]
     fn call(self) {

@@ -6,10 +6,10 @@ use crate::real::Real;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// So many trajectories share a kernel call.
-pub(super) const LANES: usize = 8;
+pub const LANES: usize = 8;
 
 /// Eight numbers, one for each of eight trajectories.
-pub(crate) trait Eight: Precise {
+pub trait Eight: Precise {
     /// The same kind of numbers with these values.
     fn with(self, lanes: [f64; LANES]) -> Self;
 
@@ -31,7 +31,7 @@ pub(crate) trait Eight: Precise {
 }
 
 /// Work that is compiled apart from the places where it is called, for the instruction set of the numbers with which it computes.
-pub(crate) trait Apart {
+pub trait Apart {
     fn run<V: Eight>(self, like: V);
 }
 

@@ -1,5 +1,6 @@
 //! A step of eight trajectories: start of the iteration, the iteration, the end.
 
+use super::Together;
 use super::group::{Group, Row, Work, flags, replace};
 use super::judge::{Increments, Judge, larger};
 use super::pair::{Eight, LANES};
@@ -8,7 +9,7 @@ use crate::model::Model;
 use crate::newton::{Control, PATIENCE, Solve};
 use crate::points::storage::Heap;
 use crate::points::tables::Tables;
-use crate::points::{Inertia, constant_rates, is_phase, is_second_order};
+use crate::points::{Inertia, is_phase, is_second_order};
 use crate::statistics::{Contraction, Statistics};
 use alloc::vec::Vec;
 
@@ -226,12 +227,15 @@ where
 
     /// Constant rates for those of the wanted lanes that continue no step.
     #[cold]
-    pub(super) fn start_cold(&self, group: &mut Group<N>, lanes: &[bool]) {
+    pub(super) fn start_cold<T>(&self, models: &T, group: &mut Group<N>, lanes: &[bool])
+    where
+        T: Together<N>,
+    {
         for (lane, wanted) in lanes.iter().enumerate() {
             if !wanted || group.warm[lane] {
                 continue;
             }
-            let (force, rate) = constant_rates(self.model, self.t, &group.state(lane));
+            let (force, rate) = models.constant_rates(lane, self.t, &group.state(lane));
             for l in 0..self.tables.points {
                 for a in 0..N {
                     group.forces[l][a][lane] = force[a];

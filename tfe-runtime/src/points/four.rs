@@ -8,7 +8,7 @@ use crate::model::{First, Model};
 use crate::real::{Lanes, Real, fused};
 
 /// Numbers whose products and sums can be had exactly.
-pub(crate) trait Precise: Real {
+pub trait Precise: Real {
     /// The product and what rounding takes from it, exactly.
     fn product(self, other: Self) -> (Self, Self);
 

@@ -1,0 +1,150 @@
+//! Whose runs an ensemble makes: those of one model, or of many that differ in their parameters.
+
+use super::error::EnsembleError;
+use super::plan::{WIDTH, start_of};
+use tfe_runtime::bundle::{Bundle, One, Trajectories, Varied};
+use tfe_runtime::step::Control;
+use tfe_runtime::{Element, ElementError, Model, State};
+
+/// The models of an ensemble.
+pub trait Members<'m, M: Model<N>, const N: usize>: Copy + Sync {
+    /// What eight trajectories side by side compute with.
+    type Lanes: Trajectories<'m, M, N> + Send + Sync;
+
+    /// The model of one run.
+    fn model(&self, index: usize) -> &'m M;
+
+    /// How many runs there are.
+    ///
+    /// # Errors
+    /// [`EnsembleError::Starts`] where starts and models do not belong together.
+    fn count(&self, starts: &[State<N>]) -> Result<usize, EnsembleError>;
+
+    /// Whether runs may go side by side, as far as the models are concerned.
+    fn share_kernels(&self) -> bool;
+
+    /// An empty bundle.
+    ///
+    /// # Errors
+    /// [`ElementError`] if the element is none.
+    fn bundle(
+        &self,
+        element: Element,
+        control: Control,
+    ) -> Result<Bundle<'m, M, N, WIDTH, Self::Lanes>, ElementError>;
+
+    /// Places the runs from `first` on, one a lane.
+    fn place(
+        &self,
+        bundle: &mut Bundle<'m, M, N, WIDTH, Self::Lanes>,
+        first: usize,
+        starts: &[State<N>],
+    );
+}
+
+/// One model in all runs.
+#[derive(Debug)]
+pub struct OneModel<'m, M>(pub(super) &'m M);
+
+/// A model for every run.
+#[derive(Debug)]
+pub struct ManyModels<'m, M>(pub(super) &'m [M]);
+
+// Not derived: the models are borrowed, they need not be `Clone`.
+impl<M> Clone for OneModel<'_, M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for OneModel<'_, M> {}
+
+impl<M> Clone for ManyModels<'_, M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for ManyModels<'_, M> {}
+
+impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for OneModel<'m, M> {
+    type Lanes = One<'m, M>;
+
+    fn model(&self, _index: usize) -> &'m M {
+        self.0
+    }
+
+    fn count(&self, starts: &[State<N>]) -> Result<usize, EnsembleError> {
+        Ok(starts.len())
+    }
+
+    fn share_kernels(&self) -> bool {
+        true
+    }
+
+    fn bundle(
+        &self,
+        element: Element,
+        control: Control,
+    ) -> Result<Bundle<'m, M, N, WIDTH, One<'m, M>>, ElementError> {
+        Bundle::new(self.0, element, control)
+    }
+
+    fn place(
+        &self,
+        bundle: &mut Bundle<'m, M, N, WIDTH, One<'m, M>>,
+        _first: usize,
+        starts: &[State<N>],
+    ) {
+        bundle.start(starts);
+    }
+}
+
+impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for ManyModels<'m, M> {
+    type Lanes = Varied<'m, M>;
+
+    fn model(&self, index: usize) -> &'m M {
+        &self.0[index]
+    }
+
+    fn count(&self, starts: &[State<N>]) -> Result<usize, EnsembleError> {
+        let models = self.0.len();
+        if starts.len() != 1 && starts.len() != models {
+            let starts = starts.len();
+            return Err(EnsembleError::Starts { models, starts });
+        }
+        Ok(models)
+    }
+
+    /// Kernels written by hand that do not number their parameters read them from one model, which no two lanes share.
+    fn share_kernels(&self) -> bool {
+        self.0.first().is_some_and(|model| model.parameters() > 0)
+    }
+
+    fn bundle(
+        &self,
+        element: Element,
+        control: Control,
+    ) -> Result<Bundle<'m, M, N, WIDTH, Varied<'m, M>>, ElementError> {
+        Bundle::of_models(self.model(0), element, control)
+    }
+
+    fn place(
+        &self,
+        bundle: &mut Bundle<'m, M, N, WIDTH, Varied<'m, M>>,
+        first: usize,
+        starts: &[State<N>],
+    ) {
+        bundle.start_with(&self.0[first..], starts);
+    }
+}
+
+/// The starts of up to eight runs from `first` on.
+pub(super) fn some_starts<const N: usize>(
+    starts: &[State<N>],
+    first: usize,
+    count: usize,
+) -> Vec<State<N>> {
+    let runs = first..(first + WIDTH).min(count);
+    runs.map(|index| *start_of(starts, index)).collect()
+}
