@@ -41,10 +41,13 @@
 
 mod arithmetic;
 mod chain;
+mod error;
 mod pair;
 mod sweep;
 #[cfg(test)]
 mod tests;
+
+pub use error::PeriodicSchurError;
 
 pub(crate) use arithmetic::{exponent, power_of_two, reflection};
 pub(crate) use chain::balancing;
@@ -52,10 +55,7 @@ pub(crate) use chain::balancing;
 use arithmetic::Scaled;
 use chain::{Chain, Wanted};
 use nalgebra::{Complex, DMatrix};
-use std::error::Error;
 use std::f64::consts::PI;
-use std::fmt;
-use tfe_runtime::StepError;
 
 /// An eigenvalue of a product, as modulus and argument.
 ///
@@ -105,105 +105,6 @@ impl Multiplier {
         }
     }
 }
-
-/// Why the eigenvalues of a product were not found. Factors are counted from 0, in the order they are given.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum PeriodicSchurError {
-    /// There is no factor, hence no size.
-    Empty,
-    /// The constraints of the model do not span the same motions at all nodes, or it has no velocity at one: there are no factors on them.
-    Constraints(StepError),
-    /// A slice does not hold a whole number of factors.
-    Length {
-        /// The number of rows of a factor.
-        order: usize,
-        /// The length of the slice.
-        found: usize,
-    },
-    /// A factor is not square.
-    NotSquare {
-        /// Which factor.
-        index: usize,
-        /// Its number of rows.
-        rows: usize,
-        /// Its number of columns.
-        columns: usize,
-    },
-    /// A factor differs in size from the first.
-    SizeMismatch {
-        /// Which factor.
-        index: usize,
-        /// Its number of rows.
-        found: usize,
-        /// The number of rows of the first factor.
-        expected: usize,
-    },
-    /// A factor holds an entry that is infinite or not a number, or, for [`PeriodicSchur`], its triangular form would.
-    NonFinite {
-        /// Which factor.
-        index: usize,
-    },
-    /// The QR iteration does not separate the eigenvalues of a diagonal block.
-    NoConvergence {
-        /// The first row of the block, from 0.
-        first: usize,
-        /// The last row of the block.
-        last: usize,
-        /// The number of QR steps taken on it.
-        iterations: u32,
-    },
-}
-
-impl fmt::Display for PeriodicSchurError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Empty => write!(f, "the product has no factor"),
-            Self::Constraints(source) => write!(f, "the constraints: {source}"),
-            Self::Length { order, found } => {
-                write!(
-                    f,
-                    "{found} entries are not a whole number of {order} × {order} factors"
-                )
-            }
-            Self::NotSquare {
-                index,
-                rows,
-                columns,
-            } => {
-                write!(
-                    f,
-                    "factor {index} is {rows} × {columns}, but it must be square"
-                )
-            }
-            Self::SizeMismatch {
-                index,
-                found,
-                expected,
-            } => {
-                write!(
-                    f,
-                    "factor {index} is {found} × {found}, but the first is {expected} × {expected}"
-                )
-            }
-            Self::NonFinite { index } => {
-                write!(f, "factor {index} holds an entry that is not finite")
-            }
-            Self::NoConvergence {
-                first,
-                last,
-                iterations,
-            } => {
-                write!(
-                    f,
-                    "rows {first} to {last} of the product did not separate in {iterations} QR steps"
-                )
-            }
-        }
-    }
-}
-
-impl Error for PeriodicSchurError {}
 
 /// Returns the eigenvalues of the product `factors[m − 1] ··· factors[1] factors[0]`, which is never formed.
 ///

@@ -1,6 +1,6 @@
 //! Axes: scales, ranges, ticks.
 
-use super::ChartError;
+use super::error::ChartError;
 use std::ops::Range;
 
 /// How numbers are laid along an axis.

@@ -1,7 +1,8 @@
 //! Drawing primitives over plotters, and the picture around them.
 
 use super::clip::Point;
-use super::{ChartError, Colour};
+use super::colours::Colour;
+use super::error::ChartError;
 use plotters::coord::Shift;
 use plotters::prelude::{
     Circle, Color, DrawingArea, FontTransform, IntoDrawingArea, IntoFont, PathElement, Polygon,

@@ -1,6 +1,6 @@
 //! Files by their endings.
 
-use super::ChartError;
+use super::error::ChartError;
 use std::fs;
 use std::path::Path;
 

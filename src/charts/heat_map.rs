@@ -2,12 +2,14 @@
 
 mod image;
 
+use super::axis::Axis;
 use super::axis::Extent;
 use super::canvas::{self, Anchor, CHARACTER, Canvas, Frame, TEXT, picture, sides};
 use super::clip::{self, Point};
+use super::colours::Colour;
+use super::error::ChartError;
 use super::file::{csv_field, csv_number, ending, write};
 use super::plot::{KEY, Key, Plot, Room, Side, draw_ticks, longest, shortened};
-use super::{Axis, ChartError, Colour};
 use std::fmt::Write;
 use std::path::Path;
 

@@ -1,10 +1,12 @@
 //! Line charts.
 
+use super::axis::Axis;
 use super::canvas::{Anchor, CHARACTER, Canvas, Shape, TEXT, picture, sides};
 use super::clip::{self, Point};
+use super::colours::Colour;
+use super::error::ChartError;
 use super::file::{csv_field, csv_number, ending, write};
 use super::plot::{KEY, Key, Plot, Room, shortened};
-use super::{Axis, ChartError, Colour};
 use std::path::Path;
 
 /// How a series is drawn.

@@ -1,6 +1,6 @@
 //! Pages: text, tables and pictures in one HTML file.
 
-use super::ChartError;
+use super::error::ChartError;
 use super::file::{ending, write};
 use std::path::Path;
 

@@ -3,7 +3,8 @@
 use super::axis::{Extent, Tick};
 use super::canvas::{Anchor, CHARACTER, Canvas, Frame, Shape, TEXT};
 use super::clip::Point;
-use super::{ChartError, Colour};
+use super::colours::Colour;
+use super::error::ChartError;
 
 /// Length of a labelled tick, in pixels.
 const TICK: f64 = 5.0;

@@ -1,6 +1,6 @@
 //! The modes of ½ q̇ᵀ M q̇ − ½ qᵀ K q + f·q.
 
-use super::ModalError;
+use super::error::ModalError;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 use tfe_runtime::Form;
 

@@ -1,7 +1,7 @@
 //! What is asked of the full model, of fixed size or of run-time length.
 
-use super::ModalError;
 use super::eigen::Quadratic;
+use super::error::ModalError;
 use nalgebra::{DMatrix, DVector};
 use tfe_runtime::family::{Block, Entries, FamilyModel, FamilyState, Gradient};
 use tfe_runtime::{CoordinateName, Facts, First, Form, Model, Real, Second, State};

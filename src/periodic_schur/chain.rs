@@ -1,10 +1,10 @@
 //! The factors under transformation: scaling, balancing, reduction to Hessenberg–triangular form.
 
-use super::PeriodicSchurError;
 use super::arithmetic::{
     Rotation, Scaled, exponent, largest, reflect_columns, reflect_rows, reflection,
     times_power_of_two,
 };
+use super::error::PeriodicSchurError;
 use nalgebra::{Complex, DMatrix};
 use std::ops::Range;
 

@@ -1,8 +1,8 @@
 //! The eigenvalues of a 2 × 2 block.
 
-use super::PeriodicSchurError;
 use super::arithmetic::{Scaled, exponent, times_power_of_two};
 use super::chain::Chain;
+use super::error::PeriodicSchurError;
 use nalgebra::Complex;
 
 type C = Complex<f64>;

@@ -1,8 +1,8 @@
 //! The periodic QR iteration on a Hessenberg–triangular chain.
 
-use super::PeriodicSchurError;
 use super::arithmetic::{Rotation, exponent, largest, reflection, times_power_of_two};
 use super::chain::Chain;
+use super::error::PeriodicSchurError;
 
 /// QR steps on one block before giving up; two or three are usual.
 const STEPS: u32 = 90;

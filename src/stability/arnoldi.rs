@@ -1,6 +1,5 @@
 //! The eigenvalue of largest modulus of an operator that is known by its products alone.
 
-use super::eigenvalues::eigenvalues_of_two;
 use super::schur_order::Ordered;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::error::Error;
@@ -254,20 +253,6 @@ impl Krylov {
             self.projected[(kept, column)] = *value;
         }
         self.count = kept;
-    }
-}
-
-/// The eigenvalues of a diagonal block of one or two rows, the larger modulus first.
-pub(super) fn largest_of(block: &DMatrix<f64>, first: usize, rows: usize) -> Complex<f64> {
-    if rows == 1 {
-        return Complex::new(block[(first, first)], 0.0);
-    }
-    let entry = |i: usize, j: usize| block[(first + i, first + j)];
-    let [one, other] = eigenvalues_of_two([[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
-    if other.norm() > one.norm() {
-        other
-    } else {
-        one
     }
 }
 

@@ -1,6 +1,6 @@
 //! A real Schur form with its largest eigenvalues first.
 
-use super::arnoldi::largest_of;
+use super::eigenvalues::eigenvalues_of_two;
 use crate::periodic_schur::{PeriodicSchur, PeriodicSchurError};
 use nalgebra::{Complex, DMatrix};
 
@@ -134,6 +134,20 @@ impl Ordered {
     /// T
     pub(super) fn triangular(&self) -> &DMatrix<f64> {
         &self.triangular
+    }
+}
+
+/// The eigenvalues of a diagonal block of one or two rows, the larger modulus first.
+pub(super) fn largest_of(block: &DMatrix<f64>, first: usize, rows: usize) -> Complex<f64> {
+    if rows == 1 {
+        return Complex::new(block[(first, first)], 0.0);
+    }
+    let entry = |i: usize, j: usize| block[(first + i, first + j)];
+    let [one, other] = eigenvalues_of_two([[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
+    if other.norm() > one.norm() {
+        other
+    } else {
+        one
     }
 }
 

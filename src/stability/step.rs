@@ -7,7 +7,7 @@ use tfe_runtime::transition::{self, TransitionError};
 use tfe_runtime::{Element, Model, State};
 
 #[cfg(feature = "sparse")]
-use super::{Dominant, DominantError, Iteration, dominant_of};
+use super::arnoldi::{Dominant, DominantError, Iteration, dominant_of};
 #[cfg(feature = "sparse")]
 use tfe_runtime::family::{FamilyModel, FamilyState, FamilyTransition, FamilyTransitionError};
 #[cfg(feature = "sparse")]

@@ -1,7 +1,8 @@
 //! Cells as PNG images: a byte a cell, the index of a colour.
 
 use crate::charts::axis::Extent;
-use crate::charts::{ChartError, Colour};
+use crate::charts::colours::Colour;
+use crate::charts::error::ChartError;
 
 /// Levels of the colour scale; one more index says that there is no value.
 const LEVELS: usize = 255;

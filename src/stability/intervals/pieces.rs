@@ -1,9 +1,9 @@
 //! Pieces of the range, small enough for polynomials, and what the polynomials show.
 
-use super::IntervalError;
-use super::search::{Failure, SHORTEST, SPLIT, Sample, Search};
+use super::error::IntervalError;
+use super::search::{Failure, Matrix, SHORTEST, SPLIT, Sample, Search};
 use crate::stability::chebyshev::{DEGREE, Series, points};
-use crate::stability::sign_functions::scale_of;
+use crate::stability::sign_functions::{Measure, scale_of};
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -34,7 +34,7 @@ pub(super) struct Piece {
 }
 
 /// Pieces that grow with the distance from zero, on both sides of it, so that each holds a moderate ratio of the parameter.
-pub(super) fn first(start: f64, end: f64) -> Vec<Piece> {
+fn first(start: f64, end: f64) -> Vec<Piece> {
     let nearest = NEAREST_ZERO * start.abs().max(end.abs());
     let mut pieces = Vec::new();
     let mut outward = |near: f64, far: f64, sign: f64| {
@@ -85,9 +85,34 @@ struct Interpolant {
     is_resolved: bool,
 }
 
+impl<'m> Search<'m> {
+    /// Samples the range until every function is resolved.
+    pub(super) fn over(matrix: Matrix<'m>, range: &Range<f64>) -> Result<Self, Failure> {
+        let Range { start, end } = *range;
+        if !(start.is_finite() && end.is_finite() && (end - start).is_finite() && start < end) {
+            return Err(IntervalError::Range { start, end });
+        }
+        let mut search = Self::new(matrix);
+        // Irregular fractions, denser near the start, where transition matrices have their structure.
+        const PROBES: [f64; 6] = [0.0023, 0.0171, 0.0673, 0.2137, 0.5519, 0.9043];
+        let probes = PROBES
+            .iter()
+            .map(|fraction| search.matrix_at(start + fraction * (end - start)))
+            .collect::<Result<Vec<_>, _>>()?;
+        search.measure = Measure::suiting(&probes);
+        let mut waiting = first(start, end);
+        while let Some(piece) = waiting.pop() {
+            search.resolve(piece, range, &mut waiting)?;
+        }
+        search.samples.sort_by(|a, b| a.at.total_cmp(&b.at));
+        search.samples.dedup_by(|a, b| a.at == b.at);
+        Ok(search)
+    }
+}
+
 impl Search<'_> {
     /// Interpolates all functions on a piece; adds samples at the points and at the critical points that matter, or smaller pieces.
-    pub(super) fn resolve(
+    fn resolve(
         &mut self,
         piece: Piece,
         range: &Range<f64>,

@@ -1,10 +1,8 @@
 //! Sampling a matrix over a range of its parameter.
 
-use super::IntervalError;
-use super::pieces;
+use super::error::IntervalError;
 use crate::stability::sign_functions::{Measure, shifted_determinant};
 use nalgebra::DMatrix;
-use std::ops::Range;
 use std::rc::Rc;
 
 /// A quantity is trusted at this many times the change under a perturbation: four random ones may miss the worst direction.
@@ -35,7 +33,7 @@ pub(super) struct Withheld;
 pub(super) type Failure = IntervalError<Withheld>;
 
 /// The matrix at a value of the parameter: a pointer to a function, so that the search is compiled once and not for every model.
-type Matrix<'m> = &'m mut dyn FnMut(f64) -> Result<DMatrix<f64>, Withheld>;
+pub(super) type Matrix<'m> = &'m mut dyn FnMut(f64) -> Result<DMatrix<f64>, Withheld>;
 
 /// The search through one range.
 pub(super) struct Search<'m> {
@@ -50,34 +48,16 @@ pub(super) struct Search<'m> {
 }
 
 impl<'m> Search<'m> {
-    /// Samples the range until every function is resolved.
-    pub(super) fn over(matrix: Matrix<'m>, range: &Range<f64>) -> Result<Self, Failure> {
-        let Range { start, end } = *range;
-        if !(start.is_finite() && end.is_finite() && (end - start).is_finite() && start < end) {
-            return Err(IntervalError::Range { start, end });
-        }
-        let mut search = Self {
+    /// Nothing sampled yet.
+    pub(super) fn new(matrix: Matrix<'m>) -> Self {
+        Self {
             matrix,
             measure: Measure::General,
             size: 0,
             evaluations: 0,
             samples: Vec::new(),
             touches: Vec::new(),
-        };
-        // Irregular fractions, denser near the start, where transition matrices have their structure.
-        const PROBES: [f64; 6] = [0.0023, 0.0171, 0.0673, 0.2137, 0.5519, 0.9043];
-        let probes = PROBES
-            .iter()
-            .map(|fraction| search.matrix_at(start + fraction * (end - start)))
-            .collect::<Result<Vec<_>, _>>()?;
-        search.measure = Measure::suiting(&probes);
-        let mut waiting = pieces::first(start, end);
-        while let Some(piece) = waiting.pop() {
-            search.resolve(piece, range, &mut waiting)?;
         }
-        search.samples.sort_by(|a, b| a.at.total_cmp(&b.at));
-        search.samples.dedup_by(|a, b| a.at == b.at);
-        Ok(search)
     }
 
     pub(super) fn matrix_at(&mut self, at: f64) -> Result<DMatrix<f64>, Failure> {

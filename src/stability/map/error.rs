@@ -1,10 +1,11 @@
 //! What can go wrong with a map, and at a point of it.
 
-use crate::stability::{EigenvalueError, TransitionError};
+use crate::stability::eigenvalues::EigenvalueError;
 use std::error::Error;
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
+use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{ElementError, StepError};
 
 /// Why there is no map, or no file of it.

@@ -1,0 +1,88 @@
+//! Why there are no intervals.
+
+use std::error::Error;
+use std::fmt;
+
+/// Why the unstable intervals could not be found.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum IntervalError<E> {
+    /// The range is empty, reversed or not finite.
+    Range {
+        /// The start asked for.
+        start: f64,
+        /// The end asked for.
+        end: f64,
+    },
+    /// The matrix could not be computed.
+    Matrix {
+        /// The parameter.
+        at: f64,
+        /// Why.
+        source: E,
+    },
+    /// The matrix is empty, not square, or not of the size it had elsewhere.
+    Shape {
+        /// The parameter.
+        at: f64,
+        /// Rows of the matrix.
+        rows: usize,
+        /// Columns of the matrix.
+        columns: usize,
+    },
+    /// An entry of the matrix is not finite.
+    NotFinite {
+        /// The parameter.
+        at: f64,
+    },
+    /// The eigenvalues of the matrix did not converge.
+    Eigenvalues {
+        /// The parameter.
+        at: f64,
+    },
+    /// The matrix is not smooth enough in the parameter: its functions were still unresolved after very many evaluations.
+    Unresolved {
+        /// Where the last evaluation was.
+        near: f64,
+        /// How many evaluations were spent.
+        evaluations: usize,
+    },
+}
+
+impl<E: fmt::Display> fmt::Display for IntervalError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range { start, end } => {
+                write!(f, "the range {start}..{end} is empty or not finite")
+            }
+            Self::Matrix { at, source } => write!(f, "no transition matrix at {at}: {source}"),
+            Self::Shape { at, rows, columns } => {
+                write!(
+                    f,
+                    "the matrix at {at} is {rows} × {columns}: expected a square matrix of one size everywhere"
+                )
+            }
+            Self::NotFinite { at } => {
+                write!(f, "the matrix at {at} has an entry that is not finite")
+            }
+            Self::Eigenvalues { at } => {
+                write!(f, "the eigenvalues of the matrix at {at} did not converge")
+            }
+            Self::Unresolved { near, evaluations } => {
+                write!(
+                    f,
+                    "the matrix is not smooth near {near}: unresolved after {evaluations} evaluations"
+                )
+            }
+        }
+    }
+}
+
+impl<E: Error + 'static> Error for IntervalError<E> {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Matrix { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}
