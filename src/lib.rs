@@ -20,6 +20,7 @@ pub mod fit;
 pub mod linearised;
 pub mod modal;
 pub mod motion;
+mod numbers;
 pub mod optimal_control;
 pub mod periodic;
 pub mod periodic_schur;

@@ -5,6 +5,7 @@ pub(crate) mod family;
 use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv;
 use crate::error::AtError;
+use crate::numbers::larger;
 use crate::simulation::{Checkpoint, Event, Warning};
 use crate::velocity::velocity_from;
 use std::fmt;
@@ -500,11 +501,6 @@ impl<const N: usize> Motion<N> {
     }
 }
 
-/// The larger one; NaN if one is, which `f64::max` would drop.
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a >= b { a } else { b }
-}
-
 impl<const N: usize> fmt::Debug for Motion<N> {
     /// The extent of the motion, not its thousands of numbers.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -515,16 +511,5 @@ impl<const N: usize> fmt::Debug for Motion<N> {
             .field("statistics", &self.statistics)
             .field("warnings", &self.warnings)
             .finish_non_exhaustive()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::larger;
-
-    #[test]
-    fn a_nan_stays_whatever_follows() {
-        assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, larger).is_nan());
-        assert_eq!([1.0, 3.0, 2.0].into_iter().fold(0.0, larger), 3.0);
     }
 }

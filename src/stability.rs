@@ -30,7 +30,8 @@ pub use tfe_runtime::transition::TransitionError;
 pub use time_scales::TimeScales;
 
 use crate::constraints::tangent_basis;
-use nalgebra::{Complex, DMatrix};
+use eigenvalues::largest_modulus;
+use nalgebra::DMatrix;
 use std::ops::Range;
 use tfe_runtime::length::Declared;
 use tfe_runtime::transition::of_step;
@@ -194,13 +195,6 @@ pub fn unstable_intervals<M: Model<N>, const N: usize>(
 /// NaN where [`eigenvalues()`] is an error: if the matrix is not square, an entry is not finite, or the iteration does not converge.
 pub fn spectral_radius(matrix: &DMatrix<f64>) -> f64 {
     eigenvalues(matrix).map_or(f64::NAN, |values| largest_modulus(&values))
-}
-
-fn largest_modulus(eigenvalues: &[Complex<f64>]) -> f64 {
-    eigenvalues
-        .iter()
-        .map(|value| value.norm())
-        .fold(0.0, f64::max)
 }
 
 /// How far a transition matrix is from symplectic: the largest entry of |AᵀJA − J|, J = [[0, −1], [1, 0]] in the order (p, q).

@@ -1,5 +1,9 @@
 //! Estimated errors against true ones, and runs that pick their element and step.
 
+#[path = "common/largest.rs"]
+mod largest;
+
+use largest::larger;
 use tfe::accuracy::Estimated;
 use tfe::prelude::*;
 use tfe::{Consistent, RunErrorKind};
@@ -33,12 +37,12 @@ fn true_error<const N: usize>(motion: &Motion<N>, (q, p): ([f64; N], [f64; N])) 
             .iter()
             .flat_map(part)
             .map(|x| x.abs())
-            .fold(0.0, f64::max);
+            .fold(0.0, larger);
         let off = exact
             .iter()
             .zip(part(motion.last()))
             .map(|(a, b)| (a - b).abs());
-        off.fold(0.0, f64::max) / size
+        off.fold(0.0, larger) / size
     };
     of(&q, |node| &node.q).max(of(&p, |node| &node.p))
 }

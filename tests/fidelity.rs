@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::observed_order;
+use common::{larger, observed_order};
 use std::time::Duration;
 use tfe::fidelity::{Choice, FidelityError, Ladder, Rung};
 use tfe::prelude::*;
@@ -147,7 +147,7 @@ fn of_phase(lag: f64) -> f64 {
     let times = (1..=16).map(|k| W * END * f64::from(k) / 16.0);
     times
         .map(|phase| (phase.cos() - (phase * (1.0 - lag)).cos()).abs())
-        .fold(0.0, f64::max)
+        .fold(0.0, larger)
 }
 
 #[test]
@@ -333,7 +333,7 @@ fn steps_that_miss_the_oscillation_of_a_spring_tell_its_swing() {
         let (resolved, long) = (run(period / 4.0), run(0.375));
         let pairs = resolved.states().iter().zip(long.states());
         let apart = pairs.map(|(a, b)| common::distance(&a.q, &b.q));
-        let apart = apart.fold(0.0, f64::max);
+        let apart = apart.fold(0.0, larger);
         // At rest the length of equilibrium l + (m/k) (g cos θ + l θ̇²) has the acceleration 3 m g² sin² θ/(k l), which over ω² is the amplitude. Long steps
         // keep it with another phase; roundings of ten thousand steps besides.
         let pull = spring.m * spring.g * Spring::ANGLE.sin() / k;

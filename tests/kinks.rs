@@ -1,5 +1,9 @@
 //! Forces with kinks and jumps: elements keep their order, and an accuracy that is asked for is met or refused.
 
+#[path = "common/largest.rs"]
+mod largest;
+
+use largest::larger;
 use tfe::RunErrorKind;
 use tfe::prelude::*;
 use tfe::runtime::length::{Declared, FixedLength};
@@ -272,7 +276,7 @@ fn elements_keep_their_order() {
             let name = scene.name;
             // Over two halvings; the last errors may be roundings, which crossings let grow.
             let measured = (0..2).map(|k| (errors[k] / errors[k + 2]).log2() / 2.0);
-            let most = measured.fold(0.0, f64::max);
+            let most = measured.fold(0.0, larger);
             assert!(
                 most > order - 0.6 || errors[3] < 1e-11,
                 "{name} {element}: order {most:.2}, {errors:?}"

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{distance, observed_order};
+use common::{distance, larger, observed_order};
 use tfe::prelude::*;
 
 /// A mathematical pendulum.
@@ -203,7 +203,7 @@ fn a_top_without_its_cyclic_angles_nods_as_the_whole() {
         assert!((whole.q[0] - 0.3 - phi[at]).abs() < 1e-11);
         assert!((whole.q[2] + 0.2 - psi[at]).abs() < 1e-11);
     }
-    let spin = |motion: &[f64]| motion.iter().copied().fold(0.0, f64::max);
+    let spin = |motion: &[f64]| motion.iter().copied().fold(0.0, larger);
     let spin = spin(&reduced.outputs().column("spin").expect("declared"));
     assert!((spin - (6.0 + 0.4 * 0.9_f64.cos())).abs() < 1e-13);
     // What holds an ignored angle is gone, their velocities have come.
@@ -328,7 +328,7 @@ fn an_elastic_rod_tends_to_the_rod() {
         let motion = fall(&soft, soft.state([1.0, 0.0], [0.0, 0.0]), 2000);
         let pairs = motion.states().iter().zip(rod.states());
         let errors = pairs.map(|(a, b)| distance(&a.q, &b.q));
-        (1.0 / k, errors.fold(0.0, f64::max))
+        (1.0 / k, errors.fold(0.0, larger))
     };
     let points = [1e3, 4e3, 16e3, 64e3].map(error);
     let order = observed_order(&points, 1e-9, "elastic against rigid");

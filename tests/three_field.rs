@@ -1,5 +1,9 @@
 //! The three-field element, and the two forms that it holds as special cases.
 
+#[path = "common/largest.rs"]
+mod largest;
+
+use largest::larger;
 use tfe::prelude::*;
 
 /// A pendulum on an elastic rod, damped.
@@ -68,7 +72,7 @@ fn difference<M: Model<2>, L: Model<2>>(
     let (run, same) = (run.unwrap(), same.unwrap());
     let numbers = |node: &Node<2>| [node.q, node.p].concat();
     let pairs = numbers(run.last()).into_iter().zip(numbers(same.last()));
-    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / 2.0
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, larger) / 2.0
 }
 
 /// Its velocity is the rate of the coordinates: the primal form of the same rule. With n − 1 points that is the mixed form.

@@ -1,5 +1,9 @@
 //! Steps that are equal in a time τ of their own, dt = g dτ.
 
+#[path = "common/largest.rs"]
+mod largest;
+
+use largest::larger;
 use std::f64::consts::{PI, TAU};
 
 use tfe::prelude::*;
@@ -94,7 +98,7 @@ fn energy_errors(motion: &Motion<3>) -> Vec<f64> {
 }
 
 fn largest(values: &[f64]) -> f64 {
-    values.iter().copied().fold(0.0, f64::max)
+    values.iter().copied().fold(0.0, larger)
 }
 
 /// The power of 2 by which errors fall from one entry to the next.
@@ -237,7 +241,7 @@ fn differences(c: f64) -> (f64, f64) {
         let outputs = motion.outputs().row(node).expect("a row for each node");
         (outputs[1] + state.p[1]).abs()
     });
-    let balance = balance.fold(0.0, f64::max);
+    let balance = balance.fold(0.0, larger);
     println!("c = {c}: t = {end}, difference {difference:.2e}, |H + p_t| {balance:.2e}");
     // Outputs know the time of the model, and rates are those of that time.
     let node = motion.states().len() - 1;

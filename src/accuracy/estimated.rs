@@ -1,5 +1,6 @@
 //! A motion with its error.
 
+use crate::numbers::larger;
 use std::fmt;
 use std::ops::Deref;
 use tfe_runtime::{Element, Solve};
@@ -39,7 +40,7 @@ impl<T> Estimated<T> {
     ///
     /// Infinite where the motion it was compared with is not finite.
     pub fn error_estimate(&self) -> f64 {
-        self.errors.iter().flatten().copied().fold(0.0, f64::max)
+        self.errors.iter().flatten().copied().fold(0.0, larger)
     }
 
     /// The estimated error at each time at which it was estimated, the end of the span the last: (t, error), measured as by
@@ -47,7 +48,7 @@ impl<T> Estimated<T> {
     pub fn error_estimates(&self) -> impl Iterator<Item = (f64, f64)> {
         self.times.iter().enumerate().map(|(k, t)| {
             let here = self.errors.iter().map(|kind| kind[k]);
-            (*t, here.fold(0.0, f64::max))
+            (*t, here.fold(0.0, larger))
         })
     }
 
@@ -56,7 +57,7 @@ impl<T> Estimated<T> {
         let at = self.outputs.iter().position(|name| name == output)?;
         // After coordinates and momenta.
         let errors = self.errors.get(2 + at)?;
-        Some(errors.iter().copied().fold(0.0, f64::max))
+        Some(errors.iter().copied().fold(0.0, larger))
     }
 
     /// The last time up to which the estimated error stays at or below `limit`; `None` where it is larger from the first time on. Of a chaotic motion: how far

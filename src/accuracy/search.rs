@@ -8,6 +8,7 @@ use super::estimated::{Attempt, Picked};
 use super::grading::Grading;
 use super::trace::{Trace, difference};
 use crate::error::RunErrorKind;
+use crate::numbers::larger;
 use cuts::cuts;
 use ladder::{Ladder, Verdict};
 use probe::probe;
@@ -446,7 +447,7 @@ fn slides(kind: &RunErrorKind) -> bool {
 }
 
 fn largest(errors: &[Vec<f64>]) -> f64 {
-    errors.iter().flatten().copied().fold(0.0, f64::max)
+    errors.iter().flatten().copied().fold(0.0, larger)
 }
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
 //! What the outputs of all runs are compared with.
 
-use super::FidelityError;
+use super::error::FidelityError;
 use super::rung::{Outputs, Runs};
+use crate::numbers::raise;
 use crate::work_precision::Reference;
 use crate::work_precision::grid::Grid;
-use crate::work_precision::measure::{Way, largest};
+use crate::work_precision::measure::Way;
 use crate::work_precision::reference::Halving;
 use std::ops::Range;
 use tfe_runtime::step::Control;
@@ -90,7 +91,7 @@ fn scales_of(rows: &[Vec<f64>]) -> Vec<f64> {
     let mut scales = vec![0.0; count];
     for row in rows {
         for (scale, value) in scales.iter_mut().zip(row) {
-            largest(scale, value.abs());
+            raise(scale, value.abs());
         }
     }
     for scale in &mut scales {
@@ -106,7 +107,7 @@ fn distance(a: &[Vec<f64>], b: &[Vec<f64>], scales: &[f64]) -> f64 {
     let mut most = 0.0;
     for (a, b) in a.iter().zip(b) {
         for ((a, b), scale) in a.iter().zip(b).zip(scales) {
-            largest(&mut most, (a - b).abs() / scale);
+            raise(&mut most, (a - b).abs() / scale);
         }
     }
     most

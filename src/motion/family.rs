@@ -1,8 +1,8 @@
 //! The result of a run of a model of run-time length.
 
-use super::larger;
 use crate::csv;
 use crate::error::AtError;
+use crate::numbers::larger;
 use crate::simulation::FamilyCheckpoint;
 use std::fmt;
 use std::io;

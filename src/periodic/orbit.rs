@@ -5,6 +5,7 @@ use super::problem::Periodic;
 use crate::assembly::{Assembly, Iterate, Solution};
 use crate::constraints::reduced;
 use crate::motion::{Motion, Node};
+use crate::numbers::larger;
 use crate::periodic_schur::{self, Multiplier};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
@@ -206,7 +207,7 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
         Verdict::of(
             others
                 .map(|place| self.floquet[place].modulus())
-                .fold(0.0, f64::max),
+                .fold(0.0, larger),
         )
     }
 

@@ -11,6 +11,7 @@ use crate::accuracy::{
     damping_element_for, difference, element_for, explore, factor_for, search,
 };
 use crate::error::RunErrorKind;
+use crate::numbers::larger;
 use beside::Beside;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Facts, Solve, Statistics, StepError};
@@ -191,7 +192,7 @@ fn estimated<R: Repeatable<N>, const N: usize>(
         }
         let nodes: Vec<f64> = [t0].iter().chain(&times).copied().collect();
         let lengths = nodes.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-        let half = lengths.fold(0.0, f64::max) * (0.5 + 1e-9);
+        let half = lengths.fold(0.0, larger) * (0.5 + 1e-9);
         let mut stepper = run.stepper(Element::mixed(element.nodes()), control, false)?;
         let mesh = run.even(&nodes, half)?;
         follow(run, &mut stepper, start, &mesh, &times).map_err(|stop| stop.0)

@@ -1,5 +1,6 @@
 //! Eigenvalues of a real matrix by QR sweeps that are counted.
 
+use crate::numbers::larger;
 use nalgebra::linalg::Hessenberg;
 use nalgebra::{Complex, DMatrix};
 use std::error::Error;
@@ -293,6 +294,14 @@ pub(super) fn balanced(a: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
         }
     }
     (a, diagonal)
+}
+
+/// max |λ|; NaN if one is.
+pub(super) fn largest_modulus(eigenvalues: &[Complex<f64>]) -> f64 {
+    eigenvalues
+        .iter()
+        .map(|value| value.norm())
+        .fold(0.0, larger)
 }
 
 #[cfg(test)]

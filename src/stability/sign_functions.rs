@@ -9,8 +9,7 @@
 //!
 //! Round-off is measured, not guessed: a value is trusted if it survives small perturbations of the matrix (see [`Measure::noise`]).
 
-use super::eigenvalues::{balanced, eigenvalues_of_finite};
-use super::largest_modulus;
+use super::eigenvalues::{balanced, eigenvalues_of_finite, largest_modulus};
 use nalgebra::{Complex, DMatrix};
 
 /// Relative size of the perturbations that measure round-off: what a condensed and solved element may lose, and a margin.

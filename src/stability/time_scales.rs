@@ -1,5 +1,6 @@
 //! How fast a linear model moves.
 
+use crate::numbers::larger;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 use std::fmt;
@@ -23,10 +24,7 @@ impl TimeScales {
 
     /// The largest |λ|, in radians per unit of time; zero if nothing moves.
     pub fn fastest(&self) -> f64 {
-        self.rates
-            .iter()
-            .map(|rate| rate.norm())
-            .fold(0.0, f64::max)
+        self.rates.iter().map(|rate| rate.norm()).fold(0.0, larger)
     }
 
     /// The smallest |λ| that is not zero; zero if all are.

@@ -1,5 +1,7 @@
 //! The power law in a curve of errors.
 
+use crate::numbers::larger;
+
 /// The power of the step by which the error falls.
 ///
 /// Least squares in the logarithms, log e = c + k log h, over the points that are a power: below a tenth of the scale, well above the
@@ -77,7 +79,7 @@ fn line(points: &[(f64, f64)]) -> Option<Slope> {
     let squares = points.iter().map(|point| (point.0 - x).powi(2));
     let exponent = products.sum::<f64>() / squares.sum::<f64>();
     let distance = |point: &(f64, f64)| (point.1 - y - exponent * (point.0 - x)).abs();
-    let residual = points.iter().map(distance).fold(0.0, f64::max);
+    let residual = points.iter().map(distance).fold(0.0, larger);
     (points.len() >= 2 && exponent.is_finite()).then_some(Slope {
         exponent,
         points: points.len(),

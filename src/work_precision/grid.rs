@@ -1,6 +1,6 @@
 //! The nodes of one run.
 
-use super::WorkPrecisionError;
+use super::error::WorkPrecisionError;
 use std::ops::Range;
 
 /// A span in equal steps; the last one may be shorter.

@@ -5,6 +5,7 @@ use super::point::Measured;
 use super::reference::Known;
 use super::subject::{PhasePoint, Subject};
 use crate::error::RunErrorKind;
+use crate::numbers::raise;
 use std::hint::black_box;
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -181,12 +182,12 @@ impl<'a, M: Subject<S>, S: PhasePoint> Observer<'a, M, S> {
             self.start_energy.abs()
         };
         let change = (energy - self.start_energy).abs() / scale;
-        largest(&mut self.measured.energy_error, change);
+        raise(&mut self.measured.energy_error, change);
         self.look_at_constraints(time, state);
         if compare && let Some((q, p)) = self.reference.errors(time, state) {
             (self.measured.error_q, self.measured.error_p) = (q, p);
-            largest(&mut self.measured.max_error_q, q);
-            largest(&mut self.measured.max_error_p, p);
+            raise(&mut self.measured.max_error_q, q);
+            raise(&mut self.measured.max_error_p, p);
         }
     }
 
@@ -199,30 +200,7 @@ impl<'a, M: Subject<S>, S: PhasePoint> Observer<'a, M, S> {
             return;
         }
         let (position, velocity) = self.model.residuals(time, state, &self.velocity);
-        largest(&mut self.measured.constraint_position, position);
-        largest(&mut self.measured.constraint_velocity, velocity);
-    }
-}
-
-/// Keeps the larger one; `f64::max` would drop a NaN.
-pub(crate) fn largest(so_far: &mut f64, value: f64) {
-    if !(value <= *so_far || so_far.is_nan()) {
-        *so_far = value;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::largest;
-
-    #[test]
-    fn a_nan_stays_whatever_follows() {
-        let of = |values: [f64; 3]| {
-            let mut so_far = 0.0;
-            values.iter().for_each(|value| largest(&mut so_far, *value));
-            so_far
-        };
-        assert!(of([1.0, f64::NAN, 2.0]).is_nan());
-        assert_eq!(of([1.0, 3.0, 2.0]), 3.0);
+        raise(&mut self.measured.constraint_position, position);
+        raise(&mut self.measured.constraint_velocity, velocity);
     }
 }

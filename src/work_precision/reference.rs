@@ -1,9 +1,10 @@
 //! What runs are compared with.
 
-use super::WorkPrecisionError;
+use super::error::WorkPrecisionError;
 use super::grid::Grid;
 use super::subject::{PhasePoint, Subject};
 use crate::error::RunErrorKind;
+use crate::numbers::larger;
 use std::fmt;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Solve};
@@ -241,7 +242,7 @@ fn computed<M: Subject<S>, S: PhasePoint>(
 ) -> Result<Known<S>, WorkPrecisionError> {
     let element = Element::from(Mixed::<8>);
     let steps = || grids.iter().map(Grid::step);
-    let longest = steps().fold(0.0, f64::max);
+    let longest = steps().fold(0.0, larger);
     let shortest = steps().fold(f64::INFINITY, f64::min);
     let halving = Halving {
         longest,

@@ -2,8 +2,8 @@
 //!
 //! Everything is resolved at compile time: the steps that are timed are those that a simulation of the same model makes.
 
-use super::measure::largest;
 use crate::error::{RunError, RunErrorKind};
+use crate::numbers::raise;
 use crate::simulation::Simulation;
 use crate::simulation::family::FamilySimulation;
 use std::ops::Range;
@@ -192,8 +192,8 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
     fn residuals(&self, t: f64, state: &State<N>, velocity: &[f64; N]) -> (f64, f64) {
         let (mut position, mut rate) = (0.0, 0.0);
         for one in constrained::residuals(self, t, &state.q, velocity, 1.0) {
-            largest(&mut position, one.position.abs());
-            largest(&mut rate, one.velocity.abs());
+            raise(&mut position, one.position.abs());
+            raise(&mut rate, one.velocity.abs());
         }
         (position, rate)
     }

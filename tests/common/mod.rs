@@ -2,6 +2,10 @@
 
 #![allow(dead_code)] // each test target uses its part
 
+mod largest;
+
+pub use largest::larger;
+
 use nalgebra::DMatrix;
 use serde_json::Value;
 
@@ -86,7 +90,7 @@ pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter()
         .zip(b)
         .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max)
+        .fold(0.0, larger)
 }
 
 /// The slope of log(error) against log(step) by least squares, over the points above `floor`.

@@ -1,6 +1,7 @@
 //! A four-bar linkage with equal cranks, through the flat position where its constraints lose rank: there the parallelogram could fold into
 //! its mirror image, and only the motion up to there says that it does not.
 
+use crate::common::larger;
 use crate::runs::run;
 use tfe::prelude::*;
 use tfe::runtime::ConstraintError;
@@ -83,7 +84,7 @@ pub fn error(motion: &Motion<3>, step: f64, angle: f64, rate: f64) -> f64 {
                 .max((node.q[2] - angle).abs())
                 .max(node.q[1].abs())
         })
-        .fold(0.0, f64::max)
+        .fold(0.0, larger)
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! A hundred thousand steps: constraints hold, energies swing, neither drifts.
 
+use crate::common::larger;
 use crate::models::{
     Bead, BeadRates, KnifeEdge, ON_WIRE, QuaternionTop, RodPendulum, RodPendulumRates,
 };
@@ -22,7 +23,7 @@ fn assert_no_drift<const N: usize>(motion: &Motion<N>, floor: f64, what: &str) {
         let most = part
             .iter()
             .map(|e| (e - energies[0]).abs())
-            .fold(0.0, f64::max);
+            .fold(0.0, larger);
         (mean, most)
     };
     let (first, last) = (
@@ -111,7 +112,7 @@ fn the_rod_at_velocity_level() {
         .states()
         .iter()
         .map(|node| ((node.q[0].powi(2) + node.q[1].powi(2) - 1.0) / 2.0).abs())
-        .fold(0.0, f64::max);
+        .fold(0.0, larger);
     assert!(most <= 1e-12, "|φ| up to {most:.1e}");
 }
 
@@ -125,7 +126,7 @@ fn the_bead_at_velocity_level() {
         nodes
             .iter()
             .map(|node| (node.q[1] - node.q[0].powi(4) / 4.0).abs())
-            .fold(0.0, f64::max)
+            .fold(0.0, larger)
     };
     let tenth = STEPS / 10;
     let (first, last) = (

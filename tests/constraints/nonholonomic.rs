@@ -1,6 +1,6 @@
 //! Rolling and sliding: closed forms, and what the same equations without the correction force would do.
 
-use crate::common::{assert_close, distance};
+use crate::common::{assert_close, distance, larger};
 use crate::models::KnifeEdge;
 use crate::runs::run;
 use tfe::prelude::*;
@@ -152,7 +152,7 @@ fn the_rolling_coin_and_its_vakonomic_double() {
                 .states()
                 .iter()
                 .map(|node| distance(&node.q[..3], &closed(node.t)[..3]))
-                .fold(0.0, f64::max);
+                .fold(0.0, larger);
             nearest = nearest.min(away);
         }
     }

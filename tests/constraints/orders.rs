@@ -1,6 +1,6 @@
 //! Orders 2(n − 1) in q and in p, with position constraints and with velocity constraints.
 
-use crate::common::{distance, observed_order};
+use crate::common::{distance, larger, observed_order};
 use crate::models::{
     Bead, BeadRates, KnifeEdge, MovingGround, MovingWire, ON_WIRE, QuaternionTop, RodPendulum,
     RodPendulumRates,
@@ -63,7 +63,7 @@ pub fn assert_orders<M: Model<N>, const N: usize>(
                 ends.iter()
                     .zip(&exact)
                     .map(|(a, b)| distance(part(a), part(b)))
-                    .fold(0.0, f64::max)
+                    .fold(0.0, larger)
             };
             let h = 0.5 / divisor as f64;
             curves[0].push((h, worst(|node| &node.q)));

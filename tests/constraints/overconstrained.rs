@@ -1,6 +1,6 @@
 //! Mechanisms that move although they have as many equations as coordinates, or more.
 
-use crate::common::distance;
+use crate::common::{distance, larger};
 use tfe::prelude::*;
 use tfe::runtime::length::{Declared, FixedLength};
 
@@ -188,9 +188,9 @@ where
     let motion = run(4, h, 200);
     let energies = motion.energies();
     let jumps = energies.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let jump = jumps.fold(0.0, f64::max);
+    let jump = jumps.fold(0.0, larger);
     let off = |energy: &f64| (energy - energies[0]).abs();
-    let drift = energies.iter().map(off).fold(0.0, f64::max);
+    let drift = energies.iter().map(off).fold(0.0, larger);
     assert!(jump < 1e-8 && drift < 5e-8, "{jump:e}, {drift:e}");
 }
 

@@ -1,5 +1,6 @@
 //! Motions of families on constraints.
 
+use crate::common::larger;
 use tfe::error::RunErrorKind;
 use tfe::prelude::*;
 use tfe::runtime::ConstraintError;
@@ -137,7 +138,7 @@ fn the_order_on_constraints_is_that_of_the_element() {
                 .iter()
                 .zip(other)
                 .map(|(one, other)| (one - other).abs());
-            all.fold(0.0, f64::max)
+            all.fold(0.0, larger)
         };
         (off(&state.q, &exact.q), off(&state.p, &exact.p))
     };

@@ -1,6 +1,6 @@
 //! Motions of families against fixed-size models and against what is known of them.
 
-use crate::common::{list, number, reference};
+use crate::common::{larger, list, number, reference};
 use nalgebra::DMatrix;
 use tfe::family::FamilyState;
 use tfe::prelude::*;
@@ -114,7 +114,7 @@ fn the_invariants_of_a_toda_chain_stay() {
     let motion = simulation.run(start, 0.0..1000.0).expect("a run");
     let after = lax_eigenvalues(&motion.last().state());
     let change = before.iter().zip(&after).map(|(a, b)| (a - b).abs());
-    let change = change.fold(0.0, f64::max);
+    let change = change.fold(0.0, larger);
     assert!(change < 1e-10, "{change:e}");
     assert!(motion.energy_error() < 1e-12, "{:e}", motion.energy_error());
 }

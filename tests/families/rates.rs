@@ -1,5 +1,6 @@
 //! Families whose rates are the unknowns: kinetic energies of any kind.
 
+use crate::common::larger;
 use tfe::prelude::*;
 
 /// n point masses on massless rods of length one, by their angles from the downward vertical: a dense mass matrix that moves.
@@ -118,7 +119,7 @@ fn the_order_is_that_of_the_element() {
     let error = |element: Element, step: f64| {
         let q = end(element, step);
         let off = q.iter().zip(&exact).map(|(q, exact)| (q - exact).abs());
-        off.fold(0.0, f64::max)
+        off.fold(0.0, larger)
     };
     for n in 2..=4 {
         let element = Element::mixed(n);

@@ -1,5 +1,8 @@
 //! Derivatives of steps of models of run-time length: transition operators, their spectra, periodic orbits.
 #![cfg(feature = "sparse")]
 
+#[path = "../common/largest.rs"]
+mod largest;
+
 mod orbits;
 mod transitions;

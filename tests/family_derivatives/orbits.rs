@@ -1,5 +1,6 @@
 //! Periodic orbits of families.
 
+use crate::largest::larger;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 use tfe::family::FamilyState;
@@ -64,7 +65,7 @@ fn apart(ones: &[Complex<f64>], others: &[Complex<f64>]) -> f64 {
         let distances = others.iter().map(|other| (one - other).norm());
         distances.fold(f64::INFINITY, f64::min)
     };
-    ones.iter().map(nearest).fold(0.0, f64::max)
+    ones.iter().map(nearest).fold(0.0, larger)
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The derivative of a step of a family.
 
+use crate::largest::larger;
 use tfe::family::{Block, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, Gradient};
 use tfe::prelude::*;
 use tfe::runtime::step::Control;
@@ -224,7 +225,7 @@ fn largest_of_modes(chain: &Harmonic, element: Element, h: f64) -> f64 {
         let matrix = transition_matrix(&one, element, &one.state([0.0], [0.0]), 0.0, h);
         spectral_radius(&matrix.expect("a matrix"))
     };
-    (1..=chain.n).map(radius).fold(0.0, f64::max)
+    (1..=chain.n).map(radius).fold(0.0, larger)
 }
 
 /// Where modes of a thousand sites are unstable the radius is that of the worst of them.

@@ -1,5 +1,6 @@
 //! Branches of periodic orbits: folds, doublings, tori, and agreement with orbits that are solved one by one.
 
+use crate::common::larger;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 use tfe::continuation::{Branch, ContinuationErrorKind, End, EventKind, Point};
@@ -132,7 +133,7 @@ fn orbits_of_a_branch_are_those_solved_one_by_one() {
             largest.at(t).expect("in the period").q[0]
         });
         // The symmetric response: half the range is the maximum. 2000 places miss it by (2π/2000)²/8 of it.
-        close(largest.fold(0.0, f64::max), point.amplitudes[0], 4e-6);
+        close(largest.fold(0.0, larger), point.amplitudes[0], 4e-6);
     }
     assert!(branch.orbit(branch.points().len()).is_none());
     assert!(branch.event_orbit(1).is_some() && branch.event_orbit(2).is_none());

@@ -1,5 +1,6 @@
 //! What elements conserve over long runs.
 
+use crate::common::larger;
 use crate::models::{DoublePendulum, EulerTop, HenonHeiles, Kepler, Pendulum};
 use tfe::prelude::*;
 
@@ -47,7 +48,7 @@ fn defect<M: Model<N>, const N: usize>(
                 .expect("a transition matrix");
             stability::symplecticity_defect(&a)
         })
-        .fold(0.0, f64::max)
+        .fold(0.0, larger)
 }
 
 #[test]
@@ -162,7 +163,7 @@ fn no_energy_drift_of_symplectic_elements() {
         let spread = |part: &[f64]| {
             part.iter()
                 .map(|energy| (energy - energies[0]).abs())
-                .fold(0.0, f64::max)
+                .fold(0.0, larger)
         };
         let (early, late) = (spread(&energies[..1000]), spread(&energies[9000..]));
         assert!(late < 1.1 * early, "{element}: {early:e} then {late:e}");

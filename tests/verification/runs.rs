@@ -1,6 +1,6 @@
 //! Runs: ends, dense output, files, impulses, failures.
 
-use crate::common::{assert_close, observed_order};
+use crate::common::{assert_close, larger, observed_order};
 use crate::models::{DoublePendulum, Pendulum};
 use tfe::prelude::*;
 use tfe::{AtError, RunErrorKind, StepError};
@@ -80,7 +80,7 @@ fn dense_output_is_continuous_and_accurate() {
                     );
                     (a[0] - b[0]).hypot(a[1] - b[1])
                 })
-                .fold(0.0, f64::max)
+                .fold(0.0, larger)
         };
         let points: Vec<_> = [0.1, 0.05, 0.025].map(|step| (step, error(step))).into();
         let order = observed_order(&points, 1e-13, "dense output");

@@ -3,6 +3,7 @@
 use super::super::grading::Grading;
 use super::super::pilot::corners;
 use super::{Asked, MOST_TIMES, STEPS_BETWEEN, Way};
+use crate::numbers::larger;
 use std::ops::Range;
 
 impl Way<'_> {
@@ -32,7 +33,7 @@ impl Way<'_> {
                 let length = self.between(pair[0], pair[1]);
                 length / (length / self.step).ceil().max(1.0)
             })
-            .fold(0.0, f64::max)
+            .fold(0.0, larger)
     }
 
     /// All nodes with a grading.

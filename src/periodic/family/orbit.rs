@@ -4,6 +4,7 @@ use super::super::orbit::{sort, trivial_of};
 use super::super::{Exponent, OrbitError, Verdict};
 use super::shooting::Shooting;
 use crate::motion::family::{FamilyMotion, FamilyNode};
+use crate::numbers::larger;
 use crate::periodic_schur::{self, Multiplier};
 use nalgebra::{Complex, DMatrix};
 use tfe_runtime::Statistics;
@@ -107,7 +108,7 @@ impl<'m, M: FamilyModel> FamilyOrbit<'m, M> {
         let trivial = self.trivial();
         let others = (0..self.floquet.len()).filter(|place| !trivial.contains(place));
         let moduli = others.map(|place| self.floquet[place].modulus());
-        Verdict::of(moduli.fold(0.0, f64::max))
+        Verdict::of(moduli.fold(0.0, larger))
     }
 
     /// The force γ v that had to be added to close an orbit of an autonomous model whose period or energy was given: as small as
