@@ -115,7 +115,7 @@ pub fn run(number: usize, random: &mut Random, tally: &mut Tally) -> Result<(), 
     }
 }
 
-fn compare<M: Model<2>>(
+fn compare<M: Model<2> + Send + Sync>(
     simulation: &Simulation<'_, M, 2>,
     start: State<2>,
     (number, event): (usize, &str),

@@ -291,6 +291,14 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         self.model.parameter(index)
     }
 
+    fn with_parameter(&self, index: usize, value: f64) -> Option<Self> {
+        let model = self.model.with_parameter(index, value)?;
+        Some(Self {
+            model: Share::own(model),
+            ..self.clone()
+        })
+    }
+
     const CONSTRAINTS: &'static [Constraint] = M::CONSTRAINTS;
 
     fn constraint_values<R: Real>(&self, t: R, q: &[R; N], values: &mut [R]) {

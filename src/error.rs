@@ -127,17 +127,33 @@ pub enum RunErrorKind {
         /// When.
         time: f64,
     },
+    /// A parameter was to be set that the model does not have.
+    NoParameter {
+        /// The name asked for.
+        name: String,
+        /// Those that there are.
+        known: Vec<String>,
+    },
+    /// A parameter was set to a number that is not finite.
+    Parameter {
+        /// Its name.
+        name: String,
+        /// What it was set to.
+        value: f64,
+    },
+    /// Parameters were to be set of a model of which no other can be made: kernels written by hand that do not say how, or a field that cannot be copied.
+    ParametersFixed,
+    /// An event set parameters in a run with derivatives by parameters, which would have to know how the new values depend on the old ones.
+    SetUnsupported {
+        /// What was called.
+        call: &'static str,
+    },
     /// An input that the model does not have, or that is none.
     Input(InputError),
     /// An earlier step failed: nothing goes on from here.
     Ended {
         /// The last node.
         time: f64,
-    },
-    /// Events were to be looked for by something that cannot.
-    EventsUnsupported {
-        /// What was called.
-        call: &'static str,
     },
     /// An element could not be solved.
     Solve {
@@ -261,12 +277,33 @@ impl fmt::Display for RunErrorKind {
                     "the event `{name}` comes ever sooner and without end at t = {time}: let `Act::Stop` end the run, or `Act::Record` leave the motion alone, where it comes to rest"
                 )
             }
+            Self::NoParameter { name, known } => {
+                let known = match known.is_empty() {
+                    true => "none".to_owned(),
+                    false => known.join(", "),
+                };
+                write!(
+                    f,
+                    "there is no parameter `{name}` to set: the model has {known}"
+                )
+            }
+            Self::Parameter { name, value } => {
+                write!(
+                    f,
+                    "parameter `{name}` was set to {value}, which is not finite"
+                )
+            }
+            Self::ParametersFixed => write!(
+                f,
+                "the parameters of this model cannot be set: it has a field that cannot be copied, or kernels that do not say how"
+            ),
+            Self::SetUnsupported { call } => write!(
+                f,
+                "`{call}` does not differentiate a run whose events set parameters; `run` and `run_linearised` go through them"
+            ),
             Self::Input(error) => error.fmt(f),
             Self::Ended { time } => {
                 write!(f, "a step after t = {time} failed: the run has ended")
-            }
-            Self::EventsUnsupported { call } => {
-                write!(f, "`{call}` does not look for events; `run` does")
             }
             Self::NodeOrder { node, time } => {
                 write!(

@@ -44,12 +44,13 @@ pub use fidelity::Fidelity;
 pub use fit::Fit;
 pub use linearised::Linearised;
 pub use modal::Modal;
-pub use motion::{Motion, Node, Outputs};
+pub use motion::{Motion, MotionArc, Node, Outputs, Setting};
 pub use optimal_control::{OptimalControl, Optimum};
 pub use periodic::{Orbit, PeriodicOrbit};
 pub use sensitivity::Sensitive;
 pub use simulation::{
-    Act, Checkpoint, Crossing, Event, Held, HeldNode, Occurrence, Simulation, Steps, Warning,
+    Act, Checkpoint, Crossing, Event, Held, HeldNode, Occurrence, Settings, Simulation, Steps,
+    Warning,
 };
 pub use tfe_macros::dynamics;
 /// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
@@ -69,8 +70,8 @@ pub mod prelude {
     pub use crate::{
         Act, BoundaryValue, ConsistentState, Continuation, Crossing, Element, EnergyConserving,
         Ensemble, FamilyVelocity, Fidelity, Interpolation, Mixed, Modal, Model, Motion, Node,
-        OptimalControl, PeriodicOrbit, Primal, Radau, Simulation, Solve, State, ThreeField,
-        Velocity, WorkPrecision, dynamics, stability,
+        OptimalControl, PeriodicOrbit, Primal, Radau, Settings, Simulation, Solve, State,
+        ThreeField, Velocity, WorkPrecision, dynamics, stability,
     };
 }
 

@@ -1,6 +1,9 @@
 //! The result of a run: nodes, dense output, energy, observables, statistics.
 
+mod arcs;
 pub(crate) mod family;
+
+pub use arcs::{MotionArc, Setting};
 
 use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv;
@@ -8,8 +11,10 @@ use crate::error::AtError;
 use crate::numbers::larger;
 use crate::simulation::{Checkpoint, Event, Warning};
 use crate::velocity::velocity_from;
+use arcs::Arcs;
 use std::fmt;
 use std::io;
+use std::ops::Range;
 use std::path::Path;
 use tfe_runtime::quadrature::Quadrature;
 use tfe_runtime::step::DenseElement;
@@ -100,6 +105,7 @@ pub struct Motion<const N: usize> {
     names: Vec<CoordinateName>,
     checkpoint: Option<Box<Checkpoint<N>>>,
     events: Vec<Event<N>>,
+    arcs: Arcs,
 }
 
 impl<const N: usize> Motion<N> {
@@ -130,6 +136,7 @@ impl<const N: usize> Motion<N> {
             names: (0..N).map(M::coordinate_name).collect(),
             checkpoint: None,
             events: Vec::new(),
+            arcs: Arcs::default(),
         };
         motion.record(model, t, start);
         motion
@@ -374,13 +381,17 @@ impl<const N: usize> Motion<N> {
         let (mut sum, mut integrals) = (0.0, vec![0.0]);
         let mut rule = Quadrature::gauss(1);
         let mut elements = self.elements.iter();
-        for pair in self.nodes.windows(2) {
+        let mut changed = None;
+        for (node, pair) in self.nodes.windows(2).enumerate() {
             let (from, to) = (pair[0].t, pair[1].t);
             // The states before and after an event.
             if from == to {
                 integrals.push(sum);
+                let now = changed.as_ref().unwrap_or(model);
+                changed = self.arcs.model_from(now, node + 1).or(changed);
                 continue;
             }
+            let model = changed.as_ref().unwrap_or(model);
             let Some(element) = elements.next() else {
                 break;
             };
@@ -423,13 +434,20 @@ impl<const N: usize> Motion<N> {
     /// max |H(t) − H(t₀)| / |H(t₀)|
     /// ```
     ///
+    /// Where [events](crate::Simulation::on) changed the state or parameters, H(t) − H of the start of its [arc](Self::arcs).
+    ///
     /// Of a model that is forced, damped or depends on time it measures physics, not error.
     pub fn energy_error(&self) -> f64 {
         let Some(&start) = self.energies.first() else {
             return 0.0;
         };
         let scale = if start == 0.0 { 1.0 } else { start.abs() };
-        let changes = self.energies.iter().map(|energy| (energy - start).abs());
+        let of_arc = |nodes: Range<usize>| {
+            let energies = self.energies.get(nodes).unwrap_or_default();
+            let start = energies.first().copied().unwrap_or_default();
+            energies.iter().map(move |energy| (energy - start).abs())
+        };
+        let changes = self.arcs.nodes(self.nodes.len()).flat_map(of_arc);
         changes.map(|change| change / scale).fold(0.0, larger)
     }
 
@@ -452,6 +470,35 @@ impl<const N: usize> Motion<N> {
     /// The events that [`Simulation::on`](crate::Simulation::on) asked for, in the order in which they happened.
     pub fn events(&self) -> &[Event<N>] {
         &self.events
+    }
+
+    /// The arcs between the events at which the state or parameters changed; one where there were none.
+    pub fn arcs(&self) -> impl Iterator<Item = MotionArc> {
+        self.arcs.all(self.nodes.len(), self.statistics)
+    }
+
+    /// The parameters that events have set, in the order in which they did.
+    pub fn settings(&self) -> &[Setting] {
+        self.arcs.settings()
+    }
+
+    /// Another arc begins at the last node.
+    pub(crate) fn begin_arc(&mut self, so_far: Statistics) {
+        self.arcs.begin(self.nodes.len() - 1, so_far);
+    }
+
+    /// Parameters are set at the node that is to come, at the time of the last one.
+    pub(crate) fn set_parameters<M: Model<N>>(&mut self, model: &M, values: &[(usize, f64)]) {
+        let (t, node) = (self.last().t, self.nodes.len());
+        for (index, value) in values {
+            let parameter = model.parameter_name(*index).to_string();
+            self.arcs.set(Setting {
+                t,
+                node,
+                parameter,
+                value: *value,
+            });
+        }
     }
 
     /// The observables at the recorded nodes.

@@ -9,35 +9,35 @@ mod follow;
 mod gradient;
 mod held;
 mod inputs;
+mod linearise;
 pub(crate) mod mesh;
+mod pieces;
 mod progress;
+mod recorder;
 mod sensitive;
 mod steps;
 mod watch;
 
 use crate::error::{RunError, RunErrorKind};
-use crate::linearised::Linearised;
 use crate::motion::Motion;
-use events::{Cut, Events, On, Passage};
+use events::{Events, On, Remodel};
 use family::Runs;
-use follow::{Follow, Nobody, Passed};
+use follow::{Follow, Nobody};
 use mesh::{Endless, Mesh};
-use nalgebra::DMatrix;
-use std::convert::identity;
+use pieces::{Left, Pieces, Planned};
+use recorder::Recorder;
 use std::ops::Range;
-use std::sync::Arc;
+use steps::Beginning;
 use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::length::Declared;
 use tfe_runtime::step::{Control, Impulse, Stepper};
 
 use tfe_runtime::{Element, Mixed, Model, Share, Solve, State};
-use watch::resolution::{Examined, Resolution};
-use watch::{Recorded, Watch};
 
 pub use accurate::Accurate;
 pub(crate) use checkpoint::Reached;
 pub use checkpoint::{Checkpoint, FamilyCheckpoint};
-pub use events::{Act, Crossing, Event, Occurrence};
+pub use events::{Act, Crossing, Event, Occurrence, Settings};
 pub use held::{Held, HeldNode};
 pub use steps::Steps;
 pub use watch::Warning;
@@ -75,6 +75,8 @@ pub struct Simulation<'m, M, const N: usize> {
     impulses: Vec<Impulse<N>>,
     breaks: Vec<f64>,
     events: Vec<On<'m, N>>,
+    /// Makes models with other parameters, where events may ask for them.
+    remodel: Option<Remodel<'m, M>>,
     /// What was asked for.
     at_kinks: Option<bool>,
     progress: bool,
@@ -123,6 +125,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             impulses: Vec::new(),
             breaks: Vec::new(),
             events: Vec::new(),
+            remodel: None,
             at_kinks: None,
             progress: false,
             refusal: None,
@@ -220,60 +223,6 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         self
     }
 
-    /// Does `act` whenever the event or output `name` of the model changes its sign in the direction of `crossing`; [`Motion::events`] lists what was met. Of several events the run does
-    /// what is to be done in the order of time.
-    ///
-    /// Times are those of an element that ends at the event, so that they are as accurate as nodes. An element ends there too where the state changes: two nodes have that
-    /// time then, with the states before and after. None is missed: where an output cannot change its sign on an element's polynomial is proved by interval arithmetic, and what is left is
-    /// searched (`docs/theory.md` §10.8). Pairs closer than 10⁻⁶ of an element may be, and those of functions given to [inputs](Self::input), which are known at samples. A value that
-    /// touches zero without changing its sign is no event.
-    ///
-    /// [`run`](Self::run) looks for events; [`steps`](Self::steps), [`run_linearised`](Self::run_linearised) and runs with an [`accuracy`](Self::accuracy) refuse them.
-    ///
-    /// ```
-    /// use tfe::prelude::*;
-    ///
-    /// /// A ball above the ground.
-    /// #[dynamics(coordinates(y), lagrangian = m/2*dot(y)^2 - m*g*y, event(impact) = y)]
-    /// struct Ball { m: f64, g: f64 }
-    ///
-    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// let ball = Ball { m: 0.1, g: 9.81 };
-    /// let motion = Simulation::new(&ball)
-    ///     .step(0.01)
-    ///     .on("impact", Crossing::Falling, |event| Act::Restart(event.state_with_velocity([-0.8 * event.v[0]])))
-    ///     .run(ball.state([1.0], [0.0]), 0.0..2.0)?;
-    /// let first = (2.0 / 9.81_f64).sqrt();
-    /// assert!((motion.events()[0].t - first).abs() < 1e-15);
-    /// assert!((motion.events()[1].t - 2.6 * first).abs() < 1e-14);
-    /// assert!(motion.states().iter().all(|node| node.q[0] > -1e-15));
-    /// # Ok(())
-    /// # }
-    /// ```
-    #[must_use]
-    pub fn on(
-        mut self,
-        name: impl Into<String>,
-        crossing: Crossing,
-        act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
-    ) -> Self {
-        self.events.push(On {
-            name: name.into(),
-            crossing,
-            act: Arc::new(act),
-        });
-        self
-    }
-
-    /// Refuses events where nothing looks for them.
-    fn refuse_events(&self, call: &'static str) -> Result<(), RunErrorKind> {
-        if self.events.is_empty() {
-            Ok(())
-        } else {
-            Err(RunErrorKind::EventsUnsupported { call })
-        }
-    }
-
     /// Whether steps are cut where a force has a kink or a jump: where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the arguments
     /// of a `min` or `max` changes its sign, in the state or in time (`docs/theory.md` §10.7). Elements keep their order then, and the run stays on the grid asked for;
     /// [`Statistics::kinks`](crate::Statistics::kinks) counts the crossings. A motion that would slide along a jump is an error, [`StepError::Slides`](crate::runtime::StepError::Slides).
@@ -356,38 +305,6 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
     }
 
-    /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion.
-    ///
-    /// A matrix costs a factorisation of the element's tangent and 2N solutions with it: half a step for one coordinate, some twenty steps
-    /// for twenty coordinates that a step iterates without Newton's method. Impulses are constant, so that they enter through the
-    /// motion only. The example is at [`Linearised`].
-    ///
-    /// # Errors
-    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element has no transition matrix.
-    pub fn run_linearised(
-        &self,
-        start: State<N>,
-        span: Range<f64>,
-    ) -> Result<Linearised<N>, RunError<N>> {
-        if let Err(kind) = self.refuse_events("run_linearised") {
-            let motion = Motion::from_start(&*self.model, span.start, &start);
-            return Err(RunError::new(kind, motion));
-        }
-        let mut transitions = Vec::new();
-        let mut entries = vec![0.0; 4 * N * N];
-        let mut starts = Vec::new();
-        let follower = |stepper: &mut Stepper<'m, M, N>, passed: &Passed<'_, N>| {
-            stepper.transition(&mut entries)?;
-            transitions.push(DMatrix::from_row_slice(2 * N, 2 * N, &entries));
-            if const { !M::CONSTRAINTS.is_empty() } {
-                starts.push((passed.start, *passed.before));
-            }
-            Ok(())
-        };
-        let motion = self.drive(start, &span, identity, follower)?;
-        Ok(Linearised::new(&*self.model, motion, transitions, &starts))
-    }
-
     /// Runs over the span, followed by `follower`.
     fn drive(
         &self,
@@ -419,8 +336,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ) -> Result<Motion<N>, RunError<N>> {
         let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, follower)?;
         let last = *motion.last();
-        // A run that was stopped has no grid to go on with.
-        if mesh.end().is_some_and(|end| end != last.t) {
+        // A run that was stopped has no grid to go on with, and one whose parameters were set no model.
+        if mesh.end().is_some_and(|end| end != last.t) || !motion.settings().is_empty() {
             return Ok(motion);
         }
         motion.set_checkpoint(Checkpoint {
@@ -448,168 +365,61 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// The same from the only node of `motion`, after the elements that are done.
     fn drive_from(
         &self,
-        mut motion: Motion<N>,
+        motion: Motion<N>,
         start: &State<N>,
         (mesh, done): (&Mesh<N>, usize),
         stepper: &mut Stepper<'m, M, N>,
-        mut follower: impl Follow<'m, M, N>,
+        follower: impl Follow<'m, M, N>,
     ) -> Result<Motion<N>, RunError<N>> {
-        follower.recorded(motion.last());
-        let mut watch = Watch::new(self.chosen_element());
-        let mut resolution = Resolution::new(&*self.model, self.chosen_element(), self.control);
-        let conserves = const { conserves_energy::<M, N>() };
-        let mut is_conserved = conserves;
-        watch.pass(recorded(&motion, false));
-        if let Some(velocity) = motion.velocities().last() {
-            watch.weigh(&*self.model, motion.last().t, (&start.q, velocity));
-        }
+        let mut pieces = match self.pieces(stepper) {
+            Ok(pieces) => pieces,
+            Err(kind) => return Err(RunError::new(kind, motion)),
+        };
+        let mut recorder = Recorder::new(self, motion, start, follower);
         let mut state = *start;
         let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
         let mut failure = None;
-        let chosen = (self.chosen_element(), self.control);
-        let mut events = match Events::new(&*self.model, &self.events, chosen) {
-            Ok(events) => events,
-            Err(kind) => return Err(RunError::new(kind, motion)),
-        };
-        let keeps = self.record_every == 1;
-        // Of an element that was looked into and is not kept.
-        let mut spare = None;
-        'run: for (element, (t, next, h)) in mesh.elements().enumerate().skip(done) {
-            let last = element + 1 == mesh.steps();
-            watch.look(&*self.model, element, (t, h), &state);
-            let impulses = mesh.impulses_in(t, next, last);
-            is_conserved &= impulses.is_empty();
-            events.begin(h);
-            // What is left of the element behind its last event.
-            let (mut from, mut length) = (t, h);
-            loop {
-                let before = state;
-                let begin = if from == t { mesh.begin(t, h) } else { from };
-                let ahead = |impulse: &&Impulse<N>| {
-                    from == t || h.signum() * impulse.time >= h.signum() * from
-                };
-                let behind = impulses.iter().take_while(|one| !ahead(one)).count();
-                let impulses = &impulses[behind..];
-                let step = stepper.advance(begin, length, &mut state, impulses);
-                let step = step.map_err(|source| RunErrorKind::Solve {
-                    element,
-                    time: from,
-                    step: length,
-                    source,
-                });
-                // Before the matrix, which needs the same memory.
-                let dense = ((keeps || !events.is_empty()) && step.is_ok())
-                    .then(|| stepper.dense_in(spare.take(), from, next));
-                let passed = Passed {
-                    start: from,
-                    before: &before,
-                    end: next,
-                    after: &state,
-                };
-                let arc = dense.as_ref().map(|dense| Passage {
-                    t: from,
-                    h: length,
-                    before: &before,
-                    after: &state,
-                    dense,
-                    impulses,
-                });
-                let looked = step.and_then(|()| match &arc {
-                    Some(arc) if !events.is_empty() => events.look(arc),
-                    _ => Ok(None),
-                });
-                let followed = looked.and_then(|cut| {
-                    let followed = match (&cut, &arc) {
-                        (Some(cut), Some(arc)) => match events.severed(arc, cut, impulses) {
-                            Some(severed) => follower.cut(&severed),
-                            None => Ok(()),
-                        },
-                        _ => follower.passed(stepper, &passed),
-                    };
-                    followed.map_err(|source| RunErrorKind::Transition {
-                        element,
-                        time: from,
-                        step: length,
-                        source,
-                    })?;
-                    Ok(cut)
-                });
-                let cut = match followed {
-                    Ok(cut) => cut,
-                    Err(kind) => {
-                        watch.examine(&*self.model, element, (from, length), &before);
-                        if motion.last().t != from {
-                            motion.record(&*self.model, from, &before);
-                        }
-                        failure = Some(kind);
-                        break 'run;
-                    }
-                };
-                let Some(cut) = cut else {
-                    if impulses.is_empty() {
-                        let examined = Examined {
-                            t: from,
-                            h: length,
-                            before: &before,
-                            after: &state,
-                        };
-                        resolution.look(stepper.statistics(), examined);
-                    }
-                    match dense {
-                        Some(dense) if keeps => motion.keep_element(dense),
-                        unneeded => spare = unneeded,
-                    }
-                    if last || (element + 1) % self.record_every == 0 {
-                        motion.record(&*self.model, next, &state);
-                        follower.recorded(motion.last());
-                        watch.pass(recorded(&motion, is_conserved));
-                        is_conserved = conserves;
-                    }
-                    break;
-                };
-                is_conserved = false;
-                let Cut {
-                    t: time,
-                    at,
-                    inside,
-                    after,
-                    ..
-                } = cut;
-                if let Some(dense) = inside.filter(|_| keeps) {
-                    motion.keep_element(dense);
-                }
-                if motion.last().t != time {
-                    motion.record(&*self.model, time, &at);
-                    follower.recorded(motion.last());
-                }
-                follower.acted();
-                let Some(after) = after else {
-                    state = at;
-                    break 'run;
-                };
-                if let Err(kind) = check_restart(&*self.model, time, length, &after) {
-                    failure = Some(kind);
-                    break 'run;
-                }
-                motion.record(&*self.model, time, &after);
-                follower.recorded(motion.last());
-                state = after;
-                if time == next {
+        for (number, (t, next, h)) in mesh.elements().enumerate().skip(done) {
+            let is_last = number + 1 == mesh.steps();
+            let planned = Planned {
+                number,
+                t,
+                next,
+                h,
+                begin: mesh.begin(t, h),
+                impulses: mesh.impulses_in(t, next, is_last),
+            };
+            let has_impulses = !planned.impulses.is_empty();
+            recorder.begin(stepper.model(), number, (t, h), &state, has_impulses);
+            match pieces.pass(stepper, planned, &mut state, &mut recorder) {
+                Ok(Left::Done) => recorder.end(stepper.model(), number, is_last, next, &state),
+                Ok(Left::Stopped) => break,
+                Err(broken) => {
+                    recorder.fail(stepper.model(), number, &broken);
+                    failure = Some(broken.kind);
                     break;
                 }
-                length -= time - from;
-                from = time;
             }
             bar.advance();
         }
-        watch.add(resolution.warning(&state));
-        motion.set_statistics(*stepper.statistics());
-        motion.set_warnings(watch.into_warnings());
-        motion.set_events(events.met);
+        let mut motion = recorder.into_motion(stepper, &state);
+        if pieces.is_changed()
+            && let Err(error) = stepper.set_model(self.model.clone())
+        {
+            failure.get_or_insert(RunErrorKind::Element(error));
+        }
+        motion.set_events(pieces.events.met);
         match failure {
             None => Ok(motion),
             Some(kind) => Err(RunError::new(kind, motion)),
         }
+    }
+
+    /// What passes elements, with a look at events.
+    fn pieces(&self, stepper: &Stepper<'m, M, N>) -> Result<Pieces<'m, M, N>, RunErrorKind> {
+        let chosen = (stepper.element(), stepper.control());
+        let events = Events::new(self.model.clone(), self.remodel, &self.events, chosen)?;
+        Ok(Pieces::new(self.model.clone(), events))
     }
 
     /// Whether the run can begin at `start`.
@@ -638,6 +448,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// The states that follow `start`, one a step, without end and in constant memory; elements end at [breaks](Self::break_at), as in [`run`](Self::run). After an error the iterator
     /// is finished. There are no [warnings](Motion::warnings).
     ///
+    /// A step in which an [event](Self::on) changes the state or a parameter has two more nodes, with the states before and after; after the node at which an event stops the run the
+    /// iterator is finished. [`Steps::events`] tells those of the last step.
+    ///
     /// ```
     /// # use tfe::prelude::*;
     /// # #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2)]
@@ -656,22 +469,28 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # }
     /// ```
     pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
+        Steps::new(self.endless(&start, t0), start, t0, self.impulses.clone())
+    }
+
+    /// The beginning of a course without an end.
+    fn endless(&self, start: &State<N>, t0: f64) -> Beginning<'m, M, N> {
         let step = self.step.unwrap_or(f64::NAN);
-        let ready = self.check_start(&start).and_then(|()| {
-            self.refuse_events("steps")?;
-            check_constraints(&*self.model, t0, step, &start)?;
-            if !t0.is_finite() {
-                return Err(RunErrorKind::Span {
-                    start: t0,
-                    end: f64::INFINITY,
-                });
-            }
-            let elements = Endless::new(t0, step, &self.breaks)?;
-            let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control)
-                .map_err(RunErrorKind::Element)?;
-            Ok((self.cutting(stepper).ends_only(), elements))
-        });
-        Steps::new(ready, start, t0, self.impulses.clone())
+        self.check_start(start)?;
+        check_constraints(&*self.model, t0, step, start)?;
+        if !t0.is_finite() {
+            return Err(RunErrorKind::Span {
+                start: t0,
+                end: f64::INFINITY,
+            });
+        }
+        let elements = Endless::new(t0, step, &self.breaks)?;
+        let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control);
+        let stepper = self.cutting(stepper.map_err(RunErrorKind::Element)?);
+        if self.events.is_empty() {
+            return Ok((stepper.ends_only(), elements, None));
+        }
+        let pieces = self.pieces(&stepper)?;
+        Ok((stepper, elements, Some(pieces)))
     }
 
     fn chosen_element(&self) -> Element {
@@ -691,16 +510,6 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 pub(crate) const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
     let facts = M::FACTS;
     !(facts.time_dependent || facts.forced || facts.linear) && M::CONSTRAINTS.is_empty()
-}
-
-fn recorded<const N: usize>(motion: &Motion<N>, is_conserved: bool) -> Recorded {
-    let (energy, action) = motion.last_energy();
-    Recorded {
-        time: motion.last().t,
-        energy,
-        action,
-        is_conserved,
-    }
 }
 
 /// Refuses start values that are not finite.

@@ -478,7 +478,7 @@ mod tests {
                 let step = way.taken();
                 for t in &way.cuts[1..] {
                     let off = error(way, step) * (t - way.cuts[0]) / 10.0;
-                    trace.pass(&[1.0 + off, 1.0], true);
+                    trace.pass(&[1.0 + off, 1.0], 0, true);
                     if way.keeps {
                         last = off;
                     }

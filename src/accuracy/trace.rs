@@ -8,6 +8,8 @@ pub(crate) struct Trace {
     /// Numbers of one kind lie together: all coordinates, all momenta, one output.
     kinds: Vec<Range<usize>>,
     rows: Vec<f64>,
+    /// How many events had changed the motion, at each row.
+    acts: Vec<usize>,
     /// The largest number of each kind so far, also between the rows.
     sizes: Vec<f64>,
 }
@@ -22,17 +24,19 @@ impl Trace {
             sizes: vec![0.0; kinds.len()],
             kinds,
             rows: Vec::new(),
+            acts: Vec::new(),
         }
     }
 
     /// Looks at all numbers of one time, and keeps them as a row if they are to be compared.
-    pub(crate) fn pass(&mut self, row: &[f64], keeps: bool) {
+    pub(crate) fn pass(&mut self, row: &[f64], acts: usize, keeps: bool) {
         for (size, kind) in self.sizes.iter_mut().zip(&self.kinds) {
             let numbers = row[kind.clone()].iter();
             *size = numbers.fold(*size, |size, x| size.max(x.abs()));
         }
         if keeps {
             self.rows.extend_from_slice(row);
+            self.acts.push(acts);
         }
     }
 
@@ -66,8 +70,19 @@ impl Trace {
 }
 
 /// The largest relative difference at each time, of each kind: over the largest number of that kind that either run has passed. Infinite where
-/// something is not finite.
+/// something is not finite, and where one run is an event ahead of the other for more than one time: at a single one the event's time is as uncertain as the states are, which those after it tell,
+/// and the difference there is left out.
 pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
+    let is_same = |row: usize| a.acts.get(row) == b.acts.get(row);
+    let side = |row: usize| {
+        if is_same(row) {
+            Side::Same
+        } else if row + 1 < a.acts.len().min(b.acts.len()) && is_same(row + 1) {
+            Side::Between
+        } else {
+            Side::Apart
+        }
+    };
     let mut differences = Vec::new();
     for (k, kind) in a.kinds.iter().enumerate() {
         let scale = a.sizes[k].max(b.sizes[k]);
@@ -81,9 +96,23 @@ pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
                 finite(largest / scale)
             }
         };
-        differences.push(a.rows().zip(b.rows()).map(relative).collect());
+        let at = |(row, pair)| match side(row) {
+            Side::Same => relative(pair),
+            Side::Between => 0.0,
+            Side::Apart => f64::INFINITY,
+        };
+        differences.push(a.rows().zip(b.rows()).enumerate().map(at).collect());
     }
     differences
+}
+
+/// Where two runs are beside each other's events.
+enum Side {
+    Same,
+    /// One has met an event that the other is about to meet.
+    Between,
+    /// One has met an event that the other does not meet.
+    Apart,
 }
 
 fn finite(x: f64) -> f64 {
@@ -97,7 +126,7 @@ mod tests {
     fn trace(rows: &[[f64; 3]]) -> Trace {
         let mut trace = Trace::new(1, 1);
         for row in rows {
-            trace.pass(row, true);
+            trace.pass(row, 0, true);
         }
         trace
     }

@@ -62,6 +62,10 @@ pub(super) trait Repeatable<const N: usize> {
         start: (f64, &Self::State),
         passed: &mut Passing<'_, Self::Stepper, Self::State>,
     ) -> Result<Self::Motion, Broken<Self::Motion>>;
+    /// Whether the run looks for events, so that elements alone do not make it.
+    fn has_events(&self) -> bool {
+        false
+    }
     /// A motion of the start and one other state.
     fn part(&self, start: (f64, &Self::State), end: (f64, &Self::State)) -> Self::Motion;
     /// A mesh of equal parts between times.
@@ -72,8 +76,8 @@ pub(super) trait Repeatable<const N: usize> {
     fn nodes(&self) -> Option<&[f64]>;
 }
 
-/// Is shown the end of every element: the stepper, the time, the state.
-pub(super) type Passing<'a, T, S> = dyn FnMut(&mut T, f64, &S) + 'a;
+/// Is shown the end of every element: the stepper, the time, the state, and how many events have changed the motion so far.
+pub(super) type Passing<'a, T, S> = dyn FnMut(&mut T, f64, &S, usize) + 'a;
 
 /// Why a recorded run has stopped, and what there is of it.
 pub(super) type Broken<T> = Box<(RunErrorKind, T)>;
@@ -97,7 +101,7 @@ impl Watcher {
             row: vec![0.0; trace.width()],
             trace,
         };
-        watcher.pass(run, stepper, (t, start), false);
+        watcher.pass(run, stepper, (t, start), 0, false);
         watcher
     }
 
@@ -106,10 +110,11 @@ impl Watcher {
         run: &R,
         stepper: &mut R::Stepper,
         (t, state): (f64, &R::State),
+        acts: usize,
         keeps: bool,
     ) {
         run.row(stepper, t, state, &mut self.row);
-        self.trace.pass(&self.row, keeps);
+        self.trace.pass(&self.row, acts, keeps);
     }
 }
 
@@ -146,6 +151,21 @@ fn follow<R: Repeatable<N>, const N: usize>(
 ) -> Result<Trace, Stop<R::State>> {
     let mut watcher = Watcher::new(run, stepper, (t0, start));
     let mut times = times.iter().peekable();
+    if run.has_events() {
+        let passed = run.record(
+            stepper,
+            mesh,
+            (t0, start),
+            &mut |stepper, t, state, acts| {
+                let keeps = times.next_if_eq(&&t).is_some();
+                watcher.pass(run, stepper, (t, state), acts, keeps);
+            },
+        );
+        return match passed {
+            Ok(_) => Ok(watcher.trace),
+            Err(broken) => Err((broken.0, t0, start.clone())),
+        };
+    }
     let mut state = start.clone();
     let mut bar = Bar::new(run.progress(), mesh.steps());
     for (element, (t, next, h)) in mesh.elements().enumerate() {
@@ -159,7 +179,7 @@ fn follow<R: Repeatable<N>, const N: usize>(
             return Err((kind, t, state));
         }
         let keeps = times.next_if_eq(&&next).is_some();
-        watcher.pass(run, stepper, (next, &state), keeps);
+        watcher.pass(run, stepper, (next, &state), 0, keeps);
         bar.advance();
     }
     Ok(watcher.trace)
@@ -178,10 +198,15 @@ fn estimated<R: Repeatable<N>, const N: usize>(
     };
     let mut watcher = Watcher::new(run, &mut stepper, (t0, start));
     let mut times = Vec::new();
-    let motion = run.record(&mut stepper, mesh, (t0, start), &mut |stepper, t, state| {
-        times.push(t);
-        watcher.pass(run, stepper, (t, state), true);
-    })?;
+    let motion = run.record(
+        &mut stepper,
+        mesh,
+        (t0, start),
+        &mut |stepper, t, state, acts| {
+            times.push(t);
+            watcher.pass(run, stepper, (t, state), acts, true);
+        },
+    )?;
     let other = || {
         // The same steps with one node more, or two steps for each of the same number where there are no more.
         let more = Element::mixed(element.nodes() + 1);
@@ -287,10 +312,15 @@ fn find<R: Repeatable<N>, const N: usize>(
         let trace = if way.keeps {
             let mut watcher = Watcher::new(run, stepper, (t0, start));
             let mut times = times.iter().peekable();
-            let motion = run.record(stepper, &mesh, (t0, start), &mut |stepper, t, state| {
-                let keeps = times.next_if_eq(&&t).is_some();
-                watcher.pass(run, stepper, (t, state), keeps);
-            });
+            let motion = run.record(
+                stepper,
+                &mesh,
+                (t0, start),
+                &mut |stepper, t, state, acts| {
+                    let keeps = times.next_if_eq(&&t).is_some();
+                    watcher.pass(run, stepper, (t, state), acts, keeps);
+                },
+            );
             let motion = motion.map_err(|broken| {
                 let (kind, part) = *broken;
                 if !matches!(kept, Kept::Motion(_)) {
@@ -303,7 +333,7 @@ fn find<R: Repeatable<N>, const N: usize>(
         } else {
             follow(run, stepper, (t0, start), &mesh, times).map_err(|(kind, t, state)| {
                 let mut failed = Failed::from(kind);
-                if place.is_met_again(t0, &failed.kind) {
+                if !run.has_events() && place.is_met_again(t0, &failed.kind) {
                     failed.is_final |= !is_passed(run, way, &mesh, (&failed.kind, &state));
                 }
                 kept.keep_part(t0, t, state);

@@ -13,12 +13,25 @@ pub(super) struct Course<S> {
 
 /// An element of a course.
 pub(super) struct Leg {
+    pub(super) number: usize,
     /// Where it begins, to all digits.
     pub(super) begin: f64,
     /// Its length.
     pub(super) h: f64,
     /// The nodes.
     pub(super) nodes: (f64, f64),
+}
+
+impl Leg {
+    /// What a failure of its solution is told as.
+    pub(super) fn failed(&self, source: StepError) -> RunErrorKind {
+        RunErrorKind::Solve {
+            element: self.number,
+            time: self.nodes.0,
+            step: self.h,
+            source,
+        }
+    }
 }
 
 impl<S> Course<S> {
@@ -44,7 +57,7 @@ impl<S> Course<S> {
     /// What `advance` makes of the next element; the stepper goes to `ended` where it fails.
     pub(super) fn next<T>(
         &mut self,
-        advance: impl FnOnce(&mut S, Leg) -> Result<T, StepError>,
+        advance: impl FnOnce(&mut S, &Leg) -> Result<T, RunErrorKind>,
         ended: impl FnOnce(&S),
     ) -> Option<Result<T, RunErrorKind>> {
         let (stepper, elements) = match &mut self.way {
@@ -52,23 +65,31 @@ impl<S> Course<S> {
             Err(failure) => return failure.take().map(Err),
         };
         let (time, next, h, begin) = elements.element();
-        let nodes = (time, next);
-        match advance(stepper, Leg { begin, h, nodes }) {
+        let leg = Leg {
+            number: self.element,
+            begin,
+            h,
+            nodes: (time, next),
+        };
+        match advance(stepper, &leg) {
             Ok(found) => {
                 elements.advance();
                 self.element += 1;
                 Some(Ok(found))
             }
-            Err(source) => {
+            Err(kind) => {
                 ended(stepper);
                 self.way = Err(None);
-                Some(Err(RunErrorKind::Solve {
-                    element: self.element,
-                    time,
-                    step: h,
-                    source,
-                }))
+                Some(Err(kind))
             }
+        }
+    }
+
+    /// Ends without an error.
+    pub(super) fn stop(&mut self, ended: impl FnOnce(&S)) {
+        if let Ok((stepper, _)) = &self.way {
+            ended(stepper);
+            self.way = Err(None);
         }
     }
 }

@@ -1,133 +1,38 @@
 //! Events of runs: where an output changes its sign, and what is done there (T-122).
 
+mod act;
+mod on;
 mod search;
+mod settings;
+mod value;
 
 use crate::error::RunErrorKind;
-use crate::sensitivity::slopes::momentum_by;
-use crate::velocity::velocity_from;
 use search::Course;
 use std::cell::RefCell;
 use std::fmt;
-use std::ops::Deref;
-use std::sync::Arc;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper};
-use tfe_runtime::{Arguments, Element, Form, Model, Real, State, constrained};
+use tfe_runtime::{Arguments, Element, Form, Model, Real, Share, State, constrained};
 
-/// Which changes of sign count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Crossing {
-    /// From below zero to above.
-    Rising,
-    /// From above zero to below.
-    Falling,
-    /// Both.
-    Either,
-}
+pub use act::{Act, Crossing, Event, Occurrence};
+pub(super) use act::{After, Changed, Near, On, state_after};
+pub use settings::Settings;
+pub(super) use settings::{Remodel, remodel};
+pub(super) use value::{Value, WEIGHTS};
 
-impl Crossing {
-    fn counts(self, rises: bool) -> bool {
-        match self {
-            Self::Rising => rises,
-            Self::Falling => !rises,
-            Self::Either => true,
-        }
-    }
-}
-
-/// What is done at an event.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Act<const N: usize> {
-    /// The event is recorded, as all are, and the run goes on as if nothing had happened, with the same bits.
-    Record,
-    /// The run ends at the event.
-    Stop,
-    /// The element ends at the event, and the run goes on from this state.
-    Restart(State<N>),
-    /// The same with momenta that are larger by an impulse.
-    Impulse([f64; N]),
-}
-
-/// An event that was met, with the state before anything is done.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Event<const N: usize> {
-    /// The output that changed its sign.
-    pub name: String,
-    /// When.
-    pub t: f64,
-    /// Generalized coordinates.
-    pub q: [f64; N],
-    /// Velocities dq/dt.
-    pub v: [f64; N],
-    /// Generalized momenta.
-    pub p: [f64; N],
-    /// Whether it went from below zero to above.
-    pub rises: bool,
-}
-
-impl<const N: usize> Event<N> {
-    /// The point of phase space, without the time.
-    pub fn state(&self) -> State<N> {
-        State {
-            q: self.q,
-            p: self.p,
-        }
-    }
-}
-
-/// An event while it happens: an [`Event`] that knows its model.
-pub struct Occurrence<'a, const N: usize> {
-    event: &'a Event<N>,
-    momenta: &'a dyn Fn([f64; N]) -> [f64; N],
-}
-
-impl<const N: usize> Occurrence<'_, N> {
-    /// The state at the same coordinates with other velocities; its momenta are NaN where none belong to them, and the run then ends with an error.
-    pub fn state_with_velocity(&self, v: [f64; N]) -> State<N> {
-        State {
-            q: self.event.q,
-            p: (self.momenta)(v),
-        }
-    }
-}
-
-impl<const N: usize> Deref for Occurrence<'_, N> {
-    type Target = Event<N>;
-
-    fn deref(&self) -> &Event<N> {
-        self.event
-    }
-}
-
-impl<const N: usize> fmt::Debug for Occurrence<'_, N> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.event.fmt(f)
-    }
-}
-
-type Action<'m, const N: usize> = Arc<dyn Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm>;
-
-/// What a run is to look for.
-#[derive(Clone)]
-pub(super) struct On<'m, const N: usize> {
-    pub(super) name: String,
-    pub(super) crossing: Crossing,
-    pub(super) act: Action<'m, N>,
-}
-
-impl<const N: usize> fmt::Debug for On<'_, N> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {:?}", self.name, self.crossing)
-    }
+/// An event that is looked for.
+pub(super) struct Watched<'m, const N: usize> {
+    pub(super) on: On<'m, N>,
+    pub(super) value: Value<'m, N>,
 }
 
 /// Looks for the events of a run.
-pub(super) struct Events<'a, 'm, M, const N: usize> {
-    model: &'m M,
-    /// With the columns of their outputs.
-    watched: Vec<(usize, &'a On<'m, N>)>,
-    /// Sides on which the outputs were seen last; 0 where this is not known.
+pub(super) struct Events<'m, M, const N: usize> {
+    model: Share<'m, M>,
+    remodel: Option<Remodel<'m, M>>,
+    watched: Vec<Watched<'m, N>>,
+    /// Sides on which the values were seen last; 0 where this is not known.
     sides: Vec<f64>,
     element: Element,
     control: Control,
@@ -135,12 +40,21 @@ pub(super) struct Events<'a, 'm, M, const N: usize> {
     /// Finds the times of events, apart from the run.
     probe: Option<Stepper<'m, M, N>>,
     pub(super) met: Vec<Event<N>>,
+    /// Events of the element looked into last that did not end it.
+    recorded: Vec<Place>,
     /// Cuts in this step.
     cuts: u32,
     /// Length of this step.
     step: f64,
     /// When an event last cut an element, and which.
     last: Option<(f64, usize)>,
+}
+
+impl<M: fmt::Debug, const N: usize> fmt::Debug for Events<'_, M, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = self.watched.iter().map(|watched| &watched.on);
+        f.debug_list().entries(names).finish()
+    }
 }
 
 /// Room for all outputs: numbers, bounds, and bounds with their slopes.
@@ -171,18 +85,27 @@ pub(super) struct Passage<'a, const N: usize> {
     pub(super) impulses: &'a [Impulse<N>],
 }
 
+/// An event in an element.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Among those that are looked for.
+    watched: usize,
+    /// Among those met.
+    met: usize,
+    /// The length of the element that ends at it.
+    length: f64,
+    /// False where it is at the start of the element.
+    inside: bool,
+}
+
 /// An element that ends at an event.
-pub(super) struct Cut<'a, 'm, const N: usize> {
+pub(super) struct Cut<'m, M, const N: usize> {
     pub(super) t: f64,
     pub(super) at: State<N>,
     pub(super) inside: Option<DenseElement<N>>,
     /// None where the run ends there.
-    pub(super) after: Option<State<N>>,
-    /// Its length.
-    length: f64,
-    on: &'a On<'m, N>,
-    /// The output, among all.
-    column: usize,
+    pub(super) after: Option<After<'m, M, N>>,
+    place: Place,
 }
 
 /// The same beside the element that was to be.
@@ -196,86 +119,11 @@ pub(super) struct Severed<'a, 'm, const N: usize> {
     pub(super) impulses: &'a [Impulse<N>],
     /// False where the event is at the start.
     pub(super) inside: bool,
-    pub(super) on: &'a On<'m, N>,
-    pub(super) column: usize,
+    pub(super) watched: &'a Watched<'m, N>,
     pub(super) event: &'a Event<N>,
     /// The place of the event among all.
     pub(super) number: usize,
     pub(super) goes_on: bool,
-}
-
-/// A place near an event, and a parameter that is a little larger there.
-pub(super) struct Near<const N: usize> {
-    pub(super) t: f64,
-    pub(super) state: State<N>,
-    /// What the parameter adds to the velocity.
-    pub(super) velocity: [f64; N],
-    /// The parameter, among all, and by how much it is larger.
-    pub(super) parameter: Option<(usize, f64)>,
-}
-
-/// What an act makes of a state near that of its event; none where it lets the run end or go on as it was.
-pub(super) fn state_after<M: Model<N>, const N: usize>(
-    model: &M,
-    on: &On<'_, N>,
-    event: &Event<N>,
-    near: &Near<N>,
-) -> Option<State<N>> {
-    let (t, state) = (near.t, &near.state);
-    let mut velocity = velocity_from(model, t, state, &event.v);
-    for (v, more) in velocity.iter_mut().zip(near.velocity) {
-        *v += more;
-    }
-    let event = Event {
-        name: event.name.clone(),
-        t,
-        q: state.q,
-        p: state.p,
-        v: velocity,
-        rises: event.rises,
-    };
-    let momenta = |v: [f64; N]| {
-        let mut p = momenta_of(model, &event, v);
-        if let Some((parameter, larger)) = near.parameter {
-            let slopes = momentum_by(model, t, (&event.q, &v, &p), parameter);
-            for (p, slope) in p.iter_mut().zip(slopes) {
-                *p += larger * slope;
-            }
-        }
-        p
-    };
-    let act = (on.act)(&Occurrence {
-        event: &event,
-        momenta: &momenta,
-    });
-    match act {
-        Act::Restart(state) => Some(state),
-        Act::Impulse(impulse) => Some(kicked(state, &impulse)),
-        Act::Record | Act::Stop => None,
-    }
-}
-
-/// What is to be done at an event.
-fn act<M: Model<N>, const N: usize>(model: &M, on: &On<'_, N>, event: &Event<N>) -> Act<N> {
-    let momenta = |v: [f64; N]| momenta_of(model, event, v);
-    (on.act)(&Occurrence {
-        event,
-        momenta: &momenta,
-    })
-}
-
-/// The momenta of velocities at an event; NaN where there are none.
-fn momenta_of<M: Model<N>, const N: usize>(model: &M, event: &Event<N>, v: [f64; N]) -> [f64; N] {
-    tfe_runtime::__private::state(model, event.t, event.q, v).p
-}
-
-/// The state with momenta that are larger by an impulse.
-fn kicked<const N: usize>(state: &State<N>, impulse: &[f64; N]) -> State<N> {
-    let mut kicked = *state;
-    for (p, more) in kicked.p.iter_mut().zip(impulse) {
-        *p += more;
-    }
-    kicked
 }
 
 /// What has come of a search for the time of an event.
@@ -298,7 +146,7 @@ impl<const N: usize> Met<N> {
     }
 }
 
-impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
+impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
     /// So many events within one step are a motion that comes to rest by ever more of them.
     const MAX_CUTS: u32 = 1000;
 
@@ -306,32 +154,50 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
     const SOON: f64 = 1e-6;
 
     pub(super) fn new(
-        model: &'m M,
-        on: &'a [On<'m, N>],
+        model: Share<'m, M>,
+        remodel: Option<Remodel<'m, M>>,
+        on: &[On<'m, N>],
         (element, control): (Element, Control),
     ) -> Result<Self, RunErrorKind> {
         let known = || (0..model.columns()).map(|at| model.column_name(at).to_string());
-        let column = |one: &'a On<'m, N>| match known().position(|name| name == one.name) {
-            Some(column) => Ok((column, one)),
-            None => Err(RunErrorKind::NoEvent {
-                name: one.name.clone(),
-                known: known().collect(),
-            }),
+        let watched = |one: &On<'m, N>| {
+            let value = match &one.function {
+                Some(function) => Value::Function(function.clone()),
+                None => match known().position(|name| name == one.name) {
+                    Some(column) => Value::Column(column),
+                    None => {
+                        return Err(RunErrorKind::NoEvent {
+                            name: one.name.clone(),
+                            known: known().collect(),
+                        });
+                    }
+                },
+            };
+            let on = one.clone();
+            Ok(Watched { on, value })
         };
-        let watched: Vec<_> = on.iter().map(column).collect::<Result<_, _>>()?;
+        let watched: Vec<_> = on.iter().map(watched).collect::<Result<_, _>>()?;
+        let columns = model.columns();
         Ok(Self {
             model,
+            remodel,
             sides: vec![0.0; watched.len()],
             watched,
             element,
             control,
-            rooms: Rooms::new(model.columns()),
+            rooms: Rooms::new(columns),
             probe: None,
             met: Vec::new(),
+            recorded: Vec::new(),
             cuts: 0,
             step: 0.0,
             last: None,
         })
+    }
+
+    /// Goes on with another model.
+    pub(super) fn set_model(&mut self, model: Share<'m, M>) {
+        (self.model, self.probe) = (model, None);
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -347,8 +213,9 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
     pub(super) fn look(
         &mut self,
         arc: &Passage<'_, N>,
-    ) -> Result<Option<Cut<'a, 'm, N>>, RunErrorKind> {
+    ) -> Result<Option<Cut<'m, M, N>>, RunErrorKind> {
         let Passage { t, h, dense, .. } = *arc;
+        self.recorded.clear();
         if self.stays_off(dense) {
             return Ok(None);
         }
@@ -358,8 +225,8 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             let time = t + tau * h;
             let inside = 0.0 < tau && tau < 1.0;
             let (state, v) = if inside {
-                (dense.at_time(time), velocity_of_form::<M, N>(dense, time))
-            } else if matches!(M::FORM, Form::Hamiltonian) {
+                (dense.at_time(time), self.velocity_inside(dense, time))
+            } else if !self.needs_velocity() {
                 (*if tau == 0.0 { arc.before } else { arc.after }, [0.0; N])
             } else {
                 // Two elements agree at a node.
@@ -368,7 +235,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
                 } else {
                     (dense.end(), arc.after)
                 };
-                let v = constrained::velocity_of(self.model, time, &state.q, &state.p, &[0.0; N]);
+                let v = constrained::velocity_of(&*self.model, time, &state.q, &state.p, &[0.0; N]);
                 (*state, v.unwrap_or([f64::NAN; N]))
             };
             self.outputs(time, &state, &v, row);
@@ -378,10 +245,11 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
         let (found, sides) =
             search::crossings(&self.sides, samples, resolution_of_tau, value, course);
         for (number, root) in found.iter().enumerate() {
-            let (column, on) = self.watched[root.function];
+            let on = &self.watched[root.function].on;
             if !on.crossing.counts(root.rises) {
                 continue;
             }
+            let name = on.name.clone();
             let met = self.locate(arc, root, resolution);
             let met = met.unwrap_or_else(|| Met::between(dense, t, root.tau * h));
             let time = if (h - met.length).abs() <= resolution {
@@ -390,22 +258,29 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
                 t + met.length
             };
             let event = Event {
-                name: on.name.clone(),
+                name: name.clone(),
                 t: time,
                 q: met.state.q,
                 v: met.velocity,
                 p: met.state.p,
                 rises: root.rises,
             };
-            let act = act(self.model, on, &event);
-            let name = event.name.clone();
-            self.met.push(event);
-            let after = match act {
-                Act::Record => continue,
-                Act::Stop => None,
-                Act::Restart(state) => Some(state),
-                Act::Impulse(impulse) => Some(kicked(&met.state, &impulse)),
+            let watched = &self.watched[root.function];
+            let act = act::act(&*self.model, (&watched.on, &watched.value), &event);
+            let goes_by = act == Act::Record;
+            let after = act::after(&*self.model, self.remodel, &event, act);
+            let place = Place {
+                watched: root.function,
+                met: self.met.len(),
+                length: met.length,
+                inside: met.inside.is_some(),
             };
+            self.met.push(event);
+            let after = after?;
+            if goes_by {
+                self.recorded.push(place);
+                continue;
+            }
             self.cuts += 1;
             let is_soon = |(last, function): (f64, usize)| {
                 function == root.function && (time - last).abs() < Self::SOON * self.step.abs()
@@ -421,38 +296,50 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
                 at: met.state,
                 inside: met.inside,
                 after,
-                length: met.length,
-                on,
-                column,
+                place,
             }));
         }
         self.sides = sides;
         Ok(None)
     }
 
-    /// The last cut, with all that derivatives need.
+    /// A cut, with all that derivatives need.
     pub(super) fn severed<'c>(
         &'c self,
         arc: &Passage<'c, N>,
-        cut: &Cut<'c, 'm, N>,
-        impulses: &'c [Impulse<N>],
-    ) -> Option<Severed<'c, 'm, N>> {
-        let event = self.met.last()?;
-        let before = |impulse: &&Impulse<N>| (impulse.time - arc.t).abs() < cut.length.abs();
-        let count = impulses.iter().take_while(before).count();
-        Some(Severed {
+        cut: &Cut<'m, M, N>,
+    ) -> Severed<'c, 'm, N> {
+        self.place(arc, &cut.place, cut.after.is_some())
+    }
+
+    /// The events that did not end the element looked into last.
+    pub(super) fn gone_by<'c>(
+        &'c self,
+        arc: &Passage<'c, N>,
+    ) -> impl Iterator<Item = Severed<'c, 'm, N>> {
+        (self.recorded.iter()).map(|place| self.place(arc, place, true))
+    }
+
+    fn place<'c>(
+        &'c self,
+        arc: &Passage<'c, N>,
+        place: &Place,
+        goes_on: bool,
+    ) -> Severed<'c, 'm, N> {
+        let before = |impulse: &&Impulse<N>| (impulse.time - arc.t).abs() < place.length.abs();
+        let count = arc.impulses.iter().take_while(before).count();
+        Severed {
             start: arc.t,
-            length: cut.length,
+            length: place.length,
             step: self.step,
             before: arc.before,
-            impulses: &impulses[..count],
-            inside: cut.inside.is_some(),
-            on: cut.on,
-            column: cut.column,
-            event,
-            number: self.met.len() - 1,
-            goes_on: cut.after.is_some(),
-        })
+            impulses: &arc.impulses[..count],
+            inside: place.inside,
+            watched: &self.watched[place.watched],
+            event: &self.met[place.met],
+            number: place.met,
+            goes_on,
+        }
     }
 
     /// After a jump of the state outputs are on new sides, but for those that are to cross at the same time.
@@ -466,6 +353,25 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
         self.sides = sides;
     }
 
+    /// Whether anything that is watched is a function of velocities; those of a Hamiltonian are of momenta.
+    fn needs_velocity(&self) -> bool {
+        matches!(M::FORM, Form::Lagrangian) || self.has_functions()
+    }
+
+    fn has_functions(&self) -> bool {
+        let is_function = |one: &Watched<'m, N>| matches!(one.value, Value::Function(_));
+        self.watched.iter().any(is_function)
+    }
+
+    /// The velocity in an element, where it is needed.
+    fn velocity_inside(&self, dense: &DenseElement<N>, time: f64) -> [f64; N] {
+        if self.needs_velocity() {
+            dense.velocity_at_time(time)
+        } else {
+            [0.0; N]
+        }
+    }
+
     /// The values of what is watched.
     fn outputs(&self, t: f64, state: &State<N>, v: &[f64; N], row: &mut Vec<f64>) {
         let z = match M::FORM {
@@ -474,7 +380,10 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
         };
         let mut values = self.rooms.values.borrow_mut();
         self.model.observables(t, &state.q, z, &mut values);
-        row.extend(self.watched.iter().map(|(column, _)| values[*column]));
+        row.extend(self.watched.iter().map(|watched| match &watched.value {
+            Value::Column(column) => values[*column],
+            Value::Function(function) => function(t, &state.q, v),
+        }));
     }
 
     /// All outputs of bounds of what they are functions of.
@@ -488,11 +397,17 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
 
     /// Whether it is proved that nothing that is watched comes to zero in an element. Sides that were not known are known then.
     fn stays_off(&mut self, dense: &DenseElement<N>) -> bool {
+        if self.has_functions() {
+            return false;
+        }
         for piece in dense.pieces() {
             let mut values = self.rooms.bounds.borrow_mut();
             self.bounded(&piece.bounds(M::FORM), &mut values);
-            for ((column, _), known) in self.watched.iter().zip(&mut self.sides) {
-                let side = values[*column].side();
+            for (watched, known) in self.watched.iter().zip(&mut self.sides) {
+                let Value::Column(column) = watched.value else {
+                    return false;
+                };
+                let side = values[column].side();
                 if side == 0.0 || *known == -side {
                     return false;
                 }
@@ -504,6 +419,9 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
 
     /// What is known of an output that is watched in a part of an element.
     fn course(&self, dense: &DenseElement<N>, function: usize, part: (f64, f64)) -> Course {
+        let Value::Column(column) = self.watched[function].value else {
+            return Course::Unknown;
+        };
         let length = dense.end() - dense.start();
         // The piece that holds the part, if one holds all of it.
         let place = |piece: &DenseElement<N>| {
@@ -518,7 +436,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
         };
         let mut values = self.rooms.slopes.borrow_mut();
         self.bounded(&piece.bounds_over(within), &mut values);
-        let Dual { value, slope, .. } = values[self.watched[function].0];
+        let Dual { value, slope, .. } = values[column];
         if value.side() != 0.0 || slope.side() != 0.0 {
             Course::Plain
         } else if value == Enclosure::WHOLE {
@@ -543,7 +461,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
         let mut length = root.tau * h;
         let mut probe = match self.probe.take() {
             Some(probe) => probe,
-            None => Stepper::new(self.model, self.element, self.control).ok()?,
+            None => Stepper::sharing(self.model.clone(), self.element, self.control).ok()?,
         };
         let mut last = f64::INFINITY;
         let mut met = None;
@@ -558,7 +476,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             }
             let guess = dense.velocity_at_time(t + length);
             let velocity =
-                constrained::velocity_of(self.model, t + length, &state.q, &state.p, &guess)
+                constrained::velocity_of(&*self.model, t + length, &state.q, &state.p, &guess)
                     .ok()?;
             let mut row = Vec::new();
             self.outputs(t + length, &state, &velocity, &mut row);
@@ -601,13 +519,5 @@ impl<'a, 'm, M: Model<N>, const N: usize> Events<'a, 'm, M, N> {
             (length / h + NEAR).min(1.0) * h,
         );
         (value(to) - value(from)) / (to - from)
-    }
-}
-
-/// The velocity that observables of a Lagrangian are functions of; those of a Hamiltonian are of the momentum, and need none.
-fn velocity_of_form<M: Model<N>, const N: usize>(dense: &DenseElement<N>, time: f64) -> [f64; N] {
-    match M::FORM {
-        Form::Lagrangian => dense.velocity_at_time(time),
-        Form::Hamiltonian => [0.0; N],
     }
 }

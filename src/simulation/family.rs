@@ -209,7 +209,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         (mesh, done, origin): (&Mesh<0>, usize, f64),
         mut stepper: FamilyStepper<'m, M>,
     ) -> Result<FamilyMotion, FamilyRunError> {
-        let motion = self.drive_from(start, (mesh, done), &mut stepper, &mut |_, _, _| {});
+        let motion = self.drive_from(start, (mesh, done), &mut stepper, &mut |_, _, _, _| {});
         let mut motion = motion.map_err(|broken| FamilyRunError::new(broken.0, broken.1))?;
         let last = motion.last();
         let checkpoint = FamilyCheckpoint {
@@ -282,7 +282,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             if self.record_every == 1 {
                 motion.keep_element(stepper.dense(t, next));
             }
-            passed(stepper, next, &state);
+            passed(stepper, next, &state, 0);
             let last = element + 1 == mesh.steps();
             if last || (element + 1) % self.record_every == 0 {
                 motion.record(self.model, next, &state, stepper.velocity(next, &state));
@@ -377,8 +377,10 @@ impl<M: FamilyModel> Iterator for FamilySteps<'_, M> {
 
     fn next(&mut self) -> Option<Self::Item> {
         let state = &mut self.state;
-        let advance = |stepper: &mut FamilyStepper<'_, M>, leg: Leg| {
-            stepper.advance(leg.begin, leg.h, state)?;
+        let advance = |stepper: &mut FamilyStepper<'_, M>, leg: &Leg| {
+            stepper
+                .advance(leg.begin, leg.h, state)
+                .map_err(|source| leg.failed(source))?;
             let (_, next) = leg.nodes;
             let velocity = stepper.velocity(next, state);
             Ok(FamilyNode::new(next, state.clone(), velocity))

@@ -1,17 +1,16 @@
 //! Who goes along with a run.
 
 use super::events::Severed;
+use crate::error::RunErrorKind;
 use crate::motion::Node;
 use tfe_runtime::step::Stepper;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Model, State};
+use tfe_runtime::{Model, Share, State};
 
-/// An element that a run has passed.
+/// Where an element begins that a run has passed.
 pub(super) struct Passed<'a, const N: usize> {
     pub(super) start: f64,
     pub(super) before: &'a State<N>,
-    pub(super) end: f64,
-    pub(super) after: &'a State<N>,
 }
 
 /// Is shown what a run does.
@@ -23,13 +22,26 @@ pub(super) trait Follow<'m, M: Model<N>, const N: usize> {
         passed: &Passed<'_, N>,
     ) -> Result<(), TransitionError>;
 
+    /// An event inside an element that goes on as if nothing had happened; before the element is passed or cut.
+    fn met(&mut self, _severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+        Ok(())
+    }
+
     /// An element that an event has cut, up to there.
-    fn cut(&mut self, _severed: &Severed<'_, '_, N>) -> Result<(), TransitionError> {
+    fn cut(&mut self, _severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
         Ok(())
     }
 
     /// After what was done at that event.
     fn acted(&mut self) {}
+
+    /// Parameters that were set at that event: the model with them.
+    fn set(&mut self, _model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+        Ok(())
+    }
+
+    /// The end of an element of the grid, in whatever pieces.
+    fn reached(&mut self, _stepper: &mut Stepper<'m, M, N>, _t: f64, _state: &State<N>) {}
 
     /// A node that is recorded.
     fn recorded(&mut self, _node: &Node<N>) {}
@@ -45,19 +57,5 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Nobody {
         _: &Passed<'_, N>,
     ) -> Result<(), TransitionError> {
         Ok(())
-    }
-}
-
-impl<'m, M, F, const N: usize> Follow<'m, M, N> for F
-where
-    M: Model<N>,
-    F: FnMut(&mut Stepper<'m, M, N>, &Passed<'_, N>) -> Result<(), TransitionError>,
-{
-    fn passed(
-        &mut self,
-        stepper: &mut Stepper<'m, M, N>,
-        passed: &Passed<'_, N>,
-    ) -> Result<(), TransitionError> {
-        self(stepper, passed)
     }
 }

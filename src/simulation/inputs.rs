@@ -1,12 +1,13 @@
 //! Runs of models with inputs.
 
+use super::events::{Remodel, remodel};
 use super::held::Held;
 use super::{RunErrorKind, Simulation};
 use crate::driven::{Cells, Driven, InputError, Interpolation};
 use std::sync::Arc;
-use tfe_runtime::{Controlled, Share, State};
+use tfe_runtime::{Controlled, Model, Share, State};
 
-impl<'m, M: Controlled<N> + Sync + 'm, const N: usize> Simulation<'m, M, N> {
+impl<'m, M: Controlled<N> + 'm, const N: usize> Simulation<'m, M, N> {
     /// Gives an input of the model as a function of the time, as [`Driven::input`]. Inputs that are not given are zero.
     ///
     /// A name that the model does not declare stops the run before it begins. Where the function jumps or has a kink, elements should [end](Self::break_at).
@@ -103,7 +104,7 @@ impl<'m, M: Controlled<N> + Sync + 'm, const N: usize> Simulation<'m, M, N> {
     }
 }
 
-impl<'m, M: Controlled<N> + Sync + 'm, const N: usize> Simulation<'m, Driven<'m, M>, N> {
+impl<'m, M: Controlled<N> + 'm, const N: usize> Simulation<'m, Driven<'m, M>, N> {
     /// Gives another input, or the same anew.
     #[must_use]
     pub fn input(self, name: &str, function: impl Fn(f64) -> f64 + Send + Sync + 'm) -> Self {
@@ -149,9 +150,13 @@ impl<'m, M: Controlled<N> + Sync + 'm, const N: usize> Simulation<'m, Driven<'m,
 
 impl<'m, M, const N: usize> Simulation<'m, M, N> {
     /// The same run of another model.
-    fn of<T>(self, model: Share<'m, T>) -> Simulation<'m, T, N> {
+    fn of<T>(self, model: Share<'m, T>) -> Simulation<'m, T, N>
+    where
+        T: Model<N> + Send + Sync + 'm,
+    {
         Simulation {
             model,
+            remodel: self.remodel.map(|_| remodel as Remodel<'m, T>),
             element: self.element,
             step: self.step,
             nodes: self.nodes,

@@ -1,9 +1,9 @@
 //! Runs with derivatives by parameters and by the start (T-123, T-124).
 
 use super::Simulation;
-use super::events::{Near, Severed, state_after};
+use super::events::{Near, Severed, WEIGHTS, state_after};
 use super::follow::{Follow, Passed};
-use crate::error::RunError;
+use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
 use crate::sensitivity::slopes::{Along, Change, Place};
 use crate::sensitivity::{Sensitive, Slopes};
@@ -49,7 +49,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 }
 
 /// Derivatives on their way along a run.
-struct Tangents<'m, M, const N: usize> {
+pub(super) struct Tangents<'m, M, const N: usize> {
     model: Share<'m, M>,
     chosen: (Element, Control),
     /// The parameters, among all, and as directions.
@@ -100,7 +100,7 @@ const END: Direction = Direction {
 };
 
 impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
-    fn new(model: Share<'m, M>, chosen: (Element, Control), indices: &[usize]) -> Self {
+    pub(super) fn new(model: Share<'m, M>, chosen: (Element, Control), indices: &[usize]) -> Self {
         let parameters = directions(&*model, indices);
         let columns = 2 * N + parameters.len();
         Self {
@@ -115,6 +115,13 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             events: Vec::new(),
             probe: None,
         }
+    }
+
+    /// The derivatives since the start, or since this was last called, from where they are counted anew.
+    pub(super) fn restart(&mut self) -> DMatrix<f64> {
+        let columns = self.columns();
+        self.moved = None;
+        std::mem::replace(&mut self.current, DMatrix::identity(2 * N, columns))
     }
 
     fn into_sensitive(self, motion: Motion<N>) -> Sensitive<N> {
@@ -215,8 +222,6 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         (at, rate): (&DMatrix<f64>, &DMatrix<f64>),
         times: &[f64],
     ) -> Result<DMatrix<f64>, TransitionError> {
-        /// Weights of the values at 1, 2 and 3 distances: of sixth order.
-        const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
         /// Distances relative to the state: the error of the formula is below roundings, and these are some 1e-13.
         const DISTANCE: f64 = 2e-3;
 
@@ -228,6 +233,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         let step = severed.step.abs();
         let q = scale(largest(&event.q).max(step * largest(&rate.q)));
         let p = scale(largest(&event.p).max(step * largest(&rate.p)));
+        let by = (&severed.watched.on, &severed.watched.value);
         let mut after = at.clone();
         for (column, dt) in times.iter().enumerate() {
             let change = Change::<N>::of_column(at, column);
@@ -257,7 +263,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
                     velocity: by_parameter.map(|v| s * v),
                     parameter: parameter.map(|index| (index, s)),
                 };
-                let found = state_after(&*self.model, severed.on, event, &near);
+                let found = state_after(&*self.model, by, event, &near);
                 let found = found.filter(|found| super::check_start(found).is_ok());
                 found.ok_or(TransitionError::from(StepError::NonFinite))
             };
@@ -286,7 +292,16 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Tangents<'m, M, 
         Ok(())
     }
 
-    fn cut(&mut self, severed: &Severed<'_, '_, N>) -> Result<(), TransitionError> {
+    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+        if !self.indices.is_empty() {
+            let call = "run_sensitive";
+            return Err(RunErrorKind::SetUnsupported { call });
+        }
+        (self.model, self.probe) = (model.clone(), None);
+        Ok(())
+    }
+
+    fn cut(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
         let (mut at, rate) = self.up_to(severed)?;
         let event = severed.event;
         let state = event.state();
@@ -300,7 +315,10 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Tangents<'m, M, 
         );
         let slope = |change: &Change<N>| {
             let velocity = along.velocity(change);
-            along.outputs(change, &velocity)[severed.column]
+            severed
+                .watched
+                .value
+                .slope(&along, event, change, &velocity)
         };
         let by_time = slope(&Change {
             t: 1.0,

@@ -1,64 +1,174 @@
 //! The endless sequence of states.
 
 use super::course::{Course, Leg};
+use super::events::Event;
+use super::follow::{Follow, Passed};
 use super::mesh::{self, Endless};
+use super::pieces::{Left, Observe, Pieces, Planned, Side};
 use crate::error::RunErrorKind;
 use crate::motion::Node;
+use std::collections::VecDeque;
 use tfe_runtime::step::{Impulse, Stepper};
+use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Model, State, Statistics};
 
 /// The endless sequence of states of [`Simulation::steps`](crate::Simulation::steps).
 #[derive(Debug)]
 pub struct Steps<'m, M, const N: usize> {
-    course: Course<Stepper<'m, M, N>>,
-    state: State<N>,
+    way: Way<'m, M, N>,
     /// Of the last node, from where the next is looked for.
     velocity: [f64; N],
+    /// Nodes at events that are to be told yet.
+    nodes: VecDeque<Result<Node<N>, RunErrorKind>>,
+}
+
+/// A stepper with its state on an endless course.
+#[derive(Debug)]
+pub(super) struct Way<'m, M, const N: usize> {
+    pub(super) course: Course<Stepper<'m, M, N>>,
+    pub(super) state: State<N>,
     impulses: Vec<Impulse<N>>,
+    /// None where no events are looked for.
+    pub(super) pieces: Option<Box<Pieces<'m, M, N>>>,
     /// Of a course that has ended.
     statistics: Statistics,
 }
 
+/// The beginning of a course: a stepper, its elements, and what looks for events.
+pub(super) type Beginning<'m, M, const N: usize> =
+    Result<(Stepper<'m, M, N>, Endless, Option<Pieces<'m, M, N>>), RunErrorKind>;
+
+impl<'m, M: Model<N>, const N: usize> Way<'m, M, N> {
+    pub(super) fn new(
+        beginning: Beginning<'m, M, N>,
+        start: State<N>,
+        impulses: Vec<Impulse<N>>,
+    ) -> Self {
+        let (way, pieces) = match beginning {
+            Ok((stepper, elements, pieces)) => (Ok((stepper, elements)), pieces.map(Box::new)),
+            Err(kind) => (Err(kind), None),
+        };
+        Self {
+            course: Course::new(way),
+            state: start,
+            impulses,
+            pieces,
+            statistics: Statistics::default(),
+        }
+    }
+
+    /// The next element, looked into for events; none after the end.
+    pub(super) fn pass(
+        &mut self,
+        observer: &mut impl Observe<'m, M, N>,
+    ) -> Option<Result<(Left, f64), RunErrorKind>> {
+        let Self {
+            course,
+            state,
+            impulses,
+            pieces,
+            statistics,
+        } = self;
+        let pieces = pieces.as_mut()?;
+        pieces.events.met.clear();
+        let advance = |stepper: &mut Stepper<'m, M, N>, leg: &Leg| {
+            let impulses = acting(impulses, leg);
+            let (t, next) = leg.nodes;
+            let planned = Planned {
+                number: leg.number,
+                t,
+                next,
+                h: leg.h,
+                begin: leg.begin,
+                impulses: &impulses,
+            };
+            let left = pieces.pass(stepper, planned, state, observer);
+            left.map(|left| (left, next)).map_err(|broken| broken.kind)
+        };
+        let passed = course.next(advance, |stepper| *statistics = *stepper.statistics());
+        if let Some(Ok((Left::Stopped, _))) = passed {
+            course.stop(|stepper| *statistics = *stepper.statistics());
+        }
+        passed
+    }
+
+    pub(super) fn statistics(&self) -> Statistics {
+        match self.course.stepper() {
+            Some(stepper) => *stepper.statistics(),
+            None => self.statistics,
+        }
+    }
+}
+
+/// The impulses that act in an element.
+fn acting<const N: usize>(impulses: &[Impulse<N>], leg: &Leg) -> Vec<Impulse<N>> {
+    let (t, next) = leg.nodes;
+    let acts = |impulse: &&Impulse<N>| mesh::within(impulse.time, t, next);
+    impulses.iter().filter(acts).copied().collect()
+}
+
 impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
     pub(super) fn new(
-        way: Result<(Stepper<'m, M, N>, Endless), RunErrorKind>,
+        beginning: Beginning<'m, M, N>,
         start: State<N>,
         t0: f64,
         impulses: Vec<Impulse<N>>,
     ) -> Self {
-        let course = Course::new(way);
+        let way = Way::new(beginning, start, impulses);
         let node = |stepper: &Stepper<'m, M, N>| Node::new(stepper.model(), t0, &start, &[0.0; N]);
-        let velocity = course.stepper().map_or([0.0; N], |stepper| node(stepper).v);
+        let velocity = (way.course.stepper()).map_or([0.0; N], |stepper| node(stepper).v);
         Self {
-            course,
-            state: start,
+            way,
             velocity,
-            impulses,
-            statistics: Statistics::default(),
+            nodes: VecDeque::new(),
         }
     }
 
     /// The model, unless the steps have ended.
     pub(super) fn model(&self) -> Option<&M> {
-        self.course.stepper().map(Stepper::model)
+        self.way.course.stepper().map(Stepper::model)
     }
 
     /// The node from which the next step goes, unless the steps have ended.
     pub(super) fn node(&self) -> Option<Node<N>> {
-        let t = self.course.time()?;
+        let t = self.way.course.time()?;
         Some(Node {
             t,
-            q: self.state.q,
-            p: self.state.p,
+            q: self.way.state.q,
+            p: self.way.state.p,
             v: self.velocity,
         })
     }
 
     /// What the steps so far have cost.
     pub fn statistics(&self) -> Statistics {
-        match self.course.stepper() {
-            Some(stepper) => *stepper.statistics(),
-            None => self.statistics,
+        self.way.statistics()
+    }
+
+    /// The [events](crate::Simulation::on) met in the step that led to the node given last, in their order. Where a step has several nodes, because events changed the state, they come
+    /// with the first of them.
+    pub fn events(&self) -> &[Event<N>] {
+        (self.way.pieces.as_ref()).map_or(&[], |pieces| &pieces.events.met)
+    }
+
+    /// A step that is looked into for events.
+    fn look(&mut self) {
+        let mut observer = Nodes {
+            nodes: &mut self.nodes,
+            velocity: &mut self.velocity,
+            last: f64::NAN,
+        };
+        match self.way.pass(&mut observer) {
+            None | Some(Ok((Left::Stopped, _))) => {}
+            Some(Err(kind)) => self.nodes.push_back(Err(kind)),
+            Some(Ok((Left::Done, next))) => {
+                if observer.last != next
+                    && let Some(stepper) = self.way.course.stepper()
+                {
+                    let state = self.way.state;
+                    observer.push(stepper.model(), next, &state);
+                }
+            }
         }
     }
 }
@@ -67,22 +177,68 @@ impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
     type Item = Result<Node<N>, RunErrorKind>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let Self {
+        if self.way.pieces.is_some() {
+            if self.nodes.is_empty() {
+                self.look();
+            }
+            return self.nodes.pop_front();
+        }
+        let Way {
             course,
             state,
-            velocity,
             impulses,
             statistics,
-        } = self;
-        let advance = |stepper: &mut Stepper<'_, M, N>, leg: Leg| {
-            let (t, next) = leg.nodes;
-            let acts = |impulse: &&Impulse<N>| mesh::within(impulse.time, t, next);
-            let impulses: Vec<_> = impulses.iter().filter(acts).copied().collect();
-            stepper.advance(leg.begin, leg.h, state, &impulses)?;
+            ..
+        } = &mut self.way;
+        let velocity = &mut self.velocity;
+        let advance = |stepper: &mut Stepper<'_, M, N>, leg: &Leg| {
+            let impulses = acting(impulses, leg);
+            stepper
+                .advance(leg.begin, leg.h, state, &impulses)
+                .map_err(|source| leg.failed(source))?;
+            let (_, next) = leg.nodes;
             let node = Node::new(stepper.model(), next, state, velocity);
             *velocity = node.v;
             Ok(node)
         };
         course.next(advance, |stepper| *statistics = *stepper.statistics())
+    }
+}
+
+/// Lines up the nodes of an element.
+struct Nodes<'a, const N: usize> {
+    nodes: &'a mut VecDeque<Result<Node<N>, RunErrorKind>>,
+    velocity: &'a mut [f64; N],
+    /// The time of the last one.
+    last: f64,
+}
+
+impl<const N: usize> Nodes<'_, N> {
+    fn push<M: Model<N>>(&mut self, model: &M, t: f64, state: &State<N>) {
+        let node = Node::new(model, t, state, self.velocity);
+        (*self.velocity, self.last) = (node.v, t);
+        self.nodes.push_back(Ok(node));
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Nodes<'_, N> {
+    fn passed(
+        &mut self,
+        _: &mut Stepper<'m, M, N>,
+        _: &Passed<'_, N>,
+    ) -> Result<(), TransitionError> {
+        Ok(())
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Observe<'m, M, N> for Nodes<'_, N> {
+    fn keeps(&self) -> bool {
+        false
+    }
+
+    fn at_event(&mut self, stepper: &Stepper<'m, M, N>, side: Side, t: f64, state: &State<N>) {
+        if side == Side::After || self.last != t {
+            self.push(stepper.model(), t, state);
+        }
     }
 }

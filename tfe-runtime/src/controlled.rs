@@ -10,7 +10,7 @@ pub const MAX_INPUTS: usize = 16;
 ///
 /// Implemented by `#[dynamics]` where `input(…)` stands; the model itself, as a [`Model`], is the one all of whose inputs are zero. Every kernel is that of [`Model`] with
 /// the inputs before its other arguments, in the order of [`INPUTS`](Self::INPUTS); entries beyond them are not read.
-pub trait Controlled<const N: usize>: Model<N> {
+pub trait Controlled<const N: usize>: Model<N> + Send + Sync {
     /// The names of the inputs, in order.
     const INPUTS: &'static [&'static str];
 

@@ -109,6 +109,25 @@ impl Statistics {
         self.contraction = self.contraction.max(other.contraction);
     }
 
+    /// What came after others that are part of these counts.
+    #[must_use]
+    pub fn since(&self, before: &Self) -> Self {
+        Self {
+            steps: self.steps - before.steps,
+            iterations: self.iterations - before.iterations,
+            fixed_point_iterations: self.fixed_point_iterations - before.fixed_point_iterations,
+            newton_iterations: self.newton_iterations - before.newton_iterations,
+            residual_evaluations: self.residual_evaluations - before.residual_evaluations,
+            tangent_evaluations: self.tangent_evaluations - before.tangent_evaluations,
+            factorizations: self.factorizations - before.factorizations,
+            fallbacks: self.fallbacks - before.fallbacks,
+            cuts: self.cuts - before.cuts,
+            kinks: self.kinks - before.kinks,
+            products: self.products - before.products,
+            contraction: self.contraction,
+        }
+    }
+
     /// How the equations were solved.
     #[must_use]
     pub fn choice(&self) -> Choice {

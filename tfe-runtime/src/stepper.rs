@@ -294,6 +294,22 @@ where
         (vec![0.0; numbers], vec![0; pivots])
     }
 
+    /// Goes on with another model, of which nothing is known yet; what the steps so far have cost stays counted.
+    ///
+    /// # Errors
+    /// None that [`new`](Self::new) did not have.
+    pub fn set_model(&mut self, model: Share<'m, M>) -> Result<(), ElementError> {
+        let control = Control {
+            solve: self.solve,
+            ..self.control
+        };
+        let mut other = Self::sharing(model, self.table.element(), control)?;
+        (other.ends_only, other.at_kinks) = (self.ends_only, self.at_kinks);
+        other.memory.statistics = self.memory.statistics;
+        *self = other;
+        Ok(())
+    }
+
     /// Changes what iterations may leave from the next step on: [`Control::tolerance`].
     pub fn set_tolerance(&mut self, tolerance: f64) {
         self.control.tolerance = tolerance;
@@ -768,6 +784,21 @@ where
         };
         let given = (self.impulses.as_slice(), directions);
         differentiate(method, &mut self.memory, workspace, &mut extra, given)
+    }
+
+    /// The element with which it steps.
+    #[must_use]
+    pub fn element(&self) -> Element {
+        self.table.element()
+    }
+
+    /// How it solves elements.
+    #[must_use]
+    pub fn control(&self) -> Control {
+        Control {
+            solve: self.solve,
+            ..self.control
+        }
     }
 
     /// The model that is stepped.

@@ -67,7 +67,7 @@ impl<'r, R: Repeatable<N>, const N: usize> Beside<'r, R, N> {
         };
         let [_, row] = &mut pair.rows;
         run.row(&mut pair.steppers[1], span.start, start, row);
-        pair.trace.pass(row, false);
+        pair.trace.pass(row, 0, false);
         pair.trace.sizes_with(row, &mut pair.sizes);
         Ok(pair)
     }
@@ -129,7 +129,7 @@ impl<R: Repeatable<N>, const N: usize> Pair for Beside<'_, R, N> {
 
     fn keep(&mut self) {
         self.state.clone_from(&self.ends[1]);
-        self.trace.pass(&self.rows[1], false);
+        self.trace.pass(&self.rows[1], 0, false);
         self.kept.0 += usize::from(self.newton > 0);
         self.kept.1 += 1;
     }

@@ -1,6 +1,7 @@
 //! Runs of models of fixed size with an estimate of their error.
 
-use super::super::follow::Passed;
+use super::super::events::Severed;
+use super::super::follow::{Follow, Passed};
 use super::super::mesh::Mesh;
 use super::super::{Simulation, check_constraints};
 use super::{
@@ -11,6 +12,7 @@ use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
 use std::ops::Range;
 use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{
     Element, First, Form, Model, Second, Solve, State, Statistics, StepError, constrained,
 };
@@ -86,10 +88,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
     ) -> Result<Estimated<Motion<N>>, RunError<N>> {
         let beginning = || Motion::from_start(&*self.model, span.start, &start);
-        let mesh = self
-            .refuse_events("run_estimated")
-            .and_then(|()| self.prepare(&start, &span));
-        let mesh = mesh.map(|(mesh, _)| mesh);
+        let mesh = self.prepare(&start, &span).map(|(mesh, _)| mesh);
         let mesh = mesh.map_err(|kind| RunError::new(kind, beginning()))?;
         estimated(self, (span.start, &start), &mesh)
             .map_err(|broken| RunError::new(broken.0, broken.1))
@@ -109,10 +108,6 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
     ) -> Result<Estimated<Motion<N>>, RunError<N>> {
         let run = &self.simulation;
         let run = &run.clone().at_kinks(run.at_kinks.unwrap_or(true));
-        run.refuse_events("accuracy").map_err(|kind| {
-            let motion = Motion::from_start(&*run.model, span.start, &start);
-            RunError::new(kind, motion)
-        })?;
         if span.start == span.end {
             let motion = run.run(start, span)?;
             let outputs = run.outputs();
@@ -145,7 +140,8 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
         let mut facts = M::FACTS;
         // Equations of first order, written as p·f(q), conserve nothing that short and long steps could spoil.
         facts.forced |= !M::FACTS.linear && is_of_first_order(&*run.model, span.start, &start);
-        let steps = Steps::of(&facts, self.equal_steps, !M::CONSTRAINTS.is_empty());
+        let are_equal = self.equal_steps || run.has_events();
+        let steps = Steps::of(&facts, are_equal, !M::CONSTRAINTS.is_empty());
         accurate(run, &start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
     }
 
@@ -214,11 +210,13 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         let stepper = Stepper::sharing(self.model.clone(), element, control)
             .map_err(RunErrorKind::Element)?;
         let stepper = self.cutting(stepper);
-        Ok(if is_recorded && self.record_every == 1 {
-            stepper
-        } else {
-            stepper.ends_only()
-        })
+        Ok(
+            if self.has_events() || (is_recorded && self.record_every == 1) {
+                stepper
+            } else {
+                stepper.ends_only()
+            },
+        )
     }
 
     fn advance(
@@ -263,12 +261,26 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         (t, start): (f64, &State<N>),
         passed: &mut Passing<'_, Stepper<'m, M, N>, State<N>>,
     ) -> Result<Motion<N>, Broken<Motion<N>>> {
-        let follower = |stepper: &mut Stepper<'m, M, N>, element: &Passed<'_, N>| {
-            passed(stepper, element.end, element.after);
-            Ok(())
+        let mut compared = Compared {
+            passed,
+            acts: 0,
+            last: t,
         };
-        self.drive_over(*start, t, mesh, stepper, follower)
-            .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))
+        let motion = self
+            .drive_over(*start, t, mesh, stepper, &mut compared)
+            .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))?;
+        // A run that an event has stopped stays where it is.
+        let (acts, last) = (compared.acts, compared.last);
+        let rest = mesh.elements().map(|(_, next, _)| next);
+        let ahead = rest.filter(|next| (next - last) * (next - t).signum() > 0.0);
+        for next in ahead {
+            passed(stepper, next, &motion.last().state(), acts);
+        }
+        Ok(motion)
+    }
+
+    fn has_events(&self) -> bool {
+        !self.events.is_empty()
     }
 
     fn part(&self, (t0, start): (f64, &State<N>), (t, end): (f64, &State<N>)) -> Motion<N> {
@@ -289,5 +301,33 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
 
     fn nodes(&self) -> Option<&[f64]> {
         self.nodes.as_deref()
+    }
+}
+
+/// Shows what a run is compared by.
+struct Compared<'a, 'p, 'm, M, const N: usize> {
+    passed: &'a mut Passing<'p, Stepper<'m, M, N>, State<N>>,
+    /// Events that have cut elements.
+    acts: usize,
+    last: f64,
+}
+
+impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Compared<'_, '_, 'm, M, N> {
+    fn passed(
+        &mut self,
+        _: &mut Stepper<'m, M, N>,
+        _: &Passed<'_, N>,
+    ) -> Result<(), TransitionError> {
+        Ok(())
+    }
+
+    fn cut(&mut self, _: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+        self.acts += 1;
+        Ok(())
+    }
+
+    fn reached(&mut self, stepper: &mut Stepper<'m, M, N>, t: f64, state: &State<N>) {
+        self.last = t;
+        (self.passed)(stepper, t, state, self.acts);
     }
 }

@@ -2,12 +2,12 @@
 
 use super::Warning;
 use tfe_runtime::step::{Control, Stepper};
-use tfe_runtime::{Element, Model, Solve, State, Statistics};
+use tfe_runtime::{Element, Model, Share, Solve, State, Statistics};
 
 /// Compares elements with three of a third of the length: halves might be cut into the same pieces as the element.
 #[derive(Debug)]
 pub(in crate::simulation) struct Resolution<'m, M, const N: usize> {
-    model: &'m M,
+    model: Share<'m, M>,
     element: Element,
     control: Control,
     /// The largest ratio of increments that is not doubtful.
@@ -49,7 +49,11 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
     /// The part of what the motion extends over that three thirds may end elsewhere.
     const MOST: f64 = 0.03;
 
-    pub(in crate::simulation) fn new(model: &'m M, element: Element, control: Control) -> Self {
+    pub(in crate::simulation) fn new(
+        model: Share<'m, M>,
+        element: Element,
+        control: Control,
+    ) -> Self {
         Self {
             model,
             element,
@@ -65,6 +69,11 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
                 p: [bound; N],
             }),
         }
+    }
+
+    /// Goes on with another model.
+    pub(in crate::simulation) fn set_model(&mut self, model: Share<'m, M>) {
+        (self.model, self.thirds) = (model, None);
     }
 
     /// Compares the element if it is the next of those that are to be. Linear models are not looked at: what their elements are wrong by is known.
@@ -114,7 +123,7 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
     fn end_of_thirds(&mut self, t: f64, h: f64, mut state: State<N>) -> Option<State<N>> {
         let mut stepper = match self.thirds.take() {
             Some(stepper) => stepper,
-            None => Stepper::new(self.model, self.element, self.control)
+            None => Stepper::sharing(self.model.clone(), self.element, self.control)
                 .ok()?
                 .ends_only(),
         };

@@ -1,0 +1,88 @@
+//! The arcs of a motion, between events that changed its state or its parameters.
+
+use std::ops::Range;
+use tfe_runtime::{Model, Statistics};
+
+/// A part of a motion between two changes of the state or of parameters, from [`Motion::arcs`](crate::Motion::arcs).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MotionArc {
+    /// Its recorded nodes: the first is the state after the event at which it begins, the last the state before that at which it ends.
+    pub nodes: Range<usize>,
+    /// What it cost. Elements that end at events are solved a few times over; those solutions are not counted.
+    pub statistics: Statistics,
+}
+
+/// A parameter that an event has set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// When.
+    pub t: f64,
+    /// The first recorded node with the new value: the second one of the two at this time.
+    pub node: usize,
+    /// The parameter, as the model calls it.
+    pub parameter: String,
+    /// Its new value.
+    pub value: f64,
+}
+
+/// Where arcs begin, and what was set there.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Arcs {
+    /// The first nodes of all but the first arc, with what all before have cost.
+    begins: Vec<(usize, Statistics)>,
+    settings: Vec<Setting>,
+}
+
+impl Arcs {
+    pub(super) fn begin(&mut self, node: usize, so_far: Statistics) {
+        self.begins.push((node, so_far));
+    }
+
+    pub(super) fn set(&mut self, setting: Setting) {
+        self.settings.push(setting);
+    }
+
+    pub(super) fn settings(&self) -> &[Setting] {
+        &self.settings
+    }
+
+    /// The nodes of every arc of a motion of `count` nodes.
+    pub(super) fn nodes(&self, count: usize) -> impl Iterator<Item = Range<usize>> {
+        let begins = self.begins.iter().map(|(node, _)| *node);
+        let starts = [0].into_iter().chain(begins.clone());
+        starts
+            .zip(begins.chain([count]))
+            .map(|(start, end)| start..end)
+    }
+
+    pub(super) fn all(&self, count: usize, total: Statistics) -> impl Iterator<Item = MotionArc> {
+        let costs = self.begins.iter().map(|(_, so_far)| *so_far);
+        let before = [Statistics::NONE].into_iter().chain(costs.clone());
+        let costs = before.zip(costs.chain([total]));
+        self.nodes(count)
+            .zip(costs)
+            .map(|(nodes, (before, after))| MotionArc {
+                nodes,
+                statistics: after.since(&before),
+            })
+    }
+
+    /// The model with what was set at a node; none where nothing was.
+    pub(super) fn model_from<M: Model<N>, const N: usize>(
+        &self,
+        model: &M,
+        node: usize,
+    ) -> Option<M> {
+        let first = self.settings.partition_point(|one| one.node < node);
+        let here = self.settings[first..]
+            .iter()
+            .take_while(|one| one.node == node);
+        let mut made: Option<M> = None;
+        for one in here {
+            let now = made.as_ref().unwrap_or(model);
+            let other = now.with_parameter(now.find_parameter(&one.parameter)?, one.value)?;
+            made = Some(other);
+        }
+        made
+    }
+}

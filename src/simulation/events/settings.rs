@@ -1,0 +1,161 @@
+//! Parameters that are set at events.
+
+use super::act::{Changed, Event, momenta_of};
+use crate::error::RunErrorKind;
+use tfe_runtime::{Model, Share, State};
+
+/// New values of parameters, for [`Act::Set`](crate::Act::Set). They hold until they are set again, or the run ends; the model of the caller stays as it is.
+///
+/// Coordinates and momenta stay as they are at the event, unless a [state](Self::and_state) or a [velocity](Self::and_velocity) is given: the momentum that stays has another velocity where a
+/// mass is set.
+///
+/// ```
+/// use tfe::Settings;
+/// use tfe::prelude::*;
+///
+/// /// A mass between two springs: a soft one to the left, a stiff one to the right.
+/// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k/2*x^2, event(middle) = x, output(stiffness) = k)]
+/// struct Springs { k: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let springs = Springs { k: 4.0 };
+/// let motion = Simulation::new(&springs)
+///     .element(Mixed::<8>)
+///     .step(0.1)
+///     .on("middle", Crossing::Either, |event| {
+///         Act::Set(Settings::new("k", if event.rises { 4.0 } else { 1.0 }))
+///     })
+///     .run(springs.state([1.0], [0.0]), 0.0..20.0)?;
+/// // Half a period with either stiffness: (π + π/2) together.
+/// let period = 1.5 * std::f64::consts::PI;
+/// assert!((motion.at(3.0 * period)?.q[0] - 1.0).abs() < 1e-9);
+/// assert_eq!(motion.settings()[0].value, 1.0);
+/// assert!(motion.energy_error() < 1e-12); // from each event to the next
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings<const N: usize> {
+    values: Vec<(String, f64)>,
+    from: From<N>,
+}
+
+/// From where a run goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum From<const N: usize> {
+    Here,
+    State(State<N>),
+    Velocity([f64; N]),
+}
+
+impl<const N: usize> Settings<N> {
+    /// Sets one parameter: `k`, or `m[2]` for an element of an array.
+    pub fn new(parameter: impl Into<String>, value: f64) -> Self {
+        Self {
+            values: vec![(parameter.into(), value)],
+            from: From::Here,
+        }
+    }
+
+    /// Sets another one besides.
+    #[must_use]
+    pub fn and(mut self, parameter: impl Into<String>, value: f64) -> Self {
+        self.values.push((parameter.into(), value));
+        self
+    }
+
+    /// Goes on from this state.
+    #[must_use]
+    pub fn and_state(mut self, state: State<N>) -> Self {
+        self.from = From::State(state);
+        self
+    }
+
+    /// Goes on with these velocities, whose momenta are those of the new parameters.
+    #[must_use]
+    pub fn and_velocity(mut self, v: [f64; N]) -> Self {
+        self.from = From::Velocity(v);
+        self
+    }
+
+    /// The model with these values, and the numbers of the parameters.
+    pub(super) fn applied<'m, M: Model<N>>(
+        &self,
+        model: &M,
+        remodel: Option<Remodel<'m, M>>,
+    ) -> Result<Changed<'m, M>, RunErrorKind> {
+        let number = |(name, value): &(String, f64)| {
+            let index = model
+                .find_parameter(name)
+                .ok_or_else(|| RunErrorKind::NoParameter {
+                    name: name.clone(),
+                    known: (0..model.parameters())
+                        .map(|index| model.parameter_name(index).to_string())
+                        .collect(),
+                })?;
+            if value.is_finite() {
+                Ok((index, *value))
+            } else {
+                Err(RunErrorKind::Parameter {
+                    name: name.clone(),
+                    value: *value,
+                })
+            }
+        };
+        let values: Vec<_> = self.values.iter().map(number).collect::<Result<_, _>>()?;
+        let made = remodel.and_then(|remodel| remodel(model, &values));
+        match made {
+            Some(model) => Ok((model, values)),
+            None => Err(RunErrorKind::ParametersFixed),
+        }
+    }
+
+    /// The state from where the run goes on, of the model with the new values.
+    pub(super) fn state<M: Model<N>>(&self, model: &M, event: &Event<N>) -> State<N> {
+        match self.from {
+            From::Here => event.state(),
+            From::State(state) => state,
+            From::Velocity(v) => State {
+                q: event.q,
+                p: momenta_of(model, event, v),
+            },
+        }
+    }
+
+    /// The same where the model has the old values still.
+    pub(super) fn state_nearby<M: Model<N>>(
+        &self,
+        model: &M,
+        event: &Event<N>,
+    ) -> Option<State<N>> {
+        if let From::Velocity(_) = self.from {
+            let mut values = self.values.iter();
+            let (name, value) = values.next()?;
+            let mut made = model.with_parameter(model.find_parameter(name)?, *value)?;
+            for (name, value) in values {
+                made = made.with_parameter(made.find_parameter(name)?, *value)?;
+            }
+            return Some(self.state(&made, event));
+        }
+        Some(self.state(model, event))
+    }
+}
+
+/// Makes a model with other values of some parameters, if that can be.
+pub(in crate::simulation) type Remodel<'m, M> = fn(&M, &[(usize, f64)]) -> Option<Share<'m, M>>;
+
+/// The [`Remodel`] of a model that may go to other threads.
+pub(in crate::simulation) fn remodel<'m, M, const N: usize>(
+    model: &M,
+    values: &[(usize, f64)],
+) -> Option<Share<'m, M>>
+where
+    M: Model<N> + Send + Sync + 'm,
+{
+    let ((first, value), others) = values.split_first()?;
+    let mut made = model.with_parameter(*first, *value)?;
+    for (index, value) in others {
+        made = made.with_parameter(*index, *value)?;
+    }
+    Some(Share::own(made))
+}

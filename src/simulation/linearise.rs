@@ -1,0 +1,111 @@
+//! Runs with the transition matrix of every element.
+
+use super::Simulation;
+use super::events::Severed;
+use super::follow::{Follow, Passed};
+use super::sensitive::Tangents;
+use crate::error::{RunError, RunErrorKind};
+use crate::linearised::Linearised;
+use nalgebra::DMatrix;
+use std::convert::identity;
+use std::ops::Range;
+use tfe_runtime::step::Stepper;
+use tfe_runtime::transition::TransitionError;
+use tfe_runtime::{Model, Share, State};
+
+impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
+    /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion.
+    ///
+    /// A matrix costs a factorisation of the element's tangent and 2N solutions with it: half a step for one coordinate, some twenty steps
+    /// for twenty coordinates that a step iterates without Newton's method. Impulses are constant, so that they enter through the
+    /// motion only. The example is at [`Linearised`].
+    ///
+    /// At [events](Self::on) that change the state the matrix of their element goes across, with the time of the event, which moves (T-140); acts are called several times with states
+    /// nearby, whose differences of sixth order are their derivatives. Where an event falls on a node, both elements have one matrix.
+    ///
+    /// # Errors
+    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element has no transition matrix.
+    pub fn run_linearised(
+        &self,
+        start: State<N>,
+        span: Range<f64>,
+    ) -> Result<Linearised<N>, RunError<N>> {
+        let chosen = (self.chosen_element(), self.control);
+        let mut matrices = Matrices {
+            tangents: Tangents::new(self.model.clone(), chosen, &[]),
+            is_across: false,
+            entries: vec![0.0; 4 * N * N],
+            transitions: Vec::new(),
+            starts: Vec::new(),
+        };
+        let motion = self.drive(start, &span, identity, &mut matrices)?;
+        matrices.close();
+        let Matrices {
+            transitions,
+            starts,
+            ..
+        } = matrices;
+        Ok(Linearised::new(&*self.model, motion, transitions, &starts))
+    }
+}
+
+/// The matrices of the elements passed so far.
+struct Matrices<'m, M, const N: usize> {
+    /// Since the last of them.
+    tangents: Tangents<'m, M, N>,
+    /// Whether there has been an event since.
+    is_across: bool,
+    entries: Vec<f64>,
+    transitions: Vec<DMatrix<f64>>,
+    /// Of every matrix, for models with constraints.
+    starts: Vec<(f64, State<N>)>,
+}
+
+impl<M: Model<N>, const N: usize> Matrices<'_, M, N> {
+    fn begin(&mut self, t: f64, state: &State<N>) {
+        if const { !M::CONSTRAINTS.is_empty() } && !self.is_across {
+            self.starts.push((t, *state));
+        }
+    }
+
+    /// Ends a matrix that goes across events.
+    fn close(&mut self) {
+        if self.is_across {
+            self.transitions.push(self.tangents.restart());
+            self.is_across = false;
+        }
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Matrices<'m, M, N> {
+    fn passed(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        passed: &Passed<'_, N>,
+    ) -> Result<(), TransitionError> {
+        self.begin(passed.start, passed.before);
+        if self.is_across {
+            (&mut self.tangents).passed(stepper, passed)?;
+            self.close();
+            return Ok(());
+        }
+        stepper.transition(&mut self.entries)?;
+        let matrix = DMatrix::from_row_slice(2 * N, 2 * N, &self.entries);
+        self.transitions.push(matrix);
+        Ok(())
+    }
+
+    fn cut(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+        self.begin(severed.start, severed.before);
+        self.is_across = true;
+        (&mut self.tangents).cut(severed)
+    }
+
+    fn acted(&mut self) {
+        (&mut self.tangents).acted();
+    }
+
+    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+        (&mut self.tangents).set(model)
+    }
+}

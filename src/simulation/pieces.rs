@@ -1,0 +1,262 @@
+//! One element of the grid of a run, in the pieces into which events cut it.
+
+use super::check_restart;
+use super::events::{After, Changed, Cut, Events, Passage};
+use super::follow::{Follow, Passed};
+use crate::error::RunErrorKind;
+use tfe_runtime::step::{DenseElement, Impulse, Stepper};
+use tfe_runtime::{Model, Share, State};
+
+/// An element of the grid.
+#[derive(Clone, Copy)]
+pub(super) struct Planned<'a, const N: usize> {
+    pub(super) number: usize,
+    /// The nodes.
+    pub(super) t: f64,
+    pub(super) next: f64,
+    pub(super) h: f64,
+    /// Where it begins, to all digits.
+    pub(super) begin: f64,
+    pub(super) impulses: &'a [Impulse<N>],
+}
+
+/// A piece that has been passed without an event that cuts it.
+pub(super) struct Piece<'a, const N: usize> {
+    pub(super) start: f64,
+    pub(super) h: f64,
+    pub(super) before: &'a State<N>,
+    pub(super) after: &'a State<N>,
+    pub(super) has_impulses: bool,
+}
+
+/// Which side of an event a node is on.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    Before,
+    After,
+}
+
+/// Is shown what becomes of an element.
+pub(super) trait Observe<'m, M: Model<N>, const N: usize>: Follow<'m, M, N> {
+    /// Whether the polynomial of every piece is wanted.
+    fn keeps(&self) -> bool;
+
+    /// A piece that was not cut.
+    fn whole(&mut self, _stepper: &Stepper<'m, M, N>, _piece: &Piece<'_, N>) {}
+
+    /// A polynomial that is wanted.
+    fn inside(&mut self, _dense: DenseElement<N>) {}
+
+    /// A node at an event.
+    fn at_event(&mut self, stepper: &Stepper<'m, M, N>, side: Side, t: f64, state: &State<N>);
+
+    /// Parameters, by their numbers, that were set at the time of the node that is to come.
+    fn changed(&mut self, _model: &Share<'m, M>, _values: &[(usize, f64)]) {}
+}
+
+/// How an element was left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Left {
+    /// At its end.
+    Done,
+    /// At an event that ends the run.
+    Stopped,
+}
+
+/// Why an element was not passed.
+#[derive(Debug)]
+pub(super) struct Broken<const N: usize> {
+    pub(super) kind: RunErrorKind,
+    /// Where the piece begins that could not be passed, with its length; none where a state after an event cannot be used.
+    pub(super) piece: Option<(f64, f64, State<N>)>,
+}
+
+/// Passes elements, with a look at events.
+#[derive(Debug)]
+pub(super) struct Pieces<'m, M, const N: usize> {
+    /// As events have left it.
+    pub(super) model: Share<'m, M>,
+    pub(super) events: Events<'m, M, N>,
+    /// Of an element that was looked into and is not kept.
+    spare: Option<DenseElement<N>>,
+    /// Whether parameters were set.
+    is_changed: bool,
+}
+
+impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
+    pub(super) fn new(model: Share<'m, M>, events: Events<'m, M, N>) -> Self {
+        Self {
+            model,
+            events,
+            spare: None,
+            is_changed: false,
+        }
+    }
+
+    /// Whether parameters were set.
+    pub(super) fn is_changed(&self) -> bool {
+        self.is_changed
+    }
+
+    /// Moves a state from the start to the end of an element, or to the event that ends the run.
+    pub(super) fn pass(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        planned: Planned<'_, N>,
+        state: &mut State<N>,
+        observer: &mut impl Observe<'m, M, N>,
+    ) -> Result<Left, Box<Broken<N>>> {
+        let Planned { t, next, h, .. } = planned;
+        self.events.begin(h);
+        // What is left of the element behind its last event.
+        let (mut from, mut length) = (t, h);
+        loop {
+            let ahead =
+                |impulse: &&Impulse<N>| from == t || h.signum() * impulse.time >= h.signum() * from;
+            let behind = (planned.impulses.iter())
+                .take_while(|one| !ahead(one))
+                .count();
+            let piece = Planned {
+                t: from,
+                h: length,
+                begin: if from == t { planned.begin } else { from },
+                impulses: &planned.impulses[behind..],
+                ..planned
+            };
+            let before = *state;
+            let cut = self.pass_piece(stepper, piece, state, observer);
+            let cut = cut.map_err(|kind| Broken {
+                kind,
+                piece: Some((from, length, before)),
+            })?;
+            let Some(cut) = cut else {
+                observer.reached(stepper, next, state);
+                return Ok(Left::Done);
+            };
+            let Cut {
+                t: time,
+                at,
+                inside,
+                after,
+                ..
+            } = cut;
+            if let Some(dense) = inside.filter(|_| observer.keeps()) {
+                observer.inside(dense);
+            }
+            observer.at_event(stepper, Side::Before, time, &at);
+            observer.acted();
+            let Some(After {
+                state: after,
+                model,
+            }) = after
+            else {
+                *state = at;
+                return Ok(Left::Stopped);
+            };
+            let changed = model.map_or(Ok(()), |changed| self.change(stepper, observer, changed));
+            let good = changed.and_then(|()| check_restart(&*self.model, time, length, &after));
+            good.map_err(|kind| Broken { kind, piece: None })?;
+            observer.at_event(stepper, Side::After, time, &after);
+            *state = after;
+            if time == next {
+                observer.reached(stepper, next, state);
+                return Ok(Left::Done);
+            }
+            length -= time - from;
+            from = time;
+        }
+    }
+
+    /// Moves a state to the end of a piece, unless an event cuts it.
+    fn pass_piece(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        piece: Planned<'_, N>,
+        state: &mut State<N>,
+        observer: &mut impl Observe<'m, M, N>,
+    ) -> Result<Option<Cut<'m, M, N>>, RunErrorKind> {
+        let Planned {
+            number,
+            t,
+            next,
+            h,
+            begin,
+            impulses,
+        } = piece;
+        let before = *state;
+        stepper
+            .advance(begin, h, state, impulses)
+            .map_err(|source| RunErrorKind::Solve {
+                element: number,
+                time: t,
+                step: h,
+                source,
+            })?;
+        let keeps = observer.keeps();
+        // Before a matrix, which needs the same memory.
+        let dense = (keeps || !self.events.is_empty())
+            .then(|| stepper.dense_in(self.spare.take(), t, next));
+        let no_matrix = |source| RunErrorKind::Transition {
+            element: number,
+            time: t,
+            step: h,
+            source,
+        };
+        if let Some(dense) = dense.as_ref().filter(|_| !self.events.is_empty()) {
+            let arc = Passage {
+                t,
+                h,
+                before: &before,
+                after: state,
+                dense,
+                impulses,
+            };
+            let cut = self.events.look(&arc)?;
+            for severed in self.events.gone_by(&arc) {
+                observer.met(&severed).map_err(no_matrix)?;
+            }
+            if let Some(cut) = cut {
+                let severed = self.events.severed(&arc, &cut);
+                observer.cut(&severed).map_err(no_matrix)?;
+                return Ok(Some(cut));
+            }
+        }
+        let passed = Passed {
+            start: t,
+            before: &before,
+        };
+        observer.passed(stepper, &passed).map_err(no_matrix)?;
+        observer.whole(
+            stepper,
+            &Piece {
+                start: t,
+                h,
+                before: &before,
+                after: state,
+                has_impulses: !impulses.is_empty(),
+            },
+        );
+        match dense {
+            Some(dense) if keeps => observer.inside(dense),
+            unneeded => self.spare = unneeded,
+        }
+        Ok(None)
+    }
+
+    /// Goes on with other parameters.
+    fn change(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        observer: &mut impl Observe<'m, M, N>,
+        (model, values): Changed<'m, M>,
+    ) -> Result<(), RunErrorKind> {
+        observer.set(&model)?;
+        stepper
+            .set_model(model.clone())
+            .map_err(RunErrorKind::Element)?;
+        self.events.set_model(model.clone());
+        observer.changed(&model, &values);
+        (self.model, self.is_changed) = (model, true);
+        Ok(())
+    }
+}
