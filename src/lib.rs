@@ -46,11 +46,11 @@ pub use linearised::Linearised;
 pub use modal::Modal;
 pub use motion::{Motion, MotionArc, Node, Outputs, Setting};
 pub use optimal_control::{OptimalControl, Optimum};
-pub use periodic::{Orbit, PeriodicOrbit};
+pub use periodic::{HybridOrbit, Orbit, PeriodicOrbit};
 pub use sensitivity::Sensitive;
 pub use simulation::{
-    Act, Checkpoint, Crossing, Event, Held, HeldNode, Occurrence, Settings, Simulation, Steps,
-    Warning,
+    Act, Checkpoint, Crossing, Event, Held, HeldNode, Occurrence, Section, SectionPoint, Settings,
+    Simulation, Steps, Warning,
 };
 pub use tfe_macros::dynamics;
 /// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.

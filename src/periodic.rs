@@ -10,12 +10,14 @@
 //! 10⁻¹² keeps its digits beside one of 10¹².
 
 mod family;
+mod hybrid;
 pub(crate) mod orbit;
 pub(crate) mod problem;
 
 pub use family::Orbits;
 #[cfg(feature = "sparse")]
 pub use family::{FamilyOrbit, FamilyPeriodicOrbit};
+pub use hybrid::{HybridOrbit, HybridOrbits};
 pub use orbit::{Exponent, Orbit, Verdict};
 
 use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh, MeshError};
@@ -402,6 +404,22 @@ pub enum OrbitError {
     },
     /// The run that was to give the guess failed.
     Guess(RunErrorKind),
+    /// A motion of an orbit with events failed.
+    Run(RunErrorKind),
+    /// An event stopped a motion before its period had passed.
+    Stopped {
+        /// When.
+        time: f64,
+    },
+    /// Corrections no longer bring the end of a motion with events nearer to its start.
+    Stalled {
+        /// How far they are apart, in parts of the motion.
+        residual: f64,
+        /// Corrections so far.
+        iterations: u32,
+    },
+    /// Orbits with events are not found for models with constraints: minimal coordinates are needed.
+    HybridConstraints,
     /// The assembled equations were not solved.
     Assembly(AssemblyError),
     /// An autonomous model has no orbit of this period: the equations can only be met with an additional force γ v.
@@ -451,6 +469,20 @@ impl fmt::Display for OrbitError {
                 write!(f, "the condition of phase names coordinate {index}, which does not exist")
             }
             Self::Guess(error) => write!(f, "the motion that was to be the guess: {error}"),
+            Self::Run(error) => write!(f, "a motion on the way to the orbit: {error}"),
+            Self::Stopped { time } => {
+                write!(f, "an event ends the motion at t = {time}, before a period has passed")
+            }
+            Self::Stalled {
+                residual,
+                iterations,
+            } => write!(
+                f,
+                "no orbit near the guess: after {iterations} corrections end and start are {residual:.1e} of the motion apart"
+            ),
+            Self::HybridConstraints => f.write_str(
+                "orbits with events are found for models without constraints only: declare minimal coordinates",
+            ),
             Self::Assembly(error) => error.fmt(f),
             Self::NoFamily { unfolding } => write!(
                 f,
@@ -469,7 +501,7 @@ impl std::error::Error for OrbitError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Self::Mesh(error) => Some(error),
-            Self::Guess(error) => Some(error),
+            Self::Guess(error) | Self::Run(error) => Some(error),
             Self::Assembly(error) => error.source(),
             Self::Multipliers(error) => Some(error),
             #[cfg(feature = "sparse")]

@@ -14,6 +14,7 @@ pub(crate) mod mesh;
 mod pieces;
 mod progress;
 mod recorder;
+mod section;
 mod sensitive;
 mod steps;
 mod watch;
@@ -39,6 +40,7 @@ pub(crate) use checkpoint::Reached;
 pub use checkpoint::{Checkpoint, FamilyCheckpoint};
 pub use events::{Act, Crossing, Event, Occurrence, Settings};
 pub use held::{Held, HeldNode};
+pub use section::{Section, SectionPoint};
 pub use steps::Steps;
 pub use watch::Warning;
 pub(crate) use watch::is_jump;
@@ -491,6 +493,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
         let pieces = self.pieces(&stepper)?;
         Ok((stepper, elements, Some(pieces)))
+    }
+
+    pub(crate) fn model(&self) -> &M {
+        &self.model
     }
 
     fn chosen_element(&self) -> Element {

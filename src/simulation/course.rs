@@ -85,6 +85,11 @@ impl<S> Course<S> {
         }
     }
 
+    /// The error that the course ended with, until it has been told.
+    pub(super) fn failure(&mut self) -> Option<RunErrorKind> {
+        self.way.as_mut().err()?.take()
+    }
+
     /// Ends without an error.
     pub(super) fn stop(&mut self, ended: impl FnOnce(&S)) {
         if let Ok((stepper, _)) = &self.way {

@@ -120,6 +120,8 @@ pub(super) struct Severed<'a, 'm, const N: usize> {
     /// False where the event is at the start.
     pub(super) inside: bool,
     pub(super) watched: &'a Watched<'m, N>,
+    /// The place of what is watched among all.
+    pub(super) which: usize,
     pub(super) event: &'a Event<N>,
     /// The place of the event among all.
     pub(super) number: usize,
@@ -336,6 +338,7 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
             impulses: &arc.impulses[..count],
             inside: place.inside,
             watched: &self.watched[place.watched],
+            which: place.watched,
             event: &self.met[place.met],
             number: place.met,
             goes_on,

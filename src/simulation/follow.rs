@@ -59,3 +59,41 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Nobody {
         Ok(())
     }
 }
+
+impl<'m, M, F, const N: usize> Follow<'m, M, N> for &mut F
+where
+    M: Model<N>,
+    F: Follow<'m, M, N>,
+{
+    fn passed(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        passed: &Passed<'_, N>,
+    ) -> Result<(), TransitionError> {
+        (**self).passed(stepper, passed)
+    }
+
+    fn met(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+        (**self).met(severed)
+    }
+
+    fn cut(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+        (**self).cut(severed)
+    }
+
+    fn acted(&mut self) {
+        (**self).acted();
+    }
+
+    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+        (**self).set(model)
+    }
+
+    fn reached(&mut self, stepper: &mut Stepper<'m, M, N>, t: f64, state: &State<N>) {
+        (**self).reached(stepper, t, state);
+    }
+
+    fn recorded(&mut self, node: &Node<N>) {
+        (**self).recorded(node);
+    }
+}

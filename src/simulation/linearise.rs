@@ -77,7 +77,7 @@ impl<M: Model<N>, const N: usize> Matrices<'_, M, N> {
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Matrices<'m, M, N> {
+impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Matrices<'m, M, N> {
     fn passed(
         &mut self,
         stepper: &mut Stepper<'m, M, N>,
@@ -85,7 +85,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Matrices<'m, M, 
     ) -> Result<(), TransitionError> {
         self.begin(passed.start, passed.before);
         if self.is_across {
-            (&mut self.tangents).passed(stepper, passed)?;
+            self.tangents.passed(stepper, passed)?;
             self.close();
             return Ok(());
         }
@@ -98,14 +98,14 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Matrices<'m, M, 
     fn cut(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
         self.begin(severed.start, severed.before);
         self.is_across = true;
-        (&mut self.tangents).cut(severed)
+        self.tangents.cut(severed)
     }
 
     fn acted(&mut self) {
-        (&mut self.tangents).acted();
+        self.tangents.acted();
     }
 
     fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
-        (&mut self.tangents).set(model)
+        self.tangents.set(model)
     }
 }

@@ -124,6 +124,66 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         std::mem::replace(&mut self.current, DMatrix::identity(2 * N, columns))
     }
 
+    /// The derivative of the state at an event that changes nothing, with its time; from there on derivatives are counted anew.
+    pub(super) fn crossed(
+        &mut self,
+        severed: &Severed<'_, 'm, N>,
+    ) -> Result<DMatrix<f64>, TransitionError> {
+        let (at, rate) = self.up_to(severed)?;
+        let times = self.times(severed, (&at, &rate))?;
+        // Where the element begins, by the state at the event at a fixed time.
+        let back = at.clone().try_inverse();
+        let back = back.ok_or(TransitionError::from(StepError::NonFinite))?;
+        if let Some(moved) = &mut self.moved {
+            let row = DMatrix::from_row_slice(1, moved.len(), moved) * &back;
+            *moved = row.iter().copied().collect();
+        }
+        self.current = &self.current * back;
+        let mut matrix = at;
+        for (mut column, dt) in matrix.column_iter_mut().zip(&times) {
+            column.axpy(*dt, &rate.column(0), 1.0);
+        }
+        Ok(matrix)
+    }
+
+    /// By how much every column moves the time of an event: g(t*, y(t*)) = 0, so ġ dt* = −δg.
+    fn times(
+        &self,
+        severed: &Severed<'_, 'm, N>,
+        (at, rate): (&DMatrix<f64>, &DMatrix<f64>),
+    ) -> Result<Vec<f64>, TransitionError> {
+        let event = severed.event;
+        let state = event.state();
+        let place = Place {
+            t: event.t,
+            state: &state,
+            v: &event.v,
+        };
+        let along = Along::new(&*self.model, place);
+        let slope = |change: &Change<N>| {
+            let velocity = along.velocity(change);
+            let value = &severed.watched.value;
+            value.slope(&along, event, change, &velocity)
+        };
+        let by_time = slope(&Change {
+            t: 1.0,
+            ..Change::of_column(rate, 0)
+        });
+        let time = |column| {
+            let change = Change {
+                parameter: self.parameter(column),
+                ..Change::of_column(at, column)
+            };
+            -slope(&change) / by_time
+        };
+        let times: Vec<f64> = (0..self.columns()).map(time).collect();
+        if times.iter().all(|dt| dt.is_finite()) {
+            Ok(times)
+        } else {
+            Err(StepError::NonFinite.into())
+        }
+    }
+
     fn into_sensitive(self, motion: Motion<N>) -> Sensitive<N> {
         let names = self.indices.iter();
         let names = names.map(|index| self.model.parameter_name(*index).to_string());
@@ -281,7 +341,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Tangents<'m, M, N> {
+impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
     fn passed(
         &mut self,
         stepper: &mut Stepper<'m, M, N>,
@@ -313,30 +373,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Tangents<'m, M, 
                 v: &event.v,
             },
         );
-        let slope = |change: &Change<N>| {
-            let velocity = along.velocity(change);
-            severed
-                .watched
-                .value
-                .slope(&along, event, change, &velocity)
-        };
-        let by_time = slope(&Change {
-            t: 1.0,
-            ..Change::of_column(&rate, 0)
-        });
-        // g(t*, y(t*)) = 0: ġ dt* = −δg.
-        let times: Vec<f64> = (0..self.columns())
-            .map(|column| {
-                let change = Change {
-                    parameter: self.parameter(column),
-                    ..Change::of_column(&at, column)
-                };
-                -slope(&change) / by_time
-            })
-            .collect();
-        if !times.iter().all(|dt| dt.is_finite()) {
-            return Err(StepError::NonFinite.into());
-        }
+        let times = self.times(severed, (&at, &rate))?;
         for (mut column, dt) in at.column_iter_mut().zip(&times) {
             column.axpy(*dt, &rate.column(0), 1.0);
         }

@@ -69,7 +69,9 @@ impl<'m, M: Model<N>, const N: usize> Way<'m, M, N> {
             pieces,
             statistics,
         } = self;
-        let pieces = pieces.as_mut()?;
+        let Some(pieces) = pieces.as_mut() else {
+            return course.failure().map(Err);
+        };
         pieces.events.met.clear();
         let advance = |stepper: &mut Stepper<'m, M, N>, leg: &Leg| {
             let impulses = acting(impulses, leg);

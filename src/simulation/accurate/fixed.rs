@@ -312,7 +312,7 @@ struct Compared<'a, 'p, 'm, M, const N: usize> {
     last: f64,
 }
 
-impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for &mut Compared<'_, '_, 'm, M, N> {
+impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Compared<'_, '_, 'm, M, N> {
     fn passed(
         &mut self,
         _: &mut Stepper<'m, M, N>,

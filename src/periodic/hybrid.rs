@@ -1,0 +1,400 @@
+//! Periodic orbits of motions with events that change the state: impacts, switches.
+
+use super::orbit::{sort, trivial_of};
+use super::{OrbitError, PeriodicOrbit, Verdict};
+use crate::linearised::Linearised;
+use crate::motion::Motion;
+use crate::periodic_schur::Multiplier;
+use crate::simulation::Simulation;
+use nalgebra::{Complex, DMatrix, DVector};
+use tfe_runtime::{First, Form, Model, State};
+
+impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
+    /// An orbit of a simulation with [events](Simulation::on) that change the state: an oscillator that hits a wall, a machine that switches. The simulation brings model, element and events;
+    /// the orbit its steps.
+    ///
+    /// ```
+    /// use std::f64::consts::TAU;
+    /// use tfe::prelude::*;
+    ///
+    /// /// A ball on a table that shakes: height above the table, with the table's acceleration −a ω² sin ωt.
+    /// #[dynamics(
+    ///     coordinates(y),
+    ///     lagrangian = dot(y)^2/2 - (g - a*omega^2*sin(omega*t))*y,
+    ///     event(impact) = y,
+    /// )]
+    /// struct Table { g: f64, a: f64, omega: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let table = Table { g: 9.81, a: 0.002, omega: 50.0 };
+    /// let bounce = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.8));
+    /// let simulation = Simulation::new(&table).element(Mixed::<8>).on("impact", Crossing::Falling, bounce);
+    /// let period = TAU / 50.0;
+    /// // Half way up: the ball flies for one period, thrown by a table that moves at (1 − e)/(1 + e) g T/2.
+    /// let w = 0.2 / 1.8 * 9.81 * period / 2.0;
+    /// let phase = (w / (0.002 * 50.0)).acos();
+    /// let start = table.state([9.81 * period * period / 8.0], [w]);
+    /// let orbit = PeriodicOrbit::of_simulation(&simulation)
+    ///     .start_time(phase / 50.0 + 0.5 * period)
+    ///     .period(period)
+    ///     .guess_from(start)
+    ///     .solve()?;
+    /// assert_eq!(orbit.motion().events().len(), 1);
+    /// let product = orbit.multipliers()[0] * orbit.multipliers()[1];
+    /// assert!((product.re - 0.64).abs() < 1e-9); // e²
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn of_simulation(simulation: &Simulation<'m, M, N>) -> HybridOrbits<'m, M, N> {
+        HybridOrbits {
+            simulation: simulation.clone(),
+            elements: 40,
+            start: 0.0,
+            period: super::Period::Missing,
+            guess: None,
+            advance: [0.0; N],
+            tolerance: 1e-13,
+            max_iterations: 50,
+        }
+    }
+}
+
+/// A periodic orbit with events, to be found; made by [`PeriodicOrbit::of_simulation`].
+///
+/// Newton's method on the state at the start, and on the period where it is not known:
+///
+/// ```text
+/// y(T; y₀) − y₀ = (0, advance) ,     (A − 1) δy₀ + ẏ(T) δT = −r                                         (T-142)
+/// ```
+///
+/// with A of [`run_linearised`](Simulation::run_linearised), across events; of corrections that do the same, as of orbits that come in families, the shortest is taken, and corrections that make
+/// r larger are halved. The guess should meet the events of the orbit, and begin away from them.
+#[derive(Debug)]
+pub struct HybridOrbits<'m, M, const N: usize> {
+    simulation: Simulation<'m, M, N>,
+    elements: usize,
+    start: f64,
+    period: super::Period,
+    guess: Option<State<N>>,
+    advance: [f64; N],
+    tolerance: f64,
+    max_iterations: u32,
+}
+
+impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
+    /// The number of elements of a period, 40 by default; events cut some of them.
+    #[must_use]
+    pub fn elements(mut self, elements: usize) -> Self {
+        self.elements = elements.max(1);
+        self
+    }
+
+    /// The time at which the period begins; 0 by default.
+    #[must_use]
+    pub fn start_time(mut self, time: f64) -> Self {
+        self.start = time;
+        self
+    }
+
+    /// The period, known: of the forcing, or a multiple of it.
+    #[must_use]
+    pub fn period(mut self, period: f64) -> Self {
+        self.period = super::Period::Known(period);
+        self
+    }
+
+    /// The period is to be found, near `guess`; for models that do not depend on time.
+    #[must_use]
+    pub fn unknown_period(mut self, guess: f64) -> Self {
+        self.period = super::Period::Guess(guess);
+        self
+    }
+
+    /// The state at which to begin.
+    #[must_use]
+    pub fn guess_from(mut self, state: State<N>) -> Self {
+        self.guess = Some(state);
+        self
+    }
+
+    /// How much the coordinates grow over a period. Zero by default.
+    #[must_use]
+    pub fn advance(mut self, advance: [f64; N]) -> Self {
+        self.advance = advance;
+        self
+    }
+
+    /// When the iteration is done: the relative size of the last correction, 10⁻¹³ by default; it ends as well where corrections below 10⁻⁹ shrink no more.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.tolerance = tolerance;
+        self
+    }
+
+    /// The most iterations of Newton's method, 50 by default.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: u32) -> Self {
+        self.max_iterations = iterations;
+        self
+    }
+
+    /// Finds the orbit and its multipliers.
+    ///
+    /// # Errors
+    /// [`OrbitError`]: [`Run`](OrbitError::Run) where a motion fails, [`Stalled`](OrbitError::Stalled) where no orbit is found near the guess; models with constraints are
+    /// [not supported](OrbitError::HybridConstraints).
+    pub fn solve(&self) -> Result<HybridOrbit<N>, OrbitError> {
+        /// Corrections below this that shrink no more are roundings.
+        const ROUNDED: f64 = 1e-9;
+        const MAX_HALVINGS: u32 = 12;
+        if const { !M::CONSTRAINTS.is_empty() } {
+            return Err(OrbitError::HybridConstraints);
+        }
+        let mut period = self.period.checked()?;
+        let is_free = matches!(self.period, super::Period::Guess(_));
+        if is_free && M::FACTS.time_dependent {
+            return Err(OrbitError::ForcedPeriod);
+        }
+        let mut state = self.guess.unwrap_or(State {
+            q: [0.0; N],
+            p: [0.0; N],
+        });
+        let mut run = self.run(&state, period)?;
+        let mut last = f64::INFINITY;
+        let mut iterations = 0;
+        while iterations < self.max_iterations {
+            iterations += 1;
+            let scales = scales(run.motion());
+            let residual = self.residual(&run, &scales);
+            let (change, stretch) = self.correction(&run, &residual, &scales, is_free, period)?;
+            let size = change.amax().max(stretch.abs() / period);
+            let is_done = size <= self.tolerance || (size < ROUNDED && size > 0.5 * last);
+            last = size;
+            let mut part = 1.0;
+            let mut tried = Err(OrbitError::Stalled {
+                residual: residual.amax(),
+                iterations,
+            });
+            for _ in 0..=MAX_HALVINGS {
+                let moved = State {
+                    q: std::array::from_fn(|a| state.q[a] + part * change[N + a] * scales.q),
+                    p: std::array::from_fn(|a| state.p[a] + part * change[a] * scales.p),
+                };
+                let time = period + part * stretch;
+                if let Ok(run) = self.run(&moved, time)
+                    && (is_done || self.residual(&run, &scales).amax() < residual.amax())
+                {
+                    tried = Ok((moved, time, run));
+                    break;
+                }
+                part *= 0.5;
+            }
+            // Nothing is better than roundings.
+            if tried.is_err() && size < ROUNDED {
+                return self.found(run, state, period, iterations);
+            }
+            (state, period, run) = tried?;
+            if is_done {
+                return self.found(run, state, period, iterations);
+            }
+        }
+        let residual = self.residual(&run, &scales(run.motion())).amax();
+        Err(OrbitError::Stalled {
+            residual,
+            iterations,
+        })
+    }
+
+    fn run(&self, state: &State<N>, period: f64) -> Result<Linearised<N>, OrbitError> {
+        if !(period > 0.0 && period.is_finite()) {
+            return Err(OrbitError::Period { period });
+        }
+        let simulation = self.simulation.clone().record_every(1);
+        let run = simulation
+            .step(period / self.elements as f64)
+            .run_linearised(*state, self.start..self.start + period);
+        let run = run.map_err(|error| OrbitError::Run(error.kind().clone()))?;
+        let last = run.motion().last().t;
+        if last != self.start + period {
+            // An event has stopped it.
+            return Err(OrbitError::Stopped { time: last });
+        }
+        Ok(run)
+    }
+
+    /// y(T) − y(0) − (0, advance), ordered (p, q), in parts of the scales.
+    fn residual(&self, run: &Linearised<N>, scales: &Scales) -> DVector<f64> {
+        let nodes = run.motion().states();
+        let (first, last) = (&nodes[0], run.motion().last());
+        DVector::from_fn(2 * N, |row, _| match row.checked_sub(N) {
+            None => (last.p[row] - first.p[row]) / scales.p,
+            Some(a) => (last.q[a] - first.q[a] - self.advance[a]) / scales.q,
+        })
+    }
+
+    /// The shortest correction, of the start in parts of the scales, and of the period.
+    fn correction(
+        &self,
+        run: &Linearised<N>,
+        residual: &DVector<f64>,
+        scales: &Scales,
+        is_free: bool,
+        period: f64,
+    ) -> Result<(DVector<f64>, f64), OrbitError> {
+        /// Singular values below this, of the largest, are zeros: of families of orbits.
+        const ZERO: f64 = 1e-9;
+        let product = run.product();
+        let scale = |row: usize| if row < N { scales.p } else { scales.q };
+        let columns = 2 * N + usize::from(is_free);
+        let last = run.motion().last();
+        let rate = rate(self.simulation.model(), last.t, &last.state(), &last.v);
+        let matrix = DMatrix::from_fn(2 * N, columns, |row, column| {
+            if column == 2 * N {
+                return rate[row] * period / scale(row);
+            }
+            let unit = if row == column { 1.0 } else { 0.0 };
+            product[(row, column)] * scale(column) / scale(row) - unit
+        });
+        let svd = matrix.svd(true, true);
+        let largest = svd.singular_values.amax();
+        let change = svd.solve(&-residual, ZERO * largest);
+        let Ok(change) = change else {
+            return Err(OrbitError::Stalled {
+                residual: residual.amax(),
+                iterations: 0,
+            });
+        };
+        let stretch = if is_free { change[2 * N] * period } else { 0.0 };
+        Ok((change.rows(0, 2 * N).into_owned(), stretch))
+    }
+
+    fn found(
+        &self,
+        run: Linearised<N>,
+        start: State<N>,
+        period: f64,
+        iterations: u32,
+    ) -> Result<HybridOrbit<N>, OrbitError> {
+        let mut floquet = run.multipliers().map_err(OrbitError::Multipliers)?;
+        sort(&mut floquet);
+        let autonomous = !M::FACTS.time_dependent;
+        let (motion, transitions) = run.into_parts();
+        Ok(HybridOrbit {
+            start,
+            period,
+            multipliers: floquet.iter().map(Multiplier::to_complex).collect(),
+            floquet,
+            trivial: usize::from(autonomous),
+            motion,
+            transitions,
+            iterations,
+        })
+    }
+}
+
+/// By what coordinates and momenta are measured.
+struct Scales {
+    q: f64,
+    p: f64,
+}
+
+fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
+    let largest = |of: fn(&State<N>) -> &[f64; N]| {
+        let states = motion.states().iter().map(|node| node.state());
+        let sizes = states.map(|state| of(&state).iter().fold(0.0_f64, |m, x| m.max(x.abs())));
+        let largest = sizes.fold(0.0, f64::max);
+        if largest > 0.0 { largest } else { 1.0 }
+    };
+    Scales {
+        q: largest(|state| &state.q),
+        p: largest(|state| &state.p),
+    }
+}
+
+/// ẏ = (ṗ, q̇).
+fn rate<M: Model<N>, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+    v: &[f64; N],
+) -> DVector<f64> {
+    let (z, sign) = match M::FORM {
+        Form::Lagrangian => (v, 1.0),
+        Form::Hamiltonian => (&state.p, -1.0),
+    };
+    let mut first = First::ZERO;
+    model.first(t, &state.q, z, &mut first);
+    DVector::from_fn(2 * N, |row, _| match row.checked_sub(N) {
+        None => sign * first.q[row] + first.force[row],
+        Some(a) => v[a],
+    })
+}
+
+/// A periodic orbit with events and its Floquet multipliers; made by [`HybridOrbits::solve`].
+#[derive(Clone, Debug)]
+pub struct HybridOrbit<const N: usize> {
+    start: State<N>,
+    period: f64,
+    floquet: Vec<Multiplier>,
+    multipliers: Vec<Complex<f64>>,
+    trivial: usize,
+    motion: Motion<N>,
+    transitions: Vec<DMatrix<f64>>,
+    iterations: u32,
+}
+
+impl<const N: usize> HybridOrbit<N> {
+    /// The period T, as given or as found.
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// The state at the start of the period.
+    pub fn start(&self) -> State<N> {
+        self.start
+    }
+
+    /// The motion over one period, with its [events](Motion::events) and dense output.
+    pub fn motion(&self) -> &Motion<N> {
+        &self.motion
+    }
+
+    /// The transition matrices of the elements in order, across events: 2N × 2N, ordered (p, q).
+    pub fn transitions(&self) -> &[DMatrix<f64>] {
+        &self.transitions
+    }
+
+    /// The monodromy matrix, 2N × 2N, ordered (p, q): the derivative of the state after a period by that before, with what events do to both the state and its changes.
+    pub fn monodromy(&self) -> DMatrix<f64> {
+        let identity = DMatrix::identity(2 * N, 2 * N);
+        (self.transitions.iter()).fold(identity, |product, matrix| matrix * product)
+    }
+
+    /// The Floquet multipliers, the largest modulus first; from the matrices of the elements, not from their product.
+    pub fn multipliers(&self) -> &[Complex<f64>] {
+        &self.multipliers
+    }
+
+    /// The places of the multiplier that is one because the model does not depend on time; empty for a forced one.
+    pub fn trivial(&self) -> Vec<usize> {
+        trivial_of(&self.floquet, self.trivial)
+    }
+
+    /// Whether neighbours stay near: [`verdict`](Self::verdict) is not unstable.
+    pub fn is_stable(&self) -> bool {
+        !matches!(self.verdict(), Verdict::Unstable { .. })
+    }
+
+    /// Stability, from all but the trivial multipliers, with its margin.
+    pub fn verdict(&self) -> Verdict {
+        let trivial = self.trivial();
+        let others = (0..self.floquet.len()).filter(|place| !trivial.contains(place));
+        let moduli = others.map(|place| self.floquet[place].modulus());
+        Verdict::of(moduli.fold(0.0, f64::max))
+    }
+
+    /// How many corrections Newton's method made.
+    pub fn iterations(&self) -> u32 {
+        self.iterations
+    }
+}

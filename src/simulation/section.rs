@@ -1,0 +1,211 @@
+//! Sections of Poincaré: where a motion without an end crosses a surface.
+
+use super::Simulation;
+use super::events::{Act, Crossing, Event, On, Severed};
+use super::follow::{Follow, Passed};
+use super::pieces::{Left, Observe, Side};
+use super::sensitive::Tangents;
+use super::steps::Way;
+use crate::error::RunErrorKind;
+use nalgebra::DMatrix;
+use std::collections::VecDeque;
+use std::fmt;
+use std::ops::Deref;
+use std::sync::Arc;
+use tfe_runtime::step::Stepper;
+use tfe_runtime::transition::TransitionError;
+use tfe_runtime::{Model, Share, State};
+
+impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
+    /// The points at which a motion crosses the surface on which an event or output of the model vanishes: an endless iterator, in constant memory. Other [events](Self::on) are looked for
+    /// as in [`steps`](Self::steps), and do what they do.
+    ///
+    /// Points are as accurate as nodes, and none is missed (see [`on`](Self::on)). The motion itself is that of `steps`: it does not know of the section.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(
+    ///     coordinates(x, y),
+    ///     momenta(px, py),
+    ///     hamiltonian = (px^2 + py^2 + x^2 + y^2)/2 + x^2*y - y^3/3,
+    ///     event(section) = x,
+    /// )]
+    /// struct HenonHeiles;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let simulation = Simulation::new(&HenonHeiles).element(Mixed::<8>).step(0.25);
+    /// let start = State { q: [0.0, 0.1], p: [0.5, 0.0] };
+    /// for point in simulation.section("section", Crossing::Rising, start, 0.0).take(100) {
+    ///     let point = point?;
+    ///     assert!(point.q[0].abs() < 1e-13 && point.p[0] > 0.0);
+    ///     println!("{} {}", point.q[1], point.p[1]);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn section(
+        &self,
+        name: impl Into<String>,
+        crossing: Crossing,
+        start: State<N>,
+        t0: f64,
+    ) -> Section<'m, M, N> {
+        let mut run = self.clone();
+        let which = run.events.len();
+        run.events.push(On {
+            name: name.into(),
+            function: None,
+            crossing,
+            act: Arc::new(|_| Act::Record),
+        });
+        let beginning = run.endless(&start, t0);
+        Section {
+            chosen: (run.chosen_element(), run.control),
+            model: run.model.clone(),
+            way: Way::new(beginning, start, run.impulses),
+            crossings: Crossings {
+                which,
+                tangents: None,
+                points: VecDeque::new(),
+            },
+        }
+    }
+}
+
+/// A point of a [section](Simulation::section); an [`Event`] by dereference.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SectionPoint<const N: usize> {
+    event: Event<N>,
+    transition: Option<DMatrix<f64>>,
+}
+
+impl<const N: usize> SectionPoint<N> {
+    /// The derivative of this point by the one before, or of the first by the start: 2N × 2N, ordered (p, q), for a [linearised](Section::linearised) section.
+    ///
+    /// It takes into account that changed motions cross the section at other times,
+    ///
+    /// ```text
+    /// δy_{k+1} = (1 − ẏ ∇gᵀ/ġ) Φ(t_{k+1}, t_k) δy_k                                           (T-141)
+    /// ```
+    ///
+    /// so that in models that do not depend on time products of these matrices are derivatives of the return map; its multipliers are their eigenvalues, besides a zero for the normal of the
+    /// section.
+    pub fn transition(&self) -> Option<&DMatrix<f64>> {
+        self.transition.as_ref()
+    }
+}
+
+impl<const N: usize> Deref for SectionPoint<N> {
+    type Target = Event<N>;
+
+    fn deref(&self) -> &Event<N> {
+        &self.event
+    }
+}
+
+/// The points of a section, one after the other; made by [`Simulation::section`]. After an error, or where an event stops the motion, it is finished.
+pub struct Section<'m, M, const N: usize> {
+    chosen: (tfe_runtime::Element, tfe_runtime::step::Control),
+    model: Share<'m, M>,
+    way: Way<'m, M, N>,
+    crossings: Crossings<'m, M, N>,
+}
+
+impl<M: fmt::Debug, const N: usize> fmt::Debug for Section<'_, M, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Section")
+            .field("way", &self.way)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<M: Model<N>, const N: usize> Section<'_, M, N> {
+    /// Points with their [transition matrices](SectionPoint::transition) from now on: a factorisation and 2N solutions a step, and as much again at each point.
+    #[must_use]
+    pub fn linearised(mut self) -> Self {
+        self.crossings.tangents = Some(Tangents::new(self.model.clone(), self.chosen, &[]));
+        self
+    }
+}
+
+impl<M: Model<N>, const N: usize> Iterator for Section<'_, M, N> {
+    type Item = Result<SectionPoint<N>, RunErrorKind>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            if let Some(point) = self.crossings.points.pop_front() {
+                return Some(point);
+            }
+            match self.way.pass(&mut self.crossings)? {
+                Ok((Left::Done, _)) => {}
+                // Points before the end may be left.
+                Ok((Left::Stopped, _)) => return self.crossings.points.pop_front(),
+                Err(kind) => self.crossings.points.push_back(Err(kind)),
+            }
+        }
+    }
+}
+
+/// Lines up the points of an element.
+struct Crossings<'m, M, const N: usize> {
+    /// The section, among all events.
+    which: usize,
+    /// Since the last point.
+    tangents: Option<Tangents<'m, M, N>>,
+    points: VecDeque<Result<SectionPoint<N>, RunErrorKind>>,
+}
+
+impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Crossings<'m, M, N> {
+    fn passed(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        passed: &Passed<'_, N>,
+    ) -> Result<(), TransitionError> {
+        match &mut self.tangents {
+            Some(tangents) => tangents.passed(stepper, passed),
+            None => Ok(()),
+        }
+    }
+
+    fn met(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+        if severed.which != self.which {
+            return Ok(());
+        }
+        let matrix = self.tangents.as_mut().map(|one| one.crossed(severed));
+        self.points.push_back(Ok(SectionPoint {
+            event: severed.event.clone(),
+            transition: matrix.transpose()?,
+        }));
+        Ok(())
+    }
+
+    fn cut(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+        match &mut self.tangents {
+            Some(tangents) => tangents.cut(severed),
+            None => Ok(()),
+        }
+    }
+
+    fn acted(&mut self) {
+        if let Some(tangents) = &mut self.tangents {
+            tangents.acted();
+        }
+    }
+
+    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+        match &mut self.tangents {
+            Some(tangents) => tangents.set(model),
+            None => Ok(()),
+        }
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Observe<'m, M, N> for Crossings<'m, M, N> {
+    fn keeps(&self) -> bool {
+        false
+    }
+
+    fn at_event(&mut self, _: &Stepper<'m, M, N>, _: Side, _: f64, _: &State<N>) {}
+}
