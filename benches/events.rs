@@ -54,7 +54,7 @@ fn nanoseconds(mut runs: Vec<Box<dyn FnMut() -> usize + '_>>, steps: f64) -> Vec
     best
 }
 
-fn measure<M: Model<N> + Sync, const N: usize>(
+fn measure<M: Model<N> + Send + Sync, const N: usize>(
     name: &str,
     plain: &Simulation<'_, M, N>,
     start: State<N>,

@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn numbers_between_the_rows_count_for_the_scale() {
         let (mut a, b) = (trace(&[[1.0, 1e-9, 1.0]]), trace(&[[1.0, 0.0, 1.0]]));
-        a.pass(&[1.0, 1.0, 1.0], false);
+        a.pass(&[1.0, 1.0, 1.0], 0, false);
         assert_eq!(difference(&a, &b)[1], [1e-9]);
     }
 
@@ -154,5 +154,23 @@ mod tests {
     fn what_is_no_number_is_an_infinite_error() {
         let (a, b) = (trace(&[[f64::NAN, 1.0, 1.0]]), trace(&[[1.0, 1.0, 1.0]]));
         assert_eq!(difference(&a, &b)[0], [f64::INFINITY]);
+    }
+
+    /// One run meets an event a time earlier than the other: left out, unless it is an event that the other does not meet at all.
+    #[test]
+    fn runs_are_compared_between_the_same_events() {
+        let of = |acts: [usize; 4], x: [f64; 4]| {
+            let mut trace = Trace::new(1, 0);
+            for (acts, x) in acts.into_iter().zip(x) {
+                trace.pass(&[x, 1.0], acts, true);
+            }
+            trace
+        };
+        let a = of([0, 0, 1, 1], [1.0, 0.5, -0.5, 1.0]);
+        let b = of([0, 1, 1, 1], [1.0, -0.5, -0.5, 0.5]);
+        assert_eq!(difference(&a, &b)[0], [0.0, 0.0, 0.0, 0.5]);
+        let c = of([0, 1, 2, 2], [1.0, 0.5, -0.5, 1.0]);
+        let infinite = f64::INFINITY;
+        assert_eq!(difference(&a, &c)[0], [0.0, infinite, infinite, infinite]);
     }
 }

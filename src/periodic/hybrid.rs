@@ -300,7 +300,7 @@ struct Scales {
 
 fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
     let largest = |of: fn(&State<N>) -> &[f64; N]| {
-        let states = motion.states().iter().map(|node| node.state());
+        let states = motion.states().iter().map(crate::motion::Node::state);
         let sizes = states.map(|state| of(&state).iter().fold(0.0_f64, |m, x| m.max(x.abs())));
         let largest = sizes.fold(0.0, f64::max);
         if largest > 0.0 { largest } else { 1.0 }

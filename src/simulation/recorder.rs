@@ -77,7 +77,7 @@ where
         t: f64,
         state: &State<N>,
     ) {
-        if !(is_last || (number + 1) % self.record_every == 0) {
+        if !(is_last || (number + 1).is_multiple_of(self.record_every)) {
             return;
         }
         if self.motion.last().t != t {
