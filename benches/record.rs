@@ -18,7 +18,8 @@ use std::process::Command;
 /// What is counted: callgrind begins and ends with this function.
 #[inline(never)]
 fn counted_case(case: &Case) -> usize {
-    black_box((case.run)()).numbers.len()
+    let outcome = black_box((case.run)());
+    outcome.numbers.len() + outcome.counts.len()
 }
 
 /// Instructions of one case, by this program under valgrind.
@@ -57,6 +58,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (before, wanted) = match words[..] {
         ["--case", name] => {
             if let Some(case) = cases.iter().find(|case| case.name == name) {
+                // Ensembles on this thread, which is the one that is counted.
+                #[cfg(feature = "parallel")]
+                rayon::ThreadPoolBuilder::new()
+                    .num_threads(1)
+                    .use_current_thread()
+                    .build_global()?;
                 // Once for memory and functions to be found.
                 black_box((case.run)());
                 counted_case(case);
