@@ -1,7 +1,9 @@
 //! No allocation per step, in every way a step can be done.
 
 use allocation_counter::measure;
+use tfe::family::FamilyStepper;
 use tfe::prelude::*;
+use tfe::runtime::bundle::Bundle;
 use tfe::runtime::step::{Control, Stepper};
 
 #[dynamics(coordinates(theta), lagrangian = l^2*dot(theta)^2/2 + g*l*cos(theta))]
@@ -144,5 +146,93 @@ fn loops_of_control_do_not_allocate() {
     let mut angle = f64::NAN;
     let used = measure(|| angle = steps(1000));
     assert!(angle.abs() < 0.05, "{angle}");
+    assert_eq!(used.count_total, 0);
+}
+
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + (q[i+1]-q[i])^4/4),
+)]
+struct Chain {
+    n: usize,
+}
+
+/// A family, whose vectors have the length of the model: all of its memory is there after the first steps.
+#[test]
+fn steps_of_families_do_not_allocate() {
+    for n in [3, 40, 2000] {
+        let chain = Chain { n };
+        let q: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).sin()).collect();
+        let mut state = chain.state(q, vec![0.0; n]);
+        for element in [Element::mixed(4), Element::mixed(7)] {
+            let mut stepper =
+                FamilyStepper::new(&chain, element, Control::default()).expect("an element");
+            let mut walk = |from: u32, to: u32| {
+                for step in from..to {
+                    let t = 0.01 * f64::from(step);
+                    stepper.advance(t, 0.01, &mut state).expect("a step");
+                }
+            };
+            walk(0, 10);
+            let count = measure(|| walk(10, 60)).count_total;
+            assert_eq!(count, 0, "{element}, {n} sites");
+        }
+    }
+}
+
+/// Eight trajectories, and eight parameter sets, side by side.
+#[test]
+fn steps_in_lanes_do_not_allocate() {
+    let models: Vec<_> = (1..=8)
+        .map(|k| Pendulum {
+            l: 0.3 * f64::from(k),
+            g: 9.81,
+        })
+        .collect();
+    let starts: Vec<_> = (models.iter().zip(1..=8))
+        .map(|(model, k)| model.state([0.1 * f64::from(k)], [0.2]))
+        .collect();
+    let (element, control) = (Element::mixed(6), Control::default());
+    let mut same = Bundle::<_, 1, 8>::new(&models[0], element, control).expect("an element");
+    same.start(&starts);
+    let mut varied = Bundle::of_models(&models[0], element, control).expect("an element");
+    varied.start_with(&models, &starts);
+    let mut walk = |from: u32, to: u32| {
+        for step in from..to {
+            let t = 0.01 * f64::from(step);
+            assert!(!same.advance(t, 0.01) && !varied.advance(t, 0.01));
+        }
+    };
+    walk(0, 10);
+    assert_eq!(measure(|| walk(10, 500)).count_total, 0);
+}
+
+/// Dense output is the memory that it is kept in, and nothing besides: a run of twice as many steps makes twice as many allocations.
+#[test]
+fn dense_output_allocates_what_it_keeps() {
+    let pendulum = Pendulum { l: 1.0, g: 9.81 };
+    let simulation = Simulation::new(&pendulum).step(0.01);
+    let start = pendulum.state([1.0], [0.2]);
+    let count = |steps: u32| {
+        let end = 0.01 * f64::from(steps);
+        let used = measure(|| {
+            simulation.run(start, 0.0..end).expect("a motion");
+        });
+        used.count_total
+    };
+    let (once, twice) = (count(1000), count(2000));
+    // Vectors of nodes double their room once more.
+    let a_step = (twice - once) as f64 / 1000.0;
+    assert!(a_step <= 2.1, "{a_step} allocations a step");
+    let motion = simulation.run(start, 0.0..1.0).expect("a motion");
+    let mut sum = 0.0;
+    let used = measure(|| {
+        for k in 0..1000 {
+            sum += motion
+                .at(0.001 * f64::from(k))
+                .map_or(f64::NAN, |node| node.q[0]);
+        }
+    });
+    assert!(sum.is_finite());
     assert_eq!(used.count_total, 0);
 }

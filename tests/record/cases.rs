@@ -439,8 +439,9 @@ fn ways_to_run(list: &mut List) {
         estimated.map_or_else(
             |_| Outcome::default(),
             |estimated| {
-                let numbers = [estimated.error_estimate()];
-                Outcome::with(numbers, estimated.motion().statistics())
+                let mut outcome = Outcome::of(estimated.motion());
+                outcome.numbers.push(estimated.error_estimate());
+                outcome
             },
         )
     });
