@@ -53,6 +53,8 @@ pub use fitted::{Fitted, Trial};
 /// Least squares find the nearest minimum: where motions oscillate, the first parameters must keep their phase over the measurements. If they do not, a fit of the first few swings makes better
 /// ones for a fit of all, as in `examples/pendulum_fit.rs`.
 ///
+/// Models with inputs are fitted as [`Driven`](crate::Driven), with the inputs that they had when they were measured.
+///
 /// Without a [`start`](Self::start) the state at the first time is unknown, too, and looked for from rest at zero on; [`start_near`](Self::start_near) tells a better guess.
 #[derive(Debug)]
 pub struct Fit<'m, M, const N: usize> {
@@ -63,6 +65,7 @@ pub struct Fit<'m, M, const N: usize> {
     parameters: Vec<String>,
     bounds: Vec<(String, f64, f64)>,
     measured: Vec<Measured>,
+    breaks: Vec<f64>,
     progress: bool,
 }
 
@@ -85,6 +88,7 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
             parameters: Vec::new(),
             bounds: Vec::new(),
             measured: Vec::new(),
+            breaks: Vec::new(),
             progress: false,
         }
     }
@@ -167,6 +171,13 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
         self
     }
 
+    /// Lets elements end at a time, as [`Simulation::break_at`]: where an input jumps, or at the knots of its table.
+    #[must_use]
+    pub fn break_at(mut self, time: f64) -> Self {
+        self.breaks.push(time);
+        self
+    }
+
     /// Shows every trial on standard error.
     #[must_use]
     pub fn progress(mut self) -> Self {
@@ -243,6 +254,7 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
         if let Some(step) = self.step {
             simulation = simulation.step(step);
         }
-        times.iter().fold(simulation, |run, t| run.break_at(*t))
+        let all = times.iter().chain(&self.breaks);
+        all.fold(simulation, |run, t| run.break_at(*t))
     }
 }

@@ -334,3 +334,65 @@ fn constrained_models_are_fitted() {
     assert!((found.values()[0] - 9.81).abs() < 1e-10);
     let _: &runtime::Statistics = found.motion().statistics();
 }
+
+/// A pendulum with a motor whose strength is not known.
+#[dynamics(
+    coordinates(theta),
+    lagrangian = dot(theta)^2/2 + g*cos(theta),
+    input(current),
+    force(theta) = strength*current - c*dot(theta),
+    output(angle) = theta,
+)]
+struct Motor {
+    g: f64,
+    strength: f64,
+    c: f64,
+}
+
+/// Measurements with the inputs that made them: a function, and a table whose knots the elements end at.
+#[test]
+fn models_with_inputs_are_fitted() {
+    let truth = Motor {
+        g: 9.81,
+        strength: 1.7,
+        c: 0.4,
+    };
+    let times: Vec<f64> = (1..=40).map(|k| 0.1 * f64::from(k)).collect();
+    let (knots, currents) = ([0.0, 0.55, 1.31, 2.2], [1.0, -2.0, 0.5, 0.0]);
+    let start = truth.state([0.1], [0.0]);
+    let held = |motor| {
+        tfe::Driven::new(motor)
+            .table("current", &knots, &currents, Interpolation::Hold)
+            .expect("a table")
+    };
+    let waves = |motor| {
+        tfe::Driven::new(motor)
+            .input("current", |t| (3.0 * t).sin())
+            .expect("an input")
+    };
+    let guess = Motor {
+        g: 9.81,
+        strength: 1.0,
+        c: 0.1,
+    };
+    for (true_model, first) in [(held(&truth), held(&guess)), (waves(&truth), waves(&guess))] {
+        let run = Simulation::new(&true_model).step(0.1);
+        let run = knots.iter().fold(run, |run, knot| run.break_at(*knot));
+        let run = times.iter().fold(run, |run, t| run.break_at(*t));
+        let motion = run.run(start, 0.0..4.0).expect("a run");
+        let measured: Vec<f64> = times
+            .iter()
+            .map(|t| motion.at(*t).expect("inside").q[0])
+            .collect();
+        let fit = Fit::new(&first)
+            .start(start, 0.0)
+            .step(0.1)
+            .parameters(["strength", "c"])
+            .output("angle", &times, &measured);
+        let fit = knots.iter().fold(fit, |fit, knot| fit.break_at(*knot));
+        let fit = fit.solve().expect("a fit");
+        let value = |name| fit.value(name).expect("named");
+        assert!((value("strength") - 1.7).abs() < 1e-9, "{fit}");
+        assert!((value("c") - 0.4).abs() < 1e-9, "{fit}");
+    }
+}
