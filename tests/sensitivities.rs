@@ -752,6 +752,48 @@ fn gradients_backwards_are_derivatives_forwards() {
     check_gradient(&Simulation::new(&rod).step(0.02), start, "height");
 }
 
+/// Masses in a row, with a friction between neighbours that depends on where they are, and springs that are all different.
+#[dynamics(
+    coordinates(q[5]),
+    lagrangian = sum(i in 0..5, m[i]/2*dot(q[i])^2 + b*q[i]*dot(q[i])^2/2) - sum(i in 0..4, k[i]/2*(q[i+1]-q[i])^2 + a[i]/4*(q[i+1]-q[i])^4) - k[4]/2*q[0]^2,
+    dissipation = sum(i in 0..4, c[i]/2*(dot(q[i+1]) - dot(q[i]))^2),
+    force(q[4]) = f*sin(omega*t),
+    output(middle) = q[2]*k[1],
+)]
+struct Row {
+    m: [f64; 5],
+    k: [f64; 5],
+    a: [f64; 4],
+    c: [f64; 4],
+    b: f64,
+    f: f64,
+    omega: f64,
+}
+
+/// Many parameters at once, by operations read backwards; with an iteration and, where steps are too long for it, with factors.
+#[test]
+fn gradients_by_many_parameters_are_derivatives_forwards() {
+    let row = Row {
+        m: [1.0, 1.1, 0.9, 1.3, 0.8],
+        k: [2.0, 1.5, 1.7, 2.2, 0.5],
+        a: [0.3, 0.2, 0.4, 0.1],
+        c: [0.05, 0.1, 0.02, 0.07],
+        b: 0.1,
+        f: 0.4,
+        omega: 1.9,
+    };
+    let start = row.state([0.3, -0.2, 0.1, 0.4, -0.5], [0.1, 0.0, -0.3, 0.2, 0.4]);
+    for (element, step) in [
+        (Element::from(Mixed::<4>), 0.1),
+        (Mixed::<3>.into(), 0.5),
+        (Primal::<3>.into(), 0.1),
+        (EnergyConserving::<3>.into(), 0.1),
+    ] {
+        let simulation = Simulation::new(&row).element(element).step(step);
+        check_gradient(&simulation, start, "middle");
+    }
+}
+
 #[test]
 fn losses_that_are_none_are_told() {
     let simulation = Simulation::new(&PENDULUMS).step(0.05);

@@ -257,13 +257,13 @@ pub(crate) enum Asked<'a> {
     Product(&'a mut [f64], &'a mut [f64]),
 }
 
-impl System<'_> {
-    /// The product (T-127): one solution with the transposed factors, whatever the number of columns. The residual holds λᵀ ∂(end)/∂(interior).
+impl<'a> System<'a> {
+    /// The product (T-127): one solution with the transposed factors, whatever the number of columns. The residual holds λᵀ ∂(end)/∂(interior); what is solved for is returned.
     pub(crate) fn product(
         self,
         lambda: &mut [f64],
         by_direction: &mut [f64],
-    ) -> Result<(), StepError> {
+    ) -> Result<&'a [f64], StepError> {
         let (size, columns) = (self.residual.len(), self.columns());
         lu::factor(size, self.tangent, self.pivots).map_err(|singular| {
             StepError::SingularTangent {
@@ -277,7 +277,7 @@ impl System<'_> {
                 *sum += weight * entry;
             }
         }
-        Ok(())
+        Ok(self.residual)
     }
 }
 

@@ -14,6 +14,8 @@
 #[cfg(feature = "alloc")]
 extern crate alloc;
 
+#[cfg(feature = "alloc")]
+mod backwards;
 pub mod basis;
 #[cfg(feature = "alloc")]
 pub mod bundle;
@@ -64,6 +66,8 @@ pub mod step;
 mod stepper;
 pub mod structure;
 mod tableau;
+#[cfg(feature = "alloc")]
+mod tape;
 pub mod transition;
 mod trigonometry;
 mod velocity_form;

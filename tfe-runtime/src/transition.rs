@@ -5,6 +5,8 @@
 
 use core::fmt;
 
+#[cfg(feature = "alloc")]
+use crate::backwards::{Backwards, are_parameters, iterated};
 use crate::condense::{
     Asked, Direction, EndForces, System, phase_ends, phase_weights, velocity_ends, velocity_weights,
 };
@@ -189,7 +191,7 @@ where
         workspace: Workspace<'_>,
         extra: &mut [f64],
         (impulses, directions): (&[Impulse<N>], &[Direction]),
-        asked: Asked<'_>,
+        #[cfg_attr(not(feature = "alloc"), expect(unused_mut))] mut asked: Asked<'_>,
     ) -> Result<(), TransitionError>
     where
         M: Model<N>,
@@ -199,6 +201,14 @@ where
         };
         let scheme = self.tables.view();
         let parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
+        // Many parameters backwards are differentiated all at once, and have no columns.
+        #[cfg(feature = "alloc")]
+        let (at_once, directions): (&[Direction], &[Direction]) =
+            if matches!(asked, Asked::Product(..)) && are_parameters(self.model, directions) {
+                (directions, &[])
+            } else {
+                (&[], directions)
+            };
         let columns = 2 * N + directions.len();
         let constraints = M::CONSTRAINTS.len();
         let needed = linearised_len(scheme.element, M::FORM, N, constraints, directions.len());
@@ -298,7 +308,13 @@ where
                 Asked::Product(lambda, by_direction) => {
                     let sums = (&*lambda, &mut *by_direction, &mut *system.residual);
                     phase_weights::<N>(scheme, span.h, x, directions, sums);
-                    system.product(lambda, by_direction)?;
+                    let _mu = system.product(lambda, by_direction)?;
+                    #[cfg(feature = "alloc")]
+                    if !at_once.is_empty() {
+                        let mut backwards = Backwards::new(self.model);
+                        backwards.of_phase(&equations, x, _mu);
+                        backwards.add_to(at_once, by_direction);
+                    }
                 }
             }
         } else {
@@ -313,6 +329,22 @@ where
                 constant_mass: &mut memory.mass,
                 statistics: &mut memory.statistics,
             };
+            #[cfg(feature = "alloc")]
+            if let (Asked::Product(lambda, by_direction), true) =
+                (&mut asked, directions.is_empty())
+            {
+                let mut of_p = [0.0; N];
+                of_p.copy_from_slice(&lambda[..N]);
+                let x = &*parts.unknowns;
+                if let Some(mu) = iterated(&mut equations, x, lambda)? {
+                    if !at_once.is_empty() {
+                        let mut backwards = Backwards::new(self.model);
+                        backwards.of_velocities(&mut equations, x, (&of_p, mu.as_flattened()))?;
+                        backwards.add_to(at_once, by_direction);
+                    }
+                    return Ok(());
+                }
+            }
             let mut forces = EndForces::of(forces, m);
             system.of_velocities(&mut equations, parts.unknowns, directions, &mut forces)?;
             let (x, h) = (&*parts.unknowns, span.h);
@@ -322,9 +354,17 @@ where
                     velocity_ends(&scheme, h, x, directions, &forces, sides, matrix);
                 }
                 Asked::Product(lambda, by_direction) => {
+                    let mut _of_p = [0.0; N];
+                    _of_p.copy_from_slice(&lambda[..N]);
                     let sums = (&mut *lambda, &mut *by_direction, &mut *system.residual);
                     velocity_weights(&scheme, h, x, (directions, &forces), sums);
-                    system.product(lambda, by_direction)?;
+                    let _mu = system.product(lambda, by_direction)?;
+                    #[cfg(feature = "alloc")]
+                    if !at_once.is_empty() {
+                        let mut backwards = Backwards::new(self.model);
+                        backwards.of_velocities(&mut equations, x, (&_of_p, _mu))?;
+                        backwards.add_to(at_once, by_direction);
+                    }
                 }
             }
         }
