@@ -1,127 +1,170 @@
-//! Steps of emitted solvers, and of the general stepper.
+//! Steps of emitted solvers and of the general stepper beside steppers written by hand: instructions, nanoseconds, iterations, errors.
 //!
-//! `cargo bench --bench solvers` prints the table; `cargo bench --bench solvers -- pendulum` one scene of it.
+//! `cargo bench --bench solvers` prints the table; `cargo bench --bench solvers -- pendulum kepler` only these scenes; and `-- --instructions` no times, for a machine that is busy with other
+//! things. All three take the same steps to the same tolerance, from and to memory, one call a step. Errors are those of the end, of coordinates, over the largest one, by a run of
+//! `Mixed::<12>` in steps half as long. Instructions are counted where valgrind is installed; what is written by hand runs where the processor has AVX2.
 
+#[cfg(target_arch = "x86_64")]
+mod by_hand;
+mod count;
 mod scenes;
 
-use scenes::*;
-use std::hint::black_box;
-use std::time::Instant;
-use tfe::prelude::*;
-use tfe::runtime::step::{Control, Stepper};
+use std::time::Duration;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Nanoseconds a step, iterations a step and the end of one stepper.
-struct Run<const N: usize> {
-    time: f64,
-    iterations: f64,
-    end: State<N>,
+/// Who wrote a stepper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Writer {
+    Hand,
+    Emitted,
+    General,
 }
 
-/// The best of several runs, taken in turn.
-fn best<const N: usize>(
-    steps: u32,
-    runs: &mut [&mut dyn FnMut() -> Result<(State<N>, u64), Failure>],
-) -> Result<Vec<Run<N>>, Failure> {
-    let mut best: Vec<Run<N>> = Vec::new();
-    for turn in 0..30 {
-        for (k, run) in runs.iter_mut().enumerate() {
-            let start = Instant::now();
-            let (end, iterations) = run()?;
-            let time = start.elapsed().as_secs_f64() * 1e9 / f64::from(steps);
-            if turn == 0 {
-                let iterations = iterations as f64 / f64::from(steps);
-                best.push(Run {
-                    time,
-                    iterations,
-                    end,
-                });
-            }
-            best[k].time = best[k].time.min(time);
+impl Writer {
+    const ALL: [Self; 3] = [Self::Hand, Self::Emitted, Self::General];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Hand => "hand",
+            Self::Emitted => "emitted",
+            Self::General => "general",
         }
     }
-    Ok(best)
 }
 
-fn show<const N: usize>(name: &str, element: Element, runs: &[Run<N>]) {
-    let [general, emitted, ..] = runs else {
-        return;
-    };
-    println!(
-        "{name:<16} {:<10} {:>5.2} {:>9.0} {:>9.0} {:>7.2} {}",
-        element.to_string(),
-        emitted.iterations,
-        general.time,
-        emitted.time,
-        emitted.time / general.time,
-        if general.end == emitted.end {
-            "same"
+/// What has come of a run.
+struct Run {
+    /// Coordinates at the end.
+    end: Vec<f64>,
+    iterations: u64,
+    /// Of all steps.
+    time: Duration,
+}
+
+/// A model, a start, an element and a step.
+struct Scene {
+    name: &'static str,
+    nodes: u32,
+    /// A run of so many steps; nothing where the processor cannot run it.
+    run: Box<dyn Fn(Writer, u32) -> Result<Option<Run>, Failure>>,
+    /// The end after so many steps.
+    reference: Box<dyn Fn(u32) -> Result<Vec<f64>, Failure>>,
+}
+
+const STEPS: u32 = 1000;
+const TURNS: u32 = 30;
+
+/// Figures of one writer.
+#[derive(Clone, Copy, Default)]
+struct Figures {
+    instructions: Option<u64>,
+    nanoseconds: Option<f64>,
+    iterations: f64,
+    error: f64,
+}
+
+fn measure(scene: &Scene, counts: bool, times: bool) -> Result<[Option<Figures>; 3], Failure> {
+    let reference = (scene.reference)(STEPS)?;
+    let mut figures = [None; 3];
+    for (figures, writer) in figures.iter_mut().zip(Writer::ALL) {
+        let Some(run) = (scene.run)(writer, STEPS)? else {
+            continue;
+        };
+        let instructions = if counts {
+            count::instructions(scene.name, scene.nodes, writer)?
         } else {
-            "DIFFER"
-        },
+            None
+        };
+        *figures = Some(Figures {
+            instructions,
+            nanoseconds: None,
+            iterations: run.iterations as f64 / f64::from(STEPS),
+            error: error(&run.end, &reference),
+        });
+    }
+    // In turn, so that all see the same machine.
+    for _ in 0..if times { TURNS } else { 0 } {
+        for (figures, writer) in figures.iter_mut().zip(Writer::ALL) {
+            if let (Some(figures), Some(run)) = (figures, (scene.run)(writer, STEPS)?) {
+                let time = run.time.as_secs_f64() * 1e9 / f64::from(STEPS);
+                figures.nanoseconds = Some(figures.nanoseconds.unwrap_or(time).min(time));
+            }
+        }
+    }
+    Ok(figures)
+}
+
+/// The largest difference over the largest coordinate.
+fn error(end: &[f64], reference: &[f64]) -> f64 {
+    let size = reference.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+    let difference = |(x, y): (&f64, &f64)| (x - y).abs();
+    end.iter()
+        .zip(reference)
+        .map(difference)
+        .fold(0.0, f64::max)
+        / size
+}
+
+/// Right-aligned, or a dash.
+fn cell(number: Option<f64>, digits: usize) -> String {
+    number.map_or("–".to_owned(), |number| format!("{number:.digits$}"))
+}
+
+fn show(scene: &Scene, figures: &[Option<Figures>; 3]) {
+    let [hand, emitted, general] = figures.map(Option::unwrap_or_default);
+    let instructions = [hand, emitted, general].map(|f| f.instructions.map(|n| n as f64));
+    let times = [hand, emitted, general].map(|f| f.nanoseconds);
+    let ratio = |x: Option<f64>, y: Option<f64>| Some(x? / y?);
+    print!("{:<16} {}", scene.name, scene.nodes);
+    for numbers in [instructions, times] {
+        let [hand, emitted, general] = numbers;
+        print!(
+            "  {:>6} {:>6} {:>6}",
+            cell(hand, 0),
+            cell(emitted, 0),
+            cell(general, 0)
+        );
+        print!(
+            " {:>5} {:>5}",
+            cell(ratio(emitted, hand), 2),
+            cell(ratio(general, emitted), 2)
+        );
+    }
+    println!(
+        "  {:>5.2} {:>5.2}  {:.0e} {:.0e}",
+        hand.iterations, emitted.iterations, hand.error, emitted.error
     );
 }
 
-macro_rules! scene {
-    ($name:literal, $model:expr, $start:expr, $($solver:ident $nodes:literal, $h:expr);*) => {{
-        if std::env::args().skip(1).all(|a| a.starts_with('-') || a == $name) {
-            let (model, start) = (&$model, $start);
-            $({
-                let element: Element = Mixed::<$nodes>.into();
-                let h: f64 = $h;
-                const STEPS: u32 = 2000;
-                let runs = best(STEPS, &mut [
-                    &mut || {
-                        let mut stepper = Stepper::new(model, element, Control::default())?.ends_only();
-                        let mut state = black_box(start);
-                        for step in 0..STEPS {
-                            stepper.advance(h * f64::from(step), h, &mut state, &[])?;
-                        }
-                        Ok((state, stepper.statistics().iterations))
-                    },
-                    &mut || {
-                        let mut solver = $solver::new(model, h);
-                        let mut state = black_box(start);
-                        for _ in 0..STEPS {
-                            solver.advance(&mut state)?;
-                        }
-                        Ok((state, solver.statistics().iterations))
-                    },
-                ])?;
-                show($name, element, &runs);
-            })*
-        }
-    }};
-}
-
 fn main() -> Result<(), Failure> {
-    println!("scene            element    iter.   general   emitted  ratio");
-    let model = Pendulum {};
-    scene!("pendulum", model, model.state([1.5], [0.0]), Pendulum4 4, 0.1; Pendulum9 9, 1.0);
-    let model = DoublePendulum { g: 9.81 };
-    scene!("double-pendulum", model, model.state([0.5, -0.3], [0.0, 0.0]), DoublePendulum4 4, 0.01; DoublePendulum9 9, 0.1);
-    let model = Kepler {};
-    scene!("kepler", model, model.state([0.4, 0.0], [0.0, 2.0]), Kepler4 4, 0.02; Kepler9 9, 0.2);
-    let model = HenonHeiles {};
-    let start = State {
-        q: [0.1, 0.0],
-        p: [0.0, 0.5],
-    };
-    scene!("henon-heiles", model, start, HenonHeiles4 4, 0.1; HenonHeiles9 9, 1.0);
-    let model = VanDerPol { mu: 1.0 };
-    scene!("van-der-pol", model, model.state([2.0], [0.0]), VanDerPol4 4, 0.02; VanDerPol9 9, 0.2);
-    let model = HeavyTop {
-        a: 1.4,
-        c: 0.6,
-        w: 5.0,
-    };
-    scene!("heavy-top", model, model.state([0.0, 0.7, 0.0], [0.5, 0.0, 12.0]), HeavyTop4 4, 0.01; HeavyTop9 9, 0.1);
-    let model = Fput { alpha: 0.25 };
-    let mut q = [0.0; 32];
-    for (i, q) in q.iter_mut().enumerate() {
-        *q = (std::f64::consts::PI * (i + 1) as f64 / 33.0).sin();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let scenes = scenes::all();
+    if let [flag, name, nodes, writer, steps] = &arguments[..]
+        && flag == "--count"
+    {
+        let (nodes, steps): (u32, u32) = (nodes.parse()?, steps.parse()?);
+        let is_wanted = |scene: &&Scene| scene.name == name && scene.nodes == nodes;
+        let scene = scenes.iter().find(is_wanted).ok_or("no such scene")?;
+        let writer = Writer::ALL.into_iter().find(|known| known.name() == writer);
+        (scene.run)(writer.ok_or("no such writer")?, steps)?;
+        return Ok(());
     }
-    scene!("fput", model, model.state(q, [0.0; 32]), Fput4 4, 0.05; Fput9 9, 0.5);
+    let counts = count::available();
+    let times = !arguments
+        .iter()
+        .any(|argument| argument == "--instructions");
+    let names: Vec<&String> = arguments.iter().filter(|a| !a.starts_with('-')).collect();
+    println!(
+        "                          instructions a step                  nanoseconds a step             iterations     error"
+    );
+    println!(
+        "scene          nodes    hand emitted general  e/h   g/e    hand emitted general  e/h   g/e  hand emitted  hand emitted"
+    );
+    for scene in &scenes {
+        if names.is_empty() || names.iter().any(|name| *name == scene.name) {
+            show(scene, &measure(scene, counts, times)?);
+        }
+    }
     Ok(())
 }

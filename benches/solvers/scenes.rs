@@ -1,6 +1,13 @@
-//! The models, each with steppers of four and of nine nodes.
+//! The models, each with steppers of four and of nine nodes, and how they are run.
 
+#[cfg(target_arch = "x86_64")]
+use crate::by_hand::{self, CoupledStepper, SecondOrderStepper};
+use crate::{Failure, Run, Scene, Writer};
+use std::hint::black_box;
+use std::time::Instant;
 use tfe::prelude::*;
+use tfe::runtime::Model;
+use tfe::runtime::step::{Control, Stepper};
 
 /// Unit length, mass and gravity.
 #[dynamics(
@@ -86,4 +93,193 @@ pub struct HeavyTop {
     pub a: f64,
     pub c: f64,
     pub w: f64,
+}
+
+/// A run of the general stepper.
+fn general<M, const N: usize>(
+    model: &M,
+    element: Element,
+    (start, h): (State<N>, f64),
+    steps: u32,
+) -> Result<Run, Failure>
+where
+    M: Model<N>,
+{
+    let mut stepper = Stepper::new(model, element, Control::default())?.ends_only();
+    let mut state = black_box(start);
+    let clock = Instant::now();
+    for step in 0..steps {
+        stepper.advance(h * f64::from(step), h, &mut state, &[])?;
+    }
+    let time = clock.elapsed();
+    Ok(Run {
+        end: state.q.to_vec(),
+        iterations: stepper.statistics().iterations,
+        time,
+    })
+}
+
+/// A scene: name, model, start; a solver, its nodes and its step; what is written by hand, from coordinates and velocities or momenta.
+macro_rules! scene {
+    ($name:literal, $model:expr, $start:expr, $solver:ident $nodes:literal, $h:literal, $stepper:ident of $hand:expr, $second:expr) => {
+        Scene {
+            name: $name,
+            nodes: $nodes,
+            run: Box::new(|writer, steps| {
+                let (model, start, h) = ($model, $start, $h);
+                match writer {
+                    Writer::General => {
+                        general(&model, Mixed::<$nodes>.into(), (start, h), steps).map(Some)
+                    }
+                    Writer::Emitted => {
+                        let mut solver = $solver::new(&model, h);
+                        let mut state = black_box(start);
+                        let clock = Instant::now();
+                        for _ in 0..steps {
+                            solver.advance(&mut state)?;
+                        }
+                        let time = clock.elapsed();
+                        let iterations = solver.statistics().iterations;
+                        Ok(Some(Run {
+                            end: state.q.to_vec(),
+                            iterations,
+                            time,
+                        }))
+                    }
+                    #[cfg(target_arch = "x86_64")]
+                    Writer::Hand => {
+                        const POINTS: usize = $nodes - 1;
+                        let Some(isa) = by_hand::V3::try_new() else {
+                            return Ok(None);
+                        };
+                        let second = $second;
+                        let mut stepper = $stepper::<_, _, POINTS, { POINTS.div_ceil(4) }>::new(
+                            isa,
+                            $hand,
+                            h,
+                            black_box((start.q, second)),
+                        );
+                        let clock = Instant::now();
+                        for _ in 0..steps {
+                            if !stepper.advance() {
+                                return Err("the stepper written by hand failed".into());
+                            }
+                        }
+                        let time = clock.elapsed();
+                        Ok(Some(Run {
+                            end: stepper.q.to_vec(),
+                            iterations: stepper.iterations,
+                            time,
+                        }))
+                    }
+                    #[cfg(not(target_arch = "x86_64"))]
+                    Writer::Hand => Ok(None),
+                }
+            }),
+            reference: Box::new(|steps| {
+                let (model, start) = ($model, $start);
+                Ok(general(&model, Mixed::<12>.into(), (start, 0.5 * $h), 2 * steps)?.end)
+            }),
+        }
+    };
+}
+
+const DOUBLE_PENDULUM: DoublePendulum = DoublePendulum { g: 9.81 };
+const TOP: HeavyTop = HeavyTop {
+    a: 1.4,
+    c: 0.6,
+    w: 5.0,
+};
+const FPUT: Fput = Fput { alpha: 0.25 };
+const VAN_DER_POL: VanDerPol = VanDerPol { mu: 1.0 };
+
+/// Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune, Pluto: astronomical units, days, masses of the Sun. [Hairer, Lubich, Wanner, Geometric Numerical Integration, I.2.4]
+const PLANETS: Planets = Planets {
+    g: 2.959_122_082_86e-4,
+    m: [
+        1.000_005_976_82,
+        0.000_954_786_104_043,
+        0.000_285_583_733_151,
+        0.000_043_727_316_454_6,
+        0.000_051_775_913_844_9,
+        1.0 / 1.3e8,
+    ],
+};
+const PLACES: [f64; 18] = [
+    0.0,
+    -3.502_365_3,
+    9.075_531_4,
+    8.310_142_0,
+    11.470_766_6,
+    -15.538_735_7, //
+    0.0,
+    -3.816_984_7,
+    -3.045_835_3,
+    -16.290_108_6,
+    -25.729_482_9,
+    -25.222_559_4, //
+    0.0,
+    -1.550_796_3,
+    -1.648_370_8,
+    -7.252_127_8,
+    -10.816_945_6,
+    -3.190_238_2,
+];
+const SPEEDS: [f64; 18] = [
+    0.0,
+    0.005_654_29,
+    0.001_683_18,
+    0.003_541_78,
+    0.002_889_30,
+    0.002_767_25, //
+    0.0,
+    -0.004_124_90,
+    0.004_835_25,
+    0.001_371_02,
+    0.001_145_27,
+    -0.001_707_02, //
+    0.0,
+    -0.001_905_89,
+    0.001_924_62,
+    0.000_550_29,
+    0.000_396_77,
+    -0.001_365_04,
+];
+
+fn first_mode() -> State<32> {
+    let mut q = [0.0; 32];
+    for (i, q) in q.iter_mut().enumerate() {
+        *q = (std::f64::consts::PI * (i + 1) as f64 / 33.0).sin();
+    }
+    FPUT.state(q, [0.0; 32])
+}
+
+/// Each scene with four and with nine nodes.
+pub fn all() -> Vec<Scene> {
+    macro_rules! both {
+        ($($name:literal, $model:expr, $start:expr, [$four:ident $h4:literal, $nine:ident $h9:literal], $stepper:ident of $hand:expr, $second:expr;)*) => {
+            vec![$(
+                scene!($name, $model, $start, $four 4, $h4, $stepper of $hand, $second),
+                scene!($name, $model, $start, $nine 9, $h9, $stepper of $hand, $second),
+            )*]
+        };
+    }
+    both! {
+        "pendulum", Pendulum {}, Pendulum {}.state([1.5], [0.0]),
+            [Pendulum4 0.1, Pendulum9 1.0], SecondOrderStepper of by_hand::Pendulum, [0.0];
+        "double-pendulum", DOUBLE_PENDULUM, DOUBLE_PENDULUM.state([0.5, -0.3], [0.0, 0.0]),
+            [DoublePendulum4 0.01, DoublePendulum9 0.1], CoupledStepper of by_hand::DoublePendulum { g: 9.81 }, [0.0; 2];
+        "kepler", Kepler {}, Kepler {}.state([0.4, 0.0], [0.0, 2.0]),
+            [Kepler4 0.02, Kepler9 0.2], SecondOrderStepper of by_hand::Kepler, [0.0, 2.0];
+        "henon-heiles", HenonHeiles {}, State { q: [0.1, 0.0], p: [0.0, 0.5] },
+            [HenonHeiles4 0.1, HenonHeiles9 1.0], SecondOrderStepper of by_hand::HenonHeiles, [0.0, 0.5];
+        "planets", PLANETS, PLANETS.state(PLACES, SPEEDS),
+            [Planets4 20.0, Planets9 200.0], SecondOrderStepper of by_hand::Planets { g: PLANETS.g, m: PLANETS.m }, SPEEDS;
+        "fput", FPUT, first_mode(),
+            [Fput4 0.05, Fput9 0.25], SecondOrderStepper of by_hand::Fput { alpha: 0.25 }, [0.0; 32];
+        "van-der-pol", VAN_DER_POL, VAN_DER_POL.state([2.0], [0.0]),
+            [VanDerPol4 0.02, VanDerPol9 0.2], SecondOrderStepper of by_hand::VanDerPol { mu: 1.0 }, [0.0];
+        "heavy-top", TOP, TOP.state([0.0, 0.7, 0.0], [0.5, 0.0, 12.0]),
+            [HeavyTop4 0.01, HeavyTop9 0.1], CoupledStepper of by_hand::HeavyTop { a: 1.4, c: 0.6, w: 5.0 }, TOP.state([0.0, 0.7, 0.0], [0.5, 0.0, 12.0]).p;
+    }
 }
