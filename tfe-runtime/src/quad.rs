@@ -56,6 +56,17 @@ macro_rules! register {
                 self.with(lanes)
             }
 
+            /// What was found for small arguments, and a function of the lanes that are not.
+            #[inline(always)]
+            fn or_by_lanes(self, found: Self, function: impl Fn(f64) -> f64) -> Self {
+                if self.is_small() {
+                    return found;
+                }
+                let (x, mut found) = (self.lanes(), found.lanes());
+                crate::trigonometry::replace_large(&x, &mut found, function);
+                self.with(found)
+            }
+
             #[inline(always)]
             fn both(self, other: Self, function: impl Fn(f64, f64) -> f64) -> Self {
                 let (mut lanes, other) = (self.lanes(), other.lanes());
@@ -159,12 +170,18 @@ macro_rules! register {
 
             #[inline(always)]
             fn sin(self) -> Self {
-                self.sin_cos().0
+                self.or_by_lanes(
+                    crate::trigonometry::sin_of_small(self),
+                    <f64 as crate::real::Real>::sin,
+                )
             }
 
             #[inline(always)]
             fn cos(self) -> Self {
-                self.sin_cos().1
+                self.or_by_lanes(
+                    crate::trigonometry::cos_of_small(self),
+                    <f64 as crate::real::Real>::cos,
+                )
             }
 
             crate::quad::lane_by_lane! {
@@ -210,6 +227,14 @@ macro_rules! register {
             #[inline(always)]
             fn fused(self, factor: Self, term: Self) -> Self {
                 crate::points::four::Precise::times_plus(self, factor, term)
+            }
+
+            #[inline(always)]
+            fn negated_if_odd(self, count: Self) -> Self {
+                let (value, count): ($bits, $bits) = (pulp::cast(self.value), pulp::cast(count.value));
+                let sign = self.isa.$shift::<63>(count);
+                let value = pulp::cast(self.isa.xor_u64s(value, sign));
+                Self { value, ..self }
             }
 
             #[inline(always)]
@@ -319,9 +344,47 @@ impl Turn for Pair<Quad> {
     }
 
     #[inline(always)]
+    fn negated_if_odd(self, count: Self) -> Self {
+        Self(
+            self.0.negated_if_odd(count.0),
+            self.1.negated_if_odd(count.1),
+        )
+    }
+
+    #[inline(always)]
     fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self) {
         let first = Quad::turned(sin.0, cos.0, quadrant.0);
         let second = Quad::turned(sin.1, cos.1, quadrant.1);
         (Self(first.0, second.0), Self(first.1, second.1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sines_have_the_bits_of_plain_lanes() {
+        let Some(isa) = V3::try_new() else {
+            return; // Nothing to compare with on this processor.
+        };
+        for k in 0..2000 {
+            let x = f64::from(k) * 0.731;
+            let x = [x, -1e-3 * x, 50.0 * x, 1e3 * x];
+            let register = Quad::of(isa, x);
+            let bits = |numbers: [f64; 4]| numbers.map(f64::to_bits);
+            let (sin, cos) = crate::trigonometry::sin_cos(&x);
+            let both = register.sin_cos();
+            assert_eq!(bits(both.0.lanes()), bits(sin));
+            assert_eq!(bits(both.1.lanes()), bits(cos));
+            assert_eq!(
+                bits(register.sin().lanes()),
+                bits(crate::trigonometry::sin(&x))
+            );
+            assert_eq!(
+                bits(register.cos().lanes()),
+                bits(crate::trigonometry::cos(&x))
+            );
+        }
     }
 }

@@ -159,11 +159,11 @@ macro_rules! elementary {
             lane_items!();
             #[inline]
             fn sin(self) -> Self {
-                self.sin_cos().0
+                Self(trigonometry::sin(&self.0))
             }
             #[inline]
             fn cos(self) -> Self {
-                self.sin_cos().1
+                Self(trigonometry::cos(&self.0))
             }
             $(lane_function!($name $($argument)*);)*
         }

@@ -179,17 +179,8 @@ impl<V: Four> Real for Pair<V> {
         (Self(first.0, second.0), Self(first.1, second.1))
     }
 
-    #[inline(always)]
-    fn sin(self) -> Self {
-        self.sin_cos().0
-    }
-
-    #[inline(always)]
-    fn cos(self) -> Self {
-        self.sin_cos().1
-    }
-
     half_by_half! {
+        sin(); cos();
         tan(); asin(); acos(); atan(); atan2(x); sinh(); cosh(); tanh(); asinh(); acosh(); atanh(); exp(); ln(); hypot(other);
         powf(exponent); sign(); min(other); max(other); sqrt(); abs();
     }
