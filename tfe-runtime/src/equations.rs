@@ -41,6 +41,14 @@ pub(crate) struct Increment {
     pub(crate) position: f64,
 }
 
+impl Increment {
+    /// Nothing has changed.
+    pub(crate) const NONE: Self = Self {
+        relative: 0.0,
+        position: 0.0,
+    };
+}
+
 /// One element of a step: where it starts, and what hits it.
 #[derive(Clone, Copy)]
 pub(crate) struct Span<'a, const N: usize> {

@@ -57,14 +57,40 @@ impl Control {
     }
 }
 
+impl Control {
+    const DEFAULT: Self = Self {
+        // Well below one rounding: what a fixed point leaves has the same sign in element after element and adds up, roundings do not.
+        tolerance: 0.05 * f64::EPSILON,
+        max_iterations: 100,
+        solve: Solve::Auto,
+    };
+}
+
 impl Default for Control {
     fn default() -> Self {
-        Self {
-            // Well below one rounding: what a fixed point leaves has the same sign in element after element and adds up, roundings do not.
-            tolerance: 0.05 * f64::EPSILON,
-            max_iterations: 100,
-            solve: Solve::Auto,
-        }
+        Self::DEFAULT
+    }
+}
+
+/// What is asked of an iteration, known when the program runs or when it is compiled.
+pub(crate) trait Asked {
+    fn control(&self) -> Control;
+}
+
+impl Asked for Control {
+    #[inline(always)]
+    fn control(&self) -> Control {
+        *self
+    }
+}
+
+/// [`Control::default`], known to the compiler.
+pub(crate) struct Standard;
+
+impl Asked for Standard {
+    #[inline(always)]
+    fn control(&self) -> Control {
+        Control::DEFAULT
     }
 }
 
@@ -201,8 +227,17 @@ impl Monitor {
     pub(crate) fn judge(&mut self, increment: Increment) -> Result<Verdict, StepError> {
         let size = increment.relative;
         self.position = increment.position;
-        if !size.is_finite() {
+        if !(size < f64::INFINITY) {
             return Err(StepError::NonFinite);
+        }
+        if size < 0.5 * self.best && size * size > self.tolerance * self.last {
+            // Most increments, neither the first nor the last: what follows, without what does not apply.
+            self.rate = size / self.last;
+            if size > Evidence::FAR {
+                self.wildest = self.wildest.max(self.rate);
+            }
+            (self.last, self.best, self.idle, self.risen) = (size, size, 0, 0);
+            return Ok(Verdict::GoOn);
         }
         let (last, first) = (self.last, self.last.is_infinite());
         // What is left is the rest of a geometric series, size · ρ/(1 − ρ). One lucky small increment must not end the iteration, hence a
@@ -274,6 +309,10 @@ impl Monitor {
     pub(crate) fn is_hopeless(&self, remaining: u32) -> bool {
         let target = self.tolerance.max(64.0 * f64::EPSILON);
         if self.last <= target {
+            return false;
+        }
+        if remaining >= 8 && self.rate < 0.05 && self.last <= 1e-4 {
+            // The eighth power is less than half of the smallest target, as below.
             return false;
         }
         let exponent = i32::try_from(remaining).unwrap_or(i32::MAX);

@@ -25,11 +25,10 @@ use crate::element::Element;
 use crate::error::StepError;
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
-use crate::newton::{Control, Solve};
+use crate::newton::Asked;
 use crate::real::Lanes;
 use crate::scheme::Tables;
-use crate::statistics::Contraction;
-use crate::step::{Last, Memory, cold_rate, cold_rates, may_be_phase};
+use crate::step::{Memory, cold_rate, cold_rates, may_be_phase};
 use crate::workspace::width;
 use core::marker::PhantomData;
 use four::{Apart, Four};
@@ -151,76 +150,27 @@ impl<const N: usize, S: Storage> Points<N, S> {
     }
 
     /// A step of a stepper, with what it remembers.
+    #[inline]
     pub(crate) fn step<M>(
         &mut self,
-        (model, tables, control): (&M, &impl Tables, &Control),
+        (model, tables, asked): (&M, &impl Tables, &impl Asked),
         memory: &mut Memory<N>,
-        (t, h): (f64, f64),
+        place: (f64, f64),
         state: &mut State<N>,
     ) -> Together
     where
         M: Model<N>,
     {
-        let yielding = control.solve != Solve::FixedPoint;
-        if yielding && !memory.preference.is_fixed_point() {
-            self.forget();
-            return Together::LeftToOthers;
-        }
-        let last = memory.last.as_ref();
-        if !last.is_some_and(|last| last.end.is_same(state)) {
-            self.forget();
-            memory.low = State::ZERO;
-        }
-        if self.is_warm {
-            self.tables.set_ratio(tables, h / self.last_step);
-        } else {
-            self.start_cold(model, t, state);
-        }
         let job = Job {
             points: self,
             model,
-            control,
-            place: (t, h),
-            start: (state, &memory.low),
-            yielding,
+            tables,
+            asked,
+            memory,
+            place,
+            state,
         };
-        let outcome = job.run();
-        let statistics = &mut memory.statistics;
-        let iterations = u64::from(outcome.iterations);
-        statistics.iterations += iterations;
-        statistics.fixed_point_iterations += iterations;
-        statistics.residual_evaluations += iterations * self.tables.points as u64;
-        statistics.contraction = Contraction::of(outcome.contraction);
-        let Some((end, end_low)) = outcome.end else {
-            if yielding {
-                memory.preference.leave_fixed_point();
-                memory.statistics.fallbacks += 1;
-                return Together::LeftToOthers;
-            }
-            memory.last = None;
-            return Together::Stalled(if outcome.residual.is_finite() {
-                StepError::FixedPointStalled {
-                    iterations: outcome.iterations,
-                    residual: outcome.residual,
-                    tolerance: control.tolerance,
-                }
-            } else {
-                StepError::NonFinite
-            });
-        };
-        (self.is_warm, self.last_step) = (true, h);
-        memory.last = Some(Last {
-            t,
-            h,
-            start: *state,
-            start_low: memory.low,
-            end,
-        });
-        (*state, memory.low) = (end, end_low);
-        memory.preference.confirm_fixed_point();
-        memory.statistics.steps += 1;
-        memory.forget_factors();
-        Together::Arrived
+        job.run()
     }
 
     /// Rates and forces of the last step to where an ordinary step has them; false if there is none.
@@ -534,6 +484,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::bundle::Pendulums;
     use crate::model::{CoordinateName, Facts, Second};
+    use crate::newton::Control;
     use crate::real::Real;
     use crate::scheme::SchemeTable;
     use crate::{Mixed, Radau};

@@ -4,7 +4,7 @@ use crate::cut::{Halving, in_halves, may_be_cut};
 use crate::element::Element;
 use crate::error::StepError;
 use crate::model::{Model, State};
-use crate::newton::{Control, Solve};
+use crate::newton::{Control, Solve, Standard};
 use crate::points::storage::Storage;
 use crate::points::tables::Tables;
 use crate::points::{Points, Together, are_possible, is_second_order};
@@ -166,13 +166,12 @@ impl<
             model,
             scheme,
         } = self;
-        let control = Control::default();
         if const { S::GROUPS > 0 }
             && let Some(points) = &mut engine.points
             && h.is_finite()
             && h != 0.0
         {
-            let method = (*model, *scheme, &control);
+            let method = (*model, *scheme, &Standard);
             match points.step(method, &mut engine.memory, (t, h), state) {
                 Together::Arrived => return Ok(()),
                 Together::Stalled(error) => return Err(error),

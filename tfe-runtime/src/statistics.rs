@@ -41,16 +41,18 @@ impl Contraction {
 
     /// Of a ratio; what is no number counts as no contraction.
     pub(crate) fn of(ratio: f64) -> Self {
-        let parts = (1e6 * ratio).clamp(0.0, 1e9);
+        let parts = 1e6 * ratio;
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "a number between 0 and 10⁹"
+            reason = "below 10⁹, and zero where it is negative"
         )]
-        Self(if ratio.is_nan() {
+        Self(if parts < 1e9 {
+            parts as u32
+        } else if ratio.is_nan() {
             1_000_000
         } else {
-            parts as u32
+            1_000_000_000
         })
     }
 

@@ -23,10 +23,10 @@ pub trait Precise: Real {
         (high, (self - (high - part)) + (other - part))
     }
 
-    /// The larger one; of a NaN and a number, either.
+    /// The larger one; of a NaN and another number, the second.
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
-        Self::select(self.less(other), other, self)
+        Self::select(other.less(self), self, other)
     }
 }
 
@@ -87,11 +87,14 @@ pub(crate) trait Four: Precise {
         M: Model<N>;
 }
 
-/// Four of the numbers; zeros beyond the last.
+/// Four of the numbers; beyond the last zeros, or copies of a single one.
 #[inline(always)]
 pub(crate) fn block<V: Four>(like: V, numbers: &[f64], at: usize) -> V {
     if let Some(four) = numbers[at..].first_chunk() {
         return like.with(*four);
+    }
+    if let [single] = numbers[at..] {
+        return like.like(single);
     }
     let mut four = [0.0; 4];
     four[..numbers.len() - at].copy_from_slice(&numbers[at..]);
@@ -107,6 +110,19 @@ pub(crate) fn put<V: Four>(four: V, numbers: &mut [f64], at: usize) {
     }
     let end = numbers.len();
     numbers[at..end].copy_from_slice(&four.lanes()[..end - at]);
+}
+
+impl Precise for f64 {
+    #[inline(always)]
+    fn product(self, other: Self) -> (Self, Self) {
+        let product = DoubleDouble::product(self, other);
+        (product.high, product.low)
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, term: Self) -> Self {
+        fused(self, factor, term)
+    }
 }
 
 impl Precise for Lanes<4> {

@@ -2,7 +2,7 @@
 
 use super::four::{Four, block, put};
 use super::storage::Storage;
-use super::sweep::{Largest, no_derivatives, relative};
+use super::sweep::{Magnitude, larger, no_derivatives};
 use super::{Leg, Work};
 use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
@@ -98,7 +98,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
             (leg.tables.once).apply(like, &self.forces, &mut self.more_products);
         }
         let (h, square) = (like.like(leg.h), like.like(leg.h * leg.h));
-        let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
+        let (mut changed, mut size) = (Magnitude::none(like), Magnitude::none(like));
         let zero = like.like(0.0);
         let count = self.forces.len();
         let forces = &mut self.forces[..count];
@@ -146,22 +146,21 @@ impl<const N: usize, S: Storage> Work<N, S> {
                 // As accelerations: momenta of light and heavy bodies say nothing beside each other.
                 let inverse = like.like(leg.inertia.inverse_diagonal[a]);
                 changed.raise(inverse * (force - like.with(forces[c][a])));
-                // What is not finite shows in the change.
-                size.raise_finite(inverse * force);
+                size.raise(inverse * force);
                 forces[c][a] = force.lanes();
             }
         }
         let (changed, size) = (changed.get(), size.get());
-        let h = leg.h;
-        let velocity = relative(h, self.speed, size, changed);
-        let moved = self.speed + h.abs() * size;
-        let position = relative(h, self.distance, moved, 0.5 * h.abs() * changed);
+        if changed == 0.0 {
+            return Increment::NONE;
+        }
+        let h = leg.h.abs();
+        let speed = larger(self.speed, h * size);
+        let distance = larger(self.distance, h * (self.speed + h * size));
+        let velocity = h * changed / speed;
+        let position = h * (0.5 * h * changed) / distance;
         // Both are NaN, or none is.
-        let relative = if velocity > position {
-            velocity
-        } else {
-            position
-        };
+        let relative = larger(velocity, position);
         Increment { relative, position }
     }
 }

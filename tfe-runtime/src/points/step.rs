@@ -2,39 +2,146 @@
 
 use super::four::Four;
 use super::storage::Storage;
-use super::{Leg, Outcome, Points, Work, is_finite, is_phase, is_second_order, largest};
+use super::{Leg, Outcome, Points, Together, Work, is_finite, is_phase, is_second_order, largest};
+use crate::error::StepError;
 use crate::model::{Model, State};
-use crate::newton::{Control, Monitor, PATIENCE, Verdict};
+use crate::newton::{Asked, Control, Monitor, PATIENCE, Solve, Verdict};
+use crate::scheme;
+use crate::statistics::Contraction;
+use crate::step::{Last, Memory};
 
 /// A step to be done.
-pub(super) struct Job<'a, M, S: Storage, const N: usize> {
+pub(super) struct Job<'a, M, T, A, S: Storage, const N: usize> {
     pub(super) points: &'a mut Points<N, S>,
     pub(super) model: &'a M,
-    pub(super) control: &'a Control,
+    pub(super) tables: &'a T,
+    pub(super) asked: &'a A,
+    pub(super) memory: &'a mut Memory<N>,
     /// Time and length.
     pub(super) place: (f64, f64),
-    /// The start, and what it is more than its rounded numbers.
-    pub(super) start: (&'a State<N>, &'a State<N>),
-    /// Newton's method may follow.
-    pub(super) yielding: bool,
+    pub(super) state: &'a mut State<N>,
 }
 
-impl<M, S: Storage, const N: usize> Job<'_, M, S, N>
+impl<M, T, A, S: Storage, const N: usize> Job<'_, M, T, A, S, N>
 where
     M: Model<N>,
+    T: scheme::Tables,
+    A: Asked,
 {
-    /// In the registers of the processor.
-    pub(super) fn run(self) -> Outcome<N> {
+    /// In the registers of the processor, all of it one function.
+    #[inline(always)]
+    pub(super) fn run(self) -> Together {
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
         if let Some(isa) = self.points.isa {
             return isa.vectorize(InRegisters { job: self, isa });
         }
+        self.step_apart()
+    }
+
+    /// Where there are no registers. Not written into the place of its call, of which there are several.
+    #[inline(never)]
+    fn step_apart(self) -> Together {
         self.step(crate::Lanes([0.0; 4]))
     }
 
     /// The whole step.
     #[inline(always)]
-    fn step<V: Four>(self, like: V) -> Outcome<N> {
+    fn step<V: Four>(self, like: V) -> Together {
+        let Self {
+            points,
+            model,
+            tables,
+            asked,
+            memory,
+            place: (t, h),
+            state,
+        } = self;
+        let control = asked.control();
+        let yielding = control.solve != Solve::FixedPoint;
+        if yielding && !memory.preference.is_fixed_point() {
+            points.forget();
+            return Together::LeftToOthers;
+        }
+        match &memory.last {
+            Some(last) if last.end.is_same(state) => {}
+            _ => {
+                points.forget();
+                memory.low = State::ZERO;
+            }
+        }
+        if points.is_warm {
+            points.tables.continue_with(tables, h, points.last_step);
+        } else {
+            points.start_cold(model, t, state);
+        }
+        let iteration = Iteration {
+            points,
+            model,
+            control,
+            place: (t, h),
+            start: (state, &memory.low),
+            yielding,
+        };
+        let outcome = iteration.run(like);
+        let statistics = &mut memory.statistics;
+        let iterations = u64::from(outcome.iterations);
+        statistics.iterations += iterations;
+        statistics.fixed_point_iterations += iterations;
+        statistics.residual_evaluations += iterations * points.tables.points as u64;
+        statistics.contraction = Contraction::of(outcome.contraction);
+        let Some((end, end_low)) = outcome.end else {
+            if yielding {
+                memory.preference.leave_fixed_point();
+                memory.statistics.fallbacks += 1;
+                return Together::LeftToOthers;
+            }
+            memory.last = None;
+            return Together::Stalled(if outcome.residual.is_finite() {
+                StepError::FixedPointStalled {
+                    iterations: outcome.iterations,
+                    residual: outcome.residual,
+                    tolerance: control.tolerance,
+                }
+            } else {
+                StepError::NonFinite
+            });
+        };
+        (points.is_warm, points.last_step) = (true, h);
+        memory.last = Some(Last {
+            t,
+            h,
+            start: *state,
+            start_low: memory.low,
+            end,
+        });
+        (*state, memory.low) = (end, end_low);
+        memory.preference.confirm_fixed_point();
+        memory.statistics.steps += 1;
+        memory.forget_factors();
+        Together::Arrived
+    }
+}
+
+/// The iteration of a step.
+struct Iteration<'a, M, S: Storage, const N: usize> {
+    points: &'a mut Points<N, S>,
+    model: &'a M,
+    control: Control,
+    /// Time and length.
+    place: (f64, f64),
+    /// The start, and what it is more than its rounded numbers.
+    start: (&'a State<N>, &'a State<N>),
+    /// Newton's method may follow.
+    yielding: bool,
+}
+
+impl<M, S: Storage, const N: usize> Iteration<'_, M, S, N>
+where
+    M: Model<N>,
+{
+    /// From its start to the end of the step.
+    #[inline(always)]
+    fn run<V: Four>(self, like: V) -> Outcome<N> {
         let Self {
             points,
             model,
@@ -123,7 +230,7 @@ where
         }
         converged |= monitor.is_at_round_off();
         // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
-        let mut end = None;
+        let (mut end, mut residual) = (None, monitor.last());
         if converged && monitor.evidence(yielding).check(control.solve).is_ok() {
             let (state, low) = if const { is_second_order::<M, N>() } {
                 if is_rough {
@@ -142,28 +249,32 @@ where
                 core::mem::swap(&mut points.forces, &mut work.forces);
                 core::mem::swap(&mut points.rates, &mut work.rates);
                 points.velocity = work.velocity;
+            } else {
+                residual = f64::NAN;
             }
         }
         Outcome {
             end,
             iterations,
-            residual: monitor.last(),
+            residual,
             contraction: monitor.rate(),
         }
     }
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-struct InRegisters<'a, M, S: Storage, const N: usize> {
-    job: Job<'a, M, S, N>,
+struct InRegisters<'a, M, T, A, S: Storage, const N: usize> {
+    job: Job<'a, M, T, A, S, N>,
     isa: pulp::x86::V3,
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl<M: Model<N>, S: Storage, const N: usize> pulp::NullaryFnOnce for InRegisters<'_, M, S, N> {
-    type Output = Outcome<N>;
+impl<M: Model<N>, T: scheme::Tables, A: Asked, S: Storage, const N: usize> pulp::NullaryFnOnce
+    for InRegisters<'_, M, T, A, S, N>
+{
+    type Output = Together;
     #[inline(always)]
-    fn call(self) -> Outcome<N> {
+    fn call(self) -> Together {
         self.job.step(crate::quad::Quad::of(self.isa, [0.0; 4]))
     }
 }

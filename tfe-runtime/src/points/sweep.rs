@@ -1,6 +1,8 @@
 //! First-order equations, and what all iterations share.
 
-use super::four::{Four, Precise};
+use super::four::Four;
+#[cfg(feature = "alloc")]
+use super::four::Precise;
 use super::storage::Storage;
 use super::{Inertia, Leg, Row, Work};
 use crate::double_double::DoubleDouble;
@@ -8,13 +10,38 @@ use crate::equations::Increment;
 use crate::model::{First, Model};
 use crate::real::Real;
 
+/// The largest magnitude so far in each lane. NaN is left out: the end of a step is not finite where one of its forces is not, and that is looked at once a step.
+#[derive(Clone, Copy)]
+pub(crate) struct Magnitude<V>(V);
+
+impl<V: Four> Magnitude<V> {
+    #[inline(always)]
+    pub(crate) fn none(like: V) -> Self {
+        Self(like.like(0.0))
+    }
+
+    #[inline(always)]
+    pub(crate) fn raise(&mut self, value: V) {
+        self.0 = value.abs().larger(self.0);
+    }
+
+    /// Of all lanes.
+    #[inline(always)]
+    pub(crate) fn get(self) -> f64 {
+        let [a, b, c, d] = self.0.lanes();
+        larger(larger(a, b), larger(c, d))
+    }
+}
+
 /// The largest magnitude so far in each lane, and a sum that shows what is no number.
+#[cfg(feature = "alloc")]
 #[derive(Clone, Copy)]
 pub(crate) struct Largest<V> {
     size: V,
     sum: V,
 }
 
+#[cfg(feature = "alloc")]
 impl<V: Precise> Largest<V> {
     #[inline(always)]
     pub(crate) fn none(like: V) -> Self {
@@ -50,11 +77,14 @@ impl<V: Precise> Largest<V> {
         V: Four,
     {
         let [a, b, c, d] = self.by_lane().lanes();
-        // Pairs of pairs: whether the iteration goes on waits for this.
-        let (left, right) = (if a < b { b } else { a }, if c < d { d } else { c });
-        let largest = if left < right { right } else { left };
-        largest + 0.0 * ((a + b) + (c + d))
+        larger(larger(a, b), larger(c, d)) + 0.0 * ((a + b) + (c + d))
     }
+}
+
+/// The larger one; in one instruction, which nothing asks about NaN.
+#[inline(always)]
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
+    if a < b { b } else { a }
 }
 
 /// |h δ| over the larger one of start and |h x|; zero over zero is zero, NaN stays NaN.
@@ -137,7 +167,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
             }
         }
         leg.tables.once.apply(like, forces, products);
-        let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
+        let (mut changed, mut size) = (Magnitude::none(like), Magnitude::none(like));
         for c in 0..count {
             let mut step = [zero; N];
             for a in 0..N {
@@ -221,7 +251,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
             }
         }
         leg.tables.once.apply(like, velocities, products);
-        let none = Largest::none(like);
+        let none = Magnitude::none(like);
         let (mut force_changed, mut force_size) = (none, none);
         let (mut rate_changed, mut rate_size) = (none, none);
         for c in 0..count {

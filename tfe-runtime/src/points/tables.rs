@@ -1,7 +1,7 @@
 //! The tables of an element, their rows in groups of four points.
 
 use super::Row;
-use super::four::Four;
+use super::four::{Four, Precise};
 use super::storage::{Array, Inline, Lines, Storage};
 use crate::double_double::DoubleDouble;
 use crate::scheme::{self, Scheme, SchemeRef};
@@ -204,17 +204,13 @@ impl<S: Storage> Weights<S> {
                 }
             }
         }
-        // From a register for each coordinate to one for each of four points.
-        let [a, b, c, d] = transposed(high);
-        if const { !EXACT } {
-            return ((a + b) + (c + d), like.like(0.0));
+        if const { N == 1 } {
+            // One number at four points: nothing fills registers.
+            let (high, low) = sum_of::<_, EXACT>(high[0].lanes(), low[0].lanes());
+            return (like.like(high), like.like(low));
         }
-        let [e, f, g, h] = transposed(low);
-        let (left, left_low) = a.exact_sum(b);
-        let (right, right_low) = c.exact_sum(d);
-        let (all, all_low) = left.exact_sum(right);
-        let lost = (left_low + right_low) + all_low;
-        (all, ((e + f) + (g + h)) + lost)
+        // From a register for each coordinate to one for each of four points.
+        sum_of::<_, EXACT>(transposed(high), transposed(low))
     }
 
     /// The weight of one point and what rounding took from it.
@@ -224,6 +220,19 @@ impl<S: Storage> Weights<S> {
         let [weight, low] = &self.0[point / 4];
         (weight[point % 4], low[point % 4])
     }
+}
+
+/// The sum of four numbers and what rounding takes from it, and from each.
+#[inline(always)]
+fn sum_of<V: Precise, const EXACT: bool>([a, b, c, d]: [V; 4], [e, f, g, h]: [V; 4]) -> (V, V) {
+    if const { !EXACT } {
+        return ((a + b) + (c + d), a.like(0.0));
+    }
+    let (left, left_low) = a.exact_sum(b);
+    let (right, right_low) = c.exact_sum(d);
+    let (all, all_low) = left.exact_sum(right);
+    let lost = (left_low + right_low) + all_low;
+    (all, ((e + f) + (g + h)) + lost)
 }
 
 #[inline(always)]
@@ -445,6 +454,15 @@ impl<S: Storage> Tables<S> {
     #[inline(always)]
     pub(crate) fn continued(&self) -> &Matrix<S> {
         self.other.as_ref().unwrap_or(&self.fixed.continued)
+    }
+
+    /// Makes `continued` that of a step of length `h` after one of length `last`.
+    #[inline(always)]
+    pub(crate) fn continue_with(&mut self, scheme: &impl scheme::Tables, h: f64, last: f64) {
+        // Mostly there is nothing to divide.
+        if h != last || self.ratio != 1.0 {
+            self.set_ratio(scheme, h / last);
+        }
     }
 
     /// Makes `continued` that of steps of this ratio.
