@@ -1,6 +1,6 @@
 //! Why there is no optimum.
 
-use super::Optimum;
+use super::optimum::Optimum;
 use crate::boundary::BoundaryError;
 use crate::driven::InputError;
 use std::error::Error;
