@@ -158,6 +158,26 @@ where
     start.state
 }
 
+/// Steps of runs for the energy: `LONG_STEPS=10000` takes as many.
+pub fn long_steps() -> u32 {
+    let asked = std::env::var("LONG_STEPS").ok();
+    asked.and_then(|text| text.parse().ok()).unwrap_or(200)
+}
+
+/// The largest change of the energy in a step, and since the start.
+pub fn energies_off<const N: usize>(motion: &Motion<N>) -> (f64, f64) {
+    let energies = motion.energies();
+    let jumps = energies.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let jump = jumps.fold(0.0, larger);
+    let off = |energy: &f64| (energy - energies[0]).abs();
+    let drift = energies.iter().map(off).fold(0.0, larger);
+    println!(
+        "{} steps: jumps up to {jump:.1e}, off by {drift:.1e}",
+        energies.len() - 1
+    );
+    (jump, drift)
+}
+
 /// Errors at the end fall with the order of the element, and energies over many steps do not drift.
 fn keeps_its_order<M, const N: usize>(model: &M, start: State<N>, (h, rank): (f64, usize))
 where
@@ -185,12 +205,7 @@ where
             "{nodes}: {long:e}, {short:e}, order {order}"
         );
     }
-    let motion = run(4, h, 200);
-    let energies = motion.energies();
-    let jumps = energies.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let jump = jumps.fold(0.0, larger);
-    let off = |energy: &f64| (energy - energies[0]).abs();
-    let drift = energies.iter().map(off).fold(0.0, larger);
+    let (jump, drift) = energies_off(&run(4, h, long_steps()));
     assert!(jump < 1e-8 && drift < 5e-8, "{jump:e}, {drift:e}");
 }
 

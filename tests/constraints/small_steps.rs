@@ -70,8 +70,7 @@ fn a_rod_takes_steps_of_any_size() {
     runs(&rod, rod.state([0.6, -0.8], [0.4, 0.3]));
 }
 
-#[test]
-fn a_slider_crank_takes_steps_of_any_size() {
+fn slider_crank() -> (SliderCrank, State<3>) {
     let crank = SliderCrank {
         j: 0.5,
         k: 0.2,
@@ -82,10 +81,14 @@ fn a_slider_crank_takes_steps_of_any_size() {
     let b = (a.sin() / 2.0).asin();
     let vb = va * a.cos() / (2.0 * b.cos());
     let vx = -a.sin() * va - 2.0 * b.sin() * vb;
-    runs(
-        &crank,
-        crank.state([a, b, a.cos() + 2.0 * b.cos()], [va, vb, vx]),
-    );
+    let start = crank.state([a, b, a.cos() + 2.0 * b.cos()], [va, vb, vx]);
+    (crank, start)
+}
+
+#[test]
+fn a_slider_crank_takes_steps_of_any_size() {
+    let (crank, start) = slider_crank();
+    runs(&crank, start);
 }
 
 /// Elements of three to seven nodes against eight: errors fall with the order 2(n − 1) of the element until they are roundings, and stay there.
@@ -125,35 +128,114 @@ where
     }
 }
 
-#[test]
-fn errors_fall_until_they_are_roundings() {
-    falls(
-        "rod",
-        &RodPendulum::UNIT,
-        RodPendulum::UNIT.horizontal(),
-        0.1,
-    );
+/// What is to be shown of each of the mechanisms, with a span in which it moves.
+trait Shown {
+    fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
+    where
+        M: tfe::runtime::Model<N>
+            + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>;
+}
+
+fn each(shown: &impl Shown) {
+    let rod = RodPendulum::UNIT;
+    shown.of("rod", &rod, rod.horizontal(), 3.0);
     let rates = RodPendulumRates::UNIT;
-    falls("rod by rates", &rates, rates.horizontal(), 0.1);
+    shown.of("rod by rates", &rates, rates.horizontal(), 3.0);
     let bead = Bead { g: 9.81 };
-    falls("bead", &bead, bead.state(ON_WIRE, [0.0; 2]), 0.1);
+    shown.of("bead", &bead, bead.state(ON_WIRE, [0.0; 2]), 3.0);
     let bead = BeadRates { g: 9.81 };
-    falls("bead by rates", &bead, bead.state(ON_WIRE, [0.0; 2]), 0.1);
+    shown.of("bead by rates", &bead, bead.state(ON_WIRE, [0.0; 2]), 3.0);
     let wire = MovingWire { g: 9.81, c: 0.3 };
     let v = [0.1, 0.1 * 1.2_f64.powi(3) + 1.2_f64.powi(4) / 20.0];
-    falls("moving wire", &wire, wire.state(ON_WIRE, v), 0.1);
+    shown.of("moving wire", &wire, wire.state(ON_WIRE, v), 3.0);
     let top = QuaternionTop::TABLE;
-    falls("top", &top, top.tilted(), 0.1);
+    shown.of("top", &top, top.tilted(), 1.0);
     let blade = KnifeEdge::TABLE;
-    falls("blade", &blade, blade.turning(1.0), 0.1);
+    shown.of("blade", &blade, blade.turning(1.0), 3.0);
     let ground = MovingGround { c: 0.1 };
-    falls(
-        "ground",
-        &ground,
-        ground.state([0.0; 3], [1.0, 0.0, 0.5]),
-        0.1,
-    );
+    let start = ground.state([0.0; 3], [1.0, 0.0, 0.5]);
+    shown.of("ground", &ground, start, 3.0);
     let (plate, start) = plate();
-    falls("plate", &plate, start, 0.1);
-    falls("Andrews", &Andrews, Andrews.at_rest(), 1e-4);
+    shown.of("plate", &plate, start, 3.0);
+    shown.of("Andrews", &Andrews, Andrews.at_rest(), 0.01);
+    let (crank, start) = slider_crank();
+    shown.of("slider-crank", &crank, start, 3.0);
+    let rod = Rod {
+        m: 1.0,
+        g: 9.81,
+        l: 1.0,
+    };
+    shown.of("fast rod", &rod, rod.state([0.6, -0.8], [4.0, 3.0]), 3.0);
+}
+
+#[test]
+fn errors_fall_until_they_are_roundings() {
+    struct Falls;
+    impl Shown for Falls {
+        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, _: f64)
+        where
+            M: tfe::runtime::Model<N>
+                + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
+        {
+            let largest = if name == "Andrews" { 1e-4 } else { 0.1 };
+            falls(name, model, start, largest);
+        }
+    }
+    each(&Falls);
+}
+
+/// Steps that an accuracy takes beside the fewest equal ones, of the same element, that meet it.
+#[test]
+fn accuracies_take_few_steps() {
+    struct Steps;
+    impl Shown for Steps {
+        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
+        where
+            M: tfe::runtime::Model<N>
+                + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
+        {
+            let simulation: Simulation<'_, M, N> = Simulation::new(model);
+            let fine = simulation.clone().element(Mixed::<8>).step(span / 400.0);
+            let exact = *fine.run(start, 0.0..span).expect("a run").last();
+            let off = |motion: &Motion<N>| {
+                let last = motion.last();
+                let size =
+                    |numbers: &[f64; N]| numbers.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+                let scale = size(&exact.q).max(size(&exact.p));
+                distance(&last.q, &exact.q).max(distance(&last.p, &exact.p)) / scale
+            };
+            for accuracy in [1e-3, 1e-6, 1e-9] {
+                let simulation = simulation.clone().element(Mixed::<5>);
+                let motion = simulation.clone().accuracy(accuracy).run(start, 0.0..span);
+                let motion = motion.unwrap_or_else(|error| panic!("{name}, {accuracy:e}: {error}"));
+                assert!(off(&motion) < accuracy, "{name}, {accuracy:e}");
+                let taken = motion.statistics().steps;
+                let meets = |count: u64| {
+                    let equal = simulation.clone().step(span / count as f64);
+                    let motion = equal.run(start, 0.0..span);
+                    motion.is_ok_and(|motion| off(&motion) < accuracy)
+                };
+                let (mut too_few, mut enough) = (0, 1);
+                while !meets(enough) {
+                    (too_few, enough) = (enough, 2 * enough);
+                }
+                while enough - too_few > 1 {
+                    let middle = (too_few + enough) / 2;
+                    if meets(middle) {
+                        enough = middle;
+                    } else {
+                        too_few = middle;
+                    }
+                }
+                let ratio = taken as f64 / enough as f64;
+                println!("{name:14} {accuracy:e}: {taken} steps, {enough} by hand, {ratio:.1}");
+                // Of loose accuracies most is in the first pilot steps.
+                assert!(
+                    ratio < 8.0 || accuracy > 1e-5,
+                    "{name}, {accuracy:e}: {ratio}"
+                );
+            }
+        }
+    }
+    each(&Steps);
 }

@@ -231,7 +231,8 @@ fn combine<M, const N: usize>(
     for a in 0..N {
         middle[a] += 0.5 * h * rate[a];
     }
-    rows.combine(model, [(t, start), (t + 0.5 * h, &middle)], active);
+    let places = [(t, start), (t + 0.5 * h, &middle)];
+    rows.combine(model, places, rate, active);
 }
 
 /// The polynomial of the rates at the end of the element.

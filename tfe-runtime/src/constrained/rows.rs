@@ -9,7 +9,7 @@ pub(crate) const fn rows_len(coordinates: usize, constraints: usize) -> usize {
 
 /// Of these, what is kept from step to step.
 const fn weights_len(constraints: usize) -> usize {
-    constraints * (constraints + 1)
+    constraints * (2 * constraints + 1)
 }
 
 /// The mark of a row that is a combination of all holonomic ones.
@@ -17,6 +17,9 @@ const COMBINED: usize = 3;
 
 /// What is left of a row beside the independent ones, relative to the row: below it the row is dependent.
 const DEPENDENT: f64 = 1e-10;
+
+/// Functions whose gradients vanish in the middle of an element, and turn there by less than this part of what others do, are not combined with these: the weights would be large.
+const STILL: f64 = 0.01;
 
 /// A row that was chosen before stays chosen while it has so much of its own.
 const KEPT: f64 = 0.1;
@@ -40,6 +43,8 @@ pub(crate) struct Rows<'a, const N: usize> {
     pub(crate) mu: &'a mut [f64],
     /// The weights of constraints in combined rows, a row for each.
     weights: &'a mut [f64],
+    /// U, with which multipliers are combined, a row for each column of it.
+    basis: &'a mut [f64],
     /// The squared lengths of the rows of A where they were combined.
     squares: &'a mut [f64],
     is_combined: bool,
@@ -61,7 +66,8 @@ impl<'a, const N: usize> Rows<'a, N> {
     pub(crate) fn of(memory: &'a mut [f64], constraints: usize) -> Self {
         let (memory, kept) = memory.split_at_mut(constraints * (5 * N + 3));
         memory.fill(0.0);
-        let (weights, squares) = kept.split_at_mut(constraints * constraints);
+        let (weights, kept) = kept.split_at_mut(constraints * constraints);
+        let (basis, squares) = kept.split_at_mut(constraints * constraints);
         let matrix = constraints * N;
         let (start, rest) = memory.split_at_mut(matrix);
         let (rows, rest) = rest.split_at_mut(matrix);
@@ -81,6 +87,7 @@ impl<'a, const N: usize> Rows<'a, N> {
             values,
             mu,
             weights,
+            basis,
             squares,
             is_combined: false,
         }
@@ -160,14 +167,15 @@ impl<'a, const N: usize> Rows<'a, N> {
     }
 
     /// Replaces the rows of holonomic constraints that depend on one another by as many combinations as are independent, functions W φ with W constant in the element
-    /// (T-118): vectors that span what the columns of A span in the middle of the element, with the rows of A scaled to the length one. Those combinations are left out
-    /// whose gradients vanish there, so that the others stay independent for as long as can be, and rows that were permuted or scaled give the same motion.
+    /// (T-118): for each gradient that the rows span in the middle of the element, of all combinations with this gradient there the one whose gradient turns least on the
+    /// way. So the others stay independent for as long as can be, and which rows are given, or how they are scaled or combined, makes no difference.
     ///
-    /// `places` are time and position at the start and in the middle, as far as that is known.
+    /// `places` are time and position at the start and in the middle, as far as that is known, and `rate` is the velocity there.
     pub(crate) fn combine<M: Model<N>>(
         &mut self,
         model: &M,
         places: [(f64, &[f64; N]); 2],
+        rate: &[f64; N],
         active: &mut [usize],
     ) {
         let count = M::CONSTRAINTS.len();
@@ -197,9 +205,12 @@ impl<'a, const N: usize> Rows<'a, N> {
             }
             active[place] = COMBINED;
         }
+        self.basis.copy_from_slice(self.weights);
+        self.turn_least(model, middle, rate, active);
         for c in 0..count {
             if !M::CONSTRAINTS[c].kind.is_holonomic() {
                 self.weights[c * count + c] = 1.0;
+                self.basis[c * count + c] = 1.0;
                 self.squares[c] = 1.0;
                 continue;
             }
@@ -214,10 +225,105 @@ impl<'a, const N: usize> Rows<'a, N> {
         self.start.copy_from_slice(self.rows);
     }
 
+    /// Adds combinations of constraints whose gradients vanish in the middle to those that were chosen, so that the gradients of these turn least.
+    ///
+    /// With B the rates of the scaled rows and R = (1 − U Uᵀ) B, the least |(u + v)ᵀ B| over all v ⊥ U, for each column u of U: v in the space of columns of R.
+    fn turn_least<M: Model<N>>(
+        &mut self,
+        model: &M,
+        (t, q): (f64, &[f64; N]),
+        rate: &[f64; N],
+        active: &[usize],
+    ) {
+        let count = M::CONSTRAINTS.len();
+        let holonomic = |c: usize| M::CONSTRAINTS[c].kind.is_holonomic();
+        // Kernels write only what can be non-zero.
+        self.is_combined = false;
+        self.psi_q.fill([0.0; N]);
+        self.rates.fill([0.0; N]);
+        self.mu.fill(0.0);
+        // At rest any direction will do.
+        let is_at_rest = rate.iter().all(|rate| *rate == 0.0);
+        let rate = if is_at_rest { &[1.0; N] } else { rate };
+        self.differentiate(model, t, q, rate);
+        let mut largest = 0.0_f64;
+        for c in 0..count {
+            let (rates, square) = (&mut self.rates[c], self.squares[c]);
+            *rates = if holonomic(c) && square > 0.0 {
+                scaled(rates, square)
+            } else {
+                [0.0; N]
+            };
+            largest = largest.max(norm(rates));
+            self.spare[c] = *rates;
+        }
+        let combined = || (0..count).filter(|&place| active[place] == COMBINED);
+        for place in combined() {
+            self.take_from_columns(place);
+        }
+        // In the places of combinations that are left out: what is added, and by how much that turns.
+        let open = || (0..count).filter(|&c| holonomic(c) && active[c] == 0);
+        let mut found = 0;
+        for place in open() {
+            if !self.add_column(place, STILL * largest) {
+                break;
+            }
+            found += 1;
+        }
+        let combination = |weights: &[f64], place: usize, rates: &[[f64; N]]| {
+            let mut sum = [0.0; N];
+            for (weight, rate) in weights[place * count..].iter().zip(rates) {
+                for a in 0..N {
+                    sum[a] += weight * rate[a];
+                }
+            }
+            sum
+        };
+        for place in open().take(found) {
+            let mut turn = combination(self.weights, place, self.rates);
+            // Twice is enough for orthogonality to rounding.
+            for _ in 0..2 {
+                for before in open().take_while(|&before| before < place) {
+                    let part = dot(&turn, &self.psi_q[before]);
+                    for a in 0..N {
+                        turn[a] -= part * self.psi_q[before][a];
+                    }
+                    add_row(self.weights, (before, place), -part);
+                }
+            }
+            let length = norm(&turn);
+            for entry in &mut turn {
+                *entry /= length;
+            }
+            for entry in &mut self.weights[place * count..(place + 1) * count] {
+                *entry /= length;
+            }
+            self.psi_q[place] = turn;
+        }
+        for place in combined() {
+            let turn = combination(self.weights, place, self.rates);
+            for added in open().take(found) {
+                add_row(
+                    self.weights,
+                    (added, place),
+                    -dot(&turn, &self.psi_q[added]),
+                );
+            }
+        }
+        for place in open() {
+            self.weights[place * count..(place + 1) * count].fill(0.0);
+        }
+    }
+
     /// Gram–Schmidt on the columns of `spare`: the one that has most of its own becomes a row of the basis. False where none has anything.
     fn add_basis(&mut self, place: usize) -> bool {
+        self.add_column(place, DEPENDENT)
+    }
+
+    /// The same where none has more than `least`.
+    fn add_column(&mut self, place: usize, least: f64) -> bool {
         let count = self.spare.len();
-        let (mut best, mut column) = (DEPENDENT, None);
+        let (mut best, mut column) = (least, None);
         for a in 0..N {
             let own: f64 = self.spare.iter().map(|row| row[a] * row[a]).sum();
             let own = crate::real::Real::sqrt(own);
@@ -230,28 +336,35 @@ impl<'a, const N: usize> Rows<'a, N> {
         for (entry, row) in basis.iter_mut().zip(&*self.spare) {
             *entry = row[column] / best;
         }
+        self.take_from_columns(place);
+        true
+    }
+
+    /// Leaves of the columns of `spare` what is orthogonal to a row of weights.
+    fn take_from_columns(&mut self, place: usize) {
+        let count = self.spare.len();
+        let direction = &self.weights[place * count..(place + 1) * count];
         // Twice is enough for orthogonality to rounding.
         for _ in 0..2 {
             for a in 0..N {
-                let part: f64 = (basis.iter().zip(&*self.spare))
+                let part: f64 = (direction.iter().zip(&*self.spare))
                     .map(|(entry, row)| entry * row[a])
                     .sum();
-                for (entry, row) in basis.iter().zip(self.spare.iter_mut()) {
+                for (entry, row) in direction.iter().zip(self.spare.iter_mut()) {
                     row[a] -= part * entry;
                 }
             }
         }
-        true
     }
 
     /// Multipliers of the constraints as declared to those of combined rows, one number for each.
     pub(crate) fn combine_multipliers(&mut self, multipliers: &mut [f64]) {
         let count = multipliers.len();
         for place in 0..count {
-            let weights = &self.weights[place * count..(place + 1) * count];
+            let basis = &self.basis[place * count..(place + 1) * count];
             let mut sum = 0.0;
             for c in 0..count {
-                sum += weights[c] * self.squares[c] * multipliers[c];
+                sum += basis[c] * crate::real::Real::sqrt(self.squares[c]) * multipliers[c];
             }
             self.mu[place] = sum;
         }
@@ -423,6 +536,14 @@ fn subtract_part<const N: usize>(row: &mut [f64; N], direction: &[f64; N]) {
         for a in 0..N {
             row[a] -= part * direction[a];
         }
+    }
+}
+
+/// Adds so much of one row of a square matrix to another.
+fn add_row(matrix: &mut [f64], (from, to): (usize, usize), part: f64) {
+    let count = matrix.len().isqrt();
+    for c in 0..count {
+        matrix[to * count + c] += part * matrix[from * count + c];
     }
 }
 
