@@ -35,6 +35,8 @@ use tfe_runtime::step::{Control, Impulse, Stepper};
 
 use tfe_runtime::{Element, Mixed, Model, Share, Solve, State};
 
+use watch::resolution::Again;
+
 pub use accurate::Accurate;
 pub(crate) use checkpoint::Reached;
 pub use checkpoint::{Checkpoint, FamilyCheckpoint};
@@ -448,7 +450,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     }
 
     /// The states that follow `start`, one a step, without end and in constant memory; elements end at [breaks](Self::break_at), as in [`run`](Self::run). After an error the iterator
-    /// is finished. There are no [warnings](Motion::warnings).
+    /// is finished. [`Steps::warnings`] tells what is doubtful about the steps so far.
     ///
     /// A step in which an [event](Self::on) changes the state or a parameter has two more nodes, with the states before and after; after the node at which an event stops the run the
     /// iterator is finished. [`Steps::events`] tells those of the last step.
@@ -471,7 +473,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # }
     /// ```
     pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
-        Steps::new(self.endless(&start, t0), start, t0, self.impulses.clone())
+        let beginning = self.endless(&start, t0);
+        Steps::new(beginning, start, t0, self.impulses.clone(), self.again())
     }
 
     /// The beginning of a course without an end.
@@ -497,6 +500,16 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 
     pub(crate) fn model(&self) -> &M {
         &self.model
+    }
+
+    /// With what elements are looked at a second time.
+    fn again(&self) -> Again<'m, M> {
+        Again {
+            model: self.model.clone(),
+            element: self.chosen_element(),
+            control: self.control,
+            at_kinks: self.at_kinks == Some(true),
+        }
     }
 
     fn chosen_element(&self) -> Element {

@@ -322,6 +322,55 @@ struct Switched {
     late: f64,
 }
 
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
+struct Oscillator;
+
+/// `steps` warn as runs do.
+#[test]
+fn endless_steps_are_watched() {
+    fn check<M: tfe::Model<N>, const N: usize>(
+        simulation: &Simulation<'_, M, N>,
+        start: State<N>,
+        span: std::ops::Range<f64>,
+    ) -> Vec<Warning> {
+        let motion = match simulation.run(start, span) {
+            Ok(motion) => motion,
+            Err(error) => error.into_partial(),
+        };
+        let mut steps = simulation.steps(start, motion.states()[0].t);
+        // One more fails where the run has failed.
+        let count = motion.statistics().steps as usize;
+        assert_eq!(
+            steps.by_ref().take(count).filter(Result::is_ok).count(),
+            count
+        );
+        assert_eq!(steps.warnings(), motion.warnings());
+        steps.warnings()
+    }
+    let start = DrivenDuffing.state([1.0], [0.0]);
+    let duffing = Simulation::new(&DrivenDuffing).element(Mixed::<3>);
+    let told = check(&duffing.clone().step(2.5), start, 0.0..10.0);
+    assert!(matches!(told[..], [Warning::Unresolved { .. }]), "{told:?}");
+    assert_eq!(check(&duffing.step(0.05), start, 0.0..10.0), []);
+    let element = Element::energy_conserving(3);
+    let pendulum = Simulation::new(&PENDULUM).element(element).step(1.5);
+    let unresolved = |start| check(&pendulum, start, 0.0..6.0).len();
+    assert!(starts().into_iter().map(unresolved).sum::<usize>() > 25);
+    let primal = Simulation::new(&Oscillator).element(Primal::<3>).step(-3.3);
+    let told = check(&primal, Oscillator.state([1.0], [0.0]), 0.0..-330.0);
+    assert!(
+        matches!(told[..], [Warning::UnstableStep { .. }]),
+        "{told:?}"
+    );
+    let coupled = Coupled { c: 1.5 };
+    let indefinite = Simulation::new(&coupled).step(0.01);
+    let told = check(&indefinite, coupled.state([0.1, 0.2], [0.0; 2]), 0.0..0.1);
+    assert!(matches!(told[..], [Warning::MassIndefinite { .. }]));
+    let fall = Simulation::new(&Kepler).element(Mixed::<2>).step(0.11);
+    let told = check(&fall, Kepler.state([1.0, 0.0], [0.0, 0.0]), 0.0..4.0);
+    assert!(!told.is_empty());
+}
+
 /// `steps` end at breaks as runs do, on the same nodes to the bit.
 #[test]
 fn endless_steps_end_at_breaks() {

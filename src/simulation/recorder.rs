@@ -45,7 +45,7 @@ where
             watch.weigh(&**model, motion.last().t, (&start.q, velocity));
         }
         Self {
-            resolution: Resolution::new(model.clone(), element, simulation.control),
+            resolution: Resolution::new(simulation.again()),
             motion,
             follower,
             watch,

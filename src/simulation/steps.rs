@@ -1,16 +1,19 @@
 //! The endless sequence of states.
 
+use super::conserves_energy;
 use super::course::{Course, Leg};
 use super::events::Event;
 use super::follow::{Follow, Passed};
 use super::mesh::{self, Endless};
-use super::pieces::{Left, Observe, Pieces, Planned, Side};
+use super::pieces::{Left, Observe, Piece, Pieces, Planned, Side};
+use super::watch::resolution::{Again, Examined, Resolution};
+use super::watch::{Recorded, Warning, Watch};
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use std::collections::VecDeque;
 use tfe_runtime::step::{Impulse, Stepper};
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Model, State, Statistics};
+use tfe_runtime::{Model, Share, State, Statistics};
 
 /// The endless sequence of states of [`Simulation::steps`](crate::Simulation::steps).
 #[derive(Debug)]
@@ -20,6 +23,8 @@ pub struct Steps<'m, M, const N: usize> {
     velocity: [f64; N],
     /// Nodes at events that are to be told yet.
     nodes: VecDeque<Result<Node<N>, RunErrorKind>>,
+    watch: Watch,
+    resolution: Resolution<'m, M, N>,
 }
 
 /// A stepper with its state on an endless course.
@@ -115,15 +120,32 @@ impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
         start: State<N>,
         t0: f64,
         impulses: Vec<Impulse<N>>,
+        again: Again<'m, M>,
     ) -> Self {
         let way = Way::new(beginning, start, impulses);
-        let node = |stepper: &Stepper<'m, M, N>| Node::new(stepper.model(), t0, &start, &[0.0; N]);
-        let velocity = (way.course.stepper()).map_or([0.0; N], |stepper| node(stepper).v);
+        let mut watch = Watch::new(again.element);
+        let mut velocity = [0.0; N];
+        if let Some(stepper) = way.course.stepper() {
+            let node = Node::new(stepper.model(), t0, &start, &velocity);
+            velocity = node.v;
+            watch.pass(Recorded::of(stepper.model(), &node, false));
+            watch.weigh(stepper.model(), t0, (&node.q, &node.v));
+        }
         Self {
             way,
             velocity,
             nodes: VecDeque::new(),
+            watch,
+            resolution: Resolution::new(again),
         }
+    }
+
+    /// What is doubtful about the steps so far without being an error, as [`Motion::warnings`](crate::Motion::warnings) tells it of a run. Where events are looked for, neither jumps of
+    /// the energy nor unstable steps are.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = self.watch.warnings().to_vec();
+        warnings.extend(self.resolution.warning(&self.way.state));
+        warnings
     }
 
     /// The model, unless the steps have ended.
@@ -159,6 +181,8 @@ impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
             nodes: &mut self.nodes,
             velocity: &mut self.velocity,
             last: f64::NAN,
+            watch: &mut self.watch,
+            resolution: &mut self.resolution,
         };
         match self.way.pass(&mut observer) {
             None | Some(Ok((Left::Stopped, _))) => {}
@@ -192,15 +216,29 @@ impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
             statistics,
             ..
         } = &mut self.way;
+        let (watch, resolution) = (&mut self.watch, &mut self.resolution);
         let velocity = &mut self.velocity;
         let advance = |stepper: &mut Stepper<'_, M, N>, leg: &Leg| {
             let impulses = acting(impulses, leg);
-            stepper
-                .advance(leg.begin, leg.h, state, &impulses)
-                .map_err(|source| leg.failed(source))?;
-            let (_, next) = leg.nodes;
+            let (before, (t, next)) = (*state, leg.nodes);
+            watch.look(stepper.model(), leg.number, (t, leg.h), &before);
+            if let Err(source) = stepper.advance(leg.begin, leg.h, state, &impulses) {
+                watch.examine(stepper.model(), leg.number, (t, leg.h), &before);
+                return Err(leg.failed(source));
+            }
             let node = Node::new(stepper.model(), next, state, velocity);
             *velocity = node.v;
+            if impulses.is_empty() {
+                let examined = Examined {
+                    t,
+                    h: leg.h,
+                    before: &before,
+                    after: state,
+                };
+                resolution.look(stepper.statistics(), examined);
+            }
+            let is_conserved = impulses.is_empty() && const { conserves_energy::<M, N>() };
+            watch.pass(Recorded::of(stepper.model(), &node, is_conserved));
             Ok(node)
         };
         course.next(advance, |stepper| *statistics = *stepper.statistics())
@@ -208,22 +246,26 @@ impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
 }
 
 /// Lines up the nodes of an element.
-struct Nodes<'a, const N: usize> {
+struct Nodes<'a, 'm, M, const N: usize> {
     nodes: &'a mut VecDeque<Result<Node<N>, RunErrorKind>>,
     velocity: &'a mut [f64; N],
     /// The time of the last one.
     last: f64,
+    watch: &'a mut Watch,
+    resolution: &'a mut Resolution<'m, M, N>,
 }
 
-impl<const N: usize> Nodes<'_, N> {
-    fn push<M: Model<N>>(&mut self, model: &M, t: f64, state: &State<N>) {
+impl<M: Model<N>, const N: usize> Nodes<'_, '_, M, N> {
+    fn push(&mut self, model: &M, t: f64, state: &State<N>) {
         let node = Node::new(model, t, state, self.velocity);
+        // Acts change the energy.
+        self.watch.pass(Recorded::of(model, &node, false));
         (*self.velocity, self.last) = (node.v, t);
         self.nodes.push_back(Ok(node));
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Nodes<'_, N> {
+impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Nodes<'_, 'm, M, N> {
     fn passed(
         &mut self,
         _: &mut Stepper<'m, M, N>,
@@ -233,9 +275,25 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Nodes<'_, N> {
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Observe<'m, M, N> for Nodes<'_, N> {
+impl<'m, M: Model<N>, const N: usize> Observe<'m, M, N> for Nodes<'_, 'm, M, N> {
     fn keeps(&self) -> bool {
         false
+    }
+
+    fn whole(&mut self, stepper: &Stepper<'m, M, N>, piece: &Piece<'_, N>) {
+        if !piece.has_impulses {
+            let examined = Examined {
+                t: piece.start,
+                h: piece.h,
+                before: piece.before,
+                after: piece.after,
+            };
+            self.resolution.look(stepper.statistics(), examined);
+        }
+    }
+
+    fn changed(&mut self, model: &Share<'m, M>, _: &[(usize, f64)]) {
+        self.resolution.set_model(model.clone());
     }
 
     fn at_event(&mut self, stepper: &Stepper<'m, M, N>, side: Side, t: f64, state: &State<N>) {

@@ -2,10 +2,12 @@
 
 pub(super) mod resolution;
 
+use crate::motion::Node;
 use crate::stability::growth::is_a_stable;
 use crate::stability::linear_model::LinearModel;
 use nalgebra::DMatrix;
 use std::fmt;
+use tfe_runtime::legendre::energy_at;
 use tfe_runtime::{Element, First, Form, Model, State};
 
 /// What is doubtful about a motion that was computed without an error.
@@ -62,7 +64,8 @@ pub enum Warning {
         /// How many such jumps there are.
         count: usize,
     },
-    /// An element and three of a third of its length end at different places: the step is too long to resolve the motion (`docs/theory.md`, (T-121)).
+    /// An element and three of a third of its length (nine of a ninth where it was cut) end at different places, or the element after it when these are carried on: the step is too
+    /// long to resolve the motion (`docs/theory.md`, (T-121)).
     ///
     /// Looked for in the elements whose iteration did not contract quickly, by their numbers 0, 1, 2, 4, 8, … among these; not in linear models, nor with
     /// [`Solve::Trusting`](crate::Solve::Trusting).
@@ -131,7 +134,7 @@ impl fmt::Display for Warning {
                 ..
             } => write!(
                 f,
-                "the step {step} at t = {time} does not resolve the motion: three thirds of it end elsewhere by {distance:.2} of what the motion extends over; \
+                "the step {step} at t = {time} does not resolve the motion: shorter steps end elsewhere by {distance:.2} of what the motion extends over; \
                  take a shorter step or an element with more nodes"
             ),
         }
@@ -297,6 +300,10 @@ impl Watch {
         self.warnings.extend(warning);
     }
 
+    pub(super) fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
     pub(super) fn into_warnings(self) -> Vec<Warning> {
         self.warnings
     }
@@ -340,4 +347,21 @@ pub(super) struct Recorded {
     pub(super) action: f64,
     /// Whether the energy has to be that of the node before.
     pub(super) is_conserved: bool,
+}
+
+impl Recorded {
+    /// Of a node whose energy is not known yet.
+    pub(super) fn of<M: Model<N>, const N: usize>(
+        model: &M,
+        node: &Node<N>,
+        is_conserved: bool,
+    ) -> Self {
+        let products = node.p.iter().zip(&node.v).map(|(p, v)| p * v);
+        Self {
+            time: node.t,
+            energy: energy_at(model, node.t, &node.q, &node.p, &node.v),
+            action: products.sum(),
+            is_conserved,
+        }
+    }
 }

@@ -4,25 +4,34 @@ use super::Warning;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::{Element, Model, Share, Solve, State, Statistics};
 
-/// Compares elements with three of a third of the length: halves might be cut into the same pieces as the element.
+/// Compares elements with three of a third of the length, those that were cut with nine of a ninth: halves might be cut into the same pieces as the element.
 #[derive(Debug)]
 pub(in crate::simulation) struct Resolution<'m, M, const N: usize> {
-    model: Share<'m, M>,
-    element: Element,
-    control: Control,
+    again: Again<'m, M>,
     /// The largest ratio of increments that is not doubtful.
     quick: f64,
     /// Made when it is first needed.
-    thirds: Option<Stepper<'m, M, N>>,
+    stepper: Option<Stepper<'m, M, N>>,
     /// Elements that were doubtful so far.
     doubtful: usize,
     /// The number among these of the one that is compared next.
     next: usize,
     /// Newton iterations and cuts so far.
     work: (u64, u64),
+    /// Where the parts of the element before have ended, if it was compared.
+    beside: Option<Beside<N>>,
     compared: Vec<Compared<N>>,
     /// The least and the largest coordinates and momenta that were seen.
     bounds: [State<N>; 2],
+}
+
+/// With what elements are stepped over again: as in the run.
+#[derive(Debug)]
+pub(in crate::simulation) struct Again<'m, M> {
+    pub(in crate::simulation) model: Share<'m, M>,
+    pub(in crate::simulation) element: Element,
+    pub(in crate::simulation) control: Control,
+    pub(in crate::simulation) at_kinks: bool,
 }
 
 /// An element that has been passed without an error.
@@ -34,7 +43,15 @@ pub(in crate::simulation) struct Examined<'a, const N: usize> {
     pub(in crate::simulation) after: &'a State<N>,
 }
 
-/// By how much its end is away from that of three thirds; infinite where these fail.
+/// A motion in parts of elements beside that of the run.
+#[derive(Clone, Copy, Debug)]
+struct Beside<const N: usize> {
+    state: State<N>,
+    /// Where the run has come to at the same time.
+    run: State<N>,
+}
+
+/// By how much its end is away from that of its parts; infinite where these fail.
 #[derive(Debug)]
 struct Compared<const N: usize> {
     t: f64,
@@ -46,23 +63,18 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
     /// About the error of an element relative to the motion from which on it is looked at. A fixed point contracts by some (hω)², an element of order k is wrong by some (hω)ᵏ.
     const DOUBTFUL: f64 = 0.008;
 
-    /// The part of what the motion extends over that three thirds may end elsewhere.
+    /// The part of what the motion extends over that its parts may end elsewhere.
     const MOST: f64 = 0.03;
 
-    pub(in crate::simulation) fn new(
-        model: Share<'m, M>,
-        element: Element,
-        control: Control,
-    ) -> Self {
+    pub(in crate::simulation) fn new(again: Again<'m, M>) -> Self {
         Self {
-            model,
-            element,
-            control,
-            quick: Self::DOUBTFUL.powf(2.0 / element.order() as f64),
-            thirds: None,
+            quick: Self::DOUBTFUL.powf(2.0 / again.element.order() as f64),
+            again,
+            stepper: None,
             doubtful: 0,
             next: 0,
             work: (0, 0),
+            beside: None,
             compared: Vec::new(),
             bounds: [f64::INFINITY, f64::NEG_INFINITY].map(|bound| State {
                 q: [bound; N],
@@ -73,88 +85,117 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
 
     /// Goes on with another model.
     pub(in crate::simulation) fn set_model(&mut self, model: Share<'m, M>) {
-        (self.model, self.thirds) = (model, None);
+        (self.again.model, self.stepper) = (model, None);
     }
 
     /// Compares the element if it is the next of those that are to be. Linear models are not looked at: what their elements are wrong by is known.
+    #[inline(always)]
     pub(in crate::simulation) fn look(
         &mut self,
         statistics: &Statistics,
         examined: Examined<'_, N>,
     ) {
-        if M::FACTS.linear || self.control.solve == Solve::Trusting {
+        if M::FACTS.linear || self.again.control.solve == Solve::Trusting {
             return;
         }
         // An element that was cut has the ratio of its last piece.
         let work = (statistics.newton_iterations, statistics.cuts);
-        let by_newton_or_cut = work != self.work;
+        let (by_newton_or_cut, is_cut) = (work != self.work, work.1 != self.work.1);
         self.work = work;
-        // Zero where the last two increments tell nothing.
-        let ratio = statistics.contraction.ratio();
-        if !by_newton_or_cut && 0.0 < ratio && ratio <= self.quick {
-            return;
-        }
-        let number = self.doubtful;
-        self.doubtful += 1;
-        if number == self.next {
-            self.next = (2 * number).max(1);
-            self.compare(examined);
+        let is_due = self.is_due(by_newton_or_cut, statistics);
+        if is_due || self.beside.is_some() {
+            // Where an element was too long to be proven, a third of it may be, too.
+            let parts = if is_cut { 9 } else { 3 };
+            self.compare(is_due, parts, examined);
         }
     }
 
+    /// Whether the element is doubtful, and the next of those to be compared.
+    #[inline(always)]
+    fn is_due(&mut self, by_newton_or_cut: bool, statistics: &Statistics) -> bool {
+        // Zero where the last two increments tell nothing.
+        let ratio = statistics.contraction.ratio();
+        if !by_newton_or_cut && 0.0 < ratio && ratio <= self.quick {
+            return false;
+        }
+        let number = self.doubtful;
+        self.doubtful += 1;
+        let is_next = number == self.next;
+        if is_next {
+            self.next = (2 * number).max(1);
+        }
+        is_next
+    }
+
+    /// Compares an element with its parts if it is due, and with parts that begin where those of the element before have ended: they show what the model makes of the error of
+    /// that element.
     #[cold]
-    fn compare(&mut self, examined: Examined<'_, N>) {
-        let Examined { t, h, .. } = examined;
-        self.extend(examined.before);
+    #[inline(never)]
+    fn compare(&mut self, is_due: bool, parts: u32, examined: Examined<'_, N>) {
+        // Not behind an act, which changes the state.
+        let continued = |beside: &Beside<N>| beside.run == *examined.before;
+        if let Some(beside) = self.beside.take().filter(continued) {
+            self.compare_from(beside.state, parts, examined);
+        }
+        if is_due {
+            extend(&mut self.bounds, examined.before);
+            let end = self.compare_from(*examined.before, parts, examined);
+            let run = *examined.after;
+            self.beside = end.map(|state| Beside { state, run });
+        }
+    }
+
+    /// Where so many parts from `start` end.
+    fn compare_from(
+        &mut self,
+        start: State<N>,
+        parts: u32,
+        Examined { t, h, after, .. }: Examined<'_, N>,
+    ) -> Option<State<N>> {
         let mut off = State {
             q: [f64::INFINITY; N],
             p: [f64::INFINITY; N],
         };
-        if let Some(end) = self.end_of_thirds(t, h, *examined.before) {
+        let end = self.end_of_parts((t, h), parts, start);
+        if let Some(end) = &end {
             for a in 0..N {
-                off.q[a] = end.q[a] - examined.after.q[a];
-                off.p[a] = end.p[a] - examined.after.p[a];
+                off.q[a] = end.q[a] - after.q[a];
+                off.p[a] = end.p[a] - after.p[a];
             }
         }
         self.compared.push(Compared { t, h, off });
+        end
     }
 
     /// None where they fail.
-    fn end_of_thirds(&mut self, t: f64, h: f64, mut state: State<N>) -> Option<State<N>> {
-        let mut stepper = match self.thirds.take() {
+    fn end_of_parts(
+        &mut self,
+        (t, h): (f64, f64),
+        parts: u32,
+        mut state: State<N>,
+    ) -> Option<State<N>> {
+        let mut stepper = match self.stepper.take() {
             Some(stepper) => stepper,
-            None => Stepper::sharing(self.model.clone(), self.element, self.control)
-                .ok()?
-                .ends_only(),
+            None => self.again.stepper()?,
         };
-        let third = h / 3.0;
-        for k in [0.0, 1.0, 2.0] {
-            stepper
-                .advance(t + k * third, third, &mut state, &[])
-                .ok()?;
-            self.extend(&state);
+        let part = h / f64::from(parts);
+        for k in 0..parts {
+            let start = t + f64::from(k) * part;
+            stepper.advance(start, part, &mut state, &[]).ok()?;
+            extend(&mut self.bounds, &state);
         }
-        self.thirds = Some(stepper);
+        self.stepper = Some(stepper);
         Some(state)
     }
 
-    fn extend(&mut self, state: &State<N>) {
-        let [least, largest] = &mut self.bounds;
-        for a in 0..N {
-            least.q[a] = least.q[a].min(state.q[a]);
-            least.p[a] = least.p[a].min(state.p[a]);
-            largest.q[a] = largest.q[a].max(state.q[a]);
-            largest.p[a] = largest.p[a].max(state.p[a]);
-        }
-    }
-
     /// What is to be told of the elements of a run that has come to `last`.
-    pub(in crate::simulation) fn warning(mut self, last: &State<N>) -> Option<Warning> {
+    pub(in crate::simulation) fn warning(&self, last: &State<N>) -> Option<Warning> {
         if self.compared.is_empty() {
             return None;
         }
-        self.extend(last);
-        let extent = Extent::between(&self.bounds);
+        let mut bounds = self.bounds;
+        extend(&mut bounds, last);
+        let extent = Extent::between(&bounds);
         let mut found = None;
         for Compared { t, h, off } in &self.compared {
             let part = extent.part(off);
@@ -162,16 +203,43 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
             if !(part > Self::MOST) {
                 continue;
             }
-            let (_, _, distance, count) = found.get_or_insert((*t, *h, part, 0));
+            let (_, _, distance, count, last) = found.get_or_insert((*t, *h, part, 0, f64::NAN));
             *distance = part.max(*distance);
-            *count += 1;
+            // One may have been compared twice.
+            *count += usize::from(last != t);
+            *last = *t;
         }
-        found.map(|(time, step, distance, count)| Warning::Unresolved {
+        found.map(|(time, step, distance, count, _)| Warning::Unresolved {
             time,
             step,
             distance,
             count,
         })
+    }
+}
+
+impl<'m, M> Again<'m, M> {
+    fn stepper<const N: usize>(&self) -> Option<Stepper<'m, M, N>>
+    where
+        M: Model<N>,
+    {
+        let stepper = Stepper::sharing(self.model.clone(), self.element, self.control).ok()?;
+        let stepper = stepper.ends_only();
+        Some(if self.at_kinks {
+            stepper.at_kinks()
+        } else {
+            stepper
+        })
+    }
+}
+
+/// Makes room for a state.
+fn extend<const N: usize>([least, largest]: &mut [State<N>; 2], state: &State<N>) {
+    for a in 0..N {
+        least.q[a] = least.q[a].min(state.q[a]);
+        least.p[a] = least.p[a].min(state.p[a]);
+        largest.q[a] = largest.q[a].max(state.q[a]);
+        largest.p[a] = largest.p[a].max(state.p[a]);
     }
 }
 
