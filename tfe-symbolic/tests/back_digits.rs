@@ -36,6 +36,18 @@ fn random_models() {
     check(&outcomes);
 }
 
+/// Models of the long run with seed 2 at which the guard once looked too little: equal velocities of links that are in line (1 − 1 instead of
+/// cos 0 = 1), a length that is much larger than the others, a branch that few states take, a sum that is exact below a power of two.
+#[test]
+fn random_models_that_once_lost_digits() {
+    let numbers = [9876, 7132, 906, 1782, 9242, 9336, 6177, 7988];
+    let outcomes: Vec<Outcome> = numbers
+        .into_iter()
+        .map(|number| random_outcome(2, number))
+        .collect();
+    check(&outcomes);
+}
+
 /// Values to 32 digits.
 #[test]
 fn double_double_functions() {

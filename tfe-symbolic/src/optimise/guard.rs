@@ -11,24 +11,26 @@
 //!
 //! **Angles.** The argument of a sine or cosine is known to half an ulp of each coordinate and parameter in it: the error of the baseline holds
 //! what such a change of the angles does. So the sine of a difference may be computed from the sines of the angles, as if these had been
-//! rounded before; a difference itself, or a power of it, may not.
+//! rounded before; a difference itself, or a power of it, may not. The cosine of equal angles counts as rounded, except at states where velocities,
+//! too, are equal or nearly so: there v − w cos(a − b) is exact, and v − w (cos a cos b + sin a sin b) is not.
+//!
+//! **Choices.** Each state is judged twice where there are choices: with the branches that its numbers choose, and with the others.
 
 mod bounded;
 mod states;
 
-use std::collections::BTreeMap;
-
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
-use crate::expr::hash::{Map, Set};
+use crate::expr::hash::Map;
 use crate::expr::input::Input;
-use crate::optimise::plan::{Op, Plan};
+use crate::optimise::plan::{Op, OpId, Plan};
 use bounded::Bounded;
-use states::{STATES, state};
+use states::{moves_together, number_of_states, state};
 
-/// How much larger than that of the baseline the bound of an error may be. Sines of differences from those of the angles need 6.4, where all
-/// angles are nearly equal; with 4, every chain of links would compute the sines of all differences.
+/// How much larger than that of the baseline the bound of an error may be. A velocity times another times the cosine of a difference needs 8, where
+/// that cosine follows from those of equal angles; with 4, every chain of links would compute the sines of all differences.
 const MAX_LOSS: f64 = 8.0;
 
 /// Arguments of sines are read as angles through so many nested sums.
@@ -37,7 +39,35 @@ const MAX_DEPTH: usize = 24;
 /// The states, and the results of the baseline at each of them.
 pub(crate) struct Guard {
     positions: Map<Input, usize>,
-    states: Vec<(Vec<f64>, Vec<Bounded>)>,
+    states: Vec<State>,
+}
+
+/// A state and the results of the baseline.
+struct State {
+    numbers: Vec<f64>,
+    branches: Branches,
+    wanted: Vec<Bounded>,
+}
+
+/// Which branches of choices are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Branches {
+    AsCompared,
+    /// The others: few states are on each side of a choice, and what they have in common is beside it.
+    Others,
+}
+
+impl Branches {
+    fn choose(
+        self,
+        comparison: Comparison,
+        [left, right, then, otherwise]: [Bounded; 4],
+    ) -> Bounded {
+        match comparison.holds(left.value, right.value) == (self == Self::AsCompared) {
+            true => then,
+            false => otherwise,
+        }
+    }
 }
 
 impl Guard {
@@ -56,21 +86,27 @@ impl Guard {
             .enumerate()
             .map(|(position, input)| (input.clone(), position))
             .collect();
-        let in_order: Set<ExprId> = order
-            .iter()
-            .copied()
-            .filter(|id| graph.keeps_order(*id))
-            .collect();
-        let states = (0..STATES).map(|number| {
+        let baseline = Baseline::of(graph, &order, &positions);
+        let chooses = |id: &ExprId| matches!(graph.node(*id), Node::Select { .. });
+        let branches: &[Branches] = match order.iter().any(chooses) {
+            true => &[Branches::AsCompared, Branches::Others],
+            false => &[Branches::AsCompared],
+        };
+        let mut states = Vec::new();
+        let mut known = vec![Bounded::NOTHING; order.last().map_or(0, |last| last.index() + 1)];
+        for number in 0..number_of_states(&inputs) {
             let numbers = state(&inputs, number);
-            let known = baseline(graph, &order, &in_order, &positions, &numbers);
-            let at = |id: &ExprId| known[id.index()];
-            (numbers, results.iter().map(at).collect())
-        });
-        Self {
-            states: states.collect(),
-            positions,
+            for branches in branches {
+                let rounded = !moves_together(number);
+                baseline.evaluate(&numbers, *branches, rounded, &mut known);
+                states.push(State {
+                    wanted: results.iter().map(|id| known[id.index()]).collect(),
+                    numbers: numbers.clone(),
+                    branches: *branches,
+                });
+            }
         }
+        Self { positions, states }
     }
 
     /// Whether a plan computes the results well enough; `roots` are the expressions that stand for them in the plan.
@@ -83,9 +119,11 @@ impl Guard {
             })
             .collect();
         let Some(places) = places else { return false };
-        self.states.iter().all(|(numbers, wanted)| {
-            let known = self.evaluate(plan, numbers);
-            let mut both = places.iter().zip(wanted);
+        let sources = self.sources(plan);
+        let mut known = Vec::with_capacity(plan.len());
+        self.states.iter().all(|state| {
+            evaluate(plan, &sources, state, &mut known);
+            let mut both = places.iter().zip(&state.wanted);
             both.all(|((op, negative), wanted)| {
                 let found = known[*op];
                 is_no_worse(if *negative { found.negated() } else { found }, *wanted)
@@ -93,24 +131,52 @@ impl Guard {
         })
     }
 
-    fn evaluate(&self, plan: &Plan, numbers: &[f64]) -> Vec<Bounded> {
-        let mut known: Vec<Bounded> = Vec::with_capacity(plan.len());
-        for id in plan.ids() {
-            let op = |x: &crate::optimise::plan::OpId| known[x.index()];
-            let result = match plan.op(id) {
-                Op::Constant(value) => Bounded::exact(value.to_f64()),
-                Op::Input(input) => {
-                    let number = self.positions.get(input).map(|at| numbers[*at]);
-                    Bounded::exact(number.unwrap_or(f64::NAN))
-                }
+    /// Where the operations of a plan have their values from.
+    fn sources(&self, plan: &Plan) -> Vec<Source> {
+        let source = |id| match plan.op(id) {
+            Op::Constant(value) => Source::Constant {
+                value: Bounded::exact(value.to_f64()),
+                scales_exactly: value.is_power_of_two(),
+            },
+            Op::Input(input) => Source::Input(self.positions.get(input).copied()),
+            _ => Source::Computed,
+        };
+        plan.ids().map(source).collect()
+    }
+}
+
+/// Where an operation of a plan has its value from.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    Constant {
+        value: Bounded,
+        scales_exactly: bool,
+    },
+    /// From the numbers of a state, where it stands among them.
+    Input(Option<usize>),
+    Computed,
+}
+
+/// The values of all operations of a plan at a state.
+fn evaluate(plan: &Plan, sources: &[Source], state: &State, known: &mut Vec<Bounded>) {
+    known.clear();
+    for (id, source) in plan.ids().zip(sources) {
+        let op = |x: &OpId| known[x.index()];
+        let result = match source {
+            Source::Constant { value, .. } => *value,
+            Source::Input(at) => {
+                at.map_or(Bounded::NOTHING, |at| Bounded::input(state.numbers[at]))
+            }
+            Source::Computed => match plan.op(id) {
+                Op::Constant(_) | Op::Input(_) => Bounded::NOTHING,
                 Op::Add(a, b) => op(a).plus(op(b)),
                 Op::Subtract(a, b) => op(a).plus(op(b).negated()),
                 Op::Multiply(a, b) => {
-                    let exact = |x| match plan.op(x) {
-                        Op::Constant(value) => value.is_power_of_two(),
+                    let exact = |x: &OpId| match sources[x.index()] {
+                        Source::Constant { scales_exactly, .. } => scales_exactly,
                         _ => false,
                     };
-                    match (exact(*a), exact(*b)) {
+                    match (exact(a), exact(b)) {
                         (true, _) => op(b).scaled(op(a).value, true),
                         (_, true) => op(a).scaled(op(b).value, true),
                         _ => op(a).times(op(b)),
@@ -130,13 +196,15 @@ impl Guard {
                     right,
                     then,
                     otherwise,
-                } => Bounded::select(*comparison, [op(left), op(right), op(then), op(otherwise)]),
+                } => {
+                    let operands = [op(left), op(right), op(then), op(otherwise)];
+                    state.branches.choose(*comparison, operands)
+                }
                 // The summand stands for the sum.
                 Op::Loop { body, .. } => op(body),
-            };
-            known.push(result);
-        }
-        known
+            },
+        };
+        known.push(result);
     }
 }
 
@@ -146,12 +214,14 @@ fn is_no_worse(found: Bounded, wanted: Bounded) -> bool {
         return true;
     }
     const UNIT: f64 = f64::EPSILON / 2.0;
+    // Of the bounds themselves.
+    const ROUNDING: f64 = 1e-9;
     // First-order bounds, and numbers below the smallest normal one.
     let apart = (found.value - wanted.value).abs();
     let near = apart <= 2.0 * UNIT * (found.error + wanted.error) + f64::MIN_POSITIVE;
     // A result that is exact by chance is no better than a rounded one.
     let allowed = wanted.error.max(wanted.value.abs());
-    near && found.error <= MAX_LOSS * allowed + f64::MIN_POSITIVE
+    near && found.error <= MAX_LOSS * (1.0 + ROUNDING) * allowed + f64::MIN_POSITIVE
 }
 
 fn integer_power(base: Bounded, exponent: i32) -> Bounded {
@@ -166,117 +236,222 @@ fn integer_power(base: Bounded, exponent: i32) -> Bounded {
     }
 }
 
-/// The values of all nodes, in the order in which they stand; `in_order`: the sums that keep it.
-fn baseline(
-    graph: &Graph,
-    order: &[ExprId],
-    in_order: &Set<ExprId>,
-    positions: &Map<Input, usize>,
-    numbers: &[f64],
-) -> Vec<Bounded> {
-    let length = order.last().map_or(0, |last| last.index() + 1);
-    let mut known = vec![Bounded::exact(f64::NAN); length];
-    for id in order {
-        let of = |x: ExprId| known[x.index()];
-        let result = match graph.node(*id) {
-            Node::Constant(value) => Bounded::exact(value.to_f64()),
-            Node::Input(input) => {
-                let number = positions.get(input).map(|at| numbers[*at]);
-                Bounded::exact(number.unwrap_or(f64::NAN))
-            }
-            Node::Sum { constant, terms } => {
-                let terms = terms.iter();
-                let term = |(c, x): &(Constant, ExprId)| {
-                    (*x, of(*x).scaled(c.to_f64(), c.is_power_of_two()))
-                };
-                let total = match in_order.contains(id) {
-                    true => by_groups(graph, terms.map(term)),
-                    false => terms.map(|one| term(one).1).reduce(Bounded::plus),
-                };
-                let number = (!constant.is_zero()).then(|| Bounded::exact(constant.to_f64()));
-                let all = total.into_iter().chain(number).reduce(Bounded::plus);
-                all.unwrap_or(Bounded::exact(0.0))
-            }
-            Node::Product(factors) => product(factors, &of),
-            Node::Power { base, exponent } => of(*base).power(of(*exponent)),
-            Node::Call {
-                function,
-                arguments,
-            } => {
-                let mut values: Vec<Bounded> = arguments.iter().map(|x| of(*x)).collect();
-                if matches!(function, Function::Sin | Function::Cos)
-                    && let Some(value) = values.first_mut()
-                    && let Some(size) = angle_size(graph, arguments[0], &of, MAX_DEPTH)
-                {
-                    value.error += size;
-                }
-                Bounded::call(*function, &values)
-            }
-            Node::Select {
-                comparison,
-                left,
-                right,
-                then,
-                otherwise,
-            } => {
-                let operands = [*left, *right, *then, *otherwise].map(of);
-                Bounded::select(*comparison, operands)
-            }
-            // The summand stands for the sum.
-            Node::Loop { body, .. } => of(*body),
-        };
-        known[id.index()] = result;
-    }
-    known
+/// The formula as declared, made ready to be evaluated at many states.
+struct Baseline<'a> {
+    graph: &'a Graph,
+    steps: Vec<(ExprId, Step)>,
 }
 
-/// A sum in the order in which it stands, groups of terms first.
-fn by_groups(graph: &Graph, terms: impl Iterator<Item = (ExprId, Bounded)>) -> Option<Bounded> {
-    let mut sums: BTreeMap<usize, Bounded> = BTreeMap::new();
-    for (x, term) in terms {
-        let sum = sums.entry(graph.group_of_term(x));
-        sum.and_modify(|sum| *sum = sum.plus(term)).or_insert(term);
+/// How a node has its value.
+enum Step {
+    Constant(Bounded),
+    /// Where it stands among the numbers of a state.
+    Input(usize),
+    /// In this order, groups of terms first.
+    Sum {
+        terms: Vec<Term>,
+        number: Option<Bounded>,
+    },
+    Sine {
+        function: Function,
+        argument: ExprId,
+        angle: Option<Angle>,
+    },
+    /// As the node says.
+    Other,
+}
+
+/// A term of a sum.
+struct Term {
+    group: usize,
+    x: ExprId,
+    factor: f64,
+    scales_exactly: bool,
+}
+
+/// The parts of an angle: a number, and inputs with their factors.
+#[derive(Default)]
+struct Angle {
+    number: f64,
+    parts: Vec<(ExprId, f64)>,
+}
+
+impl<'a> Baseline<'a> {
+    fn of(graph: &'a Graph, order: &[ExprId], positions: &Map<Input, usize>) -> Self {
+        let step = |id: &ExprId| {
+            let step = match graph.node(*id) {
+                Node::Constant(value) => Step::Constant(Bounded::exact(value.to_f64())),
+                Node::Input(input) => positions
+                    .get(input)
+                    .map_or(Step::Other, |at| Step::Input(*at)),
+                Node::Sum { constant, terms } => {
+                    let keeps_order = graph.keeps_order(*id);
+                    let term = |(c, x): &(Constant, ExprId)| Term {
+                        group: if keeps_order {
+                            graph.group_of_term(*x)
+                        } else {
+                            0
+                        },
+                        x: *x,
+                        factor: c.to_f64(),
+                        scales_exactly: c.is_power_of_two(),
+                    };
+                    let mut terms: Vec<Term> = terms.iter().map(term).collect();
+                    terms.sort_by_key(|term| term.group);
+                    let number = (!constant.is_zero()).then(|| Bounded::exact(constant.to_f64()));
+                    Step::Sum { terms, number }
+                }
+                Node::Call {
+                    function: function @ (Function::Sin | Function::Cos),
+                    arguments,
+                } => {
+                    let mut angle = Angle::default();
+                    let is_one = angle.collect(graph, arguments[0], 1.0, MAX_DEPTH);
+                    Step::Sine {
+                        function: *function,
+                        argument: arguments[0],
+                        angle: is_one.then_some(angle),
+                    }
+                }
+                _ => Step::Other,
+            };
+            (*id, step)
+        };
+        Self {
+            graph,
+            steps: order.iter().map(step).collect(),
+        }
     }
-    sums.into_values().reduce(Bounded::plus)
+
+    /// The values of all nodes at a state; `cos_zero_is_rounded`: whether the cosine of equal angles counts as rounded.
+    fn evaluate(
+        &self,
+        numbers: &[f64],
+        branches: Branches,
+        cos_zero_is_rounded: bool,
+        known: &mut [Bounded],
+    ) {
+        for (id, step) in &self.steps {
+            let of = |x: ExprId| known[x.index()];
+            let result = match step {
+                Step::Constant(value) => *value,
+                Step::Input(at) => Bounded::input(numbers[*at]),
+                Step::Sum { terms, number } => sum(terms, *number, &of),
+                Step::Sine {
+                    function,
+                    argument,
+                    angle,
+                } => {
+                    let mut argument = of(*argument);
+                    if let Some(angle) = angle {
+                        argument.error += angle.size(&of);
+                    }
+                    let mut result = Bounded::call(*function, &[argument]);
+                    if *function == Function::Cos && argument.value == 0.0 && cos_zero_is_rounded {
+                        result.error += result.value.abs();
+                    }
+                    result
+                }
+                Step::Other => match self.graph.node(*id) {
+                    Node::Constant(_) | Node::Input(_) | Node::Sum { .. } => Bounded::NOTHING,
+                    Node::Product(factors) => product(factors, &of),
+                    Node::Power { base, exponent } => of(*base).power(of(*exponent)),
+                    Node::Call {
+                        function,
+                        arguments,
+                    } => {
+                        let values: Vec<Bounded> = arguments.iter().map(|x| of(*x)).collect();
+                        Bounded::call(*function, &values)
+                    }
+                    Node::Select {
+                        comparison,
+                        left,
+                        right,
+                        then,
+                        otherwise,
+                    } => {
+                        let operands = [*left, *right, *then, *otherwise].map(of);
+                        branches.choose(*comparison, operands)
+                    }
+                    // The summand stands for the sum.
+                    Node::Loop { body, .. } => of(*body),
+                },
+            };
+            known[id.index()] = result;
+        }
+    }
+}
+
+/// The sum of the groups of terms, each of them added first, and a number.
+fn sum(terms: &[Term], number: Option<Bounded>, of: &dyn Fn(ExprId) -> Bounded) -> Bounded {
+    let mut total: Option<Bounded> = None;
+    let mut own: Option<Bounded> = None;
+    let plus = |sum: Option<Bounded>, other: Bounded| match sum {
+        Some(sum) => Some(sum.plus(other)),
+        None => Some(other),
+    };
+    for (at, term) in terms.iter().enumerate() {
+        let value = of(term.x).scaled(term.factor, term.scales_exactly);
+        own = plus(own, value);
+        let is_last = terms
+            .get(at + 1)
+            .is_none_or(|next| next.group != term.group);
+        if is_last && let Some(group) = own.take() {
+            total = plus(total, group);
+        }
+    }
+    if let Some(number) = number {
+        total = plus(total, number);
+    }
+    total.unwrap_or(Bounded::exact(0.0))
 }
 
 fn product(factors: &[(ExprId, i32)], of: &dyn Fn(ExprId) -> Bounded) -> Bounded {
-    let all = |above: bool| {
-        let side = factors.iter().filter(|(_, n)| (*n > 0) == above);
-        side.map(|(x, n)| of(*x).to_the(n.unsigned_abs()))
-            .reduce(Bounded::times)
-    };
-    match (all(true), all(false)) {
-        (Some(above), Some(below)) => above.over(below),
-        (Some(above), None) => above,
-        (None, Some(below)) => Bounded::exact(1.0).over(below),
-        (None, None) => Bounded::exact(1.0),
+    let (mut above, mut below): (Option<Bounded>, Option<Bounded>) = (None, None);
+    for (x, n) in factors {
+        let power = of(*x).to_the(n.unsigned_abs());
+        let side = if *n > 0 { &mut above } else { &mut below };
+        *side = match *side {
+            Some(known) => Some(known.times(power)),
+            None => Some(power),
+        };
+    }
+    match (above, below) {
+        (above, Some(below)) => above.unwrap_or(Bounded::exact(1.0)).over(below),
+        (above, None) => above.unwrap_or(Bounded::exact(1.0)),
     }
 }
 
-/// Σ |part| of an angle; nothing where the argument is none.
-fn angle_size(
-    graph: &Graph,
-    id: ExprId,
-    of: &dyn Fn(ExprId) -> Bounded,
-    depth: usize,
-) -> Option<f64> {
-    let depth = depth.checked_sub(1)?;
-    match graph.node(id) {
-        Node::Input(
-            Input::Coordinate(_)
-            | Input::Control(_)
-            | Input::Parameter(_)
-            | Input::ParameterElement(..)
-            | Input::Time,
-        ) => Some(of(id).value.abs()),
-        Node::Sum { constant, terms } => {
-            let mut size = constant.to_f64().abs();
-            for (c, x) in terms {
-                size += c.to_f64().abs() * angle_size(graph, *x, of, depth)?;
+impl Angle {
+    /// Adds the parts of an expression, so many times; whether it is an angle.
+    fn collect(&mut self, graph: &Graph, id: ExprId, factor: f64, depth: usize) -> bool {
+        let Some(depth) = depth.checked_sub(1) else {
+            return false;
+        };
+        match graph.node(id) {
+            Node::Input(
+                Input::Coordinate(_)
+                | Input::Control(_)
+                | Input::Parameter(_)
+                | Input::ParameterElement(..)
+                | Input::Time,
+            ) => {
+                self.parts.push((id, factor));
+                true
             }
-            Some(size)
+            Node::Sum { constant, terms } => {
+                self.number += factor * constant.to_f64().abs();
+                terms
+                    .iter()
+                    .all(|(c, x)| self.collect(graph, *x, factor * c.to_f64().abs(), depth))
+            }
+            _ => false,
         }
-        _ => None,
+    }
+
+    /// Σ |part|
+    fn size(&self, of: &dyn Fn(ExprId) -> Bounded) -> f64 {
+        let part = |(x, factor): &(ExprId, f64)| factor * of(*x).value.abs();
+        self.number + self.parts.iter().map(part).sum::<f64>()
     }
 }

@@ -6,8 +6,10 @@
 //!
 //! Inputs and numbers are exact. Each operation adds half an ulp of its result, a function a whole one; an operation whose result is exact at the
 //! numbers at hand, such as the difference of two that are close, adds nothing.
+//!
+//! A sum counts as exact where it is exact and no larger than the smallest input whose digits it has: as x − y of numbers that are close, or x − y − z
+//! of three such numbers. A larger one is exact or not as it happens to lie below or above a power of two.
 
-use crate::expr::comparison::Comparison;
 use crate::expr::function::Function;
 
 /// A value and the bound of its error, in units of 2⁻⁵³.
@@ -17,11 +19,41 @@ pub(crate) struct Bounded {
     pub(crate) error: f64,
     /// The bound of the error of the square root, where that is smaller than what follows from `error`: √(a²) is |a| to the last digit.
     root_error: Option<f64>,
+    /// What the last digit of the computed value is worth: 2⁻⁵² times the smallest input or rounded number that it is an exact sum of.
+    grid: f64,
+}
+
+/// So much larger than the smallest input a sum may be.
+const SAME_SIZE: f64 = 1.0 + 1e-5;
+
+/// What the last digit of a number is worth that has as many as it can have, without regard to powers of two.
+fn last_place(value: f64) -> f64 {
+    value.abs() * f64::EPSILON
 }
 
 impl Bounded {
-    /// What is given.
+    /// What is not known.
+    pub(crate) const NOTHING: Self = Self {
+        value: f64::NAN,
+        error: 0.0,
+        root_error: None,
+        grid: f64::NAN,
+    };
+
+    /// A number that is given: it has no digits but these.
     pub(crate) fn exact(value: f64) -> Self {
+        const EXPONENT: u64 = 0x7ff << 52;
+        let digits = value.to_bits() & !(1 << 63) & !EXPONENT;
+        let zeros = digits.trailing_zeros().min(52);
+        let power = f64::from_bits(value.to_bits() & EXPONENT);
+        Self {
+            grid: power * f64::EPSILON * 2.0_f64.powi(zeros.cast_signed()),
+            ..Self::input(value)
+        }
+    }
+
+    /// An input: it has all digits that a number of its size can have.
+    pub(crate) fn input(value: f64) -> Self {
         Self::new(value, 0.0)
     }
 
@@ -30,6 +62,7 @@ impl Bounded {
             value,
             error,
             root_error: None,
+            grid: last_place(value),
         }
     }
 
@@ -52,7 +85,17 @@ impl Bounded {
         let sum = a + b;
         let part = sum - a;
         let rest = (a - (sum - part)) + (b - part);
-        let result = Self::rounded_unless(rest == 0.0, sum, self.error + other.error);
+        let grid = self.grid.min(other.grid);
+        let is_one_term = a == 0.0 || b == 0.0 || a == b;
+        let is_exact = rest == 0.0 && (is_one_term || last_place(sum) <= SAME_SIZE * grid);
+        let mut result = Self::rounded_unless(is_exact, sum, self.error + other.error);
+        if is_exact {
+            result.grid = match (a == 0.0, b == 0.0) {
+                (true, _) => other.grid,
+                (_, true) => self.grid,
+                _ => grid,
+            };
+        }
         let root_error = match (sum == a, sum == b) {
             (true, _) => self.root_error_beside(other),
             (_, true) => other.root_error_beside(self),
@@ -72,7 +115,11 @@ impl Bounded {
 
     /// −a
     pub(crate) fn negated(self) -> Self {
-        Self::new(-self.value, self.error)
+        Self {
+            value: -self.value,
+            root_error: None,
+            ..self
+        }
     }
 
     /// a b
@@ -94,7 +141,10 @@ impl Bounded {
         }
         let product = Self::new(factor * self.value, factor.abs() * self.error);
         match is_exact {
-            true => product,
+            true => Self {
+                grid: factor.abs() * self.grid,
+                ..product
+            },
             false => Self::rounded(product.value, product.error),
         }
     }
@@ -109,6 +159,9 @@ impl Bounded {
 
     /// aⁿ by products; n > 0
     pub(crate) fn to_the(self, exponent: u32) -> Self {
+        if exponent == 1 {
+            return self;
+        }
         let n = i32::try_from(exponent).unwrap_or(i32::MAX);
         let value = self.value.powi(n);
         let slope = f64::from(exponent) * self.value.powi(n - 1).abs();
@@ -133,10 +186,9 @@ impl Bounded {
 
     /// A function of arguments.
     pub(crate) fn call(function: Function, arguments: &[Self]) -> Self {
-        let values: Vec<f64> = arguments.iter().map(|argument| argument.value).collect();
-        let value = function.evaluate(&values);
-        let of = |at: usize| arguments.get(at).copied().unwrap_or(Self::exact(f64::NAN));
+        let of = |at: usize| arguments.get(at).copied().unwrap_or(Self::NOTHING);
         let (x, y) = (of(0), of(1));
+        let value = function.evaluate(&[x.value, y.value]);
         let v = x.value;
         let slope = match function {
             // These choose, or drop a sign: nothing is rounded.
@@ -145,7 +197,11 @@ impl Bounded {
                 return if first { x } else { y };
             }
             Function::Abs => {
-                return Self::new(value, x.error);
+                return Self {
+                    value,
+                    root_error: None,
+                    ..x
+                };
             }
             Function::Sign => return Self::exact(value),
             Function::Atan2 | Function::Hypot => {
@@ -180,8 +236,7 @@ impl Bounded {
         let is_exact = match function {
             Function::Sqrt => value.mul_add(value, -v) == 0.0,
             Function::Acos | Function::Acosh | Function::Ln => v == 1.0,
-            // The cosine of equal angles may follow from those of the angles.
-            Function::Cos => false,
+            // cos 0 = 1 and cosh 0 = 1 among them.
             _ => v == 0.0,
         };
         if let (Function::Sqrt, Some(error)) = (function, x.root_error) {
@@ -194,18 +249,6 @@ impl Bounded {
         match is_exact {
             true => Self::new(value, error),
             false => Self::rounded(value, error + value.abs()),
-        }
-    }
-
-    /// The branch of a choice.
-    pub(crate) fn select(
-        comparison: Comparison,
-        [left, right, then, otherwise]: [Self; 4],
-    ) -> Self {
-        if comparison.holds(left.value, right.value) {
-            then
-        } else {
-            otherwise
         }
     }
 }
@@ -224,6 +267,29 @@ mod tests {
         let squares = x.to_the(2).plus(y.to_the(2).negated());
         let product = difference.times(x.plus(y));
         assert!(squares.error > 1e5 * product.error);
+    }
+
+    #[test]
+    fn sums_larger_than_their_terms_are_not_exact_by_chance() {
+        // On one side of 1024 and across it.
+        for (x, m) in [
+            (1021.489_269, 1022.7),
+            (1021.489_269, 1023.195_818),
+            (700.1, 703.2),
+        ] {
+            let (x, m) = (Bounded::input(x), Bounded::input(m));
+            let twice = m.scaled(2.0, true);
+            let other = x.plus(twice.negated());
+            assert!(other.value.abs() > x.value);
+            assert_eq!(other.error, other.value.abs());
+            // (x − m) − m, almost as large as m
+            let close = x.plus(m.negated());
+            assert_eq!(close.error, 0.0);
+            assert_eq!(close.plus(Bounded::exact(-0.5)).error, 0.0);
+        }
+        let x = 65_536.3;
+        let close = Bounded::input(x).plus(Bounded::input(-x * (1.0 + 1e-9)));
+        assert_eq!(close.plus(Bounded::input(-x)).error, 0.0, "(x − y) − z");
     }
 
     #[test]

@@ -6,8 +6,15 @@
 
 use crate::expr::input::Input;
 
-/// How many states there are: each kind of cluster meets each offset with each spread once. The time of the guard is proportional to it.
-pub(crate) const STATES: usize = 140;
+/// How many states there are besides those with a parameter that is much larger than all else: each kind of cluster meets each offset with each
+/// spread once. The time of the guard is proportional to it.
+const STATES: usize = 140;
+
+/// So many parameters are much larger than all else in turn, in two states each.
+const MAX_OUTSTANDING: usize = 12;
+
+/// How large such a parameter is.
+const OUTSTANDING: f64 = 1e5;
 
 /// The inputs that are close to each other.
 const CLUSTERS: [Cluster; 7] = {
@@ -116,6 +123,48 @@ impl Regime {
     }
 }
 
+/// The positions of the parameters that are much larger than all else in turn.
+fn outstanding(inputs: &[Input]) -> Vec<usize> {
+    let is_parameter =
+        |input: &Input| matches!(input, Input::Parameter(_) | Input::ParameterElement(..));
+    let all: Vec<usize> = (0..inputs.len())
+        .filter(|at| is_parameter(&inputs[*at]))
+        .collect();
+    let every = all.len().div_ceil(MAX_OUTSTANDING).max(1);
+    all.into_iter().step_by(every).collect()
+}
+
+/// How many states there are for these inputs.
+pub(crate) fn number_of_states(inputs: &[Input]) -> usize {
+    STATES + 2 * outstanding(inputs).len()
+}
+
+/// A state with a parameter that is much larger than all else: in every other one nothing moves fast, so that forces at rest are seen, too; in
+/// the others all coordinates are equal.
+fn state_with_outstanding(inputs: &[Input], number: usize) -> Vec<f64> {
+    let number_of_outstanding = number - STATES;
+    let large = outstanding(inputs).get(number_of_outstanding / 2).copied();
+    let at_rest = number_of_outstanding.is_multiple_of(2);
+    let regime = Regime {
+        cluster: match at_rest {
+            true => Cluster::Rates,
+            false => Cluster::Coordinates,
+        },
+        offset: Draw::of(number, OF_STATE).size() * if at_rest { SMALL / OUTSTANDING } else { 1.0 },
+        spread: if at_rest { 0.5 } else { 0.0 },
+        opposite: at_rest,
+        decades: 0.0,
+    };
+    let sample = |(position, input)| {
+        let own = regime.sample(input, Draw::of(number, position));
+        match Some(position) == large {
+            true => OUTSTANDING * own,
+            false => own,
+        }
+    };
+    inputs.iter().enumerate().map(sample).collect()
+}
+
 /// The kinds of inputs that are chosen in different ways.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -124,13 +173,22 @@ enum Kind {
     Parameter,
 }
 
-/// The numbers of these inputs in the state of this number, below [`STATES`].
+/// The numbers of these inputs in the state of this number, below [`number_of_states`].
 pub(crate) fn state(inputs: &[Input], number: usize) -> Vec<f64> {
+    if number >= STATES {
+        return state_with_outstanding(inputs, number);
+    }
     let mut regime = Regime::of(number);
     // Products of powers of ten would be exact.
     regime.offset *= Draw::of(number, OF_STATE).size();
     let sample = |(position, input)| regime.sample(input, Draw::of(number, position));
     inputs.iter().enumerate().map(sample).collect()
+}
+
+/// Whether coordinates are close to each other, and velocities or momenta as well, of one sign: where cos 0 = 1, sums of these cancel exactly.
+pub(crate) fn moves_together(number: usize) -> bool {
+    let regime = Regime::of(number);
+    number < STATES && !regime.opposite && matches!(regime.cluster, Cluster::Moving | Cluster::All)
 }
 
 /// The position of what all inputs of a state have in common.
@@ -211,6 +269,27 @@ mod tests {
             "sizes of parameters"
         );
         assert!(all.iter().all(|s| s[2] > 0.0));
+    }
+
+    #[test]
+    fn each_parameter_is_once_much_larger_than_all_else() {
+        let parameter = |name: &str| Input::Parameter(name.to_owned());
+        let inputs = [
+            Input::Coordinate(Affine::constant(0)),
+            parameter("k"),
+            Input::Velocity(Affine::constant(0)),
+            Input::Coordinate(Affine::constant(1)),
+            parameter("l"),
+        ];
+        assert_eq!(number_of_states(&inputs), STATES + 4);
+        for (number, large) in [(0, 1), (1, 1), (2, 4), (3, 4)] {
+            let state = state(&inputs, STATES + number);
+            let others = (0..5).filter(|at| *at != large);
+            let most = others.map(|at| state[at].abs()).fold(0.0, f64::max);
+            assert!(state[large] > 1e3 * most, "{state:?}");
+            assert_eq!(state[0] == state[3], number % 2 == 1, "{state:?}");
+            assert_eq!(state[2].abs() < 1e-6, number % 2 == 0, "{state:?}");
+        }
     }
 
     #[test]
