@@ -428,7 +428,7 @@ impl<const N: usize> Motion<N> {
         Ok(integrals)
     }
 
-    /// Largest change of the energy over the recorded nodes, relative to the energy at the start (absolute where that is zero):
+    /// Largest change of the energy over the recorded nodes, relative to the energy at the start (absolute where that is zero, or not more than a rounding beside p·v):
     ///
     /// ```text
     /// max |H(t) − H(t₀)| / |H(t₀)|
@@ -441,7 +441,8 @@ impl<const N: usize> Motion<N> {
         let Some(&start) = self.energies.first() else {
             return 0.0;
         };
-        let scale = if start == 0.0 { 1.0 } else { start.abs() };
+        let nodes = self.nodes.iter().zip(&self.velocities);
+        let scale = energy_scale(start, nodes.map(|(node, v)| (&node.p[..], &v[..])));
         let of_arc = |nodes: Range<usize>| {
             let energies = self.energies.get(nodes).unwrap_or_default();
             let start = energies.first().copied().unwrap_or_default();
@@ -545,6 +546,18 @@ impl<const N: usize> Motion<N> {
             row
         });
         csv::write(path.as_ref(), &header, rows)
+    }
+}
+
+/// With what changes of the energy are compared: its value at the start, or one where that is zero, or a rounding beside the largest product of momenta and velocities.
+fn energy_scale<'a>(start: f64, nodes: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> f64 {
+    const ROUNDING: f64 = 1e-12;
+    let action = |(p, v): (&[f64], &[f64])| p.iter().zip(v).map(|(p, v)| p * v).sum::<f64>();
+    let largest = nodes.map(|node| action(node).abs()).fold(0.0, larger);
+    if start == 0.0 || start.abs() <= ROUNDING * largest {
+        1.0
+    } else {
+        start.abs()
     }
 }
 

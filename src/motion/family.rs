@@ -1,9 +1,10 @@
 //! The result of a run of a model of run-time length.
 
+use super::energy_scale;
 use crate::csv;
 use crate::error::AtError;
 use crate::numbers::larger;
-use crate::simulation::FamilyCheckpoint;
+use crate::simulation::{FamilyCheckpoint, Warning};
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -92,6 +93,7 @@ pub struct FamilyMotion {
     statistics: Statistics,
     names: Vec<CoordinateName>,
     checkpoint: Option<Box<FamilyCheckpoint>>,
+    warnings: Vec<Warning>,
 }
 
 impl FamilyMotion {
@@ -123,6 +125,7 @@ impl FamilyMotion {
             statistics: Statistics::default(),
             names: Vec::new(),
             checkpoint: None,
+            warnings: Vec::new(),
         }
     }
 
@@ -163,6 +166,20 @@ impl FamilyMotion {
 
     pub(crate) fn set_statistics(&mut self, statistics: Statistics) {
         self.statistics = statistics;
+    }
+
+    pub(crate) fn set_warnings(&mut self, warnings: Vec<Warning>) {
+        self.warnings = warnings;
+    }
+
+    /// The energy at the last node, and p·v there.
+    pub(crate) fn last_energy(&self) -> (f64, f64) {
+        let velocity = self.velocities.last();
+        let products = velocity.into_iter().flatten().zip(&self.last().p);
+        (
+            self.energies.last().copied().unwrap_or(f64::NAN),
+            products.map(|(v, p)| v * p).sum(),
+        )
     }
 
     pub(crate) fn set_checkpoint(&mut self, checkpoint: FamilyCheckpoint) {
@@ -221,7 +238,7 @@ impl FamilyMotion {
         }
     }
 
-    /// Largest change of the energy over the recorded nodes, relative to the energy at the start (absolute where that is zero):
+    /// Largest change of the energy over the recorded nodes, relative to the energy at the start (absolute where that is zero, or not more than a rounding beside p·v):
     ///
     /// ```text
     /// max |H(t) − H(t₀)| / |H(t₀)|
@@ -230,7 +247,8 @@ impl FamilyMotion {
         let Some(&start) = self.energies.first() else {
             return 0.0;
         };
-        let scale = if start == 0.0 { 1.0 } else { start.abs() };
+        let nodes = self.nodes.iter().zip(&self.velocities);
+        let scale = energy_scale(start, nodes.map(|(node, v)| (&node.p[..], &v[..])));
         let changes = self.energies.iter().map(|energy| (energy - start).abs());
         changes.map(|change| change / scale).fold(0.0, larger)
     }
@@ -239,6 +257,12 @@ impl FamilyMotion {
     pub fn constraint_residual(&self) -> FamilyResidual {
         let (position, velocity) = self.residual;
         FamilyResidual { position, velocity }
+    }
+
+    /// What is doubtful about the motion although the run came to its end, or to where it failed: energies that are not finite ([`Warning::EnergyNotFinite`]), or that jump although the
+    /// model conserves them ([`Warning::EnergyJump`]).
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
     }
 
     /// What the run cost.
@@ -285,6 +309,7 @@ impl fmt::Debug for FamilyMotion {
             .field("start", &self.nodes[0].t)
             .field("end", &self.last().t)
             .field("statistics", &self.statistics)
+            .field("warnings", &self.warnings)
             .finish_non_exhaustive()
     }
 }

@@ -4,6 +4,7 @@ use super::accurate::{Broken, Passing};
 use super::checkpoint::{FamilyCheckpoint, Reached};
 use super::course::{Course, Leg};
 use super::mesh::{Endless, Mesh};
+use super::watch::{Recorded, Watch};
 use super::{Simulation, progress};
 use crate::error::RunErrorKind;
 use crate::motion::family::{FamilyMotion, FamilyNode};
@@ -188,6 +189,8 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
 
     /// Runs over the span, backwards where it ends before it starts. The last node is exactly at the end of the span.
     ///
+    /// What is doubtful about the result without being an error is in [`FamilyMotion::warnings`].
+    ///
     /// # Errors
     /// [`FamilyRunError`] says where and why the run stopped and holds the motion so far.
     pub fn run(
@@ -266,6 +269,8 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
         let mut failure = None;
         let mut state = start.clone();
+        let mut watch = Watch::new(self.chosen_element());
+        watch.pass(recorded::<M>(&motion, false));
         for (element, (t, next, h)) in mesh.elements().enumerate().skip(done) {
             if let Err(source) = stepper.advance(mesh.begin(t, h), h, &mut state) {
                 if motion.last().t != t {
@@ -286,10 +291,12 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             let last = element + 1 == mesh.steps();
             if last || (element + 1) % self.record_every == 0 {
                 motion.record(self.model, next, &state, stepper.velocity(next, &state));
+                watch.pass(recorded::<M>(&motion, true));
             }
             bar.advance();
         }
         motion.set_statistics(*stepper.statistics());
+        motion.set_warnings(watch.into_warnings());
         match failure {
             None => Ok(motion),
             Some(kind) => Err(Box::new((kind, motion))),
@@ -365,6 +372,19 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     }
 }
 
+/// The last node of a motion, behind another one or not.
+fn recorded<M: FamilyModel>(motion: &FamilyMotion, is_behind: bool) -> Recorded {
+    let facts = M::FACTS;
+    let conserves = !(facts.time_dependent || facts.forced || facts.linear || M::CONSTRAINED);
+    let (energy, action) = motion.last_energy();
+    Recorded {
+        time: motion.last().t,
+        energy,
+        action,
+        is_conserved: is_behind && conserves,
+    }
+}
+
 /// The endless sequence of states of [`FamilySimulation::steps`].
 #[derive(Debug)]
 pub struct FamilySteps<'m, M> {
@@ -425,10 +445,14 @@ impl fmt::Display for FamilyRunError {
         self.kind.fmt(f)?;
         match self.partial.states().last() {
             Some(node) if self.partial.states().len() > 1 => {
-                write!(f, "; the motion up to t = {} is in `partial()`", node.t)
+                write!(f, "; the motion up to t = {} is in `partial()`", node.t)?;
             }
-            _ => Ok(()),
+            _ => {}
         }
+        for warning in self.partial.warnings() {
+            write!(f, "; {warning}")?;
+        }
+        Ok(())
     }
 }
 

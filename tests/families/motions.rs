@@ -2,6 +2,7 @@
 
 use crate::common::{larger, list, number, reference};
 use nalgebra::DMatrix;
+use tfe::Warning;
 use tfe::family::FamilyState;
 use tfe::prelude::*;
 
@@ -346,4 +347,27 @@ fn a_motion_is_written_with_the_names_of_its_coordinates() {
     assert!(header.ends_with("p_z[1],energy,middle"), "{header}");
     let columns = |line: &str| line.split(',').count();
     assert_eq!(text.lines().map(columns).collect::<Vec<_>>(), [21; 4]);
+}
+
+#[dynamics(
+    coordinates(x[n]),
+    lagrangian = sum(i in 0..n, dot(x[i])^2/2 - x[i]^4/4 - select(x[i] < 0, step, 0)),
+)]
+struct Stairs {
+    n: usize,
+    step: f64,
+}
+
+/// A step of the potential without a force.
+#[test]
+fn energies_that_jump_are_told() {
+    for (step, told) in [(10.0, true), (0.0, false)] {
+        let model = Stairs { n: 2, step };
+        let start = model.state(vec![0.5, 0.7], vec![-1.0, 0.2]);
+        let motion = Simulation::new(&model).step(0.02).run(start, 0.0..1.0);
+        let motion = motion.expect("a run");
+        let is_jump = |one: &Warning| matches!(one, Warning::EnergyJump { count: 1, .. });
+        assert_eq!(motion.warnings().len(), usize::from(told));
+        assert!(motion.warnings().iter().all(is_jump));
+    }
 }
