@@ -4,12 +4,13 @@ mod table;
 
 use std::error::Error;
 use std::fmt;
-use std::sync::Arc;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use table::Table;
 use tfe_runtime::{
-    By, Constraint, ConstraintSecond, Controlled, CoordinateName, Facts, First, Form, MAX_INPUTS,
-    Model, Real, Second, Share,
+    By, Constraint, ConstraintSecond, Controlled, CoordinateName, Facts, First, Form, InputFailure,
+    InputPanicked, MAX_INPUTS, Model, Real, Second, Share,
 };
 
 pub use table::Interpolation;
@@ -38,6 +39,8 @@ pub struct Driven<'m, M> {
     sources: Vec<Source<'m>>,
     /// Numbers set between steps, which go before sources.
     held: Option<Arc<Cells>>,
+    /// The last number of a function that was not finite.
+    failed: Arc<Mutex<Option<(usize, f64, f64)>>>,
 }
 
 /// Where an input comes from.
@@ -79,6 +82,7 @@ impl<M> Clone for Driven<'_, M> {
             model: self.model.clone(),
             sources: self.sources.clone(),
             held: self.held.clone(),
+            failed: Arc::clone(&self.failed),
         }
     }
 }
@@ -114,10 +118,12 @@ impl<'m, M> Driven<'m, M> {
             model,
             sources: vec![Source::Zero; M::INPUTS.len().min(MAX_INPUTS)],
             held: None,
+            failed: Arc::default(),
         }
     }
 
-    /// Gives an input as a function of the time; it is asked at the points of elements, several times each, in any order.
+    /// Gives an input as a function of the time; it is asked at the points of elements, several times each, in any order. What it may do wrong is told by
+    /// [runs](crate::Simulation::input); elsewhere a panic goes on to the caller, and a number that is not finite is an element that cannot be solved.
     ///
     /// # Errors
     /// [`InputError::Unknown`].
@@ -172,11 +178,23 @@ impl<'m, M> Driven<'m, M> {
             *value = match (held, source) {
                 (Some(held), _) => t.like(held),
                 (None, Source::Zero) => continue,
-                (None, Source::Function(function)) => t.map(&mut |t| function(t)),
+                (None, Source::Function(function)) => t.map(&mut |t| {
+                    let value = function(t);
+                    if !value.is_finite() {
+                        self.note(input, t, value);
+                    }
+                    value
+                }),
                 (None, Source::Table(table)) => t.map(&mut |t| table.at(t)),
             };
         }
         values
+    }
+
+    #[cold]
+    fn note(&self, input: usize, time: f64, value: f64) {
+        let mut failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
+        *failed = Some((input, time, value));
     }
 
     /// Whether no input changes with the time.
@@ -196,6 +214,24 @@ pub(crate) fn place<M: Controlled<N>, const N: usize>(name: &str) -> Result<usiz
 }
 
 impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
+    /// Once for all that a step asks, so that functions are called as fast as they are. What is half done is left alone by those who are told.
+    fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked> {
+        if self.is_constant() {
+            return Ok(f());
+        }
+        catch_unwind(AssertUnwindSafe(f)).map_err(|_| InputPanicked)
+    }
+
+    fn failed_input(&self) -> Option<InputFailure> {
+        let mut failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
+        let (input, time, value) = failed.take()?;
+        Some(InputFailure {
+            input: M::INPUTS.get(input)?,
+            time,
+            value,
+        })
+    }
+
     const FORM: Form = M::FORM;
     const FACTS: Facts = Facts {
         time_dependent: true,
@@ -351,6 +387,29 @@ pub enum InputError {
         /// Those that there are.
         known: Vec<&'static str>,
     },
+    /// A function that gave a number that is not finite, so that an element could not be solved.
+    Value {
+        /// The input.
+        name: String,
+        /// The time that the function was asked for.
+        time: f64,
+        /// What it gave.
+        value: f64,
+    },
+    /// A function panicked. What it said is on standard error, or where the program's panic hook puts it.
+    Panicked {
+        /// Where the element begins that asked it, or the run.
+        time: f64,
+    },
+    /// Sampled feedback that cannot be.
+    Sampling {
+        /// The input.
+        name: String,
+        /// A time at which it was to be sampled.
+        time: f64,
+        /// What is wrong with it.
+        why: &'static str,
+    },
     /// A number that is not finite.
     NotFinite {
         /// The input.
@@ -375,6 +434,19 @@ impl fmt::Display for InputError {
                 "the model has no input `{name}`, only `{}`",
                 known.join("`, `")
             ),
+            Self::Value { name, time, value } => {
+                write!(
+                    f,
+                    "the function of input `{name}` gives {value} at t = {time}"
+                )
+            }
+            Self::Panicked { time } => write!(
+                f,
+                "a function of an input panicked in the element that begins at t = {time}"
+            ),
+            Self::Sampling { name, time, why } => {
+                write!(f, "the feedback of input `{name}` at t = {time}: {why}")
+            }
             Self::NotFinite { name, value } => write!(f, "input `{name}` was set to {value}"),
             Self::Table { name, why } => write!(f, "the table of input `{name}`: {why}"),
         }

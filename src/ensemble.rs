@@ -7,6 +7,7 @@ mod members;
 mod plan;
 mod progress;
 mod under_way;
+mod watched;
 
 pub use doubts::WarningCounts;
 pub use ends::{Ends, Failure};
@@ -16,6 +17,7 @@ pub use under_way::EnsembleRun;
 
 use crate::error::RunErrorKind;
 use crate::motion::Node;
+use crate::simulation::Watching;
 use crate::simulation::mesh::Mesh;
 use doubts::Energy;
 use members::some_starts;
@@ -67,6 +69,7 @@ pub struct Ensemble<'m, M, const N: usize, K = OneModel<'m, M>> {
     control: Control,
     breaks: Vec<f64>,
     progress: bool,
+    events: Watching<'m, M, N>,
     of: PhantomData<&'m M>,
 }
 
@@ -116,6 +119,7 @@ impl<M, const N: usize, K: Copy> Clone for Ensemble<'_, M, N, K> {
     fn clone(&self) -> Self {
         Self {
             breaks: self.breaks.clone(),
+            events: self.events.clone(),
             ..*self
         }
     }
@@ -166,6 +170,7 @@ where
 {
     fn with(models: K) -> Self {
         Self {
+            events: Watching::NOTHING,
             of: PhantomData,
             models,
             element: Element::from(Mixed::<4>),
@@ -238,13 +243,14 @@ where
         let (from, to) = (span.start, span.end);
         let statistics = self.for_each(starts, span, |index, result| {
             let model = self.models.model(index);
-            let warnings = result.as_ref().map_or_else(
-                |_| WarningCounts::default(),
-                |node| {
+            let warnings = match &result {
+                // Events may change the energy.
+                Ok(node) if self.events.is_empty() => {
                     let before = Energy::of(model, from, start_of(starts, index));
                     WarningCounts::of::<M, N>(before, Energy::of(model, to, &node.state()))
-                },
-            );
+                }
+                _ => WarningCounts::default(),
+            };
             lock(&results).put(index, result, warnings);
         })?;
         Ok(unlock(results).into_ends(statistics))
@@ -302,7 +308,20 @@ where
         if count == 0 {
             return Ok(Statistics::default());
         }
-        let statistics = if self.width() == WIDTH {
+        let statistics = if !self.events.is_empty() {
+            summed(
+                count,
+                || (),
+                |_: &mut (), index| {
+                    let start = start_of(starts, index);
+                    let model = self.models.model(index);
+                    let (result, statistics) = self.run_watched(model, start, &span);
+                    finished(index, result);
+                    progress.advance(1);
+                    statistics
+                },
+            )
+        } else if self.width() == WIDTH {
             // Made once, and one batch after the other runs in a copy.
             let empty = self.models.bundle(self.element, self.control);
             let empty = empty.map_err(RunErrorKind::Element)?;

@@ -8,7 +8,7 @@ use std::fmt;
 use tfe_runtime::constrained::Residual;
 use tfe_runtime::family::FamilyError;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{ElementError, StepError};
+use tfe_runtime::{ElementError, InputFailure, Model, StepError};
 
 /// Why a run stopped.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,6 +155,11 @@ pub enum RunErrorKind {
         /// The last node.
         time: f64,
     },
+    /// Events were to be looked for by something that cannot.
+    EventsUnsupported {
+        /// What was called.
+        call: &'static str,
+    },
     /// An element could not be solved.
     Solve {
         /// The number of the element, from 0.
@@ -177,6 +182,40 @@ pub enum RunErrorKind {
         /// Why.
         source: TransitionError,
     },
+}
+
+impl RunErrorKind {
+    /// Of an element of a model that could not be solved: for a function of an input that is not finite within it, if there is one.
+    pub(crate) fn of_element<M: Model<N>, const N: usize>(
+        model: &M,
+        element: usize,
+        (time, step): (f64, f64),
+        source: StepError,
+    ) -> Self {
+        let end = time + step;
+        let slack = 1e-6 * step.abs();
+        let is_within = |failure: &InputFailure| {
+            time.min(end) - slack <= failure.time && failure.time <= time.max(end) + slack
+        };
+        match model.failed_input().filter(is_within) {
+            Some(InputFailure { input, time, value }) => Self::Input(InputError::Value {
+                name: input.to_owned(),
+                time,
+                value,
+            }),
+            None => Self::Solve {
+                element,
+                time,
+                step,
+                source,
+            },
+        }
+    }
+
+    /// Of a function of an input that has panicked in an element.
+    pub(crate) fn panicked(time: f64) -> Self {
+        Self::Input(InputError::Panicked { time })
+    }
 }
 
 /// A run that stopped before its end: why, and the motion up to the last good state.
@@ -305,6 +344,10 @@ impl fmt::Display for RunErrorKind {
             Self::Ended { time } => {
                 write!(f, "a step after t = {time} failed: the run has ended")
             }
+            Self::EventsUnsupported { call } => write!(
+                f,
+                "`{call}` does not look for events; runs from start to end do"
+            ),
             Self::NodeOrder { node, time } => {
                 write!(
                     f,

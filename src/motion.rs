@@ -111,7 +111,26 @@ pub struct Motion<const N: usize> {
 impl<const N: usize> Motion<N> {
     /// The motion of a model that has only its start.
     pub(crate) fn from_start<M: Model<N>>(model: &M, t: f64, start: &State<N>) -> Self {
-        let mut motion = Self {
+        let mut motion = Self::empty(model);
+        motion.record(model, t, start);
+        motion
+    }
+
+    /// The same of a model that cannot be evaluated there.
+    pub(crate) fn unknown<M: Model<N>>(model: &M, t: f64, start: &State<N>) -> Self {
+        let mut motion = Self::empty(model);
+        let v = [f64::NAN; N];
+        let State { q, p } = *start;
+        motion.nodes.push(Node { t, q, p, v });
+        motion.velocities.push(v);
+        motion.energies.push(f64::NAN);
+        motion.outputs.values = vec![f64::NAN; model.columns()];
+        motion.reactions.values = vec![f64::NAN; M::CONSTRAINTS.len()];
+        motion
+    }
+
+    fn empty<M: Model<N>>(model: &M) -> Self {
+        Self {
             nodes: Vec::new(),
             velocities: Vec::new(),
             energies: Vec::new(),
@@ -137,9 +156,7 @@ impl<const N: usize> Motion<N> {
             checkpoint: None,
             events: Vec::new(),
             arcs: Arcs::default(),
-        };
-        motion.record(model, t, start);
-        motion
+        }
     }
 
     /// The same of a run that goes on, whose velocity at the start is known.

@@ -25,7 +25,7 @@ use events::{Events, On, Remodel};
 use family::Runs;
 use follow::{Follow, Nobody};
 use mesh::{Endless, Mesh};
-use pieces::{Left, Pieces, Planned};
+use pieces::{Broken, Left, Pieces, Planned};
 use recorder::Recorder;
 use std::ops::Range;
 use steps::Beginning;
@@ -40,6 +40,7 @@ use watch::resolution::Again;
 pub use accurate::Accurate;
 pub(crate) use checkpoint::Reached;
 pub use checkpoint::{Checkpoint, FamilyCheckpoint};
+pub(crate) use events::Watching;
 pub use events::{Act, Crossing, Event, Occurrence, Settings};
 pub use held::{Held, HeldNode};
 pub use section::{Section, SectionPoint};
@@ -317,14 +318,18 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         ready: impl FnOnce(Stepper<'m, M, N>) -> Stepper<'m, M, N>,
         follower: impl Follow<'m, M, N>,
     ) -> Result<Motion<N>, RunError<N>> {
-        let (mesh, stepper) = match self.prepare(&start, span) {
-            Ok(prepared) => prepared,
-            Err(kind) => {
-                let motion = Motion::from_start(&*self.model, span.start, &start);
-                return Err(RunError::new(kind, motion));
-            }
+        let prepared = self.model.guarded(|| {
+            let motion = Motion::from_start(&*self.model, span.start, &start);
+            (self.prepare(&start, span), motion)
+        });
+        let Ok((prepared, motion)) = prepared else {
+            let motion = Motion::unknown(&*self.model, span.start, &start);
+            return Err(RunError::new(RunErrorKind::panicked(span.start), motion));
         };
-        let motion = Motion::from_start(&*self.model, span.start, &start);
+        let (mesh, stepper) = match prepared {
+            Ok(prepared) => prepared,
+            Err(kind) => return Err(RunError::new(kind, motion)),
+        };
         let place = (&mesh, 0, span.start);
         self.drive_on(motion, &start, place, ready(stepper), follower)
     }
@@ -395,8 +400,19 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             };
             let has_impulses = !planned.impulses.is_empty();
             recorder.begin(stepper.model(), number, (t, h), &state, has_impulses);
-            match pieces.pass(stepper, planned, &mut state, &mut recorder) {
-                Ok(Left::Done) => recorder.end(stepper.model(), number, is_last, next, &state),
+            let passed = self.model.guarded(|| {
+                let left = pieces.pass(stepper, planned, &mut state, &mut recorder)?;
+                if left == Left::Done {
+                    recorder.end(stepper.model(), number, is_last, next, &state);
+                }
+                Ok(left)
+            });
+            let passed = passed.unwrap_or_else(|_| {
+                let (kind, piece) = (RunErrorKind::panicked(t), None);
+                Err(Box::new(Broken { kind, piece }))
+            });
+            match passed {
+                Ok(Left::Done) => {}
                 Ok(Left::Stopped) => break,
                 Err(broken) => {
                     recorder.fail(stepper.model(), number, &broken);
@@ -473,8 +489,12 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # }
     /// ```
     pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
-        let beginning = self.endless(&start, t0);
-        Steps::new(beginning, start, t0, self.impulses.clone(), self.again())
+        let new = |beginning| {
+            let (model, impulses) = (self.model.clone(), self.impulses.clone());
+            Steps::new(model, beginning, start, t0, impulses, self.again())
+        };
+        let begun = self.model.guarded(|| new(self.endless(&start, t0)));
+        begun.unwrap_or_else(|_| new(Err(RunErrorKind::panicked(t0))))
     }
 
     /// The beginning of a course without an end.
@@ -496,6 +516,11 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
         let pieces = self.pieces(&stepper)?;
         Ok((stepper, elements, Some(pieces)))
+    }
+
+    /// How elements are solved.
+    pub(crate) fn with_control(self, control: Control) -> Self {
+        Self { control, ..self }
     }
 
     pub(crate) fn model(&self) -> &M {

@@ -989,3 +989,36 @@ fn orbits_with_settings_and_unknown_periods() {
         .expect_err("it stops");
     assert!(matches!(error, tfe::periodic::OrbitError::Stopped { .. }));
 }
+
+/// Ensembles look for events, run by run.
+#[test]
+fn ensembles_meet_the_events_of_single_runs() {
+    let bounce = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.9));
+    let starts: Vec<_> = (1..=12)
+        .map(|k| BALL.state([0.2 * f64::from(k)], [0.0]))
+        .collect();
+    let ensemble = Ensemble::new(&BALL)
+        .step(0.07)
+        .on("height", Crossing::Falling, bounce);
+    let ends = ensemble.run(&starts, 0.0..1.5).expect("runs");
+    let single = Simulation::new(&BALL)
+        .step(0.07)
+        .on("height", Crossing::Falling, bounce);
+    for (start, end) in starts.iter().zip(ends.nodes()) {
+        let motion = single.run(*start, 0.0..1.5).expect("a run");
+        // Velocities are looked for from that of another node, and may differ by a rounding.
+        assert_eq!(
+            (end.t, end.state()),
+            (motion.last().t, motion.last().state())
+        );
+    }
+    assert!(ensemble.begin(&starts, 0.0).is_err());
+    // Some come to rest: failures of their own.
+    let dull = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.5));
+    let ends = Ensemble::new(&BALL)
+        .step(0.07)
+        .on("height", Crossing::Falling, dull)
+        .run(&starts, 0.0..1.5)
+        .expect("runs");
+    assert!(ends.failures().count() > 0 && ends.nodes().count() > 0);
+}

@@ -378,15 +378,15 @@ fn misuse_is_told() {
         table(&[0.0, 0.0], &[1.0, 2.0]),
         "the table of input `u`: the times must increase"
     );
-    // Without a number there is no state, and an error says where.
+    // Without a number there is no state, and an error says where and which input it was.
     let nan = Simulation::new(&DRIVING)
         .step(0.1)
         .input("u", |t| if t < 0.5 { 0.0 } else { f64::NAN });
     let error = nan.run(start, 0.0..1.0).unwrap_err();
-    assert!(
-        matches!(error.kind(), RunErrorKind::Solve { element: 4 | 5, .. }),
-        "{error}"
-    );
+    let RunErrorKind::Input(InputError::Value { name, time, value }) = error.kind() else {
+        panic!("{error}");
+    };
+    assert!(name == "u" && (0.5..0.6).contains(time) && value.is_nan());
     assert!(error.partial().last().q[0].is_finite());
     let mut run = Simulation::new(&DRIVING)
         .step(0.1)
@@ -427,4 +427,170 @@ fn events_of_inputs_are_met() {
     // 1 − 5t² = 0.1 t
     let exact = (-0.1 + (0.01_f64 + 20.0).sqrt()) / 10.0;
     assert!((motion.events()[0].t - exact).abs() < 1e-14);
+}
+
+/// A function that panics, or gives what is no number, ends a run with an error that says when; what was recorded before is kept.
+#[test]
+fn functions_that_fail_are_told() {
+    #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u, output(force) = u, event(middle) = x)]
+    struct Oscillator;
+
+    let start = Oscillator.state([1.0], [0.0]);
+    let simulation = Simulation::new(&Oscillator).step(0.1);
+    let nan = |t: f64| if t > 2.0 { f64::NAN } else { 0.1 };
+    let panics = |t: f64| {
+        assert!(t < 2.0, "no wind beyond two seconds");
+        0.1
+    };
+    let is_value = |kind: &RunErrorKind| match kind {
+        RunErrorKind::Input(InputError::Value { name, time, value }) => {
+            name == "u" && (2.0..2.1).contains(time) && value.is_nan()
+        }
+        _ => false,
+    };
+    let is_panic = |kind: &RunErrorKind| match kind {
+        RunErrorKind::Input(InputError::Panicked { time }) => (1.89..2.01).contains(time),
+        _ => false,
+    };
+    let error = simulation
+        .clone()
+        .input("u", nan)
+        .run(start, 0.0..5.0)
+        .expect_err("NaN");
+    assert!(is_value(error.kind()), "{error}");
+    assert!((error.partial().last().t - 2.0).abs() < 1e-12);
+    let error = simulation
+        .clone()
+        .input("u", panics)
+        .run(start, 0.0..5.0)
+        .expect_err("a panic");
+    assert!(is_panic(error.kind()), "{error}");
+    assert!(error.partial().states().len() >= 19);
+    // At the very start.
+    let at_once = |_: f64| -> f64 { panic!("at once") };
+    let error = simulation
+        .clone()
+        .input("u", at_once)
+        .run(start, 1.0..5.0)
+        .expect_err("a panic");
+    assert_eq!(
+        error.kind(),
+        &RunErrorKind::Input(InputError::Panicked { time: 1.0 })
+    );
+    let mut steps = simulation.clone().input("u", at_once).steps(start, 1.0);
+    assert!(steps.next().is_some_and(|step| step.is_err()) && steps.next().is_none());
+    // Step by step, with an accuracy, and where events are looked for.
+    let mut steps = simulation.clone().input("u", panics).steps(start, 0.0);
+    let error = steps.find_map(Result::err).expect("it ends");
+    assert!(is_panic(&error) && steps.next().is_none());
+    let mut steps = simulation.clone().input("u", nan).steps(start, 0.0);
+    assert!(is_value(&steps.find_map(Result::err).expect("it ends")));
+    let accurate = simulation
+        .clone()
+        .input("u", nan)
+        .accuracy(1e-6)
+        .run(start, 0.0..5.0);
+    let error = accurate.expect_err("NaN");
+    assert!(
+        matches!(error.kind(), RunErrorKind::Input(InputError::Value { .. })),
+        "{error}"
+    );
+    let watched = simulation
+        .clone()
+        .input("u", panics)
+        .on("middle", Crossing::Either, |_| Act::Record)
+        .run(start, 0.0..5.0)
+        .expect_err("a panic");
+    assert!(is_panic(watched.kind()) && watched.partial().events().len() == 1);
+    // What failed once does not spoil another run.
+    let good = simulation.clone().input("u", nan).run(start, 0.0..1.9);
+    assert_eq!(good.expect("before it fails").states().len(), 20);
+}
+
+/// Feedback with rates of their own: the same as setting the inputs by hand at these times.
+#[test]
+fn feedback_is_sampled_with_its_own_rate() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u, w), force(x) = u + w)]
+    struct Mass;
+
+    let start = Mass.state([1.0], [0.3]);
+    let hold = || {
+        Simulation::new(&Mass)
+            .step(0.02)
+            .hold(start, 0.5)
+            .expect("a loop")
+    };
+    let (mut sampled, mut by_hand) = (hold(), hold());
+    sampled
+        .sample("u", 0.1, |node| -node.q[0])
+        .expect("an input");
+    sampled
+        .sample("w", 0.06, |node| -0.5 * node.v[0])
+        .expect("an input");
+    for step in 0..600 {
+        let node = by_hand.node().clone();
+        if step % 5 == 0 {
+            by_hand.set("u", -node.q[0]);
+        }
+        if step % 3 == 0 {
+            by_hand.set("w", -0.5 * node.v[0]);
+        }
+        by_hand.advance().expect("a step");
+        sampled.advance().expect("a step");
+        assert_eq!(sampled.node(), by_hand.node(), "step {step}");
+    }
+    let told = |result: Result<(), RunErrorKind>| match result {
+        Err(RunErrorKind::Input(InputError::Sampling { .. })) => true,
+        other => panic!("{other:?}"),
+    };
+    assert!(told(hold().sample("u", 0.0, |_| 0.0)));
+    assert!(hold().sample("v", 0.1, |_| 0.0).is_err());
+    let mut between = hold();
+    between
+        .sample("u", 0.05, |_| 0.0)
+        .expect("a positive period");
+    let mut results = (0..3).map(|_| between.advance());
+    assert!(results.next().is_some_and(|first| first.is_ok()));
+    assert!(results.any(|one| one.is_err()) || told(between.advance()));
+}
+
+/// Parameters of a driven model are set as those of any other, and its inputs stay.
+#[test]
+fn parameters_of_driven_models_are_set() {
+    let start = DRIVING.state([1.0], [0.0]);
+    let heavier = |event: &tfe::Occurrence<'_, 1>| {
+        assert!(event.parameter("m").is_some());
+        Act::Set(tfe::Settings::new("m", 2.6).and("c", 0.1))
+    };
+    let run = |end: f64| {
+        Simulation::new(&DRIVING)
+            .step(0.05)
+            .input("w", w)
+            .input("u", u)
+            .on_function("late", Crossing::Rising, |t, _, _| t - 1.0, heavier)
+            .run(start, 0.0..end)
+            .expect("a run")
+    };
+    let motion = run(3.0);
+    let written = Simulation::new(&WRITTEN).step(0.05);
+    let first = written.run(start, 0.0..1.0).expect("a run");
+    let other = Written {
+        m: 2.6,
+        c: 0.1,
+        ..WRITTEN
+    };
+    let second = Simulation::new(&other)
+        .step(0.05)
+        .run(first.last().state(), 1.0..3.0)
+        .expect("a run");
+    assert!((motion.last().q[0] - second.last().q[0]).abs() < 1e-12);
+    assert!(
+        (motion
+            .outputs()
+            .row(motion.states().len() - 1)
+            .expect("a row")[0]
+            - second.outputs().row(40).expect("a row")[0])
+            .abs()
+            < 1e-12
+    );
 }

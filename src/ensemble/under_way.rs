@@ -104,13 +104,18 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`EnsembleError`] where the element does not exist or the number of starts is not that of models. A bad start is a failure of its own run only.
+    /// [`EnsembleError`] where the element does not exist, the number of starts is not that of models, or [events](Ensemble::on) are to be looked for, which
+    /// [`run`](Ensemble::run) and [`for_each`](Ensemble::for_each) do. A bad start is a failure of its own run only.
     pub fn begin(
         &self,
         starts: &[State<N>],
         t0: f64,
     ) -> Result<EnsembleRun<'m, M, N, K>, EnsembleError> {
         let count = self.models.count(starts)?;
+        if !self.events.is_empty() {
+            let call = "Ensemble::begin";
+            return Err(RunErrorKind::EventsUnsupported { call }.into());
+        }
         self.element.validate().map_err(RunErrorKind::Element)?;
         let batches = match self.width() {
             WIDTH => (0..count)

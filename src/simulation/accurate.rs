@@ -50,6 +50,15 @@ pub(super) trait Repeatable<const N: usize> {
         mesh: &Mesh<N>,
         state: &mut Self::State,
     ) -> Result<(), StepError>;
+    /// Why an element could not be solved.
+    fn failed(&self, element: usize, (time, step): (f64, f64), source: StepError) -> RunErrorKind {
+        RunErrorKind::Solve {
+            element,
+            time,
+            step,
+            source,
+        }
+    }
     fn set_tolerance(stepper: &mut Self::Stepper, tolerance: f64);
     fn statistics(stepper: &Self::Stepper) -> Statistics;
     /// Coordinates, momenta and outputs, one after the other.
@@ -170,12 +179,7 @@ fn follow<R: Repeatable<N>, const N: usize>(
     let mut bar = Bar::new(run.progress(), mesh.steps());
     for (element, (t, next, h)) in mesh.elements().enumerate() {
         if let Err(source) = run.advance(stepper, (t, next, h), mesh, &mut state) {
-            let kind = RunErrorKind::Solve {
-                element,
-                time: t,
-                step: h,
-                source,
-            };
+            let kind = run.failed(element, (t, h), source);
             return Err((kind, t, state));
         }
         let keeps = times.next_if_eq(&&next).is_some();

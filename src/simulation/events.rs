@@ -17,6 +17,7 @@ use tfe_runtime::{Arguments, Element, Form, Model, Real, Share, State, constrain
 
 pub use act::{Act, Crossing, Event, Occurrence};
 pub(super) use act::{After, Changed, Near, On, state_after};
+pub(crate) use on::Watching;
 pub use settings::Settings;
 pub(super) use settings::{Remodel, remodel};
 pub(super) use value::{Value, WEIGHTS};

@@ -4,6 +4,7 @@ use super::steps::Steps;
 use crate::driven::{Cells, Driven, InputError, place};
 use crate::error::RunErrorKind;
 use crate::motion::Node;
+use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
 use tfe_runtime::{Controlled, Form, Model, Statistics};
@@ -18,6 +19,29 @@ pub struct Held<'m, M: Controlled<N>, const N: usize> {
     node: HeldNode<N>,
     /// An input that cannot be set, to be told by the next step.
     refusal: Option<InputError>,
+    samplers: Vec<Sampler<'m, N>>,
+}
+
+/// Feedback with a rate of its own.
+struct Sampler<'m, const N: usize> {
+    /// The input.
+    place: usize,
+    start: f64,
+    period: f64,
+    /// How often it was called.
+    count: u64,
+    law: Law<'m, N>,
+}
+
+type Law<'m, const N: usize> = Box<dyn FnMut(&HeldNode<N>) -> f64 + Send + 'm>;
+
+impl<const N: usize> fmt::Debug for Sampler<'_, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Sampler")
+            .field("input", &self.place)
+            .field("period", &self.period)
+            .finish_non_exhaustive()
+    }
 }
 
 /// A node with its outputs; a [`Node`] by dereference.
@@ -71,6 +95,7 @@ impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
             cells,
             node,
             refusal: None,
+            samplers: Vec::new(),
         };
         held.observe();
         Ok(held)
@@ -88,6 +113,87 @@ impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
         }
     }
 
+    /// Samples a feedback with its own rate: from the node reached on, every `period`, `law` is asked with the node there, and what it gives is held until the next time. Several inputs, and
+    /// several of one input, may have rates of their own; one that is [set](Self::set) by hand between two samples keeps that until the second.
+    ///
+    /// Steps have to end at the samples: the period is a multiple of the step.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u)]
+    /// struct Mass;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // Deadbeat: in two samples of half a second the mass is where it is to be, at rest.
+    /// let mut run = Simulation::new(&Mass).step(0.05).hold(Mass.state([1.0], [0.0]), 0.0)?;
+    /// let period = 0.5;
+    /// run.sample("u", period, move |node| -node.q[0] / (period * period) - 1.5 * node.v[0] / period)?;
+    /// for _ in 0..20 {
+    ///     run.advance()?;
+    /// }
+    /// assert!(run.node().q[0].abs() < 1e-13 && run.node().v[0].abs() < 1e-13);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`RunErrorKind::Input`] for a name that the model does not declare, and a period that is not positive. A sample that no step ends at is an error of the step that passes it.
+    pub fn sample(
+        &mut self,
+        input: &str,
+        period: f64,
+        law: impl FnMut(&HeldNode<N>) -> f64 + Send + 'm,
+    ) -> Result<(), RunErrorKind> {
+        let place = place::<M, N>(input).map_err(RunErrorKind::Input)?;
+        if !(period > 0.0 && period.is_finite()) {
+            return Err(RunErrorKind::Input(InputError::Sampling {
+                name: input.to_owned(),
+                time: self.node.t,
+                why: "the period must be positive and finite",
+            }));
+        }
+        self.samplers.push(Sampler {
+            place,
+            start: self.node.t,
+            period,
+            count: 0,
+            law: Box::new(law),
+        });
+        Ok(())
+    }
+
+    /// Asks the feedback that is due.
+    fn ask_samplers(&mut self) -> Result<(), InputError> {
+        /// In periods.
+        const ROUNDING: f64 = 1e-9;
+        for sampler in &mut self.samplers {
+            #[allow(clippy::cast_precision_loss, reason = "a count of samples")]
+            let late = (self.node.t - sampler.start).abs() / sampler.period - sampler.count as f64;
+            if late < -ROUNDING {
+                continue;
+            }
+            let name = || M::INPUTS[sampler.place].to_owned();
+            if late > ROUNDING {
+                return Err(InputError::Sampling {
+                    name: name(),
+                    time: self.node.t,
+                    why: "a sample lies within the step before: the period must be a multiple of the step",
+                });
+            }
+            let value = (sampler.law)(&self.node);
+            if !value.is_finite() {
+                return Err(InputError::NotFinite {
+                    name: name(),
+                    value,
+                });
+            }
+            self.cells.set(sampler.place, value);
+            sampler.count += 1;
+        }
+        Ok(())
+    }
+
     /// The node reached: t, q, v, p and outputs.
     pub fn node(&self) -> &HeldNode<N> {
         &self.node
@@ -102,6 +208,7 @@ impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
         if let Some(error) = self.refusal.take() {
             return Err(RunErrorKind::Input(error));
         }
+        self.ask_samplers().map_err(RunErrorKind::Input)?;
         match self.steps.next() {
             Some(node) => self.node.node = node?,
             None => return Err(RunErrorKind::Ended { time: self.node.t }),
@@ -122,7 +229,10 @@ impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
                 Form::Lagrangian => &node.v,
                 Form::Hamiltonian => &node.p,
             };
-            model.observables(node.t, &node.q, z, outputs);
+            let seen = model.guarded(|| model.observables(node.t, &node.q, z, outputs));
+            if seen.is_err() {
+                outputs.fill(f64::NAN);
+            }
         }
     }
 }

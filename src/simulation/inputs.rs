@@ -10,7 +10,9 @@ use tfe_runtime::{Controlled, Model, Share, State};
 impl<'m, M: Controlled<N> + 'm, const N: usize> Simulation<'m, M, N> {
     /// Gives an input of the model as a function of the time, as [`Driven::input`]. Inputs that are not given are zero.
     ///
-    /// A name that the model does not declare stops the run before it begins. Where the function jumps or has a kink, elements should [end](Self::break_at).
+    /// A name that the model does not declare stops the run before it begins. A function that gives a number that is not finite where it is needed, or panics, ends the run with an error,
+    /// [`InputError::Value`] with the time, or [`InputError::Panicked`]. Panics are caught once for all that a step asks (a panic that aborts the program is not), by `run`, `steps`, `hold`,
+    /// [`section`](Self::section), `run_linearised` and runs with an `accuracy`. Where the function jumps or has a kink, elements should [end](Self::break_at).
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -186,12 +186,7 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
         let before = *state;
         stepper
             .advance(begin, h, state, impulses)
-            .map_err(|source| RunErrorKind::Solve {
-                element: number,
-                time: t,
-                step: h,
-                source,
-            })?;
+            .map_err(|source| RunErrorKind::of_element(&*self.model, number, (t, h), source))?;
         let keeps = observer.keeps();
         // Before a matrix, which needs the same memory.
         let dense = (keeps || !self.events.is_empty())

@@ -60,11 +60,12 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             crossing,
             act: Arc::new(|_| Act::Record),
         });
-        let beginning = run.endless(&start, t0);
+        let beginning = (run.model.guarded(|| run.endless(&start, t0)))
+            .unwrap_or_else(|_| Err(RunErrorKind::panicked(t0)));
         Section {
             chosen: (run.chosen_element(), run.control),
             model: run.model.clone(),
-            way: Way::new(beginning, start, run.impulses),
+            way: Way::new(run.model.clone(), beginning, start, run.impulses),
             crossings: Crossings {
                 which,
                 tangents: None,

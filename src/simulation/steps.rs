@@ -30,6 +30,8 @@ pub struct Steps<'m, M, const N: usize> {
 /// A stepper with its state on an endless course.
 #[derive(Debug)]
 pub(super) struct Way<'m, M, const N: usize> {
+    /// As it was at first.
+    model: Share<'m, M>,
     pub(super) course: Course<Stepper<'m, M, N>>,
     pub(super) state: State<N>,
     impulses: Vec<Impulse<N>>,
@@ -45,6 +47,7 @@ pub(super) type Beginning<'m, M, const N: usize> =
 
 impl<'m, M: Model<N>, const N: usize> Way<'m, M, N> {
     pub(super) fn new(
+        model: Share<'m, M>,
         beginning: Beginning<'m, M, N>,
         start: State<N>,
         impulses: Vec<Impulse<N>>,
@@ -54,6 +57,7 @@ impl<'m, M: Model<N>, const N: usize> Way<'m, M, N> {
             Err(kind) => (Err(kind), None),
         };
         Self {
+            model,
             course: Course::new(way),
             state: start,
             impulses,
@@ -68,6 +72,7 @@ impl<'m, M: Model<N>, const N: usize> Way<'m, M, N> {
         observer: &mut impl Observe<'m, M, N>,
     ) -> Option<Result<(Left, f64), RunErrorKind>> {
         let Self {
+            model,
             course,
             state,
             impulses,
@@ -89,7 +94,8 @@ impl<'m, M: Model<N>, const N: usize> Way<'m, M, N> {
                 begin: leg.begin,
                 impulses: &impulses,
             };
-            let left = pieces.pass(stepper, planned, state, observer);
+            let left = model.guarded(|| pieces.pass(stepper, planned, state, observer));
+            let left = left.map_err(|_| RunErrorKind::panicked(t))?;
             left.map(|left| (left, next)).map_err(|broken| broken.kind)
         };
         let passed = course.next(advance, |stepper| *statistics = *stepper.statistics());
@@ -116,13 +122,14 @@ fn acting<const N: usize>(impulses: &[Impulse<N>], leg: &Leg) -> Vec<Impulse<N>>
 
 impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
     pub(super) fn new(
+        model: Share<'m, M>,
         beginning: Beginning<'m, M, N>,
         start: State<N>,
         t0: f64,
         impulses: Vec<Impulse<N>>,
         again: Again<'m, M>,
     ) -> Self {
-        let way = Way::new(beginning, start, impulses);
+        let way = Way::new(model, beginning, start, impulses);
         let mut watch = Watch::new(again.element);
         let mut velocity = [0.0; N];
         if let Some(stepper) = way.course.stepper() {
@@ -210,6 +217,7 @@ impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
             return self.nodes.pop_front();
         }
         let Way {
+            model,
             course,
             state,
             impulses,
@@ -222,11 +230,19 @@ impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
             let impulses = acting(impulses, leg);
             let (before, (t, next)) = (*state, leg.nodes);
             watch.look(stepper.model(), leg.number, (t, leg.h), &before);
-            if let Err(source) = stepper.advance(leg.begin, leg.h, state, &impulses) {
-                watch.examine(stepper.model(), leg.number, (t, leg.h), &before);
-                return Err(leg.failed(source));
-            }
-            let node = Node::new(stepper.model(), next, state, velocity);
+            let passed = model.guarded(|| {
+                stepper.advance(leg.begin, leg.h, state, &impulses)?;
+                Ok(Node::new(stepper.model(), next, state, velocity))
+            });
+            let node = match passed {
+                Ok(Ok(node)) => node,
+                Ok(Err(source)) => {
+                    watch.examine(stepper.model(), leg.number, (t, leg.h), &before);
+                    let at = (t, leg.h);
+                    return Err(RunErrorKind::of_element(&**model, leg.number, at, source));
+                }
+                Err(_) => return Err(RunErrorKind::panicked(t)),
+            };
             *velocity = node.v;
             if impulses.is_empty() {
                 let examined = Examined {

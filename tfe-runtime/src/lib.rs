@@ -76,7 +76,7 @@ pub mod weak_form;
 pub mod workspace;
 
 pub use condense::{Direction, Parameter};
-pub use controlled::{Controlled, MAX_INPUTS};
+pub use controlled::{Controlled, InputFailure, InputPanicked, MAX_INPUTS};
 #[cfg(feature = "std")]
 pub use dense::bounds::Arguments;
 pub use element::{

@@ -4,6 +4,7 @@
 //! kernels evaluate that function and its partial derivatives at one instant; everything else
 //! (Legendre transform, elements, Newton) lives in this crate. In the names below **z** stands for the velocity v of a Lagrangian and for the momentum p of a Hamiltonian.
 
+use crate::controlled::{InputFailure, InputPanicked};
 use crate::real::Real;
 
 /// First derivatives at one instant.
@@ -277,6 +278,22 @@ pub trait Model<const N: usize> {
     where
         Self: Sized,
     {
+        None
+    }
+
+    /// What `f` gives, in which the model is evaluated. Models that ask functions given at run time for their inputs catch panics of these; all others do nothing else.
+    ///
+    /// # Errors
+    /// [`InputPanicked`]; what `f` was working on is to be left alone then.
+    fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked>
+    where
+        Self: Sized,
+    {
+        Ok(f())
+    }
+
+    /// The last number of a function given for an input that was not finite, which is forgotten then.
+    fn failed_input(&self) -> Option<InputFailure> {
         None
     }
 

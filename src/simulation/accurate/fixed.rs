@@ -227,7 +227,14 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         state: &mut State<N>,
     ) -> Result<(), StepError> {
         let impulses = mesh.impulses_in(t, next, mesh.end() == Some(next));
-        stepper.advance(mesh.begin(t, h), h, state, impulses)
+        // Of a panic the motion that is recorded tells, which is the first.
+        let advanced =
+            (self.model).guarded(|| stepper.advance(mesh.begin(t, h), h, state, impulses));
+        advanced.unwrap_or(Err(StepError::NonFinite))
+    }
+
+    fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
+        RunErrorKind::of_element(&*self.model, element, at, source)
     }
 
     fn set_tolerance(stepper: &mut Stepper<'m, M, N>, tolerance: f64) {

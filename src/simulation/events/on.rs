@@ -1,6 +1,6 @@
 //! What a run is asked to look for.
 
-use super::{Act, Crossing, Occurrence, On, remodel};
+use super::{Act, Crossing, Occurrence, On, Remodel, remodel};
 use crate::simulation::Simulation;
 use std::sync::Arc;
 use tfe_runtime::Model;
@@ -91,5 +91,61 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
         });
         self.remodel = Some(remodel);
         self
+    }
+}
+
+/// What all runs of an ensemble are asked to look for.
+#[derive(Debug)]
+pub(crate) struct Watching<'m, M, const N: usize> {
+    events: Vec<On<'m, N>>,
+    remodel: Option<Remodel<'m, M>>,
+}
+
+// Not derived: models need not be `Clone`.
+impl<M, const N: usize> Clone for Watching<'_, M, N> {
+    fn clone(&self) -> Self {
+        Self {
+            events: self.events.clone(),
+            remodel: self.remodel,
+        }
+    }
+}
+
+impl<'m, M, const N: usize> Watching<'m, M, N> {
+    /// No events.
+    pub(crate) const NOTHING: Self = Self {
+        events: Vec::new(),
+        remodel: None,
+    };
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.events.is_empty()
+    }
+
+    /// One event more.
+    pub(crate) fn push(
+        &mut self,
+        name: String,
+        crossing: Crossing,
+        act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
+    ) where
+        M: Model<N> + Send + Sync + 'm,
+    {
+        self.events.push(On {
+            name,
+            function: None,
+            crossing,
+            act: Arc::new(act),
+        });
+        self.remodel = Some(remodel);
+    }
+
+    /// A run that looks for them.
+    pub(crate) fn watched_by(&self, run: Simulation<'m, M, N>) -> Simulation<'m, M, N> {
+        Simulation {
+            events: self.events.clone(),
+            remodel: self.remodel,
+            ..run
+        }
     }
 }

@@ -1,0 +1,74 @@
+//! Ensembles whose runs look for events.
+
+use super::Ensemble;
+use super::members::Members;
+use crate::error::RunErrorKind;
+use crate::motion::Node;
+use crate::simulation::{Act, Crossing, Occurrence, Simulation};
+use std::ops::Range;
+use tfe_runtime::{Model, State, Statistics};
+
+impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize, K> Ensemble<'m, M, N, K>
+where
+    K: Members<'m, M, N>,
+{
+    /// Does `act` at events of every run, as [`Simulation::on`]. Runs are made one by one then, on all processors; a run that an event stops ends there, with the node at the event.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// /// A ball in a well with a floor.
+    /// #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y, event(impact) = y)]
+    /// struct Ball { g: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let ball = Ball { g: 9.81 };
+    /// let starts: Vec<_> = (1..=20).map(|k| ball.state([0.1 * f64::from(k)], [0.0])).collect();
+    /// let ends = Ensemble::new(&ball)
+    ///     .step(0.1)
+    ///     .on("impact", Crossing::Falling, |_| Act::Stop)
+    ///     .run(&starts, 0.0..10.0)?;
+    /// for (start, end) in starts.iter().zip(ends.nodes()) {
+    ///     assert!((end.t - (2.0 * start.q[0] / 9.81).sqrt()).abs() < 1e-14);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn on(
+        mut self,
+        name: impl Into<String>,
+        crossing: Crossing,
+        act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
+    ) -> Self {
+        self.events.push(name.into(), crossing, act);
+        self
+    }
+}
+
+impl<'m, M: Model<N> + Sync, const N: usize, K> Ensemble<'m, M, N, K>
+where
+    K: Members<'m, M, N>,
+{
+    /// One run, with its events.
+    pub(super) fn run_watched(
+        &self,
+        model: &'m M,
+        start: &State<N>,
+        span: &Range<f64>,
+    ) -> (Result<Node<N>, RunErrorKind>, Statistics) {
+        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        let mut run = Simulation::with_defaults(model)
+            .element(self.element)
+            .step(step)
+            .record_every(usize::MAX)
+            .with_control(self.control);
+        for time in &self.breaks {
+            run = run.break_at(*time);
+        }
+        match self.events.watched_by(run).run(*start, span.clone()) {
+            Ok(motion) => (Ok(*motion.last()), *motion.statistics()),
+            Err(error) => (Err(error.kind().clone()), *error.partial().statistics()),
+        }
+    }
+}
