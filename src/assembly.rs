@@ -6,20 +6,23 @@
 //! elements and without the growth of round-off that stepping from one end to the other has.
 
 mod chain;
+mod control;
 mod convergence;
+mod error;
 mod mesh;
 mod newton;
 mod solution;
 
+pub use error::AssemblyError;
 pub use mesh::MeshError;
-pub use newton::AssemblyError;
 
 pub(crate) use chain::{Chain, ClosureMut, DenseMut};
+pub(crate) use control::Control;
 #[cfg(feature = "sparse")]
 pub(crate) use convergence::Convergence;
 pub(crate) use convergence::size;
 pub(crate) use mesh::Mesh;
-pub(crate) use newton::{Assembly, Control, Iterate, Problem};
+pub(crate) use newton::{Assembly, Iterate, Problem};
 pub(crate) use solution::Solution;
 
 /// A curve t ↦ (q, dq/dt).

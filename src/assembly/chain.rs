@@ -39,91 +39,16 @@
 //! Differential Equations*, SIAM 1995, chapter 7.
 
 mod closing;
+mod equations;
 mod sweep;
 #[cfg(test)]
 mod tests;
 
 use closing::Closing;
-use std::error::Error;
-use std::fmt;
+use equations::{Equations, RightSide, Shape};
 use sweep::Sweep;
 
-/// The numbers of unknowns and equations.
-#[derive(Clone, Copy, Debug)]
-struct Shape {
-    /// m, the unknowns of a node.
-    block: usize,
-    /// g, the global unknowns.
-    globals: usize,
-    /// E, at least one.
-    links: usize,
-    /// k, at most m + g.
-    dense: usize,
-    /// The right sides that are solved for together.
-    rights: usize,
-}
-
-impl Shape {
-    /// The rows of the closure: m + g − k.
-    fn closure(&self) -> usize {
-        self.block + self.globals - self.dense
-    }
-
-    /// The unknowns of all nodes.
-    fn nodes(&self) -> usize {
-        (self.links + 1) * self.block
-    }
-
-    /// The unknowns of the closing system, (y_0, y_E, γ).
-    fn closing(&self) -> usize {
-        2 * self.block + self.globals
-    }
-}
-
-/// The equations as given; all matrices row by row.
-#[derive(Clone, Debug)]
-struct Equations {
-    matrices: Vec<f64>,
-    link_globals: Vec<f64>,
-    first: Vec<f64>,
-    last: Vec<f64>,
-    closure_globals: Vec<f64>,
-    dense_nodes: Vec<f64>,
-    dense_globals: Vec<f64>,
-    rights: Vec<RightSide>,
-}
-
-impl Equations {
-    fn new(shape: &Shape) -> Self {
-        let (m, g, c) = (shape.block, shape.globals, shape.closure());
-        let right = RightSide {
-            links: vec![0.0; shape.links * m],
-            closure: vec![0.0; c],
-            dense: vec![0.0; shape.dense],
-        };
-        Self {
-            matrices: vec![0.0; shape.links * m * m],
-            link_globals: vec![0.0; shape.links * m * g],
-            first: vec![0.0; c * m],
-            last: vec![0.0; c * m],
-            closure_globals: vec![0.0; c * g],
-            dense_nodes: vec![0.0; shape.dense * shape.nodes()],
-            dense_globals: vec![0.0; shape.dense * g],
-            rights: vec![right; shape.rights],
-        }
-    }
-}
-
-/// One right side of all equations.
-#[derive(Clone, Debug)]
-pub(crate) struct RightSide {
-    /// r_0, …, r_{E−1}, one after the other.
-    pub(crate) links: Vec<f64>,
-    /// b.
-    pub(crate) closure: Vec<f64>,
-    /// d, one number a dense row.
-    pub(crate) dense: Vec<f64>,
-}
+pub(crate) use equations::Singular;
 
 /// The coefficients of one link, y_{e+1} − A y_e − C γ = r.
 pub(crate) struct LinkMut<'a> {
@@ -331,36 +256,3 @@ impl Chain {
         self.sign
     }
 }
-
-/// Why the equations of a chain were not solved.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Singular {
-    /// The conditions do not determine the unknowns, to round-off.
-    Rank {
-        /// The number of independent equations found among those that remain for the two ends and the global unknowns.
-        rank: usize,
-        /// The number of these equations, 2m + g.
-        size: usize,
-        /// The size of the first pivot that is taken for zero, relative to the largest.
-        pivot: f64,
-    },
-    /// A coefficient, or a number of the solution, is infinite or not a number.
-    NotFinite,
-}
-
-impl fmt::Display for Singular {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Rank { rank, size, pivot } => write!(
-                f,
-                "the linear equations are singular: the conditions at the ends have rank {rank} of {size} (relative pivot {pivot:.1e})"
-            ),
-            Self::NotFinite => write!(
-                f,
-                "the linear equations or their solution hold a number that is not finite"
-            ),
-        }
-    }
-}
-
-impl Error for Singular {}

@@ -1,6 +1,7 @@
 //! When Newton's method on a chain has arrived, and how far it dares to go.
 
-use super::{AssemblyError, Control};
+use super::control::Control;
+use super::error::AssemblyError;
 
 /// Corrections below this one that no longer fall are round-off: a step from here would square them.
 const ROUND_OFF: f64 = 1e-9;

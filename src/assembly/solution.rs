@@ -1,6 +1,7 @@
 //! Solved chains of elements.
 
-use super::{Iterate, Mesh};
+use super::mesh::Mesh;
+use super::newton::Iterate;
 use crate::motion::{Motion, Node};
 use nalgebra::DMatrix;
 use tfe_runtime::condenser::{Condensed, Condenser, Placed};

@@ -1,6 +1,6 @@
 //! What was measured.
 
-use super::FitError;
+use super::error::FitError;
 use tfe_runtime::Model;
 
 /// Values of one output, as given.

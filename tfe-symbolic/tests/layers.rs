@@ -1,4 +1,5 @@
-//! The plan of the engine and of the macro crate by their imports: no circles among files, and folders in layers.
+//! The plan of the workspace by its imports: no circles among the files of the engine and of the macro crate, folders of the engine in layers, the circles that are left in
+//! the other crates by name, and a line in `ARCHITECTURE.md` for every module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -56,6 +57,44 @@ fn folders_import_lower_layers_only() {
     }
 }
 
+/// What is left to be taken apart: a list that gets shorter only.
+#[test]
+fn the_other_crates_have_these_circles_and_no_more() {
+    let files = |root: &str| circles(&imports(&sources(root)));
+    let folders = |root: &str| circles(&by_folder(&imports(&sources(root))));
+    let sizes = |circles: &[Vec<String>]| circles.iter().map(Vec::len).collect::<Vec<_>>();
+    let crate_folders = [["error", "motion", "simulation"]];
+    assert_eq!(folders("../src"), crate_folders);
+    assert_eq!(sizes(&files("../src")), [0; 0]);
+    assert_eq!(folders("../tfe-runtime/src"), [["a"]]);
+    assert_eq!(sizes(&files("../tfe-runtime/src")), [0; 0]);
+}
+
+/// In the tables, so that who looks for something finds where it is.
+#[test]
+fn every_module_has_a_line_in_the_tables() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(root.join("../ARCHITECTURE.md")).expect("the file can be read");
+    let rows: Vec<&str> = text
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .collect();
+    for crate_sources in ["src", "../tfe-runtime/src", "../src"] {
+        let modules = sources(crate_sources).into_keys();
+        let modules: BTreeSet<String> = modules
+            .map(|module| module.split("::").next().unwrap_or(&module).to_owned())
+            .collect();
+        for module in modules {
+            let name = format!("`{module}`");
+            let has_line = rows.iter().any(|row| {
+                let first = row.split('|').nth(1).unwrap_or_default();
+                first.contains(&name)
+            });
+            assert!(has_line, "{crate_sources}: no line for {name}");
+        }
+    }
+}
+
 #[test]
 fn imports_are_found() {
     let text = "use crate::a::{self, b::C, d}; // crate::x::y\nfn f() { super::e::g(); child::h::<crate::i::J>() }";
@@ -80,6 +119,14 @@ fn circles_are_found() {
     assert_eq!(circle(&tree), Vec::<String>::new());
     let ring = Imports::from([one("a", &["b"]), one("b", &["c"]), one("c", &["b"])]);
     assert_eq!(circle(&ring), ["b", "c"]);
+    assert_eq!(circles(&ring), [["b", "c"]]);
+    let two = Imports::from([
+        one("a", &["b"]),
+        one("b", &["a", "c"]),
+        one("c", &["d"]),
+        one("d", &["c"]),
+    ]);
+    assert_eq!(circles(&two), [["a", "b"], ["c", "d"]]);
 }
 
 fn engine() -> BTreeMap<String, String> {
@@ -231,4 +278,30 @@ fn circle(imports: &Imports) -> Vec<String> {
             return left.into_keys().collect();
         }
     }
+}
+
+/// The groups of modules of which each leads to every other.
+fn circles(imports: &Imports) -> Vec<Vec<String>> {
+    let mut reached = imports.clone();
+    loop {
+        let before: usize = reached.values().map(BTreeSet::len).sum();
+        let known = reached.clone();
+        for others in reached.values_mut() {
+            let further = others.iter().filter_map(|other| known.get(other));
+            let further: Vec<String> = further.flatten().cloned().collect();
+            others.extend(further);
+        }
+        if reached.values().map(BTreeSet::len).sum::<usize>() == before {
+            break;
+        }
+    }
+    let mut groups: Vec<Vec<String>> = Vec::new();
+    for (module, others) in &reached {
+        let back = |other: &&String| reached.get(*other).is_some_and(|own| own.contains(module));
+        let group: Vec<String> = others.iter().filter(back).cloned().collect();
+        if group.len() > 1 && !groups.contains(&group) {
+            groups.push(group);
+        }
+    }
+    groups
 }

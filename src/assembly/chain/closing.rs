@@ -1,7 +1,7 @@
 //! The small system in (ŷ_0, ŷ_E, γ) that is left of a chain.
 
+use super::equations::{Equations, Shape, Singular};
 use super::sweep::Sweep;
-use super::{Equations, Shape, Singular};
 use crate::periodic_schur::{exponent, power_of_two};
 
 /// A pivot below this part of the largest is taken for zero.

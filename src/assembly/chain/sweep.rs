@@ -1,6 +1,6 @@
 //! The elimination of the interior nodes and the back substitution.
 
-use super::{Equations, Shape};
+use super::equations::{Equations, Shape};
 use crate::periodic_schur::{balancing, power_of_two, reflection};
 
 /// The rows of the elimination; nodes are scaled, ŷ = D⁻¹ y.

@@ -1,0 +1,87 @@
+//! Why an assembled problem has no solution.
+
+use std::fmt;
+use tfe_runtime::{ElementError, LegendreError, StepError};
+
+/// Why an assembled problem has no solution.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum AssemblyError {
+    /// The time element does not exist.
+    Element(ElementError),
+    /// An element could not be linearised.
+    Linearise {
+        /// The number of the element, from 0.
+        element: usize,
+        /// Its start time.
+        time: f64,
+        /// Why.
+        source: StepError,
+    },
+    /// A velocity or a momentum at a node could not be found.
+    Legendre(LegendreError),
+    /// The equations of the chain are singular: there is no solution, or there are many near each other.
+    Singular {
+        /// Iterations done.
+        iterations: u32,
+    },
+    /// Newton's method came to no end.
+    Stalled {
+        /// Iterations done.
+        iterations: u32,
+        /// The size of the last correction beside the solution.
+        correction: f64,
+        /// What was asked for.
+        tolerance: f64,
+    },
+}
+
+impl fmt::Display for AssemblyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Element(error) => error.fmt(f),
+            Self::Linearise {
+                element,
+                time,
+                source,
+            } => write!(f, "element {element}, at t = {time}: {source}"),
+            Self::Legendre(error) => error.fmt(f),
+            Self::Singular { iterations } => write!(
+                f,
+                "the assembled equations are singular after {iterations} iterations: no solution near the guess, or a whole family of them"
+            ),
+            Self::Stalled {
+                iterations,
+                correction,
+                tolerance,
+            } => write!(
+                f,
+                "no solution after {iterations} iterations: the last correction is {correction:.1e} of the solution, {tolerance:.1e} was asked for; \
+                 a better guess or more elements may help"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for AssemblyError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Element(error) => Some(error),
+            Self::Linearise { source, .. } => Some(source),
+            Self::Legendre(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<ElementError> for AssemblyError {
+    fn from(error: ElementError) -> Self {
+        Self::Element(error)
+    }
+}
+
+impl From<LegendreError> for AssemblyError {
+    fn from(error: LegendreError) -> Self {
+        Self::Legendre(error)
+    }
+}
