@@ -9,6 +9,9 @@ use crate::double_double::DoubleDouble;
 /// The largest number of nodes of an element.
 pub const MAX_NODES: usize = 12;
 
+/// The largest number of coefficients of a rate: degree s − 1 ≤ 10.
+pub const MAX_RATES: usize = MAX_NODES - 1;
+
 /// Fills `values[j]` with P_j(2τ − 1).
 pub const fn legendre(tau: f64, values: &mut [f64]) {
     let x = 2.0 * tau - 1.0;

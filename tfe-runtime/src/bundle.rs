@@ -12,10 +12,11 @@ mod engine;
 mod first_order;
 mod group;
 mod judge;
-mod pair;
+pub(crate) mod pair;
 mod products;
 mod second_order;
 mod step;
+mod together;
 mod varied;
 
 use crate::element::{Element, ElementError};
@@ -23,10 +24,10 @@ use crate::error::StepError;
 use crate::legendre::largest;
 use crate::model::{Model, State};
 use crate::newton::{Control, Preference, Solve};
-use crate::points::{constant_rates, has_form};
+use crate::points::has_form;
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
-use crate::step::Stepper;
+use crate::stepper::Stepper;
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -34,9 +35,8 @@ use engine::Engine;
 #[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
 pub(crate) use engine::tests::Pendulums;
 use group::Group;
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-pub(crate) use pair::{Apart, Pair};
-use pair::{Eight, LANES};
+use pair::LANES;
+pub use together::{One, Together, Trajectories};
 pub use varied::Varied;
 
 /// Up to W trajectories that take the same steps.
@@ -104,69 +104,6 @@ pub struct Bundle<'m, M, const N: usize, const W: usize, T = One<'m, M>> {
     together: Statistics,
     /// Of steppers that are no more.
     past: Statistics,
-}
-
-/// What eight trajectories side by side compute with.
-pub trait Together<const N: usize>: Clone {
-    /// The kernels of all lanes.
-    type Kernels: Model<N>;
-    /// The numbers that they are given.
-    type Number<'a, V: Eight>: Eight
-    where
-        Self: 'a;
-
-    /// The kernels of all lanes.
-    fn kernels(&self) -> &Self::Kernels;
-    /// A number that kernels can be given.
-    fn number<V: Eight>(&self, like: V) -> Self::Number<'_, V>;
-    /// Rates of momenta and coordinates of one lane at a start.
-    fn constant_rates(&self, lane: usize, t: f64, start: &State<N>) -> ([f64; N], [f64; N]);
-}
-
-/// Whose trajectories they are.
-pub trait Trajectories<'m, M: Model<N>, const N: usize>: Together<N> {
-    /// The model of one lane.
-    fn model(&self, lane: usize) -> &'m M;
-}
-
-/// One model in all lanes.
-#[derive(Debug)]
-pub struct One<'m, M>(&'m M);
-
-// Not derived: the model is borrowed, it need not be `Clone`.
-impl<M> Clone for One<'_, M> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<M> Copy for One<'_, M> {}
-
-impl<M: Model<N>, const N: usize> Together<N> for One<'_, M> {
-    type Kernels = M;
-    type Number<'a, V: Eight>
-        = V
-    where
-        Self: 'a;
-
-    fn kernels(&self) -> &M {
-        self.0
-    }
-
-    #[inline(always)]
-    fn number<V: Eight>(&self, like: V) -> V {
-        like
-    }
-
-    fn constant_rates(&self, _lane: usize, t: f64, start: &State<N>) -> ([f64; N], [f64; N]) {
-        constant_rates(self.0, t, start)
-    }
-}
-
-impl<'m, M: Model<N>, const N: usize> Trajectories<'m, M, N> for One<'m, M> {
-    fn model(&self, _lane: usize) -> &'m M {
-        self.0
-    }
 }
 
 /// What has become of a trajectory.

@@ -22,11 +22,11 @@ use crate::element::{Element, ElementError};
 use crate::equations::Span;
 use crate::error::{ConstraintError, LegendreError, StepError};
 use crate::legendre;
+use crate::method::{Interval, Last, Memory, end_of, may_be_phase};
 use crate::model::{First, Model, State};
 use crate::phase_form::PhaseForm;
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
-use crate::step::{Interval, Last, Memory, end_of, may_be_phase};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Workspace, interior_len, numbers_len, pivots_len};
 

@@ -1,7 +1,7 @@
 //! Steps in halves, where the whole one fails (T-116).
 
+use crate::control::Solve;
 use crate::error::StepError;
-use crate::newton::Solve;
 use core::convert::Infallible;
 
 /// A step is halved so many times before it fails.

@@ -8,10 +8,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
+use crate::method::{Interval, Last};
 use crate::model::State;
 use crate::quadrature::Quadrature;
 use crate::scheme::{MAX_RATES, SchemeRef};
-use crate::step::{Interval, Last};
 
 /// One element of a motion, to be evaluated anywhere inside.
 ///

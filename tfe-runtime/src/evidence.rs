@@ -1,11 +1,11 @@
 //! What speaks for the solution of an element (T-115, T-117).
 
+use crate::control::{POSITION_ROUND_OFF, Solve};
 use crate::element::{Element, Family};
 use crate::equations::Increment;
 use crate::error::StepError;
 use crate::legendre::energy_at;
 use crate::model::{Model, State};
-use crate::newton::{POSITION_ROUND_OFF, Solve};
 
 /// Whether what an iteration has found is near where it began: increments that shrink by a factor from the first one on stay in a ball around the start, and the
 /// root in that ball is the only one (T-115). An iteration that wandered before it contracted may have found any root.

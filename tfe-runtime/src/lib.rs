@@ -23,6 +23,7 @@ mod condense;
 #[cfg(feature = "alloc")]
 pub mod condenser;
 pub mod constrained;
+mod control;
 mod controlled;
 mod cut;
 #[cfg(feature = "alloc")]
@@ -42,6 +43,7 @@ mod kinks;
 pub mod legendre;
 pub mod length;
 pub mod lu;
+mod method;
 pub mod model;
 mod newton;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]

@@ -1,6 +1,6 @@
 //! Eight numbers in one register of a processor with AVX-512, for eight trajectories side by side. The rules are those of [`quad`](crate::quad).
 
-use crate::bundle::Apart;
+use crate::bundle::pair::Apart;
 use crate::trigonometry::LIMIT;
 use pulp::x86::V4;
 use pulp::{Simd, b8, f64x8, u64x8};

@@ -6,8 +6,8 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use crate::method::sum;
 use crate::model::State;
-use crate::step::sum;
 
 /// A start so far away that constant forces take no digits from what it does. A power of two.
 const FAR: f64 = (1_u64 << 40) as f64;

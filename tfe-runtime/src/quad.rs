@@ -5,7 +5,7 @@
 //! and cosine are those of [`trigonometry`](crate::trigonometry). Code that computes with these numbers has to be compiled for that
 //! instruction set, hence everything is written into the place of its call, and the outermost call goes through [`pulp`].
 
-use crate::bundle::Pair;
+use crate::bundle::pair::Pair;
 use crate::points::four::Apart;
 use crate::real::Real;
 use crate::trigonometry::{LIMIT, Turn, reduced};

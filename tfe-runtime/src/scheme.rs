@@ -29,9 +29,7 @@ use crate::element::Element;
 use crate::element::ElementError;
 use crate::tableau::Target;
 
-/// The largest number of coefficients of a rate: degree s − 1 ≤ 10.
-pub const MAX_RATES: usize = MAX_NODES - 1;
-
+pub use crate::basis::MAX_RATES;
 /// Borrowed tables of an element, K points and U unknown rates; matrices are flat, row by row.
 #[derive(Clone, Copy, Debug)]
 pub struct SchemeRef<'a> {

@@ -3,6 +3,7 @@
 use crate::cut::{Halving, in_halves, may_be_cut};
 use crate::element::Element;
 use crate::error::StepError;
+use crate::method::{Interval, Memory, Method};
 use crate::model::{Model, State};
 use crate::newton::{Control, Solve, Standard};
 use crate::points::storage::Storage;
@@ -10,7 +11,6 @@ use crate::points::tables::Tables;
 use crate::points::{Points, Together, are_possible, is_second_order};
 use crate::scheme::Scheme;
 use crate::statistics::Statistics;
-use crate::step::{Interval, Memory, Method};
 use crate::workspace::Workspace;
 use core::convert::Infallible;
 

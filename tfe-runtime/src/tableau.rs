@@ -1,10 +1,9 @@
 //! How the tables of an element are computed: the weak form, solved in twice the precision.
 
-use crate::basis::{MAX_NODES, exact_integrals, exact_legendre};
+use crate::basis::{MAX_NODES, MAX_RATES, exact_integrals, exact_legendre};
 use crate::double_double::DoubleDouble;
 use crate::element::{Element, Family};
 use crate::quadrature::{MAX_POINTS, Quadrature};
-use crate::scheme::MAX_RATES;
 
 /// Where the tables are written to; the same parts as in [`SchemeRef`].
 pub(crate) struct Target<'a> {

@@ -17,12 +17,12 @@ use crate::constrained::{linearise, product as constrained_product};
 use crate::element::ElementError;
 use crate::equations::Span;
 use crate::error::StepError;
+use crate::method::{Impulse, Interval, Memory, Method, may_be_phase, set_kicks, total};
 use crate::model::Model;
 #[cfg(feature = "alloc")]
 use crate::model::State;
 use crate::phase_form::PhaseForm;
 use crate::scheme::Tables;
-use crate::step::{Impulse, Interval, Memory, Method, may_be_phase, set_kicks, total};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Workspace, linearised_len};
 
@@ -101,7 +101,7 @@ where
     M: Model<N>,
 {
     let control = crate::newton::Control::default();
-    let mut stepper = crate::step::Stepper::new(model, element, control)?;
+    let mut stepper = crate::stepper::Stepper::new(model, element, control)?;
     let mut end = *state;
     stepper.advance(t, h, &mut end, &[])?;
     stepper.transition(matrix)?;

@@ -1,9 +1,9 @@
 //! What all trajectories share, and the choice of the instruction set.
 
-use super::Together;
 use super::group::{Group, Work};
 use super::pair::{Eight, LANES, Pair};
 use super::step::Step;
+use super::together::Together;
 use crate::double_double::DoubleDouble;
 use crate::model::Model;
 use crate::newton::Control;

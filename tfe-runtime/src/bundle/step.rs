@@ -1,10 +1,10 @@
 //! A step of eight trajectories: start of the iteration, the iteration, the end.
 
-use super::Together;
 use super::group::{Group, Row, Work, flags, replace};
 use super::judge::{Increments, Judge, larger};
 use super::pair::{Eight, LANES};
 use super::products::apply;
+use super::together::Together;
 use crate::model::Model;
 use crate::newton::{Control, PATIENCE, Solve};
 use crate::points::storage::Heap;

@@ -4,7 +4,7 @@
 //! model k, and the kernel is the one that serves a single model.
 
 use super::pair::{Apart, Eight, LANES};
-use super::{Together, Trajectories};
+use super::together::{Together, Trajectories};
 use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
 use crate::points::constant_rates;
 use crate::points::four::Precise;

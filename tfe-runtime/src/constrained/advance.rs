@@ -2,17 +2,19 @@
 
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
+use crate::constrained::layout::refused;
 use crate::constrained::node::{Bordered, own_velocity, solve_velocity};
+use crate::constrained::residual::relative_residual;
 use crate::constrained::rows::Rows;
-use crate::constrained::{START_TOLERANCE, refused, relative_residual};
+use crate::control::START_TOLERANCE;
 use crate::equations::Span;
 use crate::error::{ConstraintError, StepError};
 use crate::evidence::{Energy, conserves_energy};
 use crate::legendre::largest;
+use crate::method::{Interval, Last, Memory, Method, set_kicks, total};
 use crate::model::{CoordinateName, Model, State};
 use crate::newton::{Solve, newton};
 use crate::scheme::{SchemeRef, Tables};
-use crate::step::{Interval, Last, Memory, Method, set_kicks, total};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Scratch, Workspace};
 

@@ -11,8 +11,9 @@
 //! Holonomic rows that depend on one another are combined ([`Rows::combine`], T-118); velocity rows that depend on others are replaced by μ = 0.
 
 use crate::constrained::layout::Layout;
+use crate::constrained::residual::relative_residual;
 use crate::constrained::rows::Rows;
-use crate::constrained::{START_TOLERANCE, relative_residual};
+use crate::control::START_TOLERANCE;
 use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
 use crate::error::{ConstraintError, StepError};
 use crate::legendre::{conjugate, lagrangian_view_from};

@@ -135,7 +135,7 @@ pub use heap::{Residual, independent, residuals, velocity, velocity_for, velocit
 #[cfg(feature = "alloc")]
 mod heap {
     use super::{Bordered, solve_velocity};
-    use crate::constrained::relative_residual;
+    use crate::constrained::residual::relative_residual;
     use crate::constrained::rows::{Rows, rows_len};
     use crate::error::StepError;
     use crate::model::Model;

@@ -1,6 +1,6 @@
 //! The solution of a family between the nodes: integrated rates (T-69).
 
-use super::FamilyState;
+use super::model::FamilyState;
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
 use crate::dense::piece_at;
 use crate::scheme::SchemeRef;

@@ -1,13 +1,15 @@
 //! Steps of families whose forces are the unknowns: M q̈ = f(q, q̇, t) with a constant diagonal M.
 
+use super::dense::FamilyDense;
+use super::error::FamilyError;
 use super::inertia::Inertia;
 #[cfg(feature = "sparse")]
 use super::lanes::Scale;
+use super::model::{FamilyModel, FamilyState};
 #[cfg(feature = "sparse")]
 use super::newton::Tangent;
 use super::registers::{Outcome, Registers};
 use super::space::{Kind, Leg, Problem};
-use super::{FamilyDense, FamilyError, FamilyModel, FamilyState};
 use crate::error::StepError;
 #[cfg(feature = "sparse")]
 use crate::evidence::Evidence;

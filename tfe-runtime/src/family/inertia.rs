@@ -1,6 +1,7 @@
 //! Mass matrices of families.
 
-use super::{Block, Entries, FamilyError, FamilyModel, FamilyState, slope};
+use super::error::FamilyError;
+use super::model::{Block, Entries, FamilyModel, FamilyState, slope};
 #[cfg(feature = "sparse")]
 use super::{node::Node, rows::Rows};
 use crate::double_double::DoubleDouble;

@@ -1,6 +1,6 @@
 //! The one thing that the iteration of families asks of a model, so that everything else is compiled once, not once a model.
 
-use super::FamilyModel;
+use super::model::FamilyModel;
 use super::registers::Running;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use crate::quad::Quad;

@@ -10,8 +10,9 @@
 //! numeric factorisation only when the old one serves no longer.
 
 use super::blocked::{Blocked, Place};
+use super::model::{Block, FamilyModel, Gradient};
+use super::pattern::Pattern;
 use super::space::Problem;
-use super::{Block, FamilyModel, Gradient, Pattern};
 use crate::error::StepError;
 use crate::model::Form;
 use crate::scheme::SchemeRef;

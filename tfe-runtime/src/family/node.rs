@@ -2,8 +2,9 @@
 
 use super::blocked::{Blocked, Place};
 use super::lanes::largest;
+use super::model::{FamilyModel, Gradient};
+use super::pattern::Pattern;
 use super::rows::Rows;
-use super::{FamilyModel, Gradient, Pattern};
 use crate::error::{ConstraintError, LegendreError, StepError};
 use alloc::vec;
 use alloc::vec::Vec;

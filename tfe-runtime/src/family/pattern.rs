@@ -1,6 +1,6 @@
 //! Second derivatives of families: places found once, values each time.
 
-use super::{Block, Entries, FamilyModel, Gradient};
+use super::model::{Block, Entries, FamilyModel, Gradient};
 use alloc::vec;
 use alloc::vec::Vec;
 

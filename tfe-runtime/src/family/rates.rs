@@ -9,20 +9,23 @@
 //! Newton's method with one sparse matrix for rates and multipliers; its factors are kept while they serve, also from step to step.
 
 use super::blocked::Blocked;
+use super::dense::FamilyDense;
+use super::error::FamilyError;
 use super::lanes::largest;
+use super::model::{FamilyModel, FamilyState, Gradient};
 use super::node::Node;
 use super::rows::Rows;
 use super::tangent::Parts;
-use super::{FamilyDense, FamilyError, FamilyModel, FamilyState, Gradient};
-use crate::constrained::{START_TOLERANCE, element::slopes};
+use crate::constrained::element::slopes;
+use crate::control::START_TOLERANCE;
 use crate::double_double::DoubleDouble;
 use crate::equations::{Increment, relative};
 use crate::error::{ConstraintError, StepError};
 use crate::evidence::Evidence;
+use crate::method::{continued_ratio, set_extrapolation};
 use crate::newton::{Control, Monitor, SERVES, Solve, Verdict};
 use crate::scheme::{MAX_RATES, SchemeTable, Tables as _};
 use crate::statistics::Statistics;
-use crate::step::{continued_ratio, set_extrapolation};
 use alloc::vec;
 use alloc::vec::Vec;
 

@@ -2,8 +2,8 @@
 
 use super::kernel::Kernel;
 use super::lanes::Scale;
+use super::model::{FamilyState, Gradient, Sweep};
 use super::space::{Kind, Leg, Pass, Problem, Sizes, Space};
-use super::{FamilyState, Gradient, Sweep};
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 use crate::points::four::Four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]

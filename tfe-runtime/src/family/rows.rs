@@ -1,6 +1,7 @@
 //! The constraints of a family at one instant: φ, and the entries of A = ∂φ/∂q that are not zero.
 
-use super::{FamilyModel, Pattern};
+use super::model::FamilyModel;
+use super::pattern::Pattern;
 use alloc::vec;
 use alloc::vec::Vec;
 

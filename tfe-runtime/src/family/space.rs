@@ -10,7 +10,7 @@
 
 use super::inertia::Inertia;
 use super::lanes::{add_exactly, at_points, product, rows};
-use super::{FamilyModel, FamilyState, Gradient};
+use super::model::{FamilyModel, FamilyState, Gradient};
 use crate::double_double::DoubleDouble;
 use crate::model::Form;
 use crate::points::end::moved;

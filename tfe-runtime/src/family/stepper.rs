@@ -1,11 +1,13 @@
 //! Steps of families: which unknowns a model gets.
 
+use super::dense::FamilyDense;
+use super::error::FamilyError;
 use super::forces::Forces;
 use super::inertia::Legendre;
 use super::lanes::largest;
+use super::model::{FamilyModel, FamilyState};
 #[cfg(feature = "sparse")]
 use super::rates::Rates;
-use super::{FamilyDense, FamilyError, FamilyModel, FamilyState};
 use crate::cut::{Halving, in_halves, may_be_cut};
 use crate::element::Element;
 use crate::error::StepError;

@@ -6,9 +6,10 @@
 //! ```
 
 use super::blocked::{Blocked, Place};
+use super::model::{Block, FamilyModel, Gradient};
+use super::pattern::Pattern;
 use super::rates::Point;
 use super::rows::Rows;
-use super::{Block, FamilyModel, Gradient, Pattern};
 use crate::scheme::SchemeRef;
 use alloc::vec;
 use alloc::vec::Vec;

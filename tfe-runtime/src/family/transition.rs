@@ -1,9 +1,12 @@
 //! The derivative of one step of a family by its start, as an operator: implicit differentiation (T-30).
 
 use super::blocked::Blocked;
+use super::dense::FamilyDense;
+use super::error::FamilyError;
+use super::model::{Block, FamilyModel, FamilyState, Gradient};
+use super::pattern::Pattern;
 use super::rates::Rates;
 use super::view::View;
-use super::{Block, FamilyDense, FamilyError, FamilyModel, FamilyState, Gradient, Pattern};
 use crate::element::Element;
 use crate::error::StepError;
 use crate::model::Form;

@@ -1,7 +1,8 @@
 //! A family as its Lagrangian: what is solved for rates, however it was declared.
 
+use super::error::FamilyError;
 use super::inertia::Inertia;
-use super::{Block, Entries, FamilyError, FamilyModel, Gradient};
+use super::model::{Block, Entries, FamilyModel, Gradient};
 use crate::model::{CoordinateName, Facts, Form};
 use crate::real::Real;
 use alloc::vec::Vec;

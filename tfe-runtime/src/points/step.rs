@@ -4,11 +4,11 @@ use super::four::Four;
 use super::storage::Storage;
 use super::{Leg, Outcome, Points, Together, Work, is_finite, is_phase, is_second_order, largest};
 use crate::error::StepError;
+use crate::method::{Last, Memory};
 use crate::model::{Model, State};
 use crate::newton::{Asked, Control, Monitor, PATIENCE, Solve, Verdict};
 use crate::scheme;
 use crate::statistics::Contraction;
-use crate::step::{Last, Memory};
 
 /// A step to be done.
 pub(super) struct Job<'a, M, T, A, S: Storage, const N: usize> {

@@ -4,8 +4,8 @@ use super::Row;
 use super::four::{Four, Precise};
 use super::storage::{Array, Inline, Lines, Storage};
 use crate::double_double::DoubleDouble;
+use crate::method::{continued_ratio, set_extrapolation};
 use crate::scheme::{self, Scheme, SchemeRef};
-use crate::step::{continued_ratio, set_extrapolation};
 
 /// Elements have up to 16 points at once; beyond, one point after the other.
 pub(crate) const MAX_GROUPS: usize = 4;

@@ -4,9 +4,9 @@ use super::{Piece, Stepper};
 use crate::constrained::rows::Independence;
 use crate::cut::Halving;
 use crate::error::{ConstraintError, StepError};
+use crate::method::Impulse;
 use crate::model::{Model, State};
 use crate::newton::Solve;
-use crate::step::Impulse;
 use alloc::vec::Vec;
 
 /// How far before the node the element over it begins, in parts of the step: one is tried after the other. Farther away less is lost to rounding, nearer the polynomial is

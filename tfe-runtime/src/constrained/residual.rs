@@ -1,0 +1,36 @@
+//! How far constraints are from holding.
+
+use super::rows::{Rows, norm};
+
+/// Velocities that move so small a part of the positions in one step are rest.
+const REST: f64 = 1e-5;
+
+/// By how much positions and velocities violate a constraint that was evaluated: the distance |φ| / |A| relative to the positions, and |A v + a| / |A|
+/// relative to the velocities, those that a step of length h sees.
+pub(crate) fn relative_residual<const N: usize>(
+    rows: &Rows<'_, N>,
+    c: usize,
+    q: &[f64; N],
+    v: &[f64; N],
+    h: f64,
+) -> (f64, f64) {
+    let length = norm(&rows.rows[c]);
+    let length = if length > 0.0 { length } else { 1.0 };
+    let extent = norm(q);
+    let speed = norm(v)
+        .max(rows.drift[c].abs() / length)
+        .max(REST * extent / h.abs());
+    (
+        over(rows.values[c] / length, extent),
+        over(rows.psi(c, v) / length, speed),
+    )
+}
+
+/// |value| / scale; zero over zero is zero, NaN stays NaN.
+fn over(value: f64, scale: f64) -> f64 {
+    if value == 0.0 {
+        0.0
+    } else {
+        value.abs() / scale
+    }
+}

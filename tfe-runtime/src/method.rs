@@ -1,0 +1,322 @@
+//! What a step is made of: intervals with impulses, the memory from step to step, a model with the tables of its element; starts of iterations and ends of elements.
+
+use crate::basis::{MAX_NODES, legendre};
+use crate::constrained::rows::Independence;
+use crate::control::Control;
+use crate::double_double::DoubleDouble;
+use crate::equations::Span;
+use crate::legendre::velocity;
+use crate::lu::Block;
+use crate::model::{First, Form, Model, State};
+use crate::newton::Preference;
+use crate::scheme::SchemeRef;
+use crate::statistics::Statistics;
+
+/// A generalized force of the given time integral that acts at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impulse<const N: usize> {
+    /// When it acts; a time outside the element counts as its nearer end.
+    pub time: f64,
+    /// ∫ Q dt, one entry a coordinate.
+    pub value: [f64; N],
+}
+
+/// Where an element lies in time, and the impulses that act in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Interval<'a, const N: usize> {
+    /// Time at the start.
+    pub start: f64,
+    /// Length h; negative to go back in time.
+    pub length: f64,
+    /// Impulses inside, each weighted by the test functions (T-49).
+    pub impulses: &'a [Impulse<N>],
+}
+
+impl<const N: usize> Interval<'_, N> {
+    /// Where in the element an impulse acts, τ ∈ [0, 1].
+    pub(crate) fn place(&self, impulse: &Impulse<N>) -> f64 {
+        ((impulse.time - self.start) / self.length).clamp(0.0, 1.0)
+    }
+}
+
+/// What is carried from step to step beside the [`Workspace`].
+#[derive(Clone, Debug)]
+pub struct Memory<const N: usize> {
+    pub(crate) statistics: Statistics,
+    /// Start and end of the last step; `None` before the first and after a failure.
+    pub(crate) last: Option<Last<N>>,
+    /// What the end is more than its rounded numbers.
+    pub(crate) low: State<N>,
+    pub(crate) mass: Option<Block<N>>,
+    /// The step for which the workspace holds factors.
+    pub(crate) factored: Option<f64>,
+    /// The ratio of steps for which it holds the extrapolation.
+    pub(crate) ratio: Option<f64>,
+    /// Which iteration a nonlinear step begins with.
+    pub(crate) preference: Preference,
+    /// Of the rows of constraints at the start and at the end of the last step.
+    pub(crate) independence: Option<[Independence; 2]>,
+}
+
+/// The last step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Last<const N: usize> {
+    pub(crate) t: f64,
+    pub(crate) h: f64,
+    pub(crate) start: State<N>,
+    pub(crate) start_low: State<N>,
+    pub(crate) end: State<N>,
+}
+
+impl<const N: usize> State<N> {
+    pub(crate) const ZERO: Self = Self {
+        q: [0.0; N],
+        p: [0.0; N],
+    };
+
+    /// Whether all numbers are equal, without a branch for each.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let mut same = true;
+        for a in 0..N {
+            same &= (self.q[a] == other.q[a]) & (self.p[a] == other.p[a]);
+        }
+        same
+    }
+}
+
+impl<const N: usize> Memory<N> {
+    /// Nothing is known yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            statistics: Statistics::NONE,
+            last: None,
+            low: State::ZERO,
+            mass: None,
+            factored: None,
+            ratio: None,
+            preference: Preference::NONE,
+            independence: None,
+        }
+    }
+
+    /// What the steps so far have cost.
+    #[must_use]
+    pub const fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// Says that the workspace no longer holds factors.
+    pub(crate) fn forget_factors(&mut self) {
+        self.factored = None;
+    }
+}
+
+impl<const N: usize> Default for Memory<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A model with the tables of an element: everything about a step that does not change.
+///
+/// For steps without allocation: [`Memory`] and [`Workspace`] are the caller's. [`Stepper`] owns
+/// them.
+#[derive(Debug)]
+pub struct Method<'a, M, T> {
+    /// The model.
+    pub model: &'a M,
+    /// The tables of the element.
+    pub tables: &'a T,
+    /// How its equations are solved.
+    pub control: Control,
+}
+
+// Not derived: model and tables are borrowed, they need not be `Clone`.
+impl<M, T> Clone for Method<'_, M, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M, T> Copy for Method<'_, M, T> {}
+
+/// Whether the equations are those of phase space, given an element that has them.
+pub(crate) const fn may_be_phase<M, const N: usize>() -> bool
+where
+    M: Model<N>,
+{
+    matches!(M::FORM, Form::Hamiltonian) && M::CONSTRAINTS.is_empty()
+}
+
+/// ω_i(τ*) J for every row.
+pub(crate) fn set_kicks<const N: usize>(
+    scheme: &SchemeRef<'_>,
+    interval: &Interval<'_, N>,
+    kicks: &mut [[f64; N]],
+) {
+    kicks.fill([0.0; N]);
+    for impulse in interval.impulses {
+        let tau = interval.place(impulse);
+        for (i, kick) in kicks.iter_mut().enumerate() {
+            let weight = scheme.impulse_weight(i, tau);
+            for a in 0..N {
+                kick[a] += weight * impulse.value[a];
+            }
+        }
+    }
+}
+
+/// The sum of impulses.
+pub(crate) fn total<const N: usize>(impulses: &[Impulse<N>]) -> [f64; N] {
+    let mut sum = [0.0; N];
+    for impulse in impulses {
+        for a in 0..N {
+            sum[a] += impulse.value[a];
+        }
+    }
+    sum
+}
+
+/// The ratio of steps by which the polynomial of the last element is continued: far outside of it that says nothing, and its end is; backwards it may be reused.
+pub(crate) fn continued_ratio(ratio: f64) -> f64 {
+    if (-1.5..=3.0).contains(&ratio) {
+        ratio
+    } else {
+        0.0
+    }
+}
+
+/// Old unknown rates to new ones: the polynomial of the last element, continued (T-65).
+pub(crate) const fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix: &mut [f64]) {
+    let (unknowns, rates) = (scheme.unknown_nodes.len(), scheme.element.degree());
+    let mut i = 0;
+    while i < unknowns {
+        let mut values = [0.0; MAX_NODES];
+        legendre(1.0 + scheme.unknown_nodes[i] * ratio, &mut values);
+        let mut j = 0;
+        while j < unknowns {
+            let (mut entry, mut degree) = (0.0, 0);
+            while degree < rates {
+                entry += values[degree] * scheme.rate[degree * unknowns + j];
+                degree += 1;
+            }
+            matrix[i * unknowns + j] = entry;
+            j += 1;
+        }
+        i += 1;
+    }
+}
+
+/// Constant velocity; zero where the momentum belongs to none.
+pub(crate) fn cold_velocity<M, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+    unknowns: &mut [f64],
+) where
+    M: Model<N>,
+{
+    let v = cold_rate(model, t, state);
+    unknowns.as_chunks_mut::<N>().0.fill(v);
+}
+
+/// The velocity at the start; zero if there is none, which the iteration then finds out.
+pub(crate) fn cold_rate<M, const N: usize>(model: &M, t: f64, state: &State<N>) -> [f64; N]
+where
+    M: Model<N>,
+{
+    velocity(model, t, &state.q, &state.p, &[0.0; N]).unwrap_or([0.0; N])
+}
+
+/// The rates at the start.
+pub(crate) fn cold_phase<M, const N: usize>(
+    model: &M,
+    scheme: &SchemeRef<'_>,
+    t: f64,
+    state: &State<N>,
+    unknowns: &mut [f64],
+) where
+    M: Model<N>,
+{
+    let (force, rate) = cold_rates(model, t, state);
+    let (pi, kappa) = unknowns
+        .as_chunks_mut::<N>()
+        .0
+        .split_at_mut(scheme.points());
+    kappa.fill(rate);
+    pi.fill(force);
+}
+
+/// ṗ and q̇ of a Hamiltonian at the start.
+pub(crate) fn cold_rates<M, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+) -> ([f64; N], [f64; N])
+where
+    M: Model<N>,
+{
+    let mut first = First::ZERO;
+    model.first(t, &state.q, &state.p, &mut first);
+    for a in 0..N {
+        first.force[a] -= first.q[a];
+    }
+    (first.force, first.z)
+}
+
+/// The end of an element and what rounding took from it (T-68).
+pub(crate) fn end_of<const N: usize>(
+    scheme: &SchemeRef<'_>,
+    span: &Span<'_, N>,
+    rates: &[[f64; N]],
+    forces: &[[f64; N]],
+    impulses: &[Impulse<N>],
+) -> (State<N>, State<N>) {
+    // To more than the working precision: weights and step are the same numbers in every step, and what their products lose is no chance.
+    let h = DoubleDouble::new(span.h);
+    let (mut end, mut low) = (State::ZERO, State::ZERO);
+    for a in 0..N {
+        let velocity = integral(scheme.advance, scheme.advance_low, rates, a);
+        let force = integral(scheme.weights, scheme.weights_low, forces, a);
+        let mut impulse = span.low.p[a];
+        for one in impulses {
+            impulse += one.value[a];
+        }
+        let moved = |start: f64, rate: DoubleDouble, low: f64| {
+            let change = rate.times(h).plus(DoubleDouble::new(low));
+            change.plus(DoubleDouble::new(start))
+        };
+        let q = moved(span.start.q[a], velocity, span.low.q[a]);
+        let p = moved(span.start.p[a], force, impulse);
+        (end.q[a], low.q[a]) = (q.high, q.low);
+        (end.p[a], low.p[a]) = (p.high, p.low);
+    }
+    (end, low)
+}
+
+/// Σ (high + low) · row of one coordinate.
+fn integral<const N: usize>(
+    high: &[f64],
+    low: &[f64],
+    rows: &[[f64; N]],
+    coordinate: usize,
+) -> DoubleDouble {
+    let mut sum = DoubleDouble::ZERO;
+    for ((high, low), row) in high.iter().zip(low).zip(rows) {
+        let weight = DoubleDouble {
+            high: *high,
+            low: *low,
+        };
+        sum = sum.plus(weight.times(DoubleDouble::new(row[coordinate])));
+    }
+    sum
+}
+
+/// a + b, rounded, and what rounding took.
+#[cfg(feature = "alloc")]
+pub(crate) fn sum(a: f64, b: f64) -> (f64, f64) {
+    let high = a + b;
+    let part = high - a;
+    (high, (a - (high - part)) + (b - part))
+}
