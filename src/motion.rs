@@ -1,15 +1,24 @@
 //! The result of a run: nodes, dense output, energy, observables, statistics.
 
 mod arcs;
+mod at_error;
+mod checkpoint;
+mod event;
 pub(crate) mod family;
+mod warning;
+
+pub use at_error::AtError;
+pub use checkpoint::{Checkpoint, FamilyCheckpoint};
+pub use event::Event;
+pub use warning::Warning;
+
+pub(crate) use checkpoint::Reached;
 
 pub use arcs::{MotionArc, Setting};
 
 use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv;
-use crate::error::AtError;
 use crate::numbers::larger;
-use crate::simulation::{Checkpoint, Event, Warning};
 use crate::velocity::velocity_from;
 use arcs::Arcs;
 use std::fmt;

@@ -37,15 +37,15 @@ use tfe_runtime::{Element, Mixed, Model, Share, Solve, State};
 
 use watch::resolution::Again;
 
+pub(crate) use crate::motion::Reached;
+pub use crate::motion::Warning;
+pub use crate::motion::{Checkpoint, FamilyCheckpoint};
 pub use accurate::Accurate;
-pub(crate) use checkpoint::Reached;
-pub use checkpoint::{Checkpoint, FamilyCheckpoint};
 pub(crate) use events::Watching;
 pub use events::{Act, Crossing, Event, Occurrence, Settings};
 pub use held::{Held, HeldNode};
 pub use section::{Section, SectionPoint};
 pub use steps::Steps;
-pub use watch::Warning;
 pub(crate) use watch::is_jump;
 
 /// A run to be: which model, with which element and step.

@@ -1,10 +1,11 @@
 //! The result of a run of a model of run-time length.
 
+use super::at_error::AtError;
+use super::checkpoint::FamilyCheckpoint;
 use super::energy_scale;
+use super::warning::Warning;
 use crate::csv;
-use crate::error::AtError;
 use crate::numbers::larger;
-use crate::simulation::{FamilyCheckpoint, Warning};
 use std::fmt;
 use std::io;
 use std::path::Path;

@@ -2,39 +2,14 @@
 
 mod family;
 
-pub use family::FamilyCheckpoint;
-
 use super::Simulation;
 use super::follow::Nobody;
 use super::mesh::Mesh;
 use crate::error::{RunError, RunErrorKind};
-use crate::motion::Motion;
+use crate::motion::{Checkpoint, Motion, Reached};
 use std::ops::Range;
-use tfe_runtime::step::{Stepper, Suspended};
+use tfe_runtime::step::Stepper;
 use tfe_runtime::{Model, State};
-
-/// The end of a run, with all that the next step depends on: the state to more than its rounded numbers, the polynomial of the last element, factors of its matrix, the grid.
-///
-/// One run and two halves of it are the same to the last bit: [`Simulation::resume`]. It belongs to the model, with the same parameters, and holds the memory of a
-/// stepper, some kilobytes for a few coordinates.
-#[derive(Clone, Debug)]
-pub struct Checkpoint<const N: usize> {
-    pub(super) reached: Reached,
-    pub(crate) state: State<N>,
-    pub(crate) velocity: [f64; N],
-    pub(super) stepper: Suspended<N>,
-}
-
-/// How far a run has got on its grid.
-#[derive(Clone, Debug)]
-pub(crate) struct Reached {
-    /// Where it began.
-    pub(crate) origin: f64,
-    pub(crate) step: Option<f64>,
-    /// How many elements were done.
-    pub(crate) elements: usize,
-    pub(crate) time: f64,
-}
 
 impl Reached {
     pub(crate) fn new<const N: usize>(

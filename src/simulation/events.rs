@@ -15,7 +15,8 @@ use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper};
 use tfe_runtime::{Arguments, Element, Form, Model, Real, Share, State, constrained};
 
-pub use act::{Act, Crossing, Event, Occurrence};
+pub use crate::motion::Event;
+pub use act::{Act, Crossing, Occurrence};
 pub(super) use act::{After, Changed, Near, On, state_after};
 pub(crate) use on::Watching;
 pub use settings::Settings;

@@ -1,13 +1,13 @@
 //! Runs of models of run-time length, and which kind of run `Simulation::new` gives.
 
 use super::accurate::{Broken, Passing};
-use super::checkpoint::{FamilyCheckpoint, Reached};
 use super::course::{Course, Leg};
 use super::mesh::{Endless, Mesh};
 use super::watch::{Recorded, Watch};
 use super::{Simulation, progress};
 use crate::error::RunErrorKind;
 use crate::motion::family::{FamilyMotion, FamilyNode};
+use crate::motion::{FamilyCheckpoint, Reached};
 use std::error::Error;
 use std::fmt;
 use std::ops::Range;

@@ -1,32 +1,9 @@
 //! The same for families.
 
 use super::super::family::{FamilyRunError, FamilySimulation};
-use super::Reached;
+use crate::motion::FamilyCheckpoint;
 use crate::motion::family::FamilyMotion;
-use tfe_runtime::family::{FamilyModel, FamilyState, FamilySuspended};
-
-/// The end of a family's run, with all that the next step depends on: what [`Checkpoint`](crate::Checkpoint) is for models of fixed size.
-///
-/// One run and two halves of it are the same to the last bit: [`FamilySimulation::resume`]. It belongs to the model, with the same parameters, and holds the memory of a
-/// stepper.
-#[derive(Clone, Debug)]
-pub struct FamilyCheckpoint {
-    pub(in crate::simulation) reached: Reached,
-    pub(in crate::simulation) state: FamilyState,
-    pub(in crate::simulation) stepper: FamilySuspended,
-}
-
-impl FamilyCheckpoint {
-    /// The time that the run has reached.
-    pub fn time(&self) -> f64 {
-        self.reached.time
-    }
-
-    /// The state there.
-    pub fn state(&self) -> &FamilyState {
-        &self.state
-    }
-}
+use tfe_runtime::family::FamilyModel;
 
 impl<M: FamilyModel> FamilySimulation<'_, M> {
     /// Goes on where a run ended, up to the time `end`: to the last bit as one run would have from there on, as [`Simulation::resume`](crate::Simulation::resume) does.

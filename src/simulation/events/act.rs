@@ -3,6 +3,7 @@
 use super::Value;
 use super::settings::{Remodel, Settings};
 use crate::error::RunErrorKind;
+use crate::motion::Event;
 use crate::sensitivity::slopes::momentum_by;
 use crate::velocity::velocity_from;
 use std::fmt;
@@ -45,33 +46,6 @@ pub enum Act<const N: usize> {
     Impulse([f64; N]),
     /// The same with other values of parameters, and from another state if one is given with them: [`Settings`].
     Set(Settings<N>),
-}
-
-/// An event that was met, with the state before anything is done.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Event<const N: usize> {
-    /// The output that changed its sign.
-    pub name: String,
-    /// When.
-    pub t: f64,
-    /// Generalized coordinates.
-    pub q: [f64; N],
-    /// Velocities dq/dt.
-    pub v: [f64; N],
-    /// Generalized momenta.
-    pub p: [f64; N],
-    /// Whether it went from below zero to above.
-    pub rises: bool,
-}
-
-impl<const N: usize> Event<N> {
-    /// The point of phase space, without the time.
-    pub fn state(&self) -> State<N> {
-        State {
-            q: self.q,
-            p: self.p,
-        }
-    }
 }
 
 /// An event while it happens: an [`Event`] that knows its model.

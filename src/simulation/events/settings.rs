@@ -1,7 +1,8 @@
 //! Parameters that are set at events.
 
-use super::act::{Changed, Event, momenta_of};
+use super::act::{Changed, momenta_of};
 use crate::error::RunErrorKind;
+use crate::motion::Event;
 use tfe_runtime::{Model, Share, State};
 
 /// New values of parameters, for [`Act::Set`](crate::Act::Set). They hold until they are set again, or the run ends; the model of the caller stays as it is.

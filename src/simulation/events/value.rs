@@ -1,6 +1,7 @@
 //! What changes its sign at an event.
 
-use super::act::{Event, Function};
+use super::act::Function;
+use crate::motion::Event;
 use crate::sensitivity::slopes::{Along, Change};
 use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::{Form, Model};

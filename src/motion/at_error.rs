@@ -1,0 +1,66 @@
+//! Why a motion has no value at a time.
+
+use std::error::Error;
+use std::fmt;
+
+/// Why a motion has no value at a time.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum AtError {
+    /// The time lies outside the span of the motion.
+    Outside {
+        /// The time asked for.
+        time: f64,
+        /// First time of the motion.
+        start: f64,
+        /// Last time of the motion.
+        end: f64,
+    },
+    /// The element around the time was not recorded (`record_every` keeps only some).
+    NotRecorded {
+        /// The time asked for.
+        time: f64,
+    },
+    /// The model has no output of this name.
+    NoOutput {
+        /// The name asked for.
+        output: String,
+        /// The outputs that there are.
+        known: Vec<String>,
+    },
+    /// The momentum at this time belongs to no velocity.
+    NoVelocity {
+        /// The time.
+        time: f64,
+    },
+}
+
+impl fmt::Display for AtError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Outside { time, start, end } => {
+                write!(
+                    f,
+                    "t = {time} lies outside the motion, which spans {start} to {end}"
+                )
+            }
+            Self::NotRecorded { time } => write!(
+                f,
+                "the element around t = {time} was not recorded; run without `record_every` for dense output"
+            ),
+            Self::NoOutput { output, known } if known.is_empty() => {
+                write!(f, "there is no output `{output}`: the model declares none")
+            }
+            Self::NoOutput { output, known } => write!(
+                f,
+                "there is no output `{output}`; the model has `{}`",
+                known.join("`, `")
+            ),
+            Self::NoVelocity { time } => {
+                write!(f, "the momentum at t = {time} belongs to no velocity")
+            }
+        }
+    }
+}
+
+impl Error for AtError {}

@@ -1,0 +1,135 @@
+//! What a run notices about itself.
+
+use std::fmt;
+use tfe_runtime::Element;
+
+/// What is doubtful about a motion that was computed without an error.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// The step lies in an unstable interval of the linearised model: the method grows where the model does not.
+    ///
+    /// The second derivatives of the model are held at their values at a visited state; the transition matrix of the element
+    /// for this linear model has an eigenvalue of modulus `radius`, where the linear model itself moves by `exact` in the same
+    /// time. Nonlinear motions leave such a neighbourhood sooner or later, and then the amplitude or the energy is wrong.
+    ///
+    /// Looked for at the start, in elements 1, 2, 4, 8, … and where a run fails, so that a long run costs no more; several in
+    /// a row are one warning. Elements that are stable at every step (all but primal ones without reduced quadrature) are not examined.
+    UnstableStep {
+        /// Where the first such element begins.
+        time: f64,
+        /// The length of the element that grows most; negative in a run backwards.
+        step: f64,
+        /// The element.
+        element: Element,
+        /// The factor by which that element amplifies the mode: its spectral radius, unless the model has other modes that grow.
+        radius: f64,
+        /// The factor |e^{λh}| by which the linear model amplifies it.
+        exact: f64,
+    },
+    /// The mass matrix ∂²L/∂v² at the start has eigenvalues of both signs: forces speed up where they should slow down, mostly for a wrong sign in the Lagrangian.
+    ///
+    /// Looked for at the start of a run, for Lagrangians without constraints.
+    MassIndefinite {
+        /// The start.
+        time: f64,
+        /// The least eigenvalue.
+        least: f64,
+        /// The largest one.
+        largest: f64,
+    },
+    /// The energy at a node is not finite: the momentum belongs to no velocity there (the mass matrix is singular), or the model has a singular point.
+    EnergyNotFinite {
+        /// The first such node.
+        time: f64,
+    },
+    /// The energy of a model that conserves it changes between two nodes by more than a tenth of the kinetic energy that the motion has had: the step is too long for
+    /// the motion, or the motion has passed a singular point.
+    ///
+    /// Looked for at every recorded node, unless the model is linear, forced, damped, depends on time or has constraints; not across impulses.
+    EnergyJump {
+        /// The node after the largest jump.
+        time: f64,
+        /// The energy before it.
+        before: f64,
+        /// The energy after it.
+        after: f64,
+        /// How many such jumps there are.
+        count: usize,
+    },
+    /// An element and three of a third of its length (nine of a ninth where it was cut) end at different places, or the element after it when these are carried on: the step is too
+    /// long to resolve the motion (`docs/theory.md`, (T-121)).
+    ///
+    /// Looked for in the elements whose iteration did not contract quickly, by their numbers 0, 1, 2, 4, 8, … among these; not in linear models, nor with
+    /// [`Solve::Trusting`](crate::Solve::Trusting).
+    Unresolved {
+        /// Where the first such element begins.
+        time: f64,
+        /// The length of that element; negative in a run backwards.
+        step: f64,
+        /// The largest distance of both ends, as a part of what the motion extends over.
+        distance: f64,
+        /// How many such elements were found.
+        count: usize,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnstableStep {
+                time,
+                step,
+                element,
+                radius,
+                exact,
+            } => write!(
+                f,
+                "from t = {time} on, the step {step} lies in an unstable interval of `{element}` for the linearised model: \
+                 a step multiplies a mode by {radius:.6} that the model multiplies by {exact:.6}; take a shorter step, \
+                 or an element that is stable at every step, `{}` or `{}`",
+                Element::mixed(element.nodes()),
+                element.reduced(),
+            ),
+            Self::MassIndefinite {
+                time,
+                least,
+                largest,
+            } => write!(
+                f,
+                "the mass matrix at t = {time} has eigenvalues of both signs, {least:.3e} and {largest:.3e}: look for a wrong sign in the kinetic energy"
+            ),
+            Self::EnergyNotFinite { time } => write!(
+                f,
+                "the energy at t = {time} is not finite: the mass matrix is singular there, or the model has a singular point"
+            ),
+            Self::EnergyJump {
+                time,
+                before,
+                after,
+                count,
+            } => {
+                write!(
+                    f,
+                    "the energy, which the model conserves, jumps from {before:.6e} to {after:.6e} at t = {time}"
+                )?;
+                match count {
+                    0 | 1 => {}
+                    2 => f.write_str(" and once more")?,
+                    _ => write!(f, " and at {} other nodes", count - 1)?,
+                }
+                f.write_str(": take a shorter step, or look for a singular point of the model")
+            }
+            Self::Unresolved {
+                time,
+                step,
+                distance,
+                ..
+            } => write!(
+                f,
+                "the step {step} at t = {time} does not resolve the motion: shorter steps end elsewhere by {distance:.2} of what the motion extends over; \
+                 take a shorter step or an element with more nodes"
+            ),
+        }
+    }
+}
