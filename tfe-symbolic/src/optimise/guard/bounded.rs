@@ -273,8 +273,8 @@ mod tests {
     fn sums_larger_than_their_terms_are_not_exact_by_chance() {
         // On one side of 1024 and across it.
         for (x, m) in [
-            (1021.489_269, 1022.7),
-            (1021.489_269, 1023.195_818),
+            (1_021.489_269, 1022.7),
+            (1_021.489_269, 1_023.195_818),
             (700.1, 703.2),
         ] {
             let (x, m) = (Bounded::input(x), Bounded::input(m));
