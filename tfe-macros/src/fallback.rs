@@ -8,7 +8,7 @@ use crate::source_map::SourceMap;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{quote, quote_spanned};
 use std::collections::BTreeSet;
-use syn::{Data, DeriveInput, ItemStruct, Visibility};
+use syn::{Data, DeriveInput, ItemStruct, Visibility, parse_quote};
 use tfe_symbolic::diagnostic::{Bag, Diagnostic};
 use tfe_symbolic::syntax::ast::{Array, ExprKind, Item};
 use tfe_symbolic::syntax::parse;
@@ -80,6 +80,11 @@ fn implementations(item: &DeriveInput, guess: &Guess) -> TokenStream {
     let (name, vis) = (&item.ident, &item.vis);
     let states = guess.states(vis);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+    // A type parameter, which is a mistake, need not be more than it is.
+    let mut shared = item.generics.clone();
+    (shared.make_where_clause().predicates)
+        .push(parse_quote!(Self: ::core::marker::Send + ::core::marker::Sync));
+    let shared = shared.where_clause;
     let form = if guess.hamiltonian {
         quote!(Hamiltonian)
     } else {
@@ -141,7 +146,7 @@ fn implementations(item: &DeriveInput, guess: &Guess) -> TokenStream {
 
             #[automatically_derived]
             #[allow(clippy::all)]
-            impl #impl_generics __tfe::Controlled<#dof> for #name #type_generics #where_clause {
+            impl #impl_generics __tfe::Controlled<#dof> for #name #type_generics #shared {
                 const INPUTS: &'static [&'static str] = &[];
 
                 fn energy_function_with<__R: __tfe::Real>(
