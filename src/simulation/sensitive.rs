@@ -24,7 +24,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// The example is at [`Sensitive`].
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`](crate::RunErrorKind::Transition) too where an element or an event has no derivative.
+    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element or an event has no derivative.
     pub fn run_sensitive(
         &self,
         start: State<N>,

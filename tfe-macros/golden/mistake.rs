@@ -47,7 +47,10 @@ const _: () = {
     }
     #[automatically_derived]
     #[allow(clippy::all)]
-    impl __tfe::Controlled<1> for Oscillator {
+    impl __tfe::Controlled<1> for Oscillator
+    where
+        Self: ::core::marker::Send + ::core::marker::Sync,
+    {
         const INPUTS: &'static [&'static str] = &[];
         fn energy_function_with<__R: __tfe::Real>(
             &self,

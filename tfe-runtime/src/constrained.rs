@@ -17,8 +17,10 @@ mod tangent;
 pub use crate::control::START_TOLERANCE;
 #[cfg(feature = "alloc")]
 pub use instant::{Gradients, gradients, reactions};
+#[cfg(feature = "alloc")]
 pub use node::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
 
 pub(crate) use advance::advance;
 pub(crate) use derivative::{linearise, product};
+#[cfg(feature = "alloc")]
 pub(crate) use layout::refused;

@@ -39,7 +39,7 @@ impl<const N: usize> Interval<'_, N> {
     }
 }
 
-/// What is carried from step to step beside the [`Workspace`].
+/// What is carried from step to step beside the [`Workspace`](crate::workspace::Workspace).
 #[derive(Clone, Debug)]
 pub struct Memory<const N: usize> {
     pub(crate) statistics: Statistics,
@@ -120,8 +120,7 @@ impl<const N: usize> Default for Memory<N> {
 
 /// A model with the tables of an element: everything about a step that does not change.
 ///
-/// For steps without allocation: [`Memory`] and [`Workspace`] are the caller's. [`Stepper`] owns
-/// them.
+/// For steps without allocation: [`Memory`] and [`Workspace`](crate::workspace::Workspace) are the caller's. A `Stepper` owns them.
 #[derive(Debug)]
 pub struct Method<'a, M, T> {
     /// The model.

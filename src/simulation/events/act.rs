@@ -97,7 +97,7 @@ impl<const N: usize> Occurrence<'_, N> {
     /// let motion = Simulation::new(&pendulum)
     ///     .step(0.01)
     ///     .on("wall", Crossing::Falling, |event| Act::Restart(event.after_impact(1.0)))
-    ///     .run(pendulum.state([0.0, -0.5], [0.5, 1.5]), 0.0..5.0)?;
+    ///     .run(pendulum.state([0.0, -0.5], [1.5, 2.5]), 0.0..5.0)?;
     /// assert!(motion.events().len() > 2 && motion.energy_error() < 1e-7);
     /// # Ok(())
     /// # }
