@@ -185,6 +185,7 @@ impl Energy {
 }
 
 /// The energy, and half of p·v.
+#[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
 fn energies<M, const N: usize>(model: &M, t: f64, state: &State<N>, v: &[f64; N]) -> (f64, f64)
 where
     M: Model<N>,
