@@ -13,7 +13,7 @@ pub struct Singular {
 ///
 /// # Errors
 /// [`Singular`] if no row has a finite, non-zero pivot.
-#[inline]
+#[cfg_attr(feature = "alloc", inline)]
 #[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
 pub fn factor(size: usize, matrix: &mut [f64], pivots: &mut [usize]) -> Result<(), Singular> {
     for column in 0..size {

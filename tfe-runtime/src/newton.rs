@@ -159,7 +159,7 @@ impl Monitor {
 
     /// # Errors
     /// [`StepError::NonFinite`].
-    #[inline(always)]
+    #[cfg_attr(feature = "alloc", inline(always))]
     #[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
     pub(crate) fn judge(&mut self, increment: Increment) -> Result<Verdict, StepError> {
         let size = increment.relative;
