@@ -151,6 +151,9 @@ fn check(program: &Program, declared: &Declared, context: &Context) {
     for name in &context.const_parameters {
         environment.sizes.insert(name.clone(), 30);
     }
+    for name in &declared.inputs {
+        environment.parameters.insert(name.clone(), 0.9);
+    }
     let mut arrays = BTreeMap::new();
     for field in &context.fields {
         let name = field.name.clone();
