@@ -89,8 +89,9 @@ impl ByHand<3> for FreeBody {
         let (sin, cos) = q[1].sin_cos();
         let (sin_psi, cos_psi) = q[2].sin_cos();
         let part = (a - b) * sin_psi;
-        let excess = part * sin_psi;
-        let (k, m, d) = (b + excess, a - excess, part * cos_psi);
+        let (k, d) = (b + part * sin_psi, part * cos_psi);
+        // A second derivative as it stands: A − (A − B) sin²ψ would lose the digits of a small B.
+        let m = a * (cos_psi * cos_psi) + b * (sin_psi * sin_psi);
         let w = v[0] * sin;
         let (kw, dw, d_theta) = (k * w, d * w, d * v[1]);
         let by_w = kw + d_theta;
