@@ -6,6 +6,7 @@
 //! | sums | x + 0 → x; like terms collect, c₁x + c₂x → (c₁+c₂)x; a common size of all coefficients comes out, 2x + 2y → 2(x + y); the first coefficient is positive, −x + y → −(x − y) |
 //! | nested sums | stay nested, because the inner one may be shared, unless a term cancels: (x + y) − x → y |
 //! | c·sin²x·r + c·cos²x·r | → c·r |
+//! | r·uⁿ⁺¹ − c·r·uⁿ·w | → r·uⁿ·(u − c·w), where c·w is a term of u, a sum with positive coefficients, and n < 0: 1/√(x² + y²) − x²/√(x² + y²)³ → y²/√(x² + y²)³ |
 //! | products | x·0 → 0, x·1 → x; numbers come out in front; x·x → x², xᵃxᵇ → xᵃ⁺ᵇ; (x y)ⁿ → xⁿyⁿ (up to 16 factors) |
 //! | quotients | x/y → x·y⁻¹; x/x → 1 |
 //! | powers | x^n a product for whole n; x^(n/2) → √xⁿ |
@@ -313,6 +314,7 @@ fn fold(function: Function, arguments: &[Constant]) -> Option<Constant> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::expr::differentiate::derivative;
     use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 
     /// A graph with x, y, z.
@@ -411,6 +413,34 @@ mod tests {
             2,
             "only equal coefficients join"
         );
+    }
+
+    #[test]
+    fn second_derivatives_of_distances_do_not_cancel() {
+        let (mut g, x, y, z) = variables();
+        let [x2, y2, z2] = [x, y, z].map(|x| g.multiply(x, x));
+        let second = |g: &mut Graph, square: ExprId| {
+            let distance = g.call(Function::Sqrt, &[square]);
+            let by = Input::Parameter("x".to_owned());
+            let first = derivative(g, distance, &by);
+            derivative(g, first, &by)
+        };
+        // ∂²√u/∂x² = v/√u³
+        let expected = |g: &mut Graph, u: ExprId, v: ExprId| {
+            let root = g.call(Function::Sqrt, &[u]);
+            let cube = g.multiply(u, root);
+            g.divide(v, cube)
+        };
+        let flat = g.add(x2, y2);
+        assert_eq!(second(&mut g, flat), expected(&mut g, flat, y2));
+        let space = g.add(flat, z2);
+        let rest = g.add(z2, y2);
+        assert_eq!(second(&mut g, space), expected(&mut g, space, rest));
+        // Nothing cancels in the height over a sphere.
+        let below = g.subtract(z2, x2);
+        let curvature = second(&mut g, below);
+        assert_ne!(curvature, expected(&mut g, below, z2));
+        assert_eq!(g.inputs_of(curvature).len(), 2);
     }
 
     #[test]

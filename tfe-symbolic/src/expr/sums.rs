@@ -18,6 +18,7 @@ impl Graph {
         }
         sum.open_where_terms_cancel(self);
         sum.join_squares_of_sine_and_cosine(self);
+        sum.join_parts_of_denominators(self);
         let Collected { constant, terms } = sum;
         let mut terms: Vec<(Constant, ExprId)> = terms
             .into_iter()
@@ -165,4 +166,140 @@ impl Collected {
             return;
         }
     }
+
+    /// a r uⁿ⁺¹ − a c r uⁿ w → a r uⁿ (u − c w), where c w is a term of u, a sum with positive coefficients, and n < 0.
+    ///
+    /// With u = x² + y² this is 1/√u − x²/√u³ → y²/√u³, the second derivative of a distance: nothing cancels any more where y is small. With
+    /// u = z² − x² nothing cancels in 1/√u + x²/√u³, which stays as it is.
+    fn join_parts_of_denominators(&mut self, graph: &mut Graph) {
+        while self.terms.len() > 1 {
+            let joined = self.terms.iter().find_map(|(x, coefficient)| {
+                let parts = parts_of_denominators(graph, *x).into_iter();
+                let mut known = parts.filter_map(|part| {
+                    let partner = *self.terms.get(&part.partner)?;
+                    (*coefficient == -(partner * part.coefficient)).then_some((*x, partner, part))
+                });
+                known.next()
+            });
+            let Some((x, coefficient, part)) = joined else {
+                return;
+            };
+            self.terms.remove(&x);
+            self.terms.remove(&part.partner);
+            let mut factors = part.rest;
+            factors.push((without(graph, part.sum, part.term), 1));
+            let product = graph.product(Constant::ONE, &factors);
+            self.push(graph, coefficient, product);
+        }
+    }
+}
+
+/// A product r uⁿ w, where c w is a term of u.
+struct PartOfDenominator {
+    /// u
+    sum: ExprId,
+    /// w
+    term: ExprId,
+    /// c
+    coefficient: Constant,
+    /// r uⁿ
+    rest: Vec<(ExprId, i32)>,
+    /// r uⁿ⁺¹
+    partner: ExprId,
+}
+
+/// Of denominators with more terms than this some are left as they are.
+const LONG_DENOMINATOR: usize = 8;
+
+/// The ways to read an expression as such a product whose partner has been made.
+fn parts_of_denominators(graph: &Graph, x: ExprId) -> Vec<PartOfDenominator> {
+    let Node::Product(factors) = graph.node(x) else {
+        return Vec::new();
+    };
+    let mut found = Vec::new();
+    for (sum, n) in factors.iter().filter(|(_, n)| *n < 0) {
+        for (coefficient, term) in terms_if_positive(graph, *sum) {
+            let Some(rest) = quotient(graph, factors, term) else {
+                continue;
+            };
+            let mut partner = rest.clone();
+            for (y, m) in &mut partner {
+                if y == sum {
+                    *m = n + 1;
+                }
+            }
+            partner.retain(|(_, m)| *m != 0);
+            let partner = match partner[..] {
+                [(y, 1)] => Some(y),
+                _ => graph.find(&Node::Product(partner)),
+            };
+            if let Some(partner) = partner {
+                found.push(PartOfDenominator {
+                    sum: *sum,
+                    term,
+                    coefficient,
+                    rest,
+                    partner,
+                });
+            }
+        }
+    }
+    found
+}
+
+/// The terms of a sum and of the sums in it with their coefficients, up to a few; none where a coefficient is negative.
+fn terms_if_positive(graph: &Graph, sum: ExprId) -> Vec<(Constant, ExprId)> {
+    let mut found = Vec::new();
+    let mut waiting = vec![(Constant::ONE, sum)];
+    while let Some((coefficient, x)) = waiting.pop() {
+        match graph.as_sum(x) {
+            Some((constant, terms))
+                if found.len() + waiting.len() + terms.len() <= LONG_DENOMINATOR =>
+            {
+                if constant.is_negative() || terms.iter().any(|(c, _)| c.is_negative()) {
+                    return Vec::new();
+                }
+                waiting.extend(terms.iter().map(|(c, y)| (coefficient * *c, *y)));
+            }
+            _ => found.push((coefficient, x)),
+        }
+    }
+    found
+}
+
+/// A sum without one of its terms, which may stand in a sum within.
+fn without(graph: &mut Graph, sum: ExprId, term: ExprId) -> ExprId {
+    let Some((constant, terms)) = graph.as_sum(sum) else {
+        return sum;
+    };
+    let mut left = terms.to_vec();
+    match left.iter().position(|(_, x)| *x == term) {
+        Some(at) => {
+            left.remove(at);
+        }
+        None => {
+            for (_, x) in &mut left {
+                *x = without(graph, *x, term);
+            }
+        }
+    }
+    graph.linear(constant, &left)
+}
+
+/// The factors of a product without those of one that is part of it.
+fn quotient(graph: &Graph, factors: &[(ExprId, i32)], by: ExprId) -> Option<Vec<(ExprId, i32)>> {
+    let one = [(by, 1)];
+    let by = match graph.node(by) {
+        Node::Product(by) => by.as_slice(),
+        _ => &one,
+    };
+    let mut rest = factors.to_vec();
+    for (x, n) in by {
+        let (_, m) = rest
+            .iter_mut()
+            .find(|(y, m)| y == x && *m >= *n && *n > 0)?;
+        *m -= n;
+    }
+    rest.retain(|(_, m)| *m != 0);
+    Some(rest)
 }

@@ -4,7 +4,7 @@
 //! computes the same results is accepted if at each state
 //!
 //! * its results agree with those of the baseline within the rounding errors of both, so that a false identity is found out, and
-//! * the bound of its rounding error is at most [`MAX_LOSS`] times that of the baseline.
+//! * the bound of its rounding error is at most [`MAX_LOSS`] times that of the baseline, or [`MAX_LOSS_WITH_ANGLES`].
 //!
 //! Operations that are exact at the numbers of a state count as such on both sides: a formula that keeps differences of close numbers until they are
 //! exact is not replaced by one that rounds first. A result that is exact as a whole may be replaced by one that is rounded.
@@ -31,7 +31,10 @@ use states::{moves_together, number_of_states, state};
 
 /// How much larger than that of the baseline the bound of an error may be. A velocity times another times the cosine of a difference needs 8, where
 /// that cosine follows from those of equal angles; with 4, every chain of links would compute the sines of all differences.
-const MAX_LOSS: f64 = 8.0;
+const MAX_LOSS_WITH_ANGLES: f64 = 8.0;
+
+/// The same of formulas without angles.
+const MAX_LOSS: f64 = 4.0;
 
 /// Arguments of sines are read as angles through so many nested sums.
 const MAX_DEPTH: usize = 24;
@@ -40,6 +43,7 @@ const MAX_DEPTH: usize = 24;
 pub(crate) struct Guard {
     positions: Map<Input, usize>,
     states: Vec<State>,
+    max_loss: f64,
 }
 
 /// A state and the results of the baseline.
@@ -106,7 +110,24 @@ impl Guard {
                 });
             }
         }
-        Self { positions, states }
+        let is_sine = |id: &ExprId| {
+            matches!(
+                graph.node(*id),
+                Node::Call {
+                    function: Function::Sin | Function::Cos,
+                    ..
+                }
+            )
+        };
+        let max_loss = match order.iter().any(is_sine) {
+            true => MAX_LOSS_WITH_ANGLES,
+            false => MAX_LOSS,
+        };
+        Self {
+            positions,
+            states,
+            max_loss,
+        }
     }
 
     /// Whether a plan computes the results well enough; `roots` are the expressions that stand for them in the plan.
@@ -126,7 +147,11 @@ impl Guard {
             let mut both = places.iter().zip(&state.wanted);
             both.all(|((op, negative), wanted)| {
                 let found = known[*op];
-                is_no_worse(if *negative { found.negated() } else { found }, *wanted)
+                is_no_worse(
+                    if *negative { found.negated() } else { found },
+                    *wanted,
+                    self.max_loss,
+                )
             })
         })
     }
@@ -209,7 +234,7 @@ fn evaluate(plan: &Plan, sources: &[Source], state: &State, known: &mut Vec<Boun
 }
 
 /// Whether a result is as good as that of the baseline; where the baseline has no value, anything is.
-fn is_no_worse(found: Bounded, wanted: Bounded) -> bool {
+fn is_no_worse(found: Bounded, wanted: Bounded, max_loss: f64) -> bool {
     if !(wanted.value.is_finite() && wanted.error.is_finite()) {
         return true;
     }
@@ -221,7 +246,7 @@ fn is_no_worse(found: Bounded, wanted: Bounded) -> bool {
     let near = apart <= 2.0 * UNIT * (found.error + wanted.error) + f64::MIN_POSITIVE;
     // A result that is exact by chance is no better than a rounded one.
     let allowed = wanted.error.max(wanted.value.abs());
-    near && found.error <= MAX_LOSS * (1.0 + ROUNDING) * allowed + f64::MIN_POSITIVE
+    near && found.error <= max_loss * (1.0 + ROUNDING) * allowed + f64::MIN_POSITIVE
 }
 
 fn integer_power(base: Bounded, exponent: i32) -> Bounded {

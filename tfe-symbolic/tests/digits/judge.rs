@@ -8,8 +8,9 @@
 //!
 //! over the states of the regime, where `exact` is the formula in double-double numbers and `plain` the same formula in `f64`. Numbers in a
 //! declaration stand for the decimal fractions that they are. The user writes an energy and not its derivatives: for these, `plain` is the
-//! worse one of forward and reverse mode. An entry that seems to lose more than [`LIMIT`] is judged again with the maximum over four times
-//! as many states in the divisor: a formula may be exact at a few states by chance.
+//! worse one of forward and reverse mode. A formula may be exact at a few states by chance: an entry that seems to lose more than [`LIMIT`] is judged
+//! again with more states in the divisor, three times as many of the regime and as many beside the worst, where all inputs are larger or smaller by
+//! one factor, so that what is equal stays equal.
 //!
 //! **Convention for angles.** A sine or cosine of a sum of angles may be computed from those of the angles: sin(a − b) = sin a cos b −
 //! cos a sin b is the sine of an angle that differs by some ulps of a and b, and not of a − b. Hence each part of an argument of a sine or
@@ -31,7 +32,7 @@ use super::formula::{Schedule, State};
 use super::kernels::{Kernel, kernels, run};
 use super::random::Random;
 use super::reference::{Reference, UNDERFLOW, Value, distance};
-use super::states::{Regime, regimes};
+use super::states::{Regime, beside, regimes};
 use super::writer::Model;
 
 /// Losses beyond this one are offences.
@@ -166,6 +167,10 @@ impl Case<'_> {
             let values = reference.values(entry);
             let allowed = largest(values.iter().map(Value::allowance));
             let [error, difference] = self.worst(entry, &values);
+            let worst = [&error, &difference].into_iter().flatten();
+            let allowed = worst.fold(allowed, |allowed, worst| {
+                allowed.max(self.allowed_beside(worst.value.state, entry))
+            });
             let lists = [&mut verdict.offences, &mut verdict.disagreements];
             for (worst, list) in [error, difference].into_iter().zip(lists) {
                 let Some(worst) = worst.filter(|worst| worst.error > LIMIT * allowed) else {
@@ -184,6 +189,13 @@ impl Case<'_> {
                 record(list, self.offence(entry, worst, loss));
             }
         }
+    }
+
+    /// What the formula loses at states that are like one of the regime.
+    fn allowed_beside(&self, state: usize, entry: &Entry) -> f64 {
+        let states = beside(&self.regime.states[state]);
+        let reference = Reference::of(self.schedule, self.reverse, &states);
+        largest(reference.values(entry).iter().map(Value::allowance))
     }
 
     /// The largest error of a kernel, and the largest difference between two.

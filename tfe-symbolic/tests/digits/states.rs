@@ -187,6 +187,26 @@ pub fn regimes(random: &mut Random, model: &Model) -> Vec<Regime> {
     regimes
 }
 
+/// By how much the states beside one differ from it, at most.
+const BESIDE: f64 = 0.02;
+
+/// States beside one, in each of which all inputs are larger or smaller by one factor.
+pub fn beside(state: &State) -> Vec<State> {
+    let scaled = |number: usize| {
+        let part = (number as f64 + 0.5) / FURTHER as f64;
+        let factor = 1.0 + BESIDE * (2.0 * part - 1.0);
+        let all = |list: &[f64]| list.iter().map(|x| factor * x).collect();
+        State {
+            time: factor * state.time,
+            q: all(&state.q),
+            z: all(&state.z),
+            mu: all(&state.mu),
+            parameters: all(&state.parameters),
+        }
+    };
+    (0..FURTHER).map(scaled).collect()
+}
+
 /// The states of a regime; parameters are so much larger than others, alike in all states.
 fn regime(random: &mut Random, name: String, plan: Plan, model: &Model, sizes: &[f64]) -> Regime {
     let mut one = |number: usize| {
