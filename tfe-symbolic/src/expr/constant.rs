@@ -44,6 +44,9 @@ impl Constant {
         if denominator == 0 {
             return None;
         }
+        if denominator == 1 && numerator != i128::MIN {
+            return Some(Self::whole(numerator));
+        }
         let common = gcd(numerator.unsigned_abs(), denominator.unsigned_abs());
         let top = i128::try_from(numerator.unsigned_abs() / common).ok()?;
         let bottom = i128::try_from(denominator.unsigned_abs() / common).ok()?;

@@ -11,6 +11,10 @@ use crate::expr::function::Function;
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input, LoopVariable};
 
+/// The nodes that some roots are made of are put in order by going through the marks of all nodes where there are at most so many marks for each
+/// node found, which takes no longer than sorting them does; else they are sorted.
+const MARKS_PER_FOUND_NODE: usize = 32;
+
 /// An expression of a [`Graph`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ExprId(u32);
@@ -102,20 +106,46 @@ impl ExprId {
 impl Node {
     /// The children, in order, repeated as often as they are used.
     pub(crate) fn children(&self) -> Vec<ExprId> {
+        let mut children = Vec::new();
+        self.for_each_child(|child| children.push(child));
+        children
+    }
+
+    /// Visits the children, in order, as often as they are used, without memory for a list of them.
+    pub(crate) fn for_each_child(&self, mut visit: impl FnMut(ExprId)) {
         match self {
-            Self::Constant(_) | Self::Input(_) => Vec::new(),
-            Self::Sum { terms, .. } => terms.iter().map(|(_, x)| *x).collect(),
-            Self::Product(factors) => factors.iter().map(|(x, _)| *x).collect(),
-            Self::Power { base, exponent } => vec![*base, *exponent],
-            Self::Call { arguments, .. } => arguments.clone(),
+            Self::Constant(_) | Self::Input(_) => {}
+            Self::Sum { terms, .. } => {
+                for (_, x) in terms {
+                    visit(*x);
+                }
+            }
+            Self::Product(factors) => {
+                for (x, _) in factors {
+                    visit(*x);
+                }
+            }
+            Self::Power { base, exponent } => {
+                visit(*base);
+                visit(*exponent);
+            }
+            Self::Call { arguments, .. } => {
+                for x in arguments {
+                    visit(*x);
+                }
+            }
             Self::Select {
                 left,
                 right,
                 then,
                 otherwise,
                 ..
-            } => vec![*left, *right, *then, *otherwise],
-            Self::Loop { body, .. } => vec![*body],
+            } => {
+                for x in [left, right, then, otherwise] {
+                    visit(*x);
+                }
+            }
+            Self::Loop { body, .. } => visit(*body),
         }
     }
 }
@@ -223,33 +253,44 @@ impl Graph {
 
     /// The nodes that the roots are made of, children before parents, without repetition.
     pub(crate) fn reachable(&self, roots: &[ExprId]) -> Vec<ExprId> {
-        let mut seen = vec![false; roots.iter().map(|root| root.index() + 1).max().unwrap_or(0)];
-        let mut stack = roots.to_vec();
-        let mut found = Vec::new();
-        while let Some(id) = stack.pop() {
-            if !std::mem::replace(&mut seen[id.index()], true) {
-                found.push(id);
-                stack.extend(self.node(id).children());
-            }
-        }
-        found.sort_unstable();
-        found
+        self.reached(roots, |_| true)
     }
 
     /// The same without the bodies of sums over ranges.
     pub(crate) fn reachable_outside_sums(&self, roots: &[ExprId]) -> Vec<ExprId> {
+        self.reached(roots, |node| !matches!(node, Node::Loop { .. }))
+    }
+
+    /// The nodes that the roots are made of, of some nodes only themselves.
+    fn reached(&self, roots: &[ExprId], is_entered: impl Fn(&Node) -> bool) -> Vec<ExprId> {
         let mut seen = vec![false; roots.iter().map(|root| root.index() + 1).max().unwrap_or(0)];
         let mut stack = roots.to_vec();
         let mut found = Vec::new();
         while let Some(id) = stack.pop() {
-            if !std::mem::replace(&mut seen[id.index()], true) {
+            if !seen[id.index()] {
+                seen[id.index()] = true;
                 found.push(id);
-                if !matches!(self.node(id), Node::Loop { .. }) {
-                    stack.extend(self.node(id).children());
+                let node = self.node(id);
+                if is_entered(node) {
+                    node.for_each_child(|child| {
+                        if !seen[child.index()] {
+                            stack.push(child);
+                        }
+                    });
                 }
             }
         }
-        found.sort_unstable();
+        // Going through all marks is faster than sorting, unless few are set.
+        if seen.len() <= MARKS_PER_FOUND_NODE * found.len() {
+            found.clear();
+            for (at, is_reached) in seen.iter().enumerate() {
+                if *is_reached {
+                    found.push(ExprId(at as u32));
+                }
+            }
+        } else {
+            found.sort_unstable();
+        }
         found
     }
 

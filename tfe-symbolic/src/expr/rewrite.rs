@@ -8,7 +8,7 @@ use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 /// The most terms that [`Graph::unroll`] writes out, over all sums of an expression.
 pub(crate) const UNROLL_LIMIT: u64 = 4096;
 
-/// Old expressions and what became of them; lookups only.
+/// Old expressions and what became of those that changed; lookups only.
 #[derive(Default)]
 pub(crate) struct Mapping(Map<ExprId, ExprId>);
 
@@ -19,7 +19,16 @@ impl Mapping {
     }
 
     pub(crate) fn set(&mut self, old: ExprId, new: ExprId) {
-        self.0.insert(old, new);
+        if new != old {
+            self.0.insert(old, new);
+        }
+    }
+
+    /// Whether no child of a node changed.
+    pub(crate) fn keeps(&self, node: &Node) -> bool {
+        let mut keeps = true;
+        node.for_each_child(|child| keeps &= self.of(child) == child);
+        keeps
     }
 }
 
@@ -92,13 +101,7 @@ impl Graph {
                         mapping.of(body),
                     )
                 }
-                node if node
-                    .children()
-                    .iter()
-                    .all(|child| mapping.of(*child) == *child) =>
-                {
-                    old
-                }
+                node if mapping.keeps(&node) => old,
                 node => self.remake(&node, &mapping),
             };
             mapping.set(old, new);
@@ -240,12 +243,12 @@ impl Graph {
     /// How often each of the nodes (all that the roots are made of) is used.
     pub(crate) fn uses(&self, nodes: &[ExprId], roots: &[ExprId]) -> Uses {
         let mut uses = vec![0u32; nodes.last().map_or(0, |last| last.index() + 1)];
-        for child in nodes
-            .iter()
-            .flat_map(|id| self.node(*id).children())
-            .chain(roots.iter().copied())
-        {
-            uses[child.index()] += 1;
+        for id in nodes {
+            self.node(*id)
+                .for_each_child(|child| uses[child.index()] += 1);
+        }
+        for root in roots {
+            uses[root.index()] += 1;
         }
         Uses(uses)
     }

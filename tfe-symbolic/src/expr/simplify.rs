@@ -257,7 +257,13 @@ impl Graph {
         let product = match factors[..] {
             [] => return self.constant(coefficient),
             [(x, 1)] => x,
-            _ => self.intern(Node::Product(factors)),
+            _ => {
+                let product = self.intern(Node::Product(factors));
+                if coefficient.is_one() {
+                    return product; // as it is: there are no terms to collect
+                }
+                product
+            }
         };
         self.scale(coefficient, product)
     }

@@ -86,13 +86,11 @@ pub(crate) fn expand_angles(graph: &mut Graph, roots: Vec<ExprId>) -> Vec<ExprId
         let new = match calls.get(&old).and_then(|call| call.value(graph, &known)) {
             Some(value) => value,
             None => {
-                let node = graph.node(old).clone();
-                let same = |child: &ExprId| mapping.of(*child) == *child;
-                if node.children().iter().all(same) {
-                    old
-                } else {
-                    graph.remake(&node, &mapping)
+                if mapping.keeps(graph.node(old)) {
+                    continue;
                 }
+                let node = graph.node(old).clone();
+                graph.remake(&node, &mapping)
             }
         };
         mapping.set(old, new);

@@ -217,6 +217,22 @@ fn kind(op: &Op) -> Kind {
     }
 }
 
+/// A kind and the shapes of operands as one number, in the order of kinds and then of operands: numbers are compared faster than lists.
+///
+/// No operation has more operands than the four of a choice, and no plan 2³⁰ operations.
+fn in_one_number(kind: Kind, operands: &[usize]) -> u128 {
+    const OPERANDS: usize = 4;
+    const BITS: u32 = 30;
+    debug_assert!(operands.len() <= OPERANDS);
+    let mut number = kind as u128;
+    for at in 0..OPERANDS {
+        // A list comes before a longer one that begins with it.
+        let operand = operands.get(at).map_or(0, |shape| *shape as u128 + 1);
+        number = number << BITS | operand;
+    }
+    number
+}
+
 /// How each operation is made of others, down to so many levels of operands: equal numbers where there is no difference.
 fn shapes(plan: &Plan, levels: usize, kind: impl Fn(&Op) -> Kind) -> Vec<usize> {
     let kinds: Vec<Kind> = plan.ids().map(|id| kind(plan.op(id))).collect();
@@ -226,7 +242,7 @@ fn shapes(plan: &Plan, levels: usize, kind: impl Fn(&Op) -> Kind) -> Vec<usize> 
         .map(|kind| *kind.min(&Kind::Product) as usize)
         .collect();
     for _ in 0..levels {
-        let made: Vec<(Kind, Vec<usize>)> = plan
+        let made: Vec<u128> = plan
             .ids()
             .zip(&kinds)
             .map(|(id, kind)| {
@@ -238,15 +254,15 @@ fn shapes(plan: &Plan, levels: usize, kind: impl Fn(&Op) -> Kind) -> Vec<usize> 
                 if matches!(kind, Kind::Sum | Kind::Product) {
                     operands.sort_unstable();
                 }
-                (*kind, operands)
+                in_one_number(*kind, &operands)
             })
             .collect();
-        let mut all: Vec<&(Kind, Vec<usize>)> = made.iter().collect();
+        let mut all = made.clone();
         all.sort_unstable();
         all.dedup();
         shapes = made
             .iter()
-            .map(|shape| all.partition_point(|other| *other < shape))
+            .map(|shape| all.binary_search(shape).unwrap_or(0))
             .collect();
     }
     shapes

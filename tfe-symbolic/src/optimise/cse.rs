@@ -138,7 +138,7 @@ impl Search {
         }
     }
 
-    /// Notes that two operands of a set are a pair, and gives it where something may be saved: it is in another set too, or here twice.
+    /// Notes that two operands of a set are a pair, and gives it where something may be saved: now that it is in a second set, or twice in this one.
     fn note(&mut self, set: usize, first: (Item, i32), second: (Item, i32)) -> Option<Pair> {
         let ((first, a), (second, b)) = (first.min(second), first.max(second));
         let (sign, twice) = match self.kind {
@@ -153,10 +153,12 @@ impl Search {
             sign,
         };
         let places = self.places.entry(pair).or_default();
-        if places.last() != Some(&set) {
-            places.push(set);
+        if places.last() == Some(&set) {
+            return twice.then_some(pair);
         }
-        (twice || places.len() > 1).then_some(pair)
+        places.push(set);
+        // A pair in more sets has been given before.
+        (twice || places.len() == 2).then_some(pair)
     }
 
     fn enqueue(&mut self, mut candidates: Vec<Pair>) {

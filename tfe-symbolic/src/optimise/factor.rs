@@ -152,8 +152,12 @@ fn apply(graph: &mut Graph, roots: &[ExprId], changes: &[Candidate]) -> Vec<Expr
         changes.iter().map(|change| (change.sum, *change)).collect();
     let mut mapping = Mapping::default();
     for old in nodes {
+        let change = changes.get(&old);
+        if change.is_none() && mapping.keeps(graph.node(old)) {
+            continue;
+        }
         let node = graph.node(old).clone();
-        let new = match (&node, changes.get(&old)) {
+        let new = match (&node, change) {
             (Node::Sum { constant, terms }, Some(change)) => {
                 let common = |graph: &Graph, x: ExprId| {
                     let factors = own_factors(graph, &uses, x).iter();
@@ -183,14 +187,6 @@ fn apply(graph: &mut Graph, roots: &[ExprId], changes: &[Candidate]) -> Vec<Expr
                     graph.product(Constant::ONE, &[(factor, exponent), (inside, 1)]),
                 ));
                 graph.linear(*constant, &outside)
-            }
-            (node, _)
-                if node
-                    .children()
-                    .iter()
-                    .all(|child| mapping.of(*child) == *child) =>
-            {
-                old
             }
             (node, _) => graph.remake(node, &mapping),
         };

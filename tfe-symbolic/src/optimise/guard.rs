@@ -141,7 +141,7 @@ impl Guard {
             .collect();
         let Some(places) = places else { return false };
         let sources = self.sources(plan);
-        let mut known = Vec::with_capacity(plan.len());
+        let mut known = vec![Bounded::NOTHING; plan.len()];
         self.states.iter().all(|state| {
             evaluate(plan, &sources, state, &mut known);
             let mut both = places.iter().zip(&state.wanted);
@@ -183,8 +183,7 @@ enum Source {
 }
 
 /// The values of all operations of a plan at a state.
-fn evaluate(plan: &Plan, sources: &[Source], state: &State, known: &mut Vec<Bounded>) {
-    known.clear();
+fn evaluate(plan: &Plan, sources: &[Source], state: &State, known: &mut [Bounded]) {
     for (id, source) in plan.ids().zip(sources) {
         let op = |x: &OpId| known[x.index()];
         let result = match source {
@@ -229,7 +228,7 @@ fn evaluate(plan: &Plan, sources: &[Source], state: &State, known: &mut Vec<Boun
                 Op::Loop { body, .. } => op(body),
             },
         };
-        known.push(result);
+        known[id.index()] = result;
     }
 }
 
@@ -432,18 +431,27 @@ fn sum(terms: &[Term], number: Option<Bounded>, of: &dyn Fn(ExprId) -> Bounded) 
 }
 
 fn product(factors: &[(ExprId, i32)], of: &dyn Fn(ExprId) -> Bounded) -> Bounded {
-    let (mut above, mut below): (Option<Bounded>, Option<Bounded>) = (None, None);
+    let (mut above, mut below) = (Bounded::NOTHING, Bounded::NOTHING);
+    let (mut is_above_empty, mut is_below_empty) = (true, true);
     for (x, n) in factors {
-        let power = of(*x).to_the(n.unsigned_abs());
-        let side = if *n > 0 { &mut above } else { &mut below };
-        *side = match *side {
-            Some(known) => Some(known.times(power)),
-            None => Some(power),
+        let power = match *n {
+            1 => of(*x),
+            n => of(*x).to_the(n.unsigned_abs()),
         };
+        let (side, is_empty) = match *n > 0 {
+            true => (&mut above, &mut is_above_empty),
+            false => (&mut below, &mut is_below_empty),
+        };
+        *side = if *is_empty { power } else { side.times(power) };
+        *is_empty = false;
     }
-    match (above, below) {
-        (above, Some(below)) => above.unwrap_or(Bounded::exact(1.0)).over(below),
-        (above, None) => above.unwrap_or(Bounded::exact(1.0)),
+    if is_above_empty {
+        above = Bounded::exact(1.0);
+    }
+    if is_below_empty {
+        above
+    } else {
+        above.over(below)
     }
 }
 

@@ -229,8 +229,7 @@ impl Search {
                     mapping.set(x, product(graph, powers, *core));
                     self.lost.push(powers.clone());
                 }
-                let same = node.children().into_iter().all(|x| mapping.of(x) == x);
-                let id = if same {
+                let id = if mapping.keeps(node) {
                     id
                 } else {
                     graph.remake(node, &mapping)

@@ -20,6 +20,9 @@ impl PartialOrd for PositiveConstant {
 
 impl Ord for PositiveConstant {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        if self == other {
+            return std::cmp::Ordering::Equal;
+        }
         let key = |c: &Self| (!c.0.is_one(), c.0.to_f64().to_bits(), c.0.as_ratio());
         key(self).cmp(&key(other))
     }
