@@ -32,7 +32,7 @@ struct Contact {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_variables, non_snake_case)]
+    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
     impl __tfe::Model<2> for Contact {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -82,8 +82,10 @@ const _: () = {
             let k = t.parameter(3, self.k);
             let m = t.parameter(0, self.m);
             let r = t.parameter(1, self.r);
+            /// ∂L/∂ẋ, and parts of later results
             let (sin_theta, cos_theta) = q[1].sin_cos();
             first.z[0] = m * z[0];
+            /// ∂L/∂θ̇, and parts of later results
             let t0 = g * m;
             let t1 = r * cos_theta;
             let t2 = q[0] - t1;
@@ -92,6 +94,7 @@ const _: () = {
             let t5 = r * r;
             let t6 = m * t5;
             first.z[1] = z[1] * t6;
+            /// ∂L/∂x, ∂L/∂θ, Q_θ
             let t7 = c * z[1];
             let t8 = t4 * t3;
             let t9 = R::select(t2.less(t.like(0.0)), t3, t.like(0.0));
@@ -116,14 +119,17 @@ const _: () = {
             let k = t.parameter(3, self.k);
             let m = t.parameter(0, self.m);
             let r = t.parameter(1, self.r);
+            /// ∂L/∂ẋ, ∂²L/∂ẋ², and parts of later results
             let (sin_theta, cos_theta) = q[1].sin_cos();
             zz[0][0] = m;
             first.z[0] = m * z[0];
+            /// ∂L/∂θ̇, ∂²L/∂θ̇², and parts of later results
             let t0 = g * m;
             let t1 = m * r;
             let t2 = r * t1;
             zz[1][1] = t2;
             first.z[1] = z[1] * t2;
+            /// ∂L/∂x, ∂L/∂θ, Q_θ
             let t3 = c * z[1];
             let t4 = r * cos_theta;
             let t5 = q[0] - t4;
@@ -170,30 +176,37 @@ const _: () = {
             let k = t.parameter(3, self.k);
             let m = t.parameter(0, self.m);
             let r = t.parameter(1, self.r);
+            /// ∂L/∂ẋ, ∂²L/∂ẋ², and parts of later results
             let (sin_theta, cos_theta) = q[1].sin_cos();
             second.zz[0][0] = m;
             first.z[0] = m * z[0];
+            /// ∂L/∂θ̇, ∂²L/∂θ̇², and parts of later results
             let t0 = g * m;
             let t1 = m * r;
             let t2 = r * t1;
             second.zz[1][1] = t2;
             first.z[1] = z[1] * t2;
+            /// Q_θ, ∂Q_θ/∂θ̇, and parts of later results
             let t3 = r * cos_theta;
             let t4 = r * sin_theta;
             let t5 = q[0] - t3;
             let t6 = c * z[1];
             first.force[1] = -t6;
             second.force_z[1][1] = -c;
+            /// ∂L/∂x, and parts of later results
             let t7 = k * t5;
             let t8 = t3 * t7;
             let t9 = R::select(t5.less(t.like(0.0)), t7, t.like(0.0));
             let t10 = t0 + t9;
             first.q[0] = -t10;
+            /// ∂L/∂θ
             let t11 = t4 * t7;
             let t12 = R::select(t5.less(t.like(0.0)), t11, t.like(0.0));
             first.q[1] = -t12;
+            /// ∂²L/∂x²
             let t13 = R::select(t5.less(t.like(0.0)), k, t.like(0.0));
             second.qq[0][0] = -t13;
+            /// ∂²L/∂x∂θ, ∂²L/∂θ²
             let t14 = k * t4;
             let t15 = t4 * t14;
             let t16 = t8 + t15;

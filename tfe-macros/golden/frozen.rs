@@ -34,7 +34,7 @@ pub struct SpringPendulum {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_variables, non_snake_case)]
+    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
     impl __tfe::Model<2> for SpringPendulum {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -82,8 +82,10 @@ const _: () = {
             let k = t.parameter(3, self.k);
             let l = t.parameter(1, self.l);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂ṙ, and parts of later results
             let (sin_theta, cos_theta) = q[1].sin_cos();
             first.z[0] = m * z[0];
+            /// ∂L/∂θ̇, ∂L/∂r, and parts of later results
             let t0 = g * m;
             let t1 = m * q[0];
             let t2 = z[1] * t1;
@@ -95,6 +97,7 @@ const _: () = {
             let t8 = t6 + t7;
             first.q[0] = t3 + t8;
             first.z[1] = q[0] * t2;
+            /// ∂L/∂θ
             let t9 = q[0] * t4;
             first.q[1] = -t9;
         }
@@ -112,9 +115,11 @@ const _: () = {
             let k = t.parameter(3, self.k);
             let l = t.parameter(1, self.l);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂ṙ, ∂²L/∂ṙ², and parts of later results
             let (sin_theta, cos_theta) = q[1].sin_cos();
             zz[0][0] = m;
             first.z[0] = m * z[0];
+            /// ∂L/∂θ̇, ∂²L/∂θ̇², and parts of later results
             let t0 = l - q[0];
             let t1 = k * t0;
             let t2 = g * sin_theta;
@@ -125,9 +130,11 @@ const _: () = {
             let t7 = q[0] * t6;
             zz[1][1] = t7;
             first.z[1] = z[1] * t7;
+            /// ∂L/∂r
             let t8 = z[1] * z[1];
             let t9 = t6 * t8;
             first.q[0] = t9 + t5;
+            /// ∂L/∂θ
             let t10 = t6 * t2;
             first.q[1] = -t10;
         }
@@ -163,9 +170,11 @@ const _: () = {
             let k = t.parameter(3, self.k);
             let l = t.parameter(1, self.l);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂ṙ, ∂²L/∂ṙ², and parts of later results
             let (sin_theta, cos_theta) = q[1].sin_cos();
             second.zz[0][0] = m;
             first.z[0] = m * z[0];
+            /// ∂L/∂θ̇, ∂²L/∂θ̇², and parts of later results
             let t0 = g * m;
             let t1 = cos_theta * t0;
             let t2 = sin_theta * t0;
@@ -175,16 +184,20 @@ const _: () = {
             let t6 = z[1] * t5;
             second.zz[1][1] = q[0] * t5;
             first.z[1] = q[0] * t6;
+            /// ∂L/∂r, ∂²L/∂θ̇∂r
             let t7 = z[1] * t6;
             let t8 = t4 + t7;
             first.q[0] = t1 + t8;
             second.zq[1][0] = t.like(2.0) * t6;
+            /// ∂²L/∂r²
             let t9 = z[1] * z[1];
             let t10 = m * t9;
             second.qq[0][0] = t10 - k;
+            /// ∂L/∂θ, and parts of later results
             let t11 = q[0] * t1;
             let t12 = q[0] * t2;
             first.q[1] = -t12;
+            /// ∂²L/∂r∂θ, ∂²L/∂θ²
             let t13 = -t2;
             second.qq[0][1] = t13;
             second.qq[1][0] = t13;
@@ -355,7 +368,7 @@ pub struct Rod {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_variables, non_snake_case)]
+    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
     impl __tfe::Model<1> for Rod {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -399,9 +412,11 @@ const _: () = {
             let g = t.parameter(2, self.g);
             let l = t.parameter(1, self.l);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂θ̇
             let t0 = l * m;
             let t1 = l * z[0];
             first.z[0] = t0 * t1;
+            /// ∂L/∂θ
             let t2 = g * q[0];
             let t3 = t0 * t2;
             let t4 = q[0] * q[0];
@@ -422,10 +437,12 @@ const _: () = {
             let g = t.parameter(2, self.g);
             let l = t.parameter(1, self.l);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂θ̇, ∂²L/∂θ̇²
             let t0 = l * m;
             let t1 = l * t0;
             zz[0][0] = t1;
             first.z[0] = z[0] * t1;
+            /// ∂L/∂θ
             let t2 = g * q[0];
             let t3 = t0 * t2;
             let t4 = q[0] * q[0];
@@ -464,16 +481,19 @@ const _: () = {
             let g = t.parameter(2, self.g);
             let l = t.parameter(1, self.l);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂θ̇, ∂²L/∂θ̇²
             let t0 = l * m;
             let t1 = l * t0;
             second.zz[0][0] = t1;
             first.z[0] = z[0] * t1;
+            /// ∂L/∂θ
             let t2 = g * t0;
             let t3 = q[0] * t2;
             let t4 = q[0] * t3;
             let t5 = q[0] * t4;
             let t6 = t5 / t.like(6.0);
             first.q[0] = t6 - t3;
+            /// ∂²L/∂θ²
             let t7 = t.like(0.5) * t4;
             second.qq[0][0] = t7 - t2;
         }

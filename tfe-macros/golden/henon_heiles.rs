@@ -24,7 +24,7 @@ struct HenonHeiles {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_variables, non_snake_case)]
+    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
     impl __tfe::Model<2> for HenonHeiles {
         const FORM: __tfe::Form = __tfe::Form::Hamiltonian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -66,10 +66,12 @@ const _: () = {
             let lambda = t.parameter(0, self.lambda);
             first.z[0] = z[0];
             first.z[1] = z[1];
+            /// ∂H/∂x
             let t0 = q[0] * q[1];
             let t1 = t.like(2.0) * t0;
             let t2 = lambda * t1;
             first.q[0] = q[0] + t2;
+            /// ∂H/∂y
             let t3 = q[0] * q[0];
             let t4 = q[1] * q[1];
             let t5 = t3 - t4;
@@ -91,10 +93,12 @@ const _: () = {
             first.z[1] = z[1];
             zz[0][0] = t.like(1.0);
             zz[1][1] = t.like(1.0);
+            /// ∂H/∂x
             let t0 = q[0] * q[1];
             let t1 = t.like(2.0) * t0;
             let t2 = lambda * t1;
             first.q[0] = q[0] + t2;
+            /// ∂H/∂y
             let t3 = q[0] * q[0];
             let t4 = q[1] * q[1];
             let t5 = t3 - t4;
@@ -134,16 +138,20 @@ const _: () = {
             first.z[1] = z[1];
             second.zz[0][0] = t.like(1.0);
             second.zz[1][1] = t.like(1.0);
+            /// ∂²H/∂x∂y, and parts of later results
             let t0 = t.like(2.0) * lambda;
             let t1 = q[1] * t0;
             let t2 = q[0] * t0;
             second.qq[0][1] = t2;
             second.qq[1][0] = t2;
+            /// ∂H/∂x, ∂²H/∂x²
             let t3 = t.like(1.0) + t1;
             second.qq[0][0] = t3;
             first.q[0] = q[0] * t3;
+            /// ∂²H/∂y², and parts of later results
             let t4 = q[0] * q[0];
             second.qq[1][1] = t.like(1.0) - t1;
+            /// ∂H/∂y
             let t5 = q[1] * q[1];
             let t6 = t4 - t5;
             let t7 = lambda * t6;

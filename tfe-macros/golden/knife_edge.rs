@@ -30,7 +30,7 @@ struct KnifeEdge {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_variables, non_snake_case)]
+    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
     impl __tfe::Model<3> for KnifeEdge {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -74,10 +74,12 @@ const _: () = {
             let g = t.parameter(2, self.g);
             let j = t.parameter(1, self.j);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂ẋ, ∂L/∂ẏ, ∂L/∂φ̇, and parts of later results
             let t0 = alpha.sin();
             first.z[2] = j * z[2];
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
+            /// ∂L/∂x
             let t1 = g * m;
             first.q[0] = t0 * t1;
         }
@@ -94,6 +96,7 @@ const _: () = {
             let g = t.parameter(2, self.g);
             let j = t.parameter(1, self.j);
             let m = t.parameter(0, self.m);
+            /// L_v, L_vv, and parts of later results
             let t0 = alpha.sin();
             zz[0][0] = m;
             zz[1][1] = m;
@@ -101,6 +104,7 @@ const _: () = {
             first.z[2] = j * z[2];
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
+            /// ∂L/∂x
             let t1 = g * m;
             first.q[0] = t0 * t1;
         }
@@ -117,6 +121,7 @@ const _: () = {
             let g = t.parameter(2, self.g);
             let j = t.parameter(1, self.j);
             let m = t.parameter(0, self.m);
+            /// L_v, L_vv, and parts of later results
             let t0 = alpha.sin();
             second.zz[0][0] = m;
             second.zz[1][1] = m;
@@ -124,6 +129,7 @@ const _: () = {
             first.z[2] = j * z[2];
             first.z[0] = m * z[0];
             first.z[1] = m * z[1];
+            /// ∂L/∂x
             let t1 = g * m;
             first.q[0] = t0 * t1;
         }

@@ -31,7 +31,7 @@ pub struct Pendulum {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_variables, non_snake_case)]
+    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
     impl __tfe::Model<1> for Pendulum {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -70,11 +70,13 @@ const _: () = {
             let g = t.parameter(2, self.g);
             let l = t.parameter(1, self.l);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂θ̇, and parts of later results
             let sin_theta = q[0].sin();
             let t0 = g * sin_theta;
             let t1 = l * m;
             let t2 = l * z[0];
             first.z[0] = t1 * t2;
+            /// ∂L/∂θ
             let t3 = t1 * t0;
             first.q[0] = -t3;
         }
@@ -91,12 +93,14 @@ const _: () = {
             let g = t.parameter(2, self.g);
             let l = t.parameter(1, self.l);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂θ̇, ∂²L/∂θ̇², and parts of later results
             let sin_theta = q[0].sin();
             let t0 = g * sin_theta;
             let t1 = l * m;
             let t2 = l * t1;
             zz[0][0] = t2;
             first.z[0] = z[0] * t2;
+            /// ∂L/∂θ
             let t3 = t1 * t0;
             first.q[0] = -t3;
         }
@@ -131,11 +135,13 @@ const _: () = {
             let g = t.parameter(2, self.g);
             let l = t.parameter(1, self.l);
             let m = t.parameter(0, self.m);
+            /// ∂L/∂θ̇, ∂²L/∂θ̇², and parts of later results
             let (sin_theta, cos_theta) = q[0].sin_cos();
             let t0 = l * m;
             let t1 = l * t0;
             second.zz[0][0] = t1;
             first.z[0] = z[0] * t1;
+            /// ∂L/∂θ, ∂²L/∂θ²
             let t2 = g * t0;
             let t3 = sin_theta * t2;
             let t4 = cos_theta * t2;

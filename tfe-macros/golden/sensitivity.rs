@@ -32,7 +32,7 @@ struct Duffing {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_variables, non_snake_case)]
+    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
     impl __tfe::Model<1> for Duffing {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -72,12 +72,15 @@ const _: () = {
             let c = t.parameter(3, self.c);
             let m = t.parameter(0, self.m);
             let omega = t.parameter(5, self.omega);
+            /// ∂L/∂ẋ, and parts of later results
             let t0 = t * omega;
             let t1 = t0.cos();
             let t2 = amplitude * t1;
             first.z[0] = m * z[0];
+            /// Q_x
             let t3 = c * z[0];
             first.force[0] = t2 - t3;
+            /// ∂L/∂x
             let t4 = q[0] * q[0];
             let t5 = t.parameter(2, self.k[1]) * t4;
             let t6 = t.parameter(1, self.k[0]) + t5;
@@ -98,13 +101,17 @@ const _: () = {
             let c = t.parameter(3, self.c);
             let m = t.parameter(0, self.m);
             let omega = t.parameter(5, self.omega);
+            /// ∂²L/∂ẋ², and parts of later results
             let t0 = t * omega;
             let t1 = t0.cos();
             zz[0][0] = m;
+            /// ∂L/∂ẋ, and parts of later results
             let t2 = amplitude * t1;
             first.z[0] = m * z[0];
+            /// Q_x
             let t3 = c * z[0];
             first.force[0] = t2 - t3;
+            /// ∂L/∂x
             let t4 = q[0] * q[0];
             let t5 = t.parameter(2, self.k[1]) * t4;
             let t6 = t.parameter(1, self.k[0]) + t5;
@@ -143,19 +150,24 @@ const _: () = {
             let c = t.parameter(3, self.c);
             let m = t.parameter(0, self.m);
             let omega = t.parameter(5, self.omega);
+            /// ∂²L/∂ẋ², and parts of later results
             let t0 = t * omega;
             let t1 = t0.cos();
             second.zz[0][0] = m;
+            /// ∂L/∂ẋ, and parts of later results
             let t2 = amplitude * t1;
             first.z[0] = m * z[0];
+            /// Q_x, ∂Q_x/∂ẋ
             let t3 = c * z[0];
             first.force[0] = t2 - t3;
             second.force_z[0][0] = -c;
+            /// ∂L/∂x
             let t4 = q[0] * q[0];
             let t5 = t.parameter(2, self.k[1]) * t4;
             let t6 = t.parameter(1, self.k[0]) + t5;
             let t7 = q[0] * t6;
             first.q[0] = -t7;
+            /// ∂²L/∂x²
             let t8 = t.like(3.0) * t5;
             let t9 = t.parameter(1, self.k[0]) + t8;
             second.qq[0][0] = -t9;

@@ -31,7 +31,7 @@ struct Forced {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_variables, non_snake_case)]
+    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
     impl __tfe::Model<2> for Forced {
         const FORM: __tfe::Form = __tfe::Form::Hamiltonian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -74,6 +74,7 @@ const _: () = {
             let a = t.parameter(0, self.a);
             let c = t.parameter(2, self.c);
             let omega = t.parameter(1, self.omega);
+            /// ∂H/∂p_t, and parts of later results
             let (sin_q, cos_q) = q[0].sin_cos();
             let t0 = omega * q[1];
             let (t1, t2) = t0.sin_cos();
@@ -89,10 +90,13 @@ const _: () = {
             let t12 = t.like(1.0) + t11;
             let t13 = t.like(1.0) / t12;
             first.z[1] = t13;
+            /// ∂H/∂t
             let t14 = q[0] * t13;
             first.q[1] = t5 * t14;
+            /// ∂H/∂p
             let t15 = z[0] * t13;
             first.z[0] = t15;
+            /// ∂H/∂q, Q_q, Q_t
             let t16 = c * t15;
             let t17 = z[0] * z[0];
             let t18 = t17 - t10;
@@ -115,6 +119,7 @@ const _: () = {
             let a = t.parameter(0, self.a);
             let c = t.parameter(2, self.c);
             let omega = t.parameter(1, self.omega);
+            /// ∂H/∂p_t, ∂²H/∂p², and parts of later results
             let (sin_q, cos_q) = q[0].sin_cos();
             let t0 = omega * q[1];
             let (t1, t2) = t0.sin_cos();
@@ -131,10 +136,13 @@ const _: () = {
             let t13 = t.like(1.0) / t12;
             first.z[1] = t13;
             zz[0][0] = t13;
+            /// ∂H/∂t
             let t14 = q[0] * t13;
             first.q[1] = t5 * t14;
+            /// ∂H/∂p
             let t15 = z[0] * t13;
             first.z[0] = t15;
+            /// ∂H/∂q, Q_q, Q_t
             let t16 = c * t15;
             let t17 = z[0] * z[0];
             let t18 = t17 - t10;
@@ -175,6 +183,7 @@ const _: () = {
             let a = t.parameter(0, self.a);
             let c = t.parameter(2, self.c);
             let omega = t.parameter(1, self.omega);
+            /// ∂H/∂p_t, ∂²H/∂p², and parts of later results
             let (sin_q, cos_q) = q[0].sin_cos();
             let t0 = omega * q[1];
             let (t1, t2) = t0.sin_cos();
@@ -183,8 +192,10 @@ const _: () = {
             let t5 = t.like(1.0) / t4;
             first.z[1] = t5;
             second.zz[0][0] = t5;
+            /// ∂H/∂p
             let t6 = z[0] * t5;
             first.z[0] = t6;
+            /// ∂²H/∂t², and parts of later results
             let t7 = q[0] * t5;
             let t8 = t.like(2.0) * t7;
             let t9 = a * t2;
@@ -195,13 +206,16 @@ const _: () = {
             let t14 = t1 * t12;
             let t15 = t13 * t7;
             second.qq[1][1] = t12 * t15;
+            /// ∂H/∂t
             let t16 = t7 * t14;
             first.q[1] = t16;
+            /// ∂²H/∂q∂t
             let t17 = t14 * t5;
             let t18 = t8 * t16;
             let t19 = t17 - t18;
             second.qq[0][1] = t19;
             second.qq[1][0] = t19;
+            /// ∂H/∂q, and parts of later results
             let t20 = z[0] * z[0];
             let t21 = t.like(0.5) * t20;
             let t22 = t21 - cos_q;
@@ -211,22 +225,28 @@ const _: () = {
             let t26 = t8 * t24;
             let t27 = t26 + t11;
             first.q[0] = t27 * t5;
+            /// Q_t
             let t28 = c * t6;
             let t29 = z[0] * t28;
             first.force[1] = t29;
+            /// ∂²H/∂p∂q
             let t30 = t8 * t6;
             second.zq[0][0] = -t30;
+            /// ∂Q_q/∂p
             let t31 = c * t5;
             second.force_z[0][0] = -t31;
+            /// Q_q, ∂Q_t/∂q
             let t32 = t8 * t29;
             second.force_q[1][0] = -t32;
             first.force[0] = -t28;
+            /// ∂²H/∂p_t∂q, and parts of later results
             let t33 = t8 * t5;
             let t34 = t5 * t5;
             let t35 = t34 * t24;
             let t36 = t33 * t27;
             let t37 = t35 - t36;
             second.zq[1][0] = -t33;
+            /// ∂²H/∂q², ∂Q_t/∂p, ∂Q_q/∂q
             let t38 = t.like(2.0) * t37;
             second.qq[0][0] = t38 + t25;
             second.force_q[0][0] = t8 * t28;

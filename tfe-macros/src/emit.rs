@@ -1,6 +1,8 @@
 //! Programs of the engine as Rust statements.
 
 use crate::balance::balance;
+use crate::headings::Headings;
+use crate::in_place::is_written_in_place;
 use crate::indices::{at, identifier, index, loop_name, number, real, signed};
 use crate::parts::{Part, Parts};
 use proc_macro2::{Ident, Literal, TokenStream};
@@ -29,6 +31,8 @@ pub(crate) struct Emitter<'a> {
     assigns: bool,
     /// What velocities and momenta are called.
     z: Ident,
+    /// What results are called, in headings.
+    headings: Option<Headings>,
     /// How often each temporary is read.
     reads: BTreeMap<Temporary, usize>,
     /// The indices of all loops.
@@ -77,6 +81,7 @@ impl<'a> Emitter<'a> {
             onto_zeros: false,
             assigns: false,
             z: format_ident!("z"),
+            headings: None,
             reads: BTreeMap::new(),
             indices: BTreeSet::new(),
             names: BTreeMap::new(),
@@ -103,6 +108,12 @@ impl<'a> Emitter<'a> {
     /// The same with `v` for velocities, as in the kernels of constraints.
     pub(crate) fn with_velocity(mut self) -> Self {
         self.z = format_ident!("v");
+        self
+    }
+
+    /// The same with headings that tell the results.
+    pub(crate) fn with_headings(mut self, headings: Headings) -> Self {
+        self.headings = Some(headings);
         self
     }
 
@@ -247,13 +258,20 @@ impl<'a> Emitter<'a> {
 
     pub(crate) fn statements(&mut self, statements: &[Statement]) -> TokenStream {
         let mut tokens = TokenStream::new();
+        let headings = self.headings.as_ref();
+        let headings = headings.map(|headings| headings.place(statements, &self.reads));
         let mut rest = statements;
         while let [statement, after @ ..] = rest {
-            rest = after;
+            let at = statements.len() - rest.len();
+            let heading = headings.as_ref().and_then(|headings| headings.get(&at));
+            if let Some(heading) = heading {
+                tokens.extend(quote!(#[doc = #heading]));
+            }
             // A result that nothing else needs is written where it belongs, without a temporary.
-            if let (Statement::Let { target, operation }, Some(next)) = (statement, after.first())
-                && self.reads.get(target) == Some(&1)
-                && written(next) == Some(&Operand::Temporary(*target))
+            let in_place = is_written_in_place(rest, &self.reads);
+            rest = after;
+            if let (true, Statement::Let { operation, .. }, Some(next)) =
+                (in_place, statement, after.first())
             {
                 let in_place = match operation {
                     Operation::Negate(a) => self.take_away(next, a),
@@ -677,16 +695,6 @@ fn block(array: Array) -> Option<&'static str> {
         Array::ForceQ => Some("ForceQ"),
         Array::SiteRow => Some("Row"),
         Array::Bend => Some("Bend"),
-        _ => None,
-    }
-}
-
-/// What a store, an accumulation or an assignment writes.
-fn written(statement: &Statement) -> Option<&Operand> {
-    match statement {
-        Statement::Store { value, .. }
-        | Statement::Accumulate { value, .. }
-        | Statement::Assign { value, .. } => Some(value),
         _ => None,
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::docs::Docs;
 use crate::emit::{self, Emitter, Signature};
+use crate::headings::Headings;
 use crate::indices;
 use crate::lengths::Lengths;
 use crate::parameters::Parameters;
@@ -179,6 +180,7 @@ impl<'a> Kernels<'a> {
         Emitter::new(&self.coordinates, second)
             .with_inputs(&self.declared.inputs)
             .with_parameters(&self.places)
+            .with_headings(Headings::of(self.declared))
             .body_in_parts(&self.derivation.program(request), signature)
     }
 
@@ -270,7 +272,7 @@ impl<'a> Kernels<'a> {
         let parts = (!parts.is_empty()).then(|| {
             quote! {
                 #[automatically_derived]
-                #[allow(unused_variables, non_snake_case, clippy::too_many_arguments)]
+                #[allow(unused_doc_comments, unused_variables, non_snake_case, clippy::too_many_arguments)]
                 impl #impl_generics #name #type_generics #where_clause {
                     #parts
                 }
@@ -373,7 +375,7 @@ impl<'a> Kernels<'a> {
                 let names = &self.declared.inputs;
                 let controlled = quote! {
                     #[automatically_derived]
-                    #[allow(unused_variables, non_snake_case, clippy::too_many_arguments)]
+                    #[allow(unused_doc_comments, unused_variables, non_snake_case, clippy::too_many_arguments)]
                     impl #impl_generics __tfe::Controlled<#dof> for #name #type_generics #where_clause {
                         const INPUTS: &'static [&'static str] = &[#(#names),*];
 
@@ -391,7 +393,7 @@ impl<'a> Kernels<'a> {
                 #constant
 
                 #[automatically_derived]
-                #[allow(unused_variables, non_snake_case)]
+                #[allow(unused_doc_comments, unused_variables, non_snake_case)]
                 impl #impl_generics __tfe::Model<#dof> for #name #type_generics #where_clause {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;

@@ -12,6 +12,8 @@ mod fallback;
 mod family;
 #[cfg(test)]
 mod fuzz;
+mod headings;
+mod in_place;
 mod indices;
 mod input;
 mod lengths;

@@ -101,6 +101,33 @@ fn check(name: &str, arguments: TokenStream, item: TokenStream) {
 }
 
 #[test]
+fn the_double_pendulum_of_the_readme() {
+    check(
+        "double_pendulum",
+        quote!(
+            coordinates(theta1, theta2),
+            let x1 = l1 * sin(theta1),
+            let y1 = -l1 * cos(theta1),
+            let x2 = x1 + l2 * sin(theta2),
+            let y2 = y1 - l2 * cos(theta2),
+            lagrangian = m1 / 2 * (dot(x1) ^ 2 + dot(y1) ^ 2)
+                + m2 / 2 * (dot(x2) ^ 2 + dot(y2) ^ 2)
+                - g * (m1 * y1 + m2 * y2),
+            output(tip_x) = x2,
+        ),
+        quote! {
+            struct DoublePendulum {
+                m1: f64,
+                m2: f64,
+                l1: f64,
+                l2: f64,
+                g: f64,
+            }
+        },
+    );
+}
+
+#[test]
 fn a_lagrangian() {
     check(
         "pendulum",

@@ -267,6 +267,28 @@ fn rate(argument: &Expr) -> String {
     dotted.unwrap_or_else(|| format!("d/dt({})", formula(argument)))
 }
 
+/// A coordinate or momentum by the name of [`names`](crate::model::declared::names): `θ₁`, `q[2]`.
+///
+/// ```
+/// use tfe_symbolic::model::notation::{element, rate_of};
+///
+/// assert_eq!([element("theta1"), element("phi[2]")], ["θ₁", "φ[2]"]);
+/// assert_eq!([rate_of("theta1"), rate_of("phi[2]"), rate_of("tip")], ["θ̇₁", "φ̇[2]", "d/dt(tip)"]);
+/// ```
+pub fn element(name: &str) -> String {
+    let (array, index) = name.split_at(name.find('[').unwrap_or(name.len()));
+    format!("{}{index}", symbol(array))
+}
+
+/// The rate of such a coordinate: `θ̇₁`, `q̇[2]`; `d/dt(tip)` of longer names.
+pub fn rate_of(name: &str) -> String {
+    let (array, index) = name.split_at(name.find('[').unwrap_or(name.len()));
+    dotted(array).map_or_else(
+        || format!("d/dt({})", element(name)),
+        |letter| format!("{letter}{index}"),
+    )
+}
+
 /// A dot above the letter of a one-letter symbol.
 fn dotted(name: &str) -> Option<String> {
     let symbol = symbol(name);
