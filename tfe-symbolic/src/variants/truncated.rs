@@ -161,8 +161,8 @@ impl Reduction {
 const MAX_EXPRESSIONS: usize = 3000;
 
 /// Above this degree, polynomials may be made of so many expressions: that of a double pendulum to degree 12 has 237, and of 1200 the kernels take
-/// more than a second.
-const MAX_FREE_DEGREE: u32 = 6;
+/// more than a second; a polynomial of degree 6 of one of degree 6 about another point once had 2200.
+const MAX_FREE_DEGREE: u32 = 5;
 const MAX_OF_HIGH_DEGREE: usize = 800;
 
 /// Σ 1/j! Dʲ f[δ, …, δ] with placeholders for δ.
