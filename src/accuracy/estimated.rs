@@ -3,7 +3,7 @@
 use crate::numbers::larger;
 use std::fmt;
 use std::ops::Deref;
-use tfe_runtime::{Element, Solve};
+use tfe_runtime::{Element, Solve, Statistics};
 
 /// A motion with an estimate of its error; everything that a motion can be asked, it can be asked too.
 ///
@@ -112,6 +112,8 @@ pub struct Picked {
     pub error_estimate: f64,
     /// The runs over the whole span, in their order; the last one is the motion.
     pub attempts: Vec<Attempt>,
+    /// What all steps of the search have cost: of probes, of a pilot run, of all runs, and of the one that verifies the last. The motion's own [`Statistics`] are those of the last run.
+    pub work: Statistics,
 }
 
 /// One run of a search.

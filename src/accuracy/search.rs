@@ -2,6 +2,7 @@
 
 mod cuts;
 mod ladder;
+mod paired;
 mod probe;
 
 use super::estimated::{Attempt, Picked};
@@ -12,8 +13,8 @@ use crate::numbers::larger;
 use cuts::cuts;
 use ladder::{Ladder, Verdict};
 use probe::probe;
-use std::ops::Range;
-use tfe_runtime::{Element, Solve, StepError};
+use std::ops::{ControlFlow, Range};
+use tfe_runtime::{Element, Solve, Statistics, StepError};
 
 /// What is asked of a run.
 #[derive(Clone, Debug)]
@@ -32,6 +33,8 @@ pub(crate) struct Asked {
     pub(crate) solve: Solve,
     /// Where steps are to be long and where short; equal steps without it.
     pub(crate) graded: Option<Graded>,
+    /// Whether every run goes beside one of the next order from its start: where Newton's method makes all steps, and no event changes the motion.
+    pub(crate) in_pairs: bool,
 }
 
 /// What a pilot run has found.
@@ -71,8 +74,40 @@ pub(crate) struct Ran {
 /// What looks where steps have to be short, given the first one that it tries; nothing where equal steps are as good.
 pub(crate) type Pilot<'r> = dyn FnMut(f64) -> Option<Graded> + 'r;
 
-/// What makes a run.
-pub(crate) type Runner<'r> = dyn FnMut(&Way<'_>) -> Result<Ran, Failed> + 'r;
+/// What makes runs.
+pub(crate) trait Runner {
+    /// One run.
+    fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed>;
+    /// A run that may be the motion that is asked for, and beside it another one over the same steps, until `judge` has seen enough.
+    fn run_beside(
+        &mut self,
+        way: &Way<'_>,
+        better: &Way<'_>,
+        judge: &mut Judge<'_>,
+    ) -> Result<RanBeside, Failed>;
+}
+
+/// Is shown every node that two runs have reached; says whether they go on.
+pub(crate) type Judge<'j> = dyn FnMut(&Beside<'_>) -> ControlFlow<()> + 'j;
+
+/// Where two runs are.
+pub(crate) struct Beside<'a> {
+    pub(crate) time: f64,
+    /// How far they are apart, of each kind.
+    pub(crate) apart: &'a [f64],
+    /// The largest number of each kind so far.
+    pub(crate) sizes: &'a [f64],
+}
+
+/// What has come of two runs.
+#[derive(Clone, Debug)]
+pub(crate) struct RanBeside {
+    pub(crate) traces: [Trace; 2],
+    /// The nodes.
+    pub(crate) times: Vec<f64>,
+    /// Whether they have gone to their end.
+    pub(crate) is_complete: bool,
+}
 
 /// Why a run has stopped.
 #[derive(Clone, Debug)]
@@ -158,24 +193,36 @@ const ROUNDINGS: f64 = 1e-6;
 /// What stops runs of every step.
 pub(crate) fn search(
     asked: &Asked,
-    run: &mut Runner<'_>,
+    run: &mut dyn Runner,
     pilot: Option<&mut Pilot<'_>>,
 ) -> Result<Found, RunErrorKind> {
     if let Some(graded) = &asked.graded {
         return run_down(asked, graded_way(asked, graded), run);
     }
-    let even = even_way(asked, run);
+    let length = (asked.span.end - asked.span.start).abs();
+    let mut before = Vec::new();
+    let climbed = if asked.in_pairs {
+        let most_steps = if pilot.is_some() { MANY } else { f64::INFINITY };
+        paired::climb(asked, newton_way(asked), run, most_steps)?
+    } else {
+        None
+    };
+    let mut even = match climbed {
+        Some(Climbed::Found(found)) => return Ok(*found),
+        Some(Climbed::TooMany { attempts, step }) => {
+            before = attempts;
+            Ok((newton_way(asked), step))
+        }
+        None => even_way(asked, run),
+    };
     let Some(pilot) = pilot else {
         return run_down(asked, even?, run);
     };
-    let length = (asked.span.end - asked.span.start).abs();
-    let mut even = even;
-    let mut before = Vec::new();
     if let Ok((way, step)) = &even
         && length / step <= MANY
     {
         match climb(asked, (way.clone(), *step), run, MANY)? {
-            Climbed::Found(found) => return Ok(found),
+            Climbed::Found(found) => return Ok(*found),
             Climbed::TooMany { attempts, step } => {
                 before = attempts;
                 even = even.map(|(way, _)| (way, step));
@@ -198,17 +245,17 @@ pub(crate) fn search(
 fn run_down(
     asked: &Asked,
     way: (Way<'_>, f64),
-    run: &mut Runner<'_>,
+    run: &mut dyn Runner,
 ) -> Result<Found, RunErrorKind> {
     match climb(asked, way, run, f64::INFINITY)? {
-        Climbed::Found(found) => Ok(found),
+        Climbed::Found(found) => Ok(*found),
         Climbed::TooMany { step, .. } => Err(RunErrorKind::Step { step }),
     }
 }
 
 /// What has come of runs with shorter and shorter steps.
 enum Climbed {
-    Found(Found),
+    Found(Box<Found>),
     /// Steps would be more than they were allowed to be.
     TooMany {
         attempts: Vec<Attempt>,
@@ -241,6 +288,20 @@ pub(crate) fn damping_element_for(accuracy: f64) -> Element {
     }
 }
 
+/// The way with equal steps that Newton's method makes, as long as may be.
+fn newton_way<'a>(asked: &Asked) -> Way<'a> {
+    let length = (asked.span.end - asked.span.start).abs();
+    Way {
+        element: (asked.element).unwrap_or_else(|| paired::element_for(asked.accuracy)),
+        tolerance: 1e-3 * asked.accuracy,
+        by_iteration: false,
+        step: asked.longest.map_or(length, |step| step.abs().min(length)),
+        cuts: &[],
+        grading: None,
+        keeps: false,
+    }
+}
+
 /// The way with a grading, and its factor.
 fn graded_way<'a>(asked: &'a Asked, graded: &'a Graded) -> (Way<'a>, f64) {
     let mut way = Way {
@@ -258,7 +319,7 @@ fn graded_way<'a>(asked: &'a Asked, graded: &'a Graded) -> (Way<'a>, f64) {
 }
 
 /// The way with equal steps, and a step by a probe at the start.
-fn even_way<'a>(asked: &'a Asked, run: &mut Runner<'_>) -> Result<(Way<'a>, f64), RunErrorKind> {
+fn even_way<'a>(asked: &'a Asked, run: &mut dyn Runner) -> Result<(Way<'a>, f64), RunErrorKind> {
     let element = asked.element.unwrap_or_else(|| element_for(asked.accuracy));
     let length = (asked.span.end - asked.span.start).abs();
     let longest = asked.longest.map_or(length, |step| step.abs().min(length));
@@ -304,7 +365,7 @@ fn even_way<'a>(asked: &'a Asked, run: &mut Runner<'_>) -> Result<(Way<'a>, f64)
 fn climb(
     asked: &Asked,
     (way, step): (Way<'_>, f64),
-    run: &mut Runner<'_>,
+    run: &mut dyn Runner,
     most_steps: f64,
 ) -> Result<Climbed, RunErrorKind> {
     let cuts = cuts(asked, way.grading, step);
@@ -330,7 +391,7 @@ fn climb(
             // Its error is so much larger than that of the run that it is compared with; and errors of iterations that grow with the motion show in the comparison.
             here.tolerance *= (COARSER.powf(element.order() as f64) / 3.0).max(1.0);
         }
-        match run(&here) {
+        match run.run(&here) {
             Ok(ran) => match ladder.climb(taken, ran) {
                 Verdict::Enough => match verify(&way, taken, &mut ladder, run) {
                     Some(wanted) => {
@@ -371,7 +432,7 @@ fn climb(
         extremes = way.extremes();
         attempt.step = extremes.1;
     }
-    Ok(Climbed::Found(Found {
+    Ok(Climbed::Found(Box::new(Found {
         is_met,
         picked: Picked {
             element,
@@ -386,15 +447,17 @@ fn climb(
             accuracy: asked.accuracy,
             error_estimate: largest(&errors),
             attempts,
+            // Whoever makes the runs counts.
+            work: Statistics::NONE,
         },
         times: cuts[1..].to_vec(),
         errors,
-    }))
+    })))
 }
 
 /// Compares the last run with one of the next higher order over the same steps, whose iterations end much later: that tells its error, whatever runs with other steps have told.
 /// Gives a shorter step where it is too large. Where steps do not contract an order may be reduced, of both elements alike: the estimate becomes no smaller then.
-fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut Runner<'_>) -> Option<f64> {
+fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut dyn Runner) -> Option<f64> {
     let (_, last) = ladder.last.as_ref()?;
     let (errors, is_met) = ladder.errors.as_mut()?;
     if !*is_met {
@@ -408,7 +471,7 @@ fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut Runner<'_>) 
         ..way.clone()
     };
     // Where that fails the estimate stays as it was.
-    let ran = run(&better).ok()?;
+    let ran = run.run(&better).ok()?;
     let seen = difference(&last.trace, &ran.trace);
     // What iterations leave shows in the comparison.
     let left = LEFT * ladder.accuracy;
@@ -454,8 +517,80 @@ fn largest(errors: &[Vec<f64>]) -> f64 {
 mod tests {
     use super::*;
 
+    /// Runs whose errors are known.
+    struct Law<F> {
+        error: F,
+        contracts: bool,
+        last: f64,
+    }
+
+    impl<F: Fn(&Way<'_>, f64) -> f64> Runner for Law<F> {
+        fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
+            let mut trace = Trace::new(1, 0);
+            let step = way.taken();
+            for t in &way.cuts[1..] {
+                let off = (self.error)(way, step) * (t - way.cuts[0]) / 10.0;
+                trace.pass(&[1.0 + off, 1.0], 0, true);
+                if way.keeps {
+                    self.last = off;
+                }
+            }
+            Ok(Ran {
+                trace,
+                contracts: self.contracts,
+            })
+        }
+
+        fn run_beside(
+            &mut self,
+            way: &Way<'_>,
+            better: &Way<'_>,
+            judge: &mut Judge<'_>,
+        ) -> Result<RanBeside, Failed> {
+            let mut traces = [Trace::new(1, 0), Trace::new(1, 0)];
+            let step = way.taken();
+            let (start, steps) = (way.cuts[0], (10.0 / step).round() as u32);
+            let mut times = Vec::new();
+            for k in 1..=steps {
+                let done = f64::from(k) / f64::from(steps);
+                let off = [way, better].map(|way| done * (self.error)(way, step));
+                for (trace, off) in traces.iter_mut().zip(off) {
+                    trace.pass(&[1.0 + off, 1.0], 0, true);
+                }
+                self.last = off[0];
+                times.push(start + 10.0 * done);
+                let goes_on = judge(&Beside {
+                    time: start + 10.0 * done,
+                    apart: &[(off[1] - off[0]).abs(), 0.0],
+                    sizes: &[1.0, 1.0],
+                });
+                if goes_on.is_break() {
+                    return Ok(RanBeside {
+                        traces,
+                        times,
+                        is_complete: false,
+                    });
+                }
+            }
+            Ok(RanBeside {
+                traces,
+                times,
+                is_complete: true,
+            })
+        }
+    }
+
     /// Runs that are off by what `error` says of element, step and tolerance, over ten units of time.
     fn found(
+        accuracy: f64,
+        contracts: bool,
+        error: impl Fn(&Way<'_>, f64) -> f64,
+    ) -> Result<(Found, f64), RunErrorKind> {
+        found_in(false, accuracy, contracts, error)
+    }
+
+    fn found_in(
+        in_pairs: bool,
         accuracy: f64,
         contracts: bool,
         error: impl Fn(&Way<'_>, f64) -> f64,
@@ -469,25 +604,15 @@ mod tests {
             may_iterate: true,
             solve: Solve::Auto,
             graded: None,
+            in_pairs,
         };
-        let mut last = 0.0;
-        let found = search(
-            &asked,
-            &mut |way| {
-                let mut trace = Trace::new(1, 0);
-                let step = way.taken();
-                for t in &way.cuts[1..] {
-                    let off = error(way, step) * (t - way.cuts[0]) / 10.0;
-                    trace.pass(&[1.0 + off, 1.0], 0, true);
-                    if way.keeps {
-                        last = off;
-                    }
-                }
-                Ok(Ran { trace, contracts })
-            },
-            None,
-        )?;
-        Ok((found, last))
+        let mut law = Law {
+            error,
+            contracts,
+            last: 0.0,
+        };
+        let found = search(&asked, &mut law, None)?;
+        Ok((found, law.last))
     }
 
     /// Errors h^p: the estimate is right, and the step no shorter than safety asks for.
@@ -509,6 +634,52 @@ mod tests {
             assert_eq!(found.times.last(), Some(&10.0));
             assert!(found.times.contains(&3.0));
         }
+    }
+
+    /// The same in pairs, from steps that are far too long and from such as are too short.
+    #[test]
+    fn pairs_find_the_step_of_a_power_law() {
+        for accuracy in [1e-2, 1e-4, 1e-6, 1e-9, 1e-12] {
+            for scale in [0.3, 1.0, 10.0] {
+                let law =
+                    |way: &Way<'_>, step: f64| (step / scale).powi(way.element.order() as i32);
+                let (found, error) = found_in(true, accuracy, false, law).expect("runs");
+                assert!(found.is_met && error <= accuracy, "{accuracy}: {error}");
+                let estimate = found.picked.error_estimate;
+                assert!(
+                    (estimate - error).abs() < 0.5 * error + 1e-15,
+                    "{estimate}, {error}"
+                );
+                let order = found.picked.element.order() as f64;
+                let longest = scale * accuracy.powf(1.0 / order);
+                assert!(
+                    found.picked.step > longest.min(1.25) / 1.8,
+                    "{accuracy} {scale}: {} {longest}",
+                    found.picked.step
+                );
+                assert!(
+                    found.picked.attempts.len() <= 6,
+                    "{:?}",
+                    found.picked.attempts
+                );
+                assert_eq!(found.times.last(), Some(&10.0));
+            }
+        }
+    }
+
+    /// What does not fall with the step is refused, after a run over the whole span; what falls with the tolerance is met.
+    #[test]
+    fn pairs_know_what_cannot_be_had() {
+        let noise = |way: &Way<'_>, step: f64| (1e5 * step + way.element.nodes() as f64).sin();
+        let (refused, _) =
+            found_in(true, 1e-12, false, |way, step| 1e-10 * noise(way, step)).expect("runs");
+        assert!(!refused.is_met && refused.picked.error_estimate >= 1e-12);
+        assert!(refused.picked.attempts.len() < 10);
+        let by_tolerance = |way: &Way<'_>, step: f64| 1e4 * way.tolerance * noise(way, step);
+        let (found, error) = found_in(true, 1e-6, false, by_tolerance).expect("runs");
+        assert!(found.is_met && error.abs() <= 1e-6, "{error}");
+        let outcome = found_in(true, 1e-6, false, |_, _| f64::NAN);
+        assert!(outcome.is_err());
     }
 
     /// Errors that fall with h² alone, whatever the element promises, where Newton's method makes the steps: the power is measured, and the error met.

@@ -1,18 +1,18 @@
 //! Runs with an estimate of their error: what models of both kinds of length have in common.
 
-mod beside;
 mod family;
 mod fixed;
+mod pilots;
 
 use super::mesh::Mesh;
 use super::progress::Bar;
 use crate::accuracy::{
-    Asked, Course, Estimated, Failed, Found, Graded, Grading, Pilot, Ran, Trace, Way,
-    damping_element_for, difference, element_for, explore, factor_for, search,
+    Asked, Beside, Course, Estimated, Failed, Found, Graded, Grading, Judge, Pilot, Ran, RanBeside,
+    Runner, Trace, Way, damping_element_for, difference, element_for, explore, factor_for, search,
 };
 use crate::error::RunErrorKind;
 use crate::numbers::larger;
-use beside::Beside;
+use std::ops::ControlFlow;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Facts, Solve, Statistics, StepError};
 
@@ -61,6 +61,8 @@ pub(super) trait Repeatable<const N: usize> {
     }
     fn set_tolerance(stepper: &mut Self::Stepper, tolerance: f64);
     fn statistics(stepper: &Self::Stepper) -> Statistics;
+    /// The same since the last call.
+    fn take_statistics(stepper: &mut Self::Stepper) -> Statistics;
     /// Coordinates, momenta and outputs, one after the other.
     fn row(&self, stepper: &mut Self::Stepper, t: f64, state: &Self::State, row: &mut [f64]);
     /// The steps of a mesh as motion; every end of an element is shown to `passed`.
@@ -85,8 +87,8 @@ pub(super) trait Repeatable<const N: usize> {
     fn nodes(&self) -> Option<&[f64]>;
 }
 
-/// Is shown the end of every element: the stepper, the time, the state, and how many events have changed the motion so far.
-pub(super) type Passing<'a, T, S> = dyn FnMut(&mut T, f64, &S, usize) + 'a;
+/// Is shown the end of every element: the stepper, the time, the state, and how many events have changed the motion so far. Says whether the run goes on.
+pub(super) type Passing<'a, T, S> = dyn FnMut(&mut T, f64, &S, usize) -> ControlFlow<()> + 'a;
 
 /// Why a recorded run has stopped, and what there is of it.
 pub(super) type Broken<T> = Box<(RunErrorKind, T)>;
@@ -168,6 +170,7 @@ fn follow<R: Repeatable<N>, const N: usize>(
             &mut |stepper, t, state, acts| {
                 let keeps = times.next_if_eq(&&t).is_some();
                 watcher.pass(run, stepper, (t, state), acts, keeps);
+                ControlFlow::Continue(())
             },
         );
         return match passed {
@@ -209,6 +212,7 @@ fn estimated<R: Repeatable<N>, const N: usize>(
         &mut |stepper, t, state, acts| {
             times.push(t);
             watcher.pass(run, stepper, (t, state), acts, true);
+            ControlFlow::Continue(())
         },
     )?;
     let other = || {
@@ -244,6 +248,7 @@ fn accurate<R: Repeatable<N>, const N: usize>(
 ) -> Result<Estimated<R::Motion>, Broken<R::Motion>> {
     let t0 = asked.span.start;
     let mut kept = Kept::Nothing;
+    let mut work = Statistics::NONE;
     let outcome = match (steps, run.nodes()) {
         (_, Some(nodes)) => {
             let element = asked.element.unwrap_or_else(|| element_for(asked.accuracy));
@@ -251,12 +256,15 @@ fn accurate<R: Repeatable<N>, const N: usize>(
                 graded: graded_by(nodes, element),
                 ..asked.clone()
             };
-            find(run, start, &given, None, &mut kept)
+            find(run, start, &given, None, (&mut kept, &mut work))
         }
-        (Steps::Equal, None) => find(run, start, asked, None, &mut kept),
+        (Steps::Equal, None) => find(run, start, asked, None, (&mut kept, &mut work)),
         (Steps::Varying { damps }, None) => {
-            let mut pilot = |first| graded(run, start, asked, damps, first);
-            find(run, start, asked, Some(&mut pilot), &mut kept)
+            let mut explored = Statistics::NONE;
+            let mut pilot = |first| graded(run, start, asked, damps, first, &mut explored);
+            let found = find(run, start, asked, Some(&mut pilot), (&mut kept, &mut work));
+            work.merge(&explored);
+            found
         }
     };
     let motion = match kept {
@@ -265,7 +273,10 @@ fn accurate<R: Repeatable<N>, const N: usize>(
         Kept::Part(t, state) => run.part((t0, start), (t, &state)),
     };
     let found = match outcome {
-        Ok(found) => found,
+        Ok(mut found) => {
+            found.picked.work = work;
+            found
+        }
         Err(kind) => return Err(Box::new((kind, motion))),
     };
     let (times, errors) = (found.times, found.errors);
@@ -286,72 +297,199 @@ fn find<R: Repeatable<N>, const N: usize>(
     start: &R::State,
     asked: &Asked,
     pilot: Option<&mut Pilot<'_>>,
-    kept: &mut Kept<R::Motion, R::State>,
+    (kept, work): (&mut Kept<R::Motion, R::State>, &mut Statistics),
 ) -> Result<Found, RunErrorKind> {
-    let t0 = asked.span.start;
-    let mut last: Option<(bool, Element, R::Stepper)> = None;
-    let mut place = Place::default();
-    let mut make = |way: &Way<'_>| {
-        let mesh = match way.grading {
-            Some(grading) => run.through(&way.nodes(grading))?,
-            None => run.even(way.cuts, way.step)?,
-        };
-        let is_known = matches!(&last, Some((by_iteration, element, _))
-            if (*by_iteration, *element) == (way.by_iteration, way.element));
-        if !is_known {
-            let mut control = run.control();
-            if way.by_iteration {
-                control.solve = Solve::FixedPoint;
-                control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
-            }
-            let stepper = run.stepper(way.element, control, true)?;
-            last = Some((way.by_iteration, way.element, stepper));
-        }
-        let Some((.., stepper)) = &mut last else {
-            return Err(RunErrorKind::Step { step: way.step }.into());
-        };
-        R::set_tolerance(stepper, way.tolerance);
-        let before = R::statistics(stepper);
-        let times = &way.cuts[1..];
-        let trace = if way.keeps {
-            let mut watcher = Watcher::new(run, stepper, (t0, start));
-            let mut times = times.iter().peekable();
-            let motion = run.record(
-                stepper,
-                &mesh,
-                (t0, start),
-                &mut |stepper, t, state, acts| {
-                    let keeps = times.next_if_eq(&&t).is_some();
-                    watcher.pass(run, stepper, (t, state), acts, keeps);
-                },
-            );
-            let motion = motion.map_err(|broken| {
-                let (kind, part) = *broken;
-                if !matches!(kept, Kept::Motion(_)) {
-                    *kept = Kept::Motion(part);
-                }
-                kind
-            })?;
-            *kept = Kept::Motion(motion);
-            watcher.trace
-        } else {
-            follow(run, stepper, (t0, start), &mesh, times).map_err(|(kind, t, state)| {
-                let mut failed = Failed::from(kind);
-                if !run.has_events() && place.is_met_again(t0, &failed.kind) {
-                    failed.is_final |= !is_passed(run, way, &mesh, (&failed.kind, &state));
-                }
-                kept.keep_part(t0, t, state);
-                failed
-            })?
-        };
-        let after = R::statistics(stepper);
-        Ok(Ran {
-            trace,
-            contracts: after.newton_iterations == before.newton_iterations
-                && after.products == before.products,
-        })
+    let mut runs = Runs {
+        run,
+        start: (asked.span.start, start),
+        steppers: Vec::new(),
+        place: Place::default(),
+        kept,
+        work,
     };
-    search(asked, &mut make, pilot)
+    search(asked, &mut runs, pilot)
+}
+
+/// Makes the runs of a search.
+struct Runs<'a, R: Repeatable<N>, const N: usize> {
+    run: &'a R,
+    start: (f64, &'a R::State),
+    /// The last ones.
+    steppers: Vec<Reusable<R::Stepper>>,
+    place: Place,
+    kept: &'a mut Kept<R::Motion, R::State>,
+    work: &'a mut Statistics,
+}
+
+/// A stepper, and what it is for.
+struct Reusable<T> {
+    by_iteration: bool,
+    element: Element,
+    stepper: T,
+}
+
+impl<R: Repeatable<N>, const N: usize> Runs<'_, R, N> {
+    /// How many steppers are kept: of two elements.
+    const MOST_STEPPERS: usize = 2;
+
+    /// Takes the stepper for a way from those that are kept, or makes one.
+    fn take_stepper(&mut self, way: &Way<'_>) -> Result<Reusable<R::Stepper>, RunErrorKind> {
+        let is_known = |one: &Reusable<R::Stepper>| {
+            (one.by_iteration, one.element) == (way.by_iteration, way.element)
+        };
+        if let Some(known) = self.steppers.iter().position(is_known) {
+            return Ok(self.steppers.remove(known));
+        }
+        let mut control = self.run.control();
+        if way.by_iteration {
+            control.solve = Solve::FixedPoint;
+            control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
+        }
+        Ok(Reusable {
+            by_iteration: way.by_iteration,
+            element: way.element,
+            stepper: self.run.stepper(way.element, control, true)?,
+        })
+    }
+
+    /// Counts what a stepper has done, and keeps it for the next run. What it has done in this one is returned.
+    fn keep_stepper(&mut self, mut reusable: Reusable<R::Stepper>) -> Statistics {
+        let taken = R::take_statistics(&mut reusable.stepper);
+        self.work.merge(&taken);
+        self.steppers.insert(0, reusable);
+        self.steppers.truncate(Self::MOST_STEPPERS);
+        taken
+    }
+
+    fn mesh(&self, way: &Way<'_>) -> Result<Mesh<N>, RunErrorKind> {
+        match way.grading {
+            Some(grading) => self.run.through(&way.nodes(grading)),
+            None => self.run.even(way.cuts, way.step),
+        }
+    }
+
+    /// A run that may be the motion that is asked for.
+    fn record(
+        &mut self,
+        stepper: &mut R::Stepper,
+        mesh: &Mesh<N>,
+        passed: &mut Passing<'_, R::Stepper, R::State>,
+    ) -> Result<(), Failed> {
+        match self.run.record(stepper, mesh, self.start, passed) {
+            Ok(motion) => {
+                *self.kept = Kept::Motion(motion);
+                Ok(())
+            }
+            Err(broken) => {
+                let (kind, part) = *broken;
+                if !matches!(self.kept, Kept::Motion(_)) {
+                    *self.kept = Kept::Motion(part);
+                }
+                Err(Failed::from(kind))
+            }
+        }
+    }
+
+    fn trace(
+        &mut self,
+        stepper: &mut R::Stepper,
+        way: &Way<'_>,
+        mesh: &Mesh<N>,
+    ) -> Result<Trace, Failed> {
+        let (run, times) = (self.run, &way.cuts[1..]);
+        if way.keeps {
+            let mut watcher = Watcher::new(run, stepper, self.start);
+            let mut times = times.iter().peekable();
+            self.record(stepper, mesh, &mut |stepper, t, state, acts| {
+                let keeps = times.next_if_eq(&&t).is_some();
+                watcher.pass(run, stepper, (t, state), acts, keeps);
+                ControlFlow::Continue(())
+            })?;
+            return Ok(watcher.trace);
+        }
+        follow(run, stepper, self.start, mesh, times).map_err(|(kind, t, state)| {
+            let mut failed = Failed::from(kind);
+            if !run.has_events() && self.place.is_met_again(self.start.0, &failed.kind) {
+                failed.is_final |= !is_passed(run, way, mesh, (&failed.kind, &state));
+            }
+            self.kept.keep_part(self.start.0, t, state);
+            failed
+        })
+    }
+}
+
+impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
+    fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
+        let mesh = self.mesh(way)?;
+        let mut reusable = self.take_stepper(way)?;
+        R::set_tolerance(&mut reusable.stepper, way.tolerance);
+        let trace = self.trace(&mut reusable.stepper, way, &mesh);
+        let taken = self.keep_stepper(reusable);
+        Ok(Ran {
+            trace: trace?,
+            contracts: taken.newton_iterations == 0 && taken.products == 0,
+        })
+    }
+
+    fn run_beside(
+        &mut self,
+        way: &Way<'_>,
+        better: &Way<'_>,
+        judge: &mut Judge<'_>,
+    ) -> Result<RanBeside, Failed> {
+        let (run, (t0, start)) = (self.run, self.start);
+        let mesh = self.mesh(way)?;
+        let (mut first, mut second) = (self.take_stepper(way)?, self.take_stepper(better)?);
+        R::set_tolerance(&mut first.stepper, way.tolerance);
+        R::set_tolerance(&mut second.stepper, better.tolerance);
+        let mut watchers = [
+            Watcher::new(run, &mut first.stepper, self.start),
+            Watcher::new(run, &mut second.stepper, self.start),
+        ];
+        let mut elements = mesh.elements().enumerate();
+        let mut state = start.clone();
+        let mut times = Vec::new();
+        let mut failure = None;
+        let mut goes_on = ControlFlow::Continue(());
+        let (mut apart, mut sizes) = (Vec::new(), Vec::new());
+        let passed = self.record(&mut first.stepper, &mesh, &mut |stepper, t, end, acts| {
+            let [one, other] = &mut watchers;
+            // The other one makes the same step.
+            let Some((element, (from, next, h))) = elements.next() else {
+                return ControlFlow::Continue(());
+            };
+            let step = run.advance(&mut second.stepper, (from, next, h), &mesh, &mut state);
+            if let Err(source) = step {
+                failure = Some(run.failed(element, (from, h), source));
+                return ControlFlow::Break(());
+            }
+            times.push(t);
+            one.pass(run, stepper, (t, end), acts, true);
+            other.pass(run, &mut second.stepper, (t, &state), acts, true);
+            other.trace.apart(&one.row, &other.row, &mut apart);
+            other.trace.sizes_with(&one.row, &mut sizes);
+            goes_on = judge(&Beside {
+                time: t,
+                apart: &apart,
+                sizes: &sizes,
+            });
+            goes_on
+        });
+        self.keep_stepper(second);
+        self.keep_stepper(first);
+        let failed = passed.err().or(failure.map(Failed::from));
+        if let Some(mut failed) = failed {
+            if self.place.is_met_again(t0, &failed.kind) {
+                failed.is_final |= !is_passed(run, way, &mesh, (&failed.kind, &state));
+            }
+            return Err(failed);
+        }
+        Ok(RanBeside {
+            traces: watchers.map(|watcher| watcher.trace),
+            times,
+            is_complete: goes_on.is_continue(),
+        })
+    }
 }
 
 /// Where runs with shorter and shorter steps stop.
@@ -444,6 +582,7 @@ fn graded<R: Repeatable<N>, const N: usize>(
     asked: &Asked,
     damps: bool,
     first: f64,
+    work: &mut Statistics,
 ) -> Option<Graded> {
     /// The part of steps that Newton's method may have made.
     const FEW: f64 = 0.1;
@@ -464,8 +603,10 @@ fn graded<R: Repeatable<N>, const N: usize>(
         first,
         local: LOCAL,
     };
-    let mut pair = Beside::new(run, element, &course, start).ok()?;
-    let grading = explore(&course, &mut pair)?;
+    let mut pair = pilots::Pilots::new(run, element, &course, start).ok()?;
+    let grading = explore(&course, &mut pair);
+    *work = pair.work();
+    let grading = grading?;
     let element = if asked.element.is_none() && pair.by_newton() < FEW {
         smooth
     } else {

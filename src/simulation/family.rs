@@ -10,7 +10,7 @@ use crate::motion::family::{FamilyMotion, FamilyNode};
 use crate::motion::{FamilyCheckpoint, Reached};
 use std::error::Error;
 use std::fmt;
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use tfe_runtime::family::{FamilyError, FamilyModel, FamilyState, FamilyStepper, FamilySuspended};
 use tfe_runtime::length::{FixedLength, RunTimeLength};
 use tfe_runtime::step::Control;
@@ -212,7 +212,9 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         (mesh, done, origin): (&Mesh<0>, usize, f64),
         mut stepper: FamilyStepper<'m, M>,
     ) -> Result<FamilyMotion, FamilyRunError> {
-        let motion = self.drive_from(start, (mesh, done), &mut stepper, &mut |_, _, _, _| {});
+        let motion = self.drive_from(start, (mesh, done), &mut stepper, &mut |_, _, _, _| {
+            ControlFlow::Continue(())
+        });
         let mut motion = motion.map_err(|broken| FamilyRunError::new(broken.0, broken.1))?;
         let last = motion.last();
         let checkpoint = FamilyCheckpoint {
@@ -287,11 +289,14 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             if self.record_every == 1 {
                 motion.keep_element(stepper.dense(t, next));
             }
-            passed(stepper, next, &state, 0);
+            let goes_on = passed(stepper, next, &state, 0);
             let last = element + 1 == mesh.steps();
             if last || (element + 1) % self.record_every == 0 {
                 motion.record(self.model, next, &state, stepper.velocity(next, &state));
                 watch.pass(recorded::<M>(&motion, true));
+            }
+            if goes_on.is_break() {
+                break;
             }
             bar.advance();
         }

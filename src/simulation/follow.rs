@@ -3,6 +3,7 @@
 use super::events::Severed;
 use crate::error::RunErrorKind;
 use crate::motion::Node;
+use std::ops::ControlFlow;
 use tfe_runtime::step::Stepper;
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Model, Share, State};
@@ -40,8 +41,15 @@ pub(super) trait Follow<'m, M: Model<N>, const N: usize> {
         Ok(())
     }
 
-    /// The end of an element of the grid, in whatever pieces.
-    fn reached(&mut self, _stepper: &mut Stepper<'m, M, N>, _t: f64, _state: &State<N>) {}
+    /// The end of an element of the grid, in whatever pieces; whether the run goes on.
+    fn reached(
+        &mut self,
+        _stepper: &mut Stepper<'m, M, N>,
+        _t: f64,
+        _state: &State<N>,
+    ) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
 
     /// A node that is recorded.
     fn recorded(&mut self, _node: &Node<N>) {}
@@ -89,8 +97,13 @@ where
         (**self).set(model)
     }
 
-    fn reached(&mut self, stepper: &mut Stepper<'m, M, N>, t: f64, state: &State<N>) {
-        (**self).reached(stepper, t, state);
+    fn reached(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        t: f64,
+        state: &State<N>,
+    ) -> ControlFlow<()> {
+        (**self).reached(stepper, t, state)
     }
 
     fn recorded(&mut self, node: &Node<N>) {

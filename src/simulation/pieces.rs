@@ -4,6 +4,7 @@ use super::check_restart;
 use super::events::{After, Changed, Cut, Events, Passage};
 use super::follow::{Follow, Passed};
 use crate::error::RunErrorKind;
+use std::ops::ControlFlow;
 use tfe_runtime::step::{DenseElement, Impulse, Stepper};
 use tfe_runtime::{Model, Share, State};
 
@@ -59,8 +60,15 @@ pub(super) trait Observe<'m, M: Model<N>, const N: usize>: Follow<'m, M, N> {
 pub(super) enum Left {
     /// At its end.
     Done,
-    /// At an event that ends the run.
+    /// At an event that ends the run, or at its end where a follower ends the run.
     Stopped,
+}
+
+fn left(goes_on: ControlFlow<()>) -> Left {
+    match goes_on {
+        ControlFlow::Continue(()) => Left::Done,
+        ControlFlow::Break(()) => Left::Stopped,
+    }
 }
 
 /// Why an element was not passed.
@@ -130,8 +138,7 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
                 piece: Some((from, length, before)),
             })?;
             let Some(cut) = cut else {
-                observer.reached(stepper, next, state);
-                return Ok(Left::Done);
+                return Ok(left(observer.reached(stepper, next, state)));
             };
             let Cut {
                 t: time,
@@ -159,8 +166,7 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
             observer.at_event(stepper, Side::After, time, &after);
             *state = after;
             if time == next {
-                observer.reached(stepper, next, state);
-                return Ok(Left::Done);
+                return Ok(left(observer.reached(stepper, next, state)));
             }
             length -= time - from;
             from = time;

@@ -8,6 +8,7 @@ use super::watch::{Recorded, Watch};
 use super::{Simulation, conserves_energy};
 use crate::error::RunErrorKind;
 use crate::motion::{Motion, Node};
+use std::ops::ControlFlow;
 use tfe_runtime::step::{DenseElement, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Model, Share, State};
@@ -146,8 +147,13 @@ where
         self.follower.set(model)
     }
 
-    fn reached(&mut self, stepper: &mut Stepper<'m, M, N>, t: f64, state: &State<N>) {
-        self.follower.reached(stepper, t, state);
+    fn reached(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        t: f64,
+        state: &State<N>,
+    ) -> ControlFlow<()> {
+        self.follower.reached(stepper, t, state)
     }
 
     fn recorded(&mut self, node: &Node<N>) {

@@ -1,12 +1,14 @@
 //! Steps down to the resolution of positions: an iteration that has reached the roundings of its constraints is done.
 
-use crate::common::distance;
+use crate::common::{distance, larger};
 use crate::models::{
     Andrews, Bead, BeadRates, KnifeEdge, MovingGround, MovingWire, ON_WIRE, QuaternionTop,
     RodPendulum, RodPendulumRates,
 };
 use crate::overconstrained::plate;
+use std::cell::Cell;
 use tfe::prelude::*;
+use tfe::runtime::Statistics;
 
 #[dynamics(
     coordinates(x, y),
@@ -184,11 +186,21 @@ fn errors_fall_until_they_are_roundings() {
     each(&Falls);
 }
 
-/// Steps that an accuracy takes beside the fewest equal ones, of the same element, that meet it.
+/// What all runs of an accuracy take, beside a run with the fewest equal steps of the same element from which on the accuracy is met: kernels evaluated. Three times in most cases; more
+/// where a pair of runs had to be given up shortly before its end.
 #[test]
-fn accuracies_take_few_steps() {
-    struct Steps;
-    impl Shown for Steps {
+fn accuracies_take_three_times_the_best_by_hand() {
+    /// A few steps are enough there, which no search knows.
+    const SHORT: [&str; 2] = ["top", "blade"];
+    /// Where a run that was nearly good enough is made again.
+    const MOST: f64 = 5.5;
+    struct Work {
+        /// Estimates within a factor of two, and all.
+        sharp: Cell<(u32, u32)>,
+        /// Runs with at most three times the least work.
+        good: Cell<u32>,
+    }
+    impl Shown for Work {
         fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
         where
             M: tfe::runtime::Model<N>
@@ -196,46 +208,84 @@ fn accuracies_take_few_steps() {
         {
             let simulation: Simulation<'_, M, N> = Simulation::new(model);
             let fine = simulation.clone().element(Mixed::<8>).step(span / 400.0);
-            let exact = *fine.run(start, 0.0..span).expect("a run").last();
+            let exact = fine.run(start, 0.0..span).expect("a run");
+            // At all nodes, over the largest number of its kind.
             let off = |motion: &Motion<N>| {
-                let last = motion.last();
-                let size =
-                    |numbers: &[f64; N]| numbers.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
-                let scale = size(&exact.q).max(size(&exact.p));
-                distance(&last.q, &exact.q).max(distance(&last.p, &exact.p)) / scale
-            };
-            for accuracy in [1e-3, 1e-6, 1e-9] {
-                let simulation = simulation.clone().element(Mixed::<5>);
-                let motion = simulation.clone().accuracy(accuracy).run(start, 0.0..span);
-                let motion = motion.unwrap_or_else(|error| panic!("{name}, {accuracy:e}: {error}"));
-                assert!(off(&motion) < accuracy, "{name}, {accuracy:e}");
-                let taken = motion.statistics().steps;
-                let meets = |count: u64| {
-                    let equal = simulation.clone().step(span / count as f64);
-                    let motion = equal.run(start, 0.0..span);
-                    motion.is_ok_and(|motion| off(&motion) < accuracy)
+                let largest = |part: fn(&tfe::Node<N>) -> [f64; N]| {
+                    let size = |numbers: [f64; N]| {
+                        numbers
+                            .iter()
+                            .fold(0.0, |size: f64, x| larger(size, x.abs()))
+                    };
+                    let nodes = motion.states().iter();
+                    let off = nodes.clone().map(|node| {
+                        let there = exact.at(node.t).expect("in the span");
+                        distance(&part(node), &part(&there))
+                    });
+                    off.fold(0.0, larger) / nodes.map(|node| size(part(node))).fold(0.0, larger)
                 };
+                larger(largest(|node| node.q), largest(|node| node.p))
+            };
+            let work = |statistics: &Statistics| {
+                statistics.residual_evaluations + statistics.tangent_evaluations
+            };
+            let mut worst = 0.0;
+            for accuracy in [1e-3, 1e-6, 1e-9] {
+                let what = format!("{name:14} {accuracy:e}");
+                let motion = simulation.clone().accuracy(accuracy).run(start, 0.0..span);
+                let motion = motion.unwrap_or_else(|error| panic!("{what}: {error}"));
+                let (error, estimate) = (off(motion.motion()), motion.error_estimate());
+                assert!(
+                    error < accuracy && estimate <= accuracy,
+                    "{what}: {error:e}, {estimate:e}"
+                );
+                assert!(error < 2.0 * estimate, "{what}: {error:e}, {estimate:e}");
+                let (sharp, all) = self.sharp.get();
+                self.sharp
+                    .set((sharp + u32::from(estimate < 2.0 * error), all + 1));
+                let picked = motion.picked().expect("picked");
+                let by_hand = simulation.clone().element(picked.element);
+                let by_hand = by_hand.tolerance(1e-3 * accuracy);
+                let made = |count: u64| {
+                    let run = by_hand.clone().step(span / count as f64);
+                    let motion = run.run(start, 0.0..span);
+                    motion.ok().filter(|motion| off(motion) < accuracy)
+                };
+                // Not by chance.
+                let meets = |count: u64| (count..count + 3).all(|count| made(count).is_some());
                 let (mut too_few, mut enough) = (0, 1);
                 while !meets(enough) {
                     (too_few, enough) = (enough, 2 * enough);
                 }
                 while enough - too_few > 1 {
-                    let middle = (too_few + enough) / 2;
+                    let middle = u64::midpoint(too_few, enough);
                     if meets(middle) {
                         enough = middle;
                     } else {
                         too_few = middle;
                     }
                 }
-                let ratio = taken as f64 / enough as f64;
-                println!("{name:14} {accuracy:e}: {taken} steps, {enough} by hand, {ratio:.1}");
-                // Of loose accuracies most is in the first pilot steps.
-                assert!(
-                    ratio < 8.0 || accuracy > 1e-5,
-                    "{name}, {accuracy:e}: {ratio}"
+                let least = work(made(enough).expect("it was made").statistics());
+                let ratio = work(&picked.work) as f64 / least as f64;
+                println!(
+                    "{what}: {} steps of {}, all runs {:.2} of {enough} steps; error {error:.1e}, estimate {estimate:.1e}",
+                    motion.statistics().steps,
+                    picked.element,
+                    ratio
                 );
+                worst = larger(worst, ratio);
+                self.good.set(self.good.get() + u32::from(ratio <= 3.0));
             }
+            assert!(worst <= MOST || SHORT.contains(&name), "{name}: {worst}");
         }
     }
-    each(&Steps);
+    let all = Work {
+        sharp: Cell::new((0, 0)),
+        good: Cell::new(0),
+    };
+    each(&all);
+    let (good, (sharp, all)) = (all.good.get(), all.sharp.get());
+    println!("{sharp} sharp estimates and {good} cheap runs of {all}");
+    assert!(2 * good >= all, "{good} of {all}");
+    assert!(10 * sharp >= 9 * all, "{sharp} of {all}");
 }

@@ -9,7 +9,7 @@ pub(super) fn probe(
     asked: &Asked,
     way: &mut Way<'_>,
     longest: f64,
-    run: &mut Runner<'_>,
+    run: &mut dyn Runner,
 ) -> Result<(f64, f64), RunErrorKind> {
     /// Halvings of the span: 2⁻⁶⁰ of it is nothing.
     const MOST: u32 = 60;
@@ -34,7 +34,7 @@ pub(super) fn probe(
         let h = way.step;
         let cuts = [span.start, span.start + direction * h];
         let mut over = |step: f64| {
-            run(&Way {
+            run.run(&Way {
                 step,
                 cuts: &cuts,
                 ..way.clone()

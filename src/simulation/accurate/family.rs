@@ -96,6 +96,7 @@ impl<M: FamilyModel> Accurate<FamilySimulation<'_, M>> {
                 && const { M::FACTS.separable && !M::CONSTRAINED },
             solve: run.control.solve,
             graded: None,
+            in_pairs: M::CONSTRAINED,
         };
         let steps = Steps::of(&M::FACTS, self.equal_steps, M::CONSTRAINED);
         accurate(run, &start, &asked, steps)
@@ -159,6 +160,10 @@ impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
 
     fn statistics(stepper: &FamilyStepper<'m, M>) -> Statistics {
         *stepper.statistics()
+    }
+
+    fn take_statistics(stepper: &mut FamilyStepper<'m, M>) -> Statistics {
+        stepper.take_statistics()
     }
 
     fn row(

@@ -10,7 +10,7 @@ use super::{
 use crate::accuracy::{Asked, Estimated};
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{
@@ -136,6 +136,7 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
                 && const { !M::FACTS.linear && M::CONSTRAINTS.is_empty() },
             solve: run.control.solve,
             graded: None,
+            in_pairs: const { !M::CONSTRAINTS.is_empty() } && !run.has_events(),
         };
         let mut facts = M::FACTS;
         // Equations of first order, written as p·f(q), conserve nothing that short and long steps could spoil.
@@ -245,6 +246,10 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         *stepper.statistics()
     }
 
+    fn take_statistics(stepper: &mut Stepper<'m, M, N>) -> Statistics {
+        stepper.take_statistics()
+    }
+
     fn row(&self, _: &mut Stepper<'m, M, N>, t: f64, state: &State<N>, row: &mut [f64]) {
         row[..N].copy_from_slice(&state.q);
         row[N..2 * N].copy_from_slice(&state.p);
@@ -272,16 +277,20 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
             passed,
             acts: 0,
             last: t,
+            goes_on: ControlFlow::Continue(()),
         };
         let motion = self
             .drive_over(*start, t, mesh, stepper, &mut compared)
             .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))?;
         // A run that an event has stopped stays where it is.
         let (acts, last) = (compared.acts, compared.last);
+        if compared.goes_on.is_break() {
+            return Ok(motion);
+        }
         let rest = mesh.elements().map(|(_, next, _)| next);
         let ahead = rest.filter(|next| (next - last) * (next - t).signum() > 0.0);
         for next in ahead {
-            passed(stepper, next, &motion.last().state(), acts);
+            let _ = passed(stepper, next, &motion.last().state(), acts);
         }
         Ok(motion)
     }
@@ -317,6 +326,7 @@ struct Compared<'a, 'p, 'm, M, const N: usize> {
     /// Events that have cut elements.
     acts: usize,
     last: f64,
+    goes_on: ControlFlow<()>,
 }
 
 impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Compared<'_, '_, 'm, M, N> {
@@ -333,8 +343,14 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Compared<'_, '_, 'm, 
         Ok(())
     }
 
-    fn reached(&mut self, stepper: &mut Stepper<'m, M, N>, t: f64, state: &State<N>) {
+    fn reached(
+        &mut self,
+        stepper: &mut Stepper<'m, M, N>,
+        t: f64,
+        state: &State<N>,
+    ) -> ControlFlow<()> {
         self.last = t;
-        (self.passed)(stepper, t, state, self.acts);
+        self.goes_on = (self.passed)(stepper, t, state, self.acts);
+        self.goes_on
     }
 }

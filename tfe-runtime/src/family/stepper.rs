@@ -262,6 +262,11 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
             Way::Rates(rates) => &rates.statistics,
         }
     }
+
+    /// The same since the last call.
+    pub fn take_statistics(&mut self) -> Statistics {
+        core::mem::take(self.statistics_mut())
+    }
 }
 
 impl<M: FamilyModel> Halving for FamilyStepper<'_, M> {

@@ -10,7 +10,7 @@ use tfe_runtime::{Element, Statistics, StepError};
 const TOLERANCE: f64 = 1e-3;
 
 /// An element and one of the next order, both from the state that the latter has reached: it goes on from where its own last step has ended.
-pub(super) struct Beside<'r, R: Repeatable<N>, const N: usize> {
+pub(super) struct Pilots<'r, R: Repeatable<N>, const N: usize> {
     run: &'r R,
     /// The one whose errors are asked for, and the one of higher order.
     steppers: [R::Stepper; 2],
@@ -31,7 +31,7 @@ pub(super) struct Beside<'r, R: Repeatable<N>, const N: usize> {
     slides: bool,
 }
 
-impl<'r, R: Repeatable<N>, const N: usize> Beside<'r, R, N> {
+impl<'r, R: Repeatable<N>, const N: usize> Pilots<'r, R, N> {
     pub(super) fn new(
         run: &'r R,
         element: Element,
@@ -72,13 +72,20 @@ impl<'r, R: Repeatable<N>, const N: usize> Beside<'r, R, N> {
         Ok(pair)
     }
 
+    /// What both have cost.
+    pub(super) fn work(&self) -> Statistics {
+        let [mut work, other] = self.steppers.each_ref().map(R::statistics);
+        work.merge(&other);
+        work
+    }
+
     /// The part of steps that were made by Newton's method.
     pub(super) fn by_newton(&self) -> f64 {
         self.kept.0 as f64 / self.kept.1.max(1) as f64
     }
 }
 
-impl<R: Repeatable<N>, const N: usize> Pair for Beside<'_, R, N> {
+impl<R: Repeatable<N>, const N: usize> Pair for Pilots<'_, R, N> {
     fn attempt(&mut self, t: f64, h: f64) -> bool {
         let reached = t + h;
         let is_reached = |time: &&f64| (*time - reached).abs() <= 4.0 * f64::EPSILON * time.abs();
