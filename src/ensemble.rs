@@ -68,6 +68,7 @@ pub struct Ensemble<'m, M, const N: usize, K = OneModel<'m, M>> {
     step: Option<f64>,
     control: Control,
     breaks: Vec<f64>,
+    at_kinks: bool,
     progress: bool,
     events: Watching<'m, M, N>,
     of: PhantomData<&'m M>,
@@ -177,6 +178,7 @@ where
             step: None,
             control: Control::default(),
             breaks: Vec::new(),
+            at_kinks: false,
             progress: false,
         }
     }
@@ -222,6 +224,39 @@ where
     pub fn break_at(mut self, time: f64) -> Self {
         self.breaks.push(time);
         self
+    }
+
+    /// Whether steps are cut where a force has a kink or a jump, as by [`Simulation::at_kinks`](crate::Simulation::at_kinks). Runs of models with kinks are made one by one then, on all
+    /// processors; a motion that would slide along a jump is the failure of its run.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// /// A mass that falls onto a spring.
+    /// #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y - k/2*min(y, 0)^2)]
+    /// struct Landing { g: f64, k: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let landing = Landing { g: 10.0, k: 1e4 };
+    /// let starts: Vec<_> = (1..=20).map(|k| landing.state([0.01 * f64::from(k)], [0.0])).collect();
+    /// let ends = Ensemble::new(&landing).element(Mixed::<6>).step(0.02).at_kinks(true).run(&starts, 0.0..1.0)?;
+    /// assert!(ends.statistics().kinks > 20);
+    /// for (start, end) in starts.iter().zip(ends.nodes()) {
+    ///     let energy = end.p[0] * end.p[0] / 2.0 + 10.0 * end.q[0] + 5e3 * end.q[0].min(0.0).powi(2);
+    ///     assert!((energy - 10.0 * start.q[0]).abs() < 1e-11);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn at_kinks(mut self, are_cut: bool) -> Self {
+        self.at_kinks = are_cut;
+        self
+    }
+
+    /// Whether runs are made one by one, since events or kinks cut their elements.
+    fn is_watched(&self) -> bool {
+        !self.events.is_empty() || (self.at_kinks && const { !M::FACTS.smooth })
     }
 
     /// Shows the progress on standard error, once a second.
@@ -308,7 +343,7 @@ where
         if count == 0 {
             return Ok(Statistics::default());
         }
-        let statistics = if !self.events.is_empty() {
+        let statistics = if self.is_watched() {
             summed(
                 count,
                 || (),

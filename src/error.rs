@@ -162,6 +162,11 @@ pub enum RunErrorKind {
         /// What was called.
         call: &'static str,
     },
+    /// Steps were to be cut at kinks by something that cannot.
+    KinksUnsupported {
+        /// What was called.
+        call: &'static str,
+    },
     /// An element could not be solved.
     Solve {
         /// The number of the element, from 0.
@@ -349,6 +354,10 @@ impl fmt::Display for RunErrorKind {
             Self::EventsUnsupported { call } => write!(
                 f,
                 "`{call}` does not look for events; runs from start to end do"
+            ),
+            Self::KinksUnsupported { call } => write!(
+                f,
+                "`{call}` does not cut steps at kinks; runs of models of fixed size from start to end do"
             ),
             Self::NodeOrder { node, time } => {
                 write!(

@@ -233,7 +233,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// [`Statistics::kinks`](crate::Statistics::kinks) counts the crossings. A motion that would slide along a jump is an error, [`StepError::Slides`](crate::runtime::StepError::Slides).
     ///
     /// [`run`](Self::run), [`steps`](Self::steps) and [`run_estimated`](Self::run_estimated) do so only if asked, runs with an [`accuracy`](Self::accuracy) unless forbidden;
-    /// [`run_linearised`](Self::run_linearised) never does.
+    /// [`run_linearised`](Self::run_linearised) refuses to, as [`RunErrorKind::KinksUnsupported`].
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -4,10 +4,10 @@
 mod largest;
 
 use largest::larger;
-use tfe::RunErrorKind;
 use tfe::prelude::*;
 use tfe::runtime::length::{Declared, FixedLength};
 use tfe::runtime::{Model, StepError};
+use tfe::{RunErrorKind, Warning};
 
 /// Bounces on a spring.
 #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y - k/2*min(y, 0)^2)]
@@ -437,4 +437,91 @@ fn smooth_models_are_not_touched() {
     let asked = run.at_kinks(true).run(start, 0.0..10.0).expect("a run");
     assert_eq!(plain.states(), asked.states());
     assert_eq!(plain.statistics(), asked.statistics());
+}
+
+/// Runs of an ensemble are those of a simulation, to the bit.
+#[test]
+fn ensembles_are_cut_at_kinks() {
+    let starts: Vec<_> = (1..=20)
+        .map(|k| BOUNCE.state([0.02 * f64::from(k)], [0.0]))
+        .collect();
+    let ensemble = Ensemble::new(&BOUNCE).element(Mixed::<5>).step(0.02);
+    let cut = ensemble.clone().at_kinks(true);
+    let ends = cut.run(&starts, 0.0..1.0).expect("runs");
+    let simulation = Simulation::new(&BOUNCE).element(Mixed::<5>).step(0.02);
+    let mut kinks = 0;
+    for (start, end) in starts.iter().zip(ends.iter()) {
+        let run = simulation.clone().at_kinks(true).run(*start, 0.0..1.0);
+        let run = run.expect("a run");
+        assert_eq!(end.as_ref().map(|node| node.q), Ok(run.last().q));
+        kinks += run.statistics().kinks;
+    }
+    assert_eq!(ends.statistics().kinks, kinks);
+    assert!(kinks > 40, "{kinks}");
+    let across = ensemble.run(&starts, 0.0..1.0).expect("runs");
+    assert_eq!(across.statistics().kinks, 0);
+    // A motion that slides is the failure of its run.
+    let held = Coulomb {
+        c: 3.0,
+        a: 0.5,
+        w: 1.3,
+    };
+    let ends = Ensemble::new(&held).step(0.1).at_kinks(true);
+    let ends = ends.run(&[held.state([0.1], [0.5])], 0.0..6.0);
+    let ends = ends.expect("runs");
+    assert_eq!((ends.nodes().count(), ends.failures().count()), (0, 1));
+}
+
+/// What cannot be cut there says so.
+#[test]
+fn what_cannot_be_cut_at_kinks_is_refused() {
+    let ensemble = Ensemble::new(&BOUNCE).step(0.02).at_kinks(true);
+    let start = BOUNCE.state([0.1], [0.0]);
+    let Err(refused) = ensemble.begin(&[start], 0.0) else {
+        panic!("begun");
+    };
+    assert!(
+        refused.to_string().contains("`Ensemble::begin`"),
+        "{refused}"
+    );
+    let run = Simulation::new(&BOUNCE).step(0.02).at_kinks(true);
+    let refused = run.run_linearised(start, 0.0..1.0).expect_err("kinks");
+    let kind = refused.kind();
+    assert!(
+        matches!(kind, RunErrorKind::KinksUnsupported { .. }),
+        "{kind}"
+    );
+    // A smooth model has none.
+    let smooth = Simulation::new(&SMOOTHED).step(0.02).at_kinks(true);
+    let start = SMOOTHED.state([1.0], [0.0]);
+    smooth.run_linearised(start, 0.0..1.0).expect("a run");
+    let smooth = Ensemble::new(&SMOOTHED).step(0.02).at_kinks(true);
+    smooth.begin(&[start], 0.0).expect("no kinks");
+}
+
+/// Beads on a soft floor.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2 - k/2*min(q[i], 0)^2) - sum(i in 0..n-1, (q[i+1] - q[i])^2/2),
+)]
+struct Beads {
+    n: usize,
+    k: f64,
+}
+
+/// Models of run-time length go across kinks: they refuse an accuracy, which they would miss (4.5e-4 for 1e-4), and say so with an estimate.
+#[test]
+fn families_tell_that_they_cross_kinks() {
+    let beads = Beads { n: 2, k: 9.0 };
+    let start = beads.state(vec![1.0, -0.3], vec![-0.5, 0.2]);
+    let run = Simulation::new(&beads).accuracy(1e-4);
+    let refused = run.run(start.clone(), 0.0..10.0).expect_err("kinks");
+    let kind = refused.kind();
+    assert!(
+        matches!(kind, RunErrorKind::KinksUnsupported { .. }),
+        "{kind}"
+    );
+    let estimated = Simulation::new(&beads).step(0.1);
+    let estimated = estimated.run_estimated(start, 0.0..10.0).expect("a run");
+    assert!(estimated.warnings().contains(&Warning::KinksCrossed));
 }

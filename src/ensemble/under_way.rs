@@ -104,8 +104,8 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`EnsembleError`] where the element does not exist, the number of starts is not that of models, or [events](Ensemble::on) are to be looked for, which
-    /// [`run`](Ensemble::run) and [`for_each`](Ensemble::for_each) do. A bad start is a failure of its own run only.
+    /// [`EnsembleError`] where the element does not exist, the number of starts is not that of models, or [events](Ensemble::on) are to be looked for, or steps to be cut at
+    /// [kinks](Ensemble::at_kinks), which [`run`](Ensemble::run) and [`for_each`](Ensemble::for_each) do. A bad start is a failure of its own run only.
     pub fn begin(
         &self,
         starts: &[State<N>],
@@ -115,6 +115,10 @@ where
         if !self.events.is_empty() {
             let call = "Ensemble::begin";
             return Err(RunErrorKind::EventsUnsupported { call }.into());
+        }
+        if self.is_watched() {
+            let call = "Ensemble::begin";
+            return Err(RunErrorKind::KinksUnsupported { call }.into());
         }
         self.element.validate().map_err(RunErrorKind::Element)?;
         let batches = match self.width() {

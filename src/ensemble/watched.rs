@@ -1,4 +1,4 @@
-//! Ensembles whose runs look for events.
+//! Ensembles whose runs look for events, or are cut at kinks.
 
 use super::Ensemble;
 use super::members::Members;
@@ -50,7 +50,7 @@ impl<'m, M: Model<N> + Sync, const N: usize, K> Ensemble<'m, M, N, K>
 where
     K: Members<'m, M, N>,
 {
-    /// One run, with its events.
+    /// One run, with its events and kinks.
     pub(super) fn run_watched(
         &self,
         model: &'m M,
@@ -62,6 +62,7 @@ where
             .element(self.element)
             .step(step)
             .record_every(usize::MAX)
+            .at_kinks(self.at_kinks)
             .with_control(self.control);
         for time in &self.breaks {
             run = run.break_at(*time);

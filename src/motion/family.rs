@@ -173,6 +173,10 @@ impl FamilyMotion {
         self.warnings = warnings;
     }
 
+    pub(crate) fn add_warning(&mut self, warning: Warning) {
+        self.warnings.push(warning);
+    }
+
     /// The energy at the last node, and p·v there.
     pub(crate) fn last_energy(&self) -> (f64, f64) {
         let velocity = self.velocities.last();
@@ -261,7 +265,7 @@ impl FamilyMotion {
     }
 
     /// What is doubtful about the motion although the run came to its end, or to where it failed: energies that are not finite ([`Warning::EnergyNotFinite`]), or that jump although the
-    /// model conserves them ([`Warning::EnergyJump`]).
+    /// model conserves them ([`Warning::EnergyJump`]); in runs with an estimate of their error, that steps go across kinks ([`Warning::KinksCrossed`]).
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }

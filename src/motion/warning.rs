@@ -57,6 +57,11 @@ pub enum Warning {
         /// How many such jumps there are.
         count: usize,
     },
+    /// Forces of a model of run-time length have kinks or jumps, at which steps are not cut there: elements that cross one lose their order, and the estimate of the error
+    /// compares runs that cross it both.
+    ///
+    /// Told by runs with an estimate of their error.
+    KinksCrossed,
     /// An element and three of a third of its length (nine of a ninth where it was cut) end at different places, or the element after it when these are carried on: the step is too
     /// long to resolve the motion (`docs/theory.md`, (T-121)).
     ///
@@ -120,6 +125,9 @@ impl fmt::Display for Warning {
                 }
                 f.write_str(": take a shorter step, or look for a singular point of the model")
             }
+            Self::KinksCrossed => f.write_str(
+                "forces of the model have kinks or jumps, which steps go across: elements lose their order there, and errors fall more slowly than with smooth forces",
+            ),
             Self::Unresolved {
                 time,
                 step,

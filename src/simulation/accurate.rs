@@ -77,6 +77,8 @@ pub(super) trait Repeatable<const N: usize> {
     fn has_events(&self) -> bool {
         false
     }
+    /// Whether steps go across kinks or jumps of forces, so that errors need not fall with the order of the element.
+    fn crosses_kinks(&self) -> bool;
     /// A motion of the start and one other state.
     fn part(&self, start: (f64, &Self::State), end: (f64, &Self::State)) -> Self::Motion;
     /// A mesh of equal parts between times.
@@ -427,7 +429,9 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
         let taken = self.keep_stepper(reusable);
         Ok(Ran {
             trace: trace?,
-            contracts: taken.newton_iterations == 0 && taken.products == 0,
+            contracts: taken.newton_iterations == 0
+                && taken.products == 0
+                && !self.run.crosses_kinks(),
         })
     }
 

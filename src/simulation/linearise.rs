@@ -6,6 +6,7 @@ use super::follow::{Follow, Passed};
 use super::sensitive::Tangents;
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
+use crate::motion::Motion;
 use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
@@ -30,6 +31,12 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         start: State<N>,
         span: Range<f64>,
     ) -> Result<Linearised<N>, RunError<N>> {
+        if self.at_kinks == Some(true) && const { !M::FACTS.smooth } {
+            let call = "run_linearised";
+            let kind = RunErrorKind::KinksUnsupported { call };
+            let motion = Motion::from_start(&*self.model, span.start, &start);
+            return Err(RunError::new(kind, motion));
+        }
         let chosen = (self.chosen_element(), self.control);
         let mut matrices = Matrices {
             tangents: Tangents::new(self.model.clone(), chosen, &[]),

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::accuracy::{Asked, Estimated};
 use crate::error::RunErrorKind;
+use crate::motion::Warning;
 use crate::motion::family::FamilyMotion;
 use crate::simulation::mesh::Mesh;
 use std::ops::Range;
@@ -16,6 +17,8 @@ use tfe_runtime::{Element, Form, Solve, Statistics, StepError};
 impl<M: FamilyModel> FamilySimulation<'_, M> {
     /// Picks element and step so that the estimated error is at or below `accuracy`, as [`Simulation::accuracy`](crate::Simulation::accuracy) does: largest errors over
     /// all sites, each over the largest number of its kind.
+    ///
+    /// Where forces have kinks or jumps, steps would go across them, and no estimate would be certain: that is refused, [`RunErrorKind::KinksUnsupported`].
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -41,7 +44,7 @@ impl<M: FamilyModel> FamilySimulation<'_, M> {
     }
 
     /// Runs over the span as [`run`](Self::run) does, and estimates the error at every node by a second run with an element of higher order (T-98), as
-    /// [`Simulation::run_estimated`](crate::Simulation::run_estimated) does.
+    /// [`Simulation::run_estimated`](crate::Simulation::run_estimated) does. Where forces have kinks or jumps steps go across them, and the motion says so, [`Warning::KinksCrossed`].
     ///
     /// # Errors
     /// [`FamilyRunError`], as from [`run`](Self::run), of either run.
@@ -72,6 +75,10 @@ impl<M: FamilyModel> Accurate<FamilySimulation<'_, M>> {
         let run = &self.simulation;
         let refused = |kind| run.refused(kind, span.start, &start);
         check_accuracy(self.accuracy).map_err(refused)?;
+        if run.crosses_kinks() {
+            let call = "accuracy";
+            return Err(refused(RunErrorKind::KinksUnsupported { call }));
+        }
         run.stepper(span.start, &start).map_err(refused)?;
         run.mesh(&span).map_err(refused)?;
         if span.start == span.end {
@@ -199,7 +206,15 @@ impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
         start: (f64, &FamilyState),
         passed: &mut Passing<'_, FamilyStepper<'m, M>, FamilyState>,
     ) -> Result<FamilyMotion, Broken<FamilyMotion>> {
-        self.drive_over(start, mesh, stepper, passed)
+        let mut motion = self.drive_over(start, mesh, stepper, passed)?;
+        if self.crosses_kinks() {
+            motion.add_warning(Warning::KinksCrossed);
+        }
+        Ok(motion)
+    }
+
+    fn crosses_kinks(&self) -> bool {
+        const { !M::FACTS.smooth }
     }
 
     fn part(

@@ -136,7 +136,9 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
                 && const { !M::FACTS.linear && M::CONSTRAINTS.is_empty() },
             solve: run.control.solve,
             graded: None,
-            in_pairs: const { !M::CONSTRAINTS.is_empty() } && !run.has_events(),
+            in_pairs: const { !M::CONSTRAINTS.is_empty() }
+                && !run.has_events()
+                && !run.crosses_kinks(),
         };
         let mut facts = M::FACTS;
         // Equations of first order, written as p·f(q), conserve nothing that short and long steps could spoil.
@@ -293,6 +295,10 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
             let _ = passed(stepper, next, &motion.last().state(), acts);
         }
         Ok(motion)
+    }
+
+    fn crosses_kinks(&self) -> bool {
+        self.at_kinks != Some(true) && const { !M::FACTS.smooth }
     }
 
     fn has_events(&self) -> bool {
