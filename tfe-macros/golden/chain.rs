@@ -50,7 +50,7 @@ const _: () = {
         };
     }
     #[automatically_derived]
-    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
+    #[allow(unused, non_snake_case)]
     impl<const N: usize> __tfe::Model<N> for Chain<N> {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {

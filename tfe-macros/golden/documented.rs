@@ -31,7 +31,7 @@ struct Spring {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
+    #[allow(unused, non_snake_case)]
     impl __tfe::Model<1> for Spring {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -358,7 +358,7 @@ struct Rigid {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
+    #[allow(unused, non_snake_case)]
     impl __tfe::Model<1> for Rigid {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {

@@ -34,7 +34,7 @@ pub struct SpringPendulum {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
+    #[allow(unused, non_snake_case)]
     impl __tfe::Model<2> for SpringPendulum {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -368,7 +368,7 @@ pub struct Rod {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
+    #[allow(unused, non_snake_case)]
     impl __tfe::Model<1> for Rod {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {

@@ -24,7 +24,7 @@ struct HenonHeiles {
 const _: () = {
     use ::tfe::__private as __tfe;
     #[automatically_derived]
-    #[allow(unused_doc_comments, unused_variables, non_snake_case)]
+    #[allow(unused, non_snake_case)]
     impl __tfe::Model<2> for HenonHeiles {
         const FORM: __tfe::Form = __tfe::Form::Hamiltonian;
         const FACTS: __tfe::Facts = __tfe::Facts {

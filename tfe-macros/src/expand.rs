@@ -272,7 +272,7 @@ impl<'a> Kernels<'a> {
         let parts = (!parts.is_empty()).then(|| {
             quote! {
                 #[automatically_derived]
-                #[allow(unused_doc_comments, unused_variables, non_snake_case, clippy::too_many_arguments)]
+                #[allow(unused_variables, non_snake_case, clippy::too_many_arguments)]
                 impl #impl_generics #name #type_generics #where_clause {
                     #parts
                 }
@@ -375,7 +375,7 @@ impl<'a> Kernels<'a> {
                 let names = &self.declared.inputs;
                 let controlled = quote! {
                     #[automatically_derived]
-                    #[allow(unused_doc_comments, unused_variables, non_snake_case, clippy::too_many_arguments)]
+                    #[allow(unused, non_snake_case, clippy::too_many_arguments)]
                     impl #impl_generics __tfe::Controlled<#dof> for #name #type_generics #where_clause {
                         const INPUTS: &'static [&'static str] = &[#(#names),*];
 
@@ -393,7 +393,7 @@ impl<'a> Kernels<'a> {
                 #constant
 
                 #[automatically_derived]
-                #[allow(unused_doc_comments, unused_variables, non_snake_case)]
+                #[allow(unused, non_snake_case)]
                 impl #impl_generics __tfe::Model<#dof> for #name #type_generics #where_clause {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;
