@@ -4,188 +4,32 @@ mod cuts;
 mod ladder;
 mod paired;
 mod probe;
+mod runs;
 
-use super::estimated::{Attempt, Picked};
-use super::grading::Grading;
-use super::trace::{Trace, difference};
+use super::estimated::Picked;
+use super::trace::difference;
 use crate::error::RunErrorKind;
-use crate::numbers::larger;
 use cuts::cuts;
 use ladder::{Ladder, Verdict};
 use probe::probe;
-use std::ops::{ControlFlow, Range};
-use tfe_runtime::{Element, Solve, Statistics, StepError};
-
-/// What is asked of a run.
-#[derive(Clone, Debug)]
-pub(crate) struct Asked {
-    pub(crate) accuracy: f64,
-    pub(crate) span: Range<f64>,
-    /// Times at which elements have to end.
-    pub(crate) breaks: Vec<f64>,
-    /// The element, where it is not to be picked.
-    pub(crate) element: Option<Element>,
-    /// The longest step allowed.
-    pub(crate) longest: Option<f64>,
-    /// Whether there is a fixed-point iteration.
-    pub(crate) may_iterate: bool,
-    /// How elements are solved where it is not.
-    pub(crate) solve: Solve,
-    /// Where steps are to be long and where short; equal steps without it.
-    pub(crate) graded: Option<Graded>,
-    /// Whether every run goes beside one of the next order from its start: where Newton's method makes all steps, and no event changes the motion.
-    pub(crate) in_pairs: bool,
-}
-
-/// What a pilot run has found.
-#[derive(Clone, Debug)]
-pub(crate) struct Graded {
-    pub(crate) grading: Grading,
-    /// The element for it.
-    pub(crate) element: Element,
-    /// A factor that is near.
-    pub(crate) factor: f64,
-}
-
-/// One way to run.
-#[derive(Clone, Debug)]
-pub(crate) struct Way<'a> {
-    pub(crate) element: Element,
-    pub(crate) tolerance: f64,
-    /// Whether a step that does not contract counts as one that fails.
-    pub(crate) by_iteration: bool,
-    /// The longest step, positive; with a grading its factor.
-    pub(crate) step: f64,
-    /// Start, times of comparison, end; between two of them steps are equal, or equal parts of the grading.
-    pub(crate) cuts: &'a [f64],
-    pub(crate) grading: Option<&'a Grading>,
-    /// Whether it may be the motion that is asked for.
-    pub(crate) keeps: bool,
-}
-
-/// What has come of a run.
-#[derive(Clone, Debug)]
-pub(crate) struct Ran {
-    pub(crate) trace: Trace,
-    /// Whether a fixed-point iteration contracted in every step. Then steps are short beside all times of the model, and errors fall with the order of the element.
-    pub(crate) contracts: bool,
-}
-
-/// What looks where steps have to be short, given the first one that it tries; nothing where equal steps are as good.
-pub(crate) type Pilot<'r> = dyn FnMut(f64) -> Option<Graded> + 'r;
-
-/// What makes runs.
-pub(crate) trait Runner {
-    /// One run.
-    fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed>;
-    /// A run that may be the motion that is asked for, and beside it another one over the same steps, until `judge` has seen enough.
-    fn run_beside(
-        &mut self,
-        way: &Way<'_>,
-        better: &Way<'_>,
-        judge: &mut Judge<'_>,
-    ) -> Result<RanBeside, Failed>;
-}
-
-/// Is shown every node that two runs have reached; says whether they go on.
-pub(crate) type Judge<'j> = dyn FnMut(&Beside<'_>) -> ControlFlow<()> + 'j;
-
-/// Where two runs are.
-pub(crate) struct Beside<'a> {
-    pub(crate) time: f64,
-    /// How far they are apart, of each kind.
-    pub(crate) apart: &'a [f64],
-    /// The largest number of each kind so far.
-    pub(crate) sizes: &'a [f64],
-}
-
-/// What has come of two runs.
-#[derive(Clone, Debug)]
-pub(crate) struct RanBeside {
-    pub(crate) traces: [Trace; 2],
-    /// The nodes.
-    pub(crate) times: Vec<f64>,
-    /// Whether they have gone to their end.
-    pub(crate) is_complete: bool,
-}
-
-/// Why a run has stopped.
-#[derive(Clone, Debug)]
-pub(crate) struct Failed {
-    pub(crate) kind: RunErrorKind,
-    /// Whether steps of any length stop there.
-    pub(crate) is_final: bool,
-}
-
-impl From<RunErrorKind> for Failed {
-    fn from(kind: RunErrorKind) -> Self {
-        let is_final = slides(&kind);
-        Self { kind, is_final }
-    }
-}
-
-/// What a search has found.
-#[derive(Clone, Debug)]
-pub(crate) struct Found {
-    pub(crate) picked: Picked,
-    pub(crate) times: Vec<f64>,
-    /// Of each kind at each time.
-    pub(crate) errors: Vec<Vec<f64>>,
-    /// Whether the accuracy is met.
-    pub(crate) is_met: bool,
-}
+use runs::{
+    AIM, COARSER, Climbed, FIRST, ITERATION, LEAST_FACTOR, LEFT, LONGER, MOST_FACTOR, MOST_RUNS,
+    ROUGH, TIGHTEST, largest,
+};
+pub(crate) use runs::{
+    Asked, Beside, Failed, Found, Graded, Judge, Pilot, Ran, RanBeside, Runner, Way, next,
+};
+use tfe_runtime::{Element, Solve, Statistics};
 
 /// Above it a motion of these elements takes fewer operations with four points than with eight, below it the other way round; so it was on eight scenes
 /// from a pendulum to eighteen coordinates of planets (`docs/theory.md` §14.3).
 const FEW_POINTS: f64 = 1e-5;
-/// What errors of the iteration may be of what is asked, all steps together: what they leave has the same sign in step after step.
-const ITERATION: f64 = 0.1;
 /// What iterations may leave of that in the run that a motion is verified by.
 const VERIFIED: f64 = 1e-3;
-/// Iterations do not end earlier with less.
-const TIGHTEST: f64 = 1e-17;
-/// Above it roundings do not show, and what they take needs not be carried along.
-const ROUGH: f64 = 0.99e-11;
-/// A first step longer than the second one by this factor costs two thirds of it.
-const COARSER: f64 = 1.5;
-/// A comparison with a run of an error above this says nothing about one with shorter steps.
-const RESOLVED: f64 = 0.1;
-/// Steps have become a hundred times shorter then, and errors of each step less than a rounding: it is the motion that lets them grow.
-const MOST_UNRESOLVED: u32 = 5;
-/// Runs over the whole span.
-const MOST_RUNS: usize = 14;
-/// Steps between two times of comparison: so many that steps can be chosen finely.
-const STEPS_BETWEEN: f64 = 12.0;
-const MOST_TIMES: f64 = 64.0;
-/// How much shorter the next step may be, and has to be.
-const LEAST_FACTOR: f64 = 0.4;
-const MOST_FACTOR: f64 = 0.87;
 /// Equal steps up to this number cost less than to look where they may be longer.
 const MANY: f64 = 200.0;
-/// The first step that is tried is this part of the span.
-const FIRST: f64 = 8.0;
-/// Where steps will be more than this, another probe is cheap.
-const MANY_TO_PROBE: f64 = 24.0;
-/// An order is high above it.
-const HIGH: f64 = 10.0;
-/// However much shorter the second step, errors are not believed to fall by more.
-const MOST_GAIN: f64 = 150.0;
-/// The same where iterations of both runs end nearly alike: what they leave may have grown, and does not fall at all.
-const MOST_GAIN_MEASURED: f64 = 30.0;
-/// Errors do not fall smoothly where steps meet a pericentre now here, now there: by the estimate, steps longer by this factor have to be enough too.
-const LONGER: f64 = 1.2;
-/// The same where it was measured how errors fall with the step.
-const LONGER_MEASURED: f64 = 1.1;
-/// What is added to estimates for what iterations leave, which two runs have in common: relative to what is asked.
-const LEFT: f64 = 0.1;
-/// The next step aims a little beyond that.
-const AIM: f64 = 1.13;
 /// By what factor a step that contracts is shorter than one that is accurate where Newton's method pays.
 const STIFF: f64 = 3.0;
-/// Steps that differ by less tell nothing.
-const SAME: f64 = 1.01;
-/// Differences below it that do not fall are of roundings.
-const ROUNDINGS: f64 = 1e-6;
 
 /// Runs until the estimated error is at or below what is asked: with equal steps, and where those would be many with steps that vary, if there is a pilot.
 ///
@@ -251,16 +95,6 @@ fn run_down(
         Climbed::Found(found) => Ok(*found),
         Climbed::TooMany { step, .. } => Err(RunErrorKind::Step { step }),
     }
-}
-
-/// What has come of runs with shorter and shorter steps.
-enum Climbed {
-    Found(Box<Found>),
-    /// Steps would be more than they were allowed to be.
-    TooMany {
-        attempts: Vec<Attempt>,
-        step: f64,
-    },
 }
 
 /// The factor of a grading whose steps are off by `local`: so many of them add up to the accuracy (T-103). The first run takes none longer than the pilot run did: what
@@ -492,30 +326,10 @@ fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut dyn Runner) 
     Some(taken * factor.clamp(LEAST_FACTOR, MOST_FACTOR))
 }
 
-/// The element of the next higher order of the same kind, if there is one.
-pub(crate) fn next(element: Element) -> Option<Element> {
-    let nodes = element.nodes() + 1;
-    let same = if element == Element::radau(element.nodes()) {
-        Element::radau(nodes)
-    } else {
-        Element::mixed(nodes)
-    };
-    same.validate().is_ok().then_some(same)
-}
-
-/// Whether steps of any length fail.
-fn slides(kind: &RunErrorKind) -> bool {
-    let source = StepError::Slides;
-    matches!(kind, RunErrorKind::Solve { source: found, .. } if *found == source)
-}
-
-fn largest(errors: &[Vec<f64>]) -> f64 {
-    errors.iter().flatten().copied().fold(0.0, larger)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accuracy::trace::Trace;
 
     /// Runs whose errors are known.
     struct Law<F> {

@@ -2,7 +2,7 @@
 
 use super::super::grading::Grading;
 use super::super::pilot::corners;
-use super::{Asked, MOST_TIMES, STEPS_BETWEEN, Way};
+use super::runs::{Asked, MOST_TIMES, STEPS_BETWEEN, Way};
 use crate::numbers::larger;
 use std::ops::Range;
 

@@ -2,7 +2,7 @@
 
 use super::super::estimated::Attempt;
 use super::super::trace::difference;
-use super::{
+use super::runs::{
     AIM, COARSER, HIGH, LEAST_FACTOR, LEFT, LONGER, LONGER_MEASURED, MOST_FACTOR, MOST_GAIN,
     MOST_GAIN_MEASURED, MOST_UNRESOLVED, RESOLVED, ROUNDINGS, Ran, SAME, largest,
 };

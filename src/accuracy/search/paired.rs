@@ -4,14 +4,13 @@
 //! with one of longer steps: two elements go side by side from the first step on, their distance is the error of the lower one (T-98), and steps that are too long, or much too
 //! short, are noticed on the way.
 
-use super::super::estimated::Attempt;
+use super::super::estimated::{Attempt, Picked};
 use super::super::pilot::corners;
 use super::super::trace::difference;
-use super::{
+use super::runs::{
     AIM, Asked, Beside, Climbed, FIRST, Found, ITERATION, MOST_RUNS, RESOLVED, ROUGH, ROUNDINGS,
     Runner, TIGHTEST, Way, largest, next,
 };
-use crate::accuracy::Picked;
 use crate::error::RunErrorKind;
 use crate::numbers::larger;
 use std::ops::ControlFlow;

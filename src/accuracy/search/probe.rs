@@ -1,7 +1,7 @@
 //! One step at the start against two of half its length: a step that is near.
 
 use super::super::trace::difference;
-use super::{Asked, HIGH, LONGER, MANY_TO_PROBE, Runner, Way, largest};
+use super::runs::{Asked, HIGH, LONGER, MANY_TO_PROBE, Runner, Way, largest};
 use crate::error::RunErrorKind;
 
 /// A step that is near, and by what factor it should be longer than the longest one that could be made, which stays in `way`: one step at the start against two of half its length.
