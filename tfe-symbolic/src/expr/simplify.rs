@@ -257,13 +257,9 @@ impl Graph {
         let product = match factors[..] {
             [] => return self.constant(coefficient),
             [(x, 1)] => x,
-            _ => {
-                let product = self.intern(Node::Product(factors));
-                if coefficient.is_one() {
-                    return product; // as it is: there are no terms to collect
-                }
-                product
-            }
+            // As it is: there are no terms to collect.
+            _ if coefficient.is_one() => return self.intern(Node::Product(factors)),
+            _ => self.intern(Node::Product(factors)),
         };
         self.scale(coefficient, product)
     }
