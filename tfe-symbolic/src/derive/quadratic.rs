@@ -391,8 +391,8 @@ fn with_leaves_for(graph: &mut Graph, energy: ExprId, rates: &[Rate]) -> ExprId 
         if mapping.of(old) != old {
             continue;
         }
-        let node = graph.node(old).clone();
-        if node.children().iter().any(|x| mapping.of(*x) != *x) {
+        if !mapping.keeps(graph.node(old)) {
+            let node = graph.node(old).clone();
             let new = graph.remake(&node, &mapping);
             mapping.set(old, new);
         }

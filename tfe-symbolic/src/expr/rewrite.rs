@@ -118,10 +118,9 @@ impl Graph {
         let mut mapping = Mapping::default();
         for old in self.reachable(&[id]) {
             let node = self.node(old).clone();
-            let children = node.children();
             let made = match &node {
                 Node::Input(input) => new(self, input).unwrap_or(old),
-                _ if children.iter().all(|child| mapping.of(*child) == *child) => old,
+                node if mapping.keeps(node) => old,
                 node => self.remake(node, &mapping),
             };
             mapping.set(old, made);

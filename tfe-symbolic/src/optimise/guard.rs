@@ -431,27 +431,18 @@ fn sum(terms: &[Term], number: Option<Bounded>, of: &dyn Fn(ExprId) -> Bounded) 
 }
 
 fn product(factors: &[(ExprId, i32)], of: &dyn Fn(ExprId) -> Bounded) -> Bounded {
-    let (mut above, mut below) = (Bounded::NOTHING, Bounded::NOTHING);
-    let (mut is_above_empty, mut is_below_empty) = (true, true);
+    let (mut above, mut below): (Option<Bounded>, Option<Bounded>) = (None, None);
     for (x, n) in factors {
-        let power = match *n {
-            1 => of(*x),
-            n => of(*x).to_the(n.unsigned_abs()),
+        let power = of(*x).to_the(n.unsigned_abs());
+        let side = if *n > 0 { &mut above } else { &mut below };
+        *side = match *side {
+            Some(known) => Some(known.times(power)),
+            None => Some(power),
         };
-        let (side, is_empty) = match *n > 0 {
-            true => (&mut above, &mut is_above_empty),
-            false => (&mut below, &mut is_below_empty),
-        };
-        *side = if *is_empty { power } else { side.times(power) };
-        *is_empty = false;
     }
-    if is_above_empty {
-        above = Bounded::exact(1.0);
-    }
-    if is_below_empty {
-        above
-    } else {
-        above.over(below)
+    match (above, below) {
+        (above, Some(below)) => above.unwrap_or(Bounded::exact(1.0)).over(below),
+        (above, None) => above.unwrap_or(Bounded::exact(1.0)),
     }
 }
 
