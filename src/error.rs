@@ -60,7 +60,7 @@ pub enum RunErrorKind {
         /// The end asked for.
         end: f64,
     },
-    /// The span holds more steps than can be counted.
+    /// The span holds more steps than can be counted, or an accuracy would take more than ten million of them.
     TooManySteps {
         /// Length of the span.
         span: f64,

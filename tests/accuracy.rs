@@ -392,6 +392,64 @@ struct Chain {
 }
 
 /// The same for a chain of any length, against a run with steps so short that only roundings are left.
+/// A force that jumps with the velocity, from rest, with points at the ends of elements: errors fall with the step alone, and what is asked would take a thousand million steps.
+#[test]
+fn what_would_take_too_many_steps_is_refused() {
+    #[dynamics(
+        coordinates(y),
+        lagrangian = m*dot(y)^2/2 - y - k/2*min(y, 0)^2,
+        force(y) = -sign(dot(y))/10 + select(t < 1, 1, 0),
+    )]
+    struct Bounce {
+        m: f64,
+        k: f64,
+    }
+    let bounce = Bounce {
+        m: 1.0,
+        k: 1.098_412_768_435_865_8,
+    };
+    let run = Simulation::new(&bounce).element(Element::primal(3).lobatto());
+    let start = State {
+        q: [-1.831_333_406_300_542_4],
+        p: [0.0],
+    };
+    let run = run.accuracy(3.446_593_853_243_537_3e-4);
+    let error = run
+        .run(start, 0.0..2.027_077_867_746_391_4)
+        .expect_err("too many steps");
+    assert!(
+        matches!(error.kind(), RunErrorKind::TooManySteps { .. }),
+        "{error}"
+    );
+}
+
+/// A bead that slides into the cusp of a curve has no motion from there on, though steps may get across: it was tried with steps of half, half of that, … without an end.
+#[test]
+fn a_motion_that_ends_in_a_cusp_is_refused() {
+    #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(cusp) = y^3 - x^2)]
+    struct Bead {
+        g: f64,
+    }
+    let bead = Bead {
+        g: 4.852_910_093_804_8,
+    };
+    let start = State {
+        q: [0.017_136_246_428_218_385, 0.066_467_671_673_985_12],
+        p: [0.033_592_203_433_136_625, 0.086_864_435_100_663_77],
+    };
+    let run = Simulation::new(&bead).element(Element::three_field(7));
+    let run = run.accuracy(1.318_782_783_078_634e-3);
+    let error = run.run(start, 0.0..1.34).expect_err("a cusp");
+    let RunErrorKind::Solve { time, step, .. } = *error.kind() else {
+        panic!("{error}");
+    };
+    // It slides up a little, and back.
+    assert!((0.15..0.25).contains(&time), "{time}");
+    // Steps did not become ever shorter.
+    assert!(step > 1e-7, "{step}");
+    assert!(error.partial().last().t <= time);
+}
+
 #[test]
 fn families_know_their_errors_too() {
     let chain = Chain { n: 40, a: 0.25 };

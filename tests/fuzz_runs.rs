@@ -1,5 +1,6 @@
 //! Random runs: models with singular points, masses of any size and sign, steps from far too short to absurd, all elements and iterations. None may panic, and none may show a
-//! state or an energy that is not finite without saying so. `FUZZ_RUNS=1000000 cargo test --release --test fuzz_runs` tries as many.
+//! state or an energy that is not finite without saying so. `FUZZ_RUNS=1000000 cargo test --release --test fuzz_runs` tries as many,
+//! `FUZZ_SEED=2` others.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use tfe::prelude::*;
@@ -214,8 +215,12 @@ where
 
 #[test]
 fn random_runs_neither_panic_nor_hide_what_is_not_finite() {
-    let runs = std::env::var("FUZZ_RUNS").map_or(3000, |text| text.parse().expect("a number"));
-    let mut random = Random(1);
+    let number = |name: &str| {
+        let text = std::env::var(name).ok()?;
+        Some(text.parse().expect("a number"))
+    };
+    let runs = number("FUZZ_RUNS").unwrap_or(3000);
+    let mut random = Random(number("FUZZ_SEED").unwrap_or(1).into());
     let mut count = Count::default();
     for run in 0..runs {
         let Random(seed) = random;

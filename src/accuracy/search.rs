@@ -14,7 +14,7 @@ use ladder::{Ladder, Verdict};
 use probe::probe;
 use runs::{
     AIM, COARSER, Climbed, FIRST, ITERATION, LEAST_FACTOR, LEFT, LONGER, MOST_FACTOR, MOST_RUNS,
-    ROUGH, TIGHTEST, largest,
+    MOST_STEPS, ROUGH, TIGHTEST, largest,
 };
 pub(crate) use runs::{
     Asked, Beside, Failed, Found, Graded, Judge, Pilot, Ran, RanBeside, Runner, Way, next,
@@ -46,7 +46,7 @@ pub(crate) fn search(
     let length = (asked.span.end - asked.span.start).abs();
     let mut before = Vec::new();
     let climbed = if asked.in_pairs {
-        let most_steps = if pilot.is_some() { MANY } else { f64::INFINITY };
+        let most_steps = if pilot.is_some() { MANY } else { MOST_STEPS };
         paired::climb(asked, newton_way(asked), run, most_steps)?
     } else {
         None
@@ -91,9 +91,12 @@ fn run_down(
     way: (Way<'_>, f64),
     run: &mut dyn Runner,
 ) -> Result<Found, RunErrorKind> {
-    match climb(asked, way, run, f64::INFINITY)? {
+    match climb(asked, way, run, MOST_STEPS)? {
         Climbed::Found(found) => Ok(*found),
-        Climbed::TooMany { step, .. } => Err(RunErrorKind::Step { step }),
+        Climbed::TooMany { step, .. } => {
+            let span = asked.span.end - asked.span.start;
+            Err(RunErrorKind::TooManySteps { span, step })
+        }
     }
 }
 

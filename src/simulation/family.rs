@@ -1,6 +1,6 @@
 //! Runs of models of run-time length, and which kind of run `Simulation::new` gives.
 
-use super::accurate::{Broken, Passing};
+use super::accurate::repeatable::{Broken, Passing};
 use super::course::{Course, Leg};
 use super::mesh::{Endless, Mesh};
 use super::watch::{Recorded, Watch};

@@ -9,6 +9,8 @@ use crate::overconstrained::plate;
 use std::cell::Cell;
 use tfe::prelude::*;
 use tfe::runtime::Statistics;
+use tfe::runtime::constrained::Trail;
+use tfe::runtime::step::{Control, Stepper};
 
 #[dynamics(
     coordinates(x, y),
@@ -186,14 +188,15 @@ fn errors_fall_until_they_are_roundings() {
     each(&Falls);
 }
 
-/// What all runs of an accuracy take, beside a run with the fewest equal steps of the same element from which on the accuracy is met: kernels evaluated. Three times in most cases; more
-/// where a pair of runs had to be given up shortly before its end.
+/// What all runs of an accuracy take, beside a run with the fewest equal steps of the same element from which on the accuracy is met: kernels evaluated. Three times at most on six
+/// mechanisms; a little more on others, where a pair of runs had to be given up shortly before its end.
 #[test]
 fn accuracies_take_a_few_times_the_best_by_hand() {
     /// A few steps are enough there, which no search knows.
     const SHORT: [&str; 2] = ["top", "blade"];
+    const THRICE: [&str; 6] = ["rod", "bead", "moving wire", "ground", "plate", "fast rod"];
     /// Where a run that was nearly good enough is made again.
-    const MOST: f64 = 5.5;
+    const MOST: f64 = 4.0;
     struct Work {
         /// Estimates within a factor of two, and all.
         sharp: Cell<(u32, u32)>,
@@ -229,6 +232,7 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
             let work = |statistics: &Statistics| {
                 statistics.residual_evaluations + statistics.tangent_evaluations
             };
+            let is_thrice = THRICE.contains(&name);
             let mut worst = 0.0;
             for accuracy in [1e-3, 1e-6, 1e-9] {
                 let what = format!("{name:14} {accuracy:e}");
@@ -240,6 +244,10 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
                     "{what}: {error:e}, {estimate:e}"
                 );
                 assert!(error < 2.0 * estimate, "{what}: {error:e}, {estimate:e}");
+                assert!(
+                    !is_thrice || estimate < 2.0 * error,
+                    "{what}: {error:e}, {estimate:e}"
+                );
                 let (sharp, all) = self.sharp.get();
                 self.sharp
                     .set((sharp + u32::from(estimate < 2.0 * error), all + 1));
@@ -276,7 +284,8 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
                 worst = larger(worst, ratio);
                 self.good.set(self.good.get() + u32::from(ratio <= 3.0));
             }
-            assert!(worst <= MOST || SHORT.contains(&name), "{name}: {worst}");
+            let most = if is_thrice { 3.0 } else { MOST };
+            assert!(worst <= most || SHORT.contains(&name), "{name}: {worst}");
         }
     }
     let all = Work {
@@ -286,6 +295,55 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
     each(&all);
     let (good, (sharp, all)) = (all.good.get(), all.sharp.get());
     println!("{sharp} sharp estimates and {good} cheap runs of {all}");
-    assert!(2 * good >= all, "{good} of {all}");
+    assert!(3 * good >= 2 * all, "{good} of {all}");
     assert!(10 * sharp >= 9 * all, "{sharp} of {all}");
+}
+
+/// An iteration that starts from what another one has found for the same step ends after two increments, at the same state; of another number of nodes, sooner than by itself.
+#[test]
+fn what_one_element_has_found_serves_another() {
+    struct Serves;
+    impl Shown for Serves {
+        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
+        where
+            M: tfe::runtime::Model<N>
+                + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
+        {
+            let h = span / 60.0;
+            let stepper = |nodes: usize| {
+                let element = tfe::Element::mixed(nodes);
+                // Roundings take iterations of their own.
+                let control = Control {
+                    tolerance: 1e-11,
+                    ..Control::default()
+                };
+                let stepper = Stepper::new(model, element, control);
+                let (mut stepper, mut state) = (stepper.expect("an element"), start);
+                stepper.advance(0.0, h, &mut state, &[]).expect("a step");
+                (stepper, state)
+            };
+            let step = |nodes: usize, trail: &Trail| {
+                let (mut stepper, mut state) = stepper(nodes);
+                let before = stepper.statistics().iterations;
+                stepper.foresee(trail, (h, h));
+                stepper.advance(h, h, &mut state, &[]).expect("a step");
+                let iterations = stepper.statistics().iterations - before;
+                let mut left = Trail::new();
+                stepper.leave(&mut left);
+                (left, state, iterations)
+            };
+            let (trail, expected, alone) = step(5, &Trail::new());
+            let (_, state, again) = step(5, &trail);
+            let off = distance(&state.q, &expected.q) + distance(&state.p, &expected.p);
+            assert!(off < 1e-10, "{name}: {off:e}");
+            assert!(again <= 2, "{name}: {again} of {alone}");
+            let (_, exact, alone) = step(6, &Trail::new());
+            let (_, state, again) = step(6, &trail);
+            let off = distance(&state.q, &exact.q) + distance(&state.p, &exact.p);
+            assert!(off < 1e-10, "{name}: {off:e}");
+            assert!(again <= alone, "{name}: {again} of {alone}");
+            println!("{name:14} {alone} iterations, {again} with what was found");
+        }
+    }
+    each(&Serves);
 }

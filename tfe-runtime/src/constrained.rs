@@ -13,12 +13,18 @@ mod node;
 pub(crate) mod residual;
 pub(crate) mod rows;
 mod tangent;
+#[cfg(feature = "alloc")]
+mod trail;
 
 pub use crate::control::START_TOLERANCE;
 #[cfg(feature = "alloc")]
 pub use instant::{Gradients, gradients, reactions};
 #[cfg(feature = "alloc")]
 pub use node::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
+#[cfg(feature = "alloc")]
+pub(crate) use trail::Foreseen;
+#[cfg(feature = "alloc")]
+pub use trail::Trail;
 
 pub(crate) use advance::advance;
 pub(crate) use derivative::{linearise, product};

@@ -56,6 +56,8 @@ pub struct Memory<const N: usize> {
     pub(crate) preference: Preference,
     /// Of the rows of constraints at the start and at the end of the last step.
     pub(crate) independence: Option<[Independence; 2]>,
+    /// The workspace holds where the next step is to start from, beside the velocity at the end of the last one.
+    pub(crate) is_foreseen: bool,
 }
 
 /// The last step.
@@ -97,6 +99,7 @@ impl<const N: usize> Memory<N> {
             ratio: None,
             preference: Preference::NONE,
             independence: None,
+            is_foreseen: false,
         }
     }
 
@@ -104,6 +107,11 @@ impl<const N: usize> Memory<N> {
     #[must_use]
     pub const fn statistics(&self) -> &Statistics {
         &self.statistics
+    }
+
+    /// Whether the last step has ended in `state`.
+    pub(crate) fn has_reached(&self, state: &State<N>) -> bool {
+        self.last.is_some_and(|last| last.end.is_same(state))
     }
 
     /// Says that the workspace no longer holds factors.

@@ -7,6 +7,7 @@ use alloc::vec::Vec;
 
 use crate::condense::Direction;
 use crate::constrained::rows::Independence;
+use crate::constrained::{Foreseen, Trail};
 use crate::cut::{Halving, Instant, in_halves, may_be_cut};
 use crate::dense::DenseElement;
 use crate::element::{Element, ElementError};
@@ -98,6 +99,7 @@ pub struct Stepper<'m, M, const N: usize> {
     at_kinks: bool,
     /// What was asked for; what is in use may trust more.
     solve: Solve,
+    foreseen: Foreseen,
 }
 
 /// A part of a step that was cut.
@@ -133,6 +135,7 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             passes_node: self.passes_node,
             at_kinks: self.at_kinks,
             solve: self.solve,
+            foreseen: self.foreseen.clone(),
         }
     }
 }
@@ -216,6 +219,7 @@ where
             passes_node: suspended.passes_node,
             at_kinks: false,
             solve: control.solve,
+            foreseen: Foreseen::default(),
         })
     }
 
@@ -273,6 +277,7 @@ where
             passes_node: false,
             at_kinks: false,
             solve: control.solve,
+            foreseen: Foreseen::default(),
         };
         if stepper.points.is_none() {
             stepper.make_room();
@@ -360,6 +365,30 @@ where
             return self.advance_constrained(t, h, state, impulses);
         }
         self.advance_plainly(t, h, state, impulses)
+    }
+
+    /// Adds the last step to a trail, for models with constraints and elements of Gauss points; a step that was cut is left out.
+    pub fn leave(&self, trail: &mut Trail) {
+        let scheme = self.table.view();
+        if let Some(last) = &self.memory.last
+            && self.may_foresee()
+        {
+            trail.push::<M, N>(&scheme, (last.t, last.h), &self.numbers);
+        }
+    }
+
+    /// Has the iteration of the step from t to t + h start from what another run has found there, if a trail reaches that far and the last step is continued.
+    pub fn foresee(&mut self, trail: &Trail, (t, h): (f64, f64)) {
+        if self.may_foresee() {
+            let scheme = self.table.view();
+            self.foreseen.look::<M, N>(trail, &scheme, (t, h));
+        }
+    }
+
+    fn may_foresee(&self) -> bool {
+        let element = self.table.element();
+        let is_gauss = element == Element::mixed(element.nodes());
+        Self::HAS_CONSTRAINTS && is_gauss && self.ahead.is_none() && self.pieces.is_empty()
     }
 
     /// A step without a look at kinks.

@@ -18,6 +18,8 @@ use tfe_runtime::{Element, Statistics};
 
 /// Errors stay below what is asked by this factor: the better run has an error, too.
 const SAFE: f64 = 1.1;
+/// Two elements that are farther apart may both be wrong: more is not aimed at.
+const LOOSEST: f64 = 0.01;
 /// What iterations of the better run may leave of what those of the other may: a comparison is not spoilt by it.
 const LEFT_BESIDE: f64 = 0.01;
 /// Steps that have come that far, in parts of the span, are not given up for longer ones.
@@ -172,7 +174,7 @@ pub(super) fn climb(
     let mut too_long = f64::INFINITY;
     let mut attempts: Vec<Attempt> = Vec::new();
     let mut judge = Judge {
-        accuracy: asked.accuracy / SAFE,
+        accuracy: (asked.accuracy / SAFE).min(LOOSEST),
         order: way.element.order() as f64,
         most_longer: 1.0,
         is_last: false,
@@ -240,9 +242,9 @@ pub(super) fn climb(
             let error = largest(&seen);
             told.error_estimate = Some(error);
             attempts.push(told);
-            let is_met = error <= judge.accuracy;
-            errors = Some((ran.times, seen, is_met));
-            if is_met || judge.is_last {
+            let is_enough = error <= judge.accuracy;
+            errors = Some((ran.times, seen, error <= asked.accuracy / SAFE));
+            if is_enough || judge.is_last {
                 break;
             }
             verdict = Some(Verdict::Shorter(judge.shorter()));

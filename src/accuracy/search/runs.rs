@@ -141,6 +141,8 @@ pub(super) const RESOLVED: f64 = 0.1;
 pub(super) const MOST_UNRESOLVED: u32 = 5;
 /// Runs over the whole span.
 pub(super) const MOST_RUNS: usize = 14;
+/// Steps of a run: the nodes of more would take gigabytes, and a search that asks for them meets errors that do not fall with the order of its element.
+pub(super) const MOST_STEPS: f64 = 1e7;
 /// Steps between two times of comparison: so many that steps can be chosen finely.
 pub(super) const STEPS_BETWEEN: f64 = 12.0;
 pub(super) const MOST_TIMES: f64 = 64.0;

@@ -1,9 +1,9 @@
 //! Runs of models of run-time length with an estimate of their error.
 
 use super::super::family::{FamilyRunError, FamilySimulation};
-use super::{
-    Accurate, Broken, Passing, Repeatable, Steps, accurate, check_accuracy, estimated, trusting,
-};
+use super::graded::Steps;
+use super::repeatable::{Broken, Passing, Repeatable, trusting};
+use super::{Accurate, accurate, check_accuracy, estimated};
 use crate::accuracy::{Asked, Estimated};
 use crate::error::RunErrorKind;
 use crate::motion::Warning;

@@ -4,13 +4,14 @@ use super::super::events::Severed;
 use super::super::follow::{Follow, Passed};
 use super::super::mesh::Mesh;
 use super::super::{Simulation, check_constraints};
-use super::{
-    Accurate, Broken, Passing, Repeatable, Steps, accurate, check_accuracy, estimated, trusting,
-};
+use super::graded::Steps;
+use super::repeatable::{Broken, Passing, Repeatable, trusting};
+use super::{Accurate, accurate, check_accuracy, estimated};
 use crate::accuracy::{Asked, Estimated};
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
 use std::ops::{ControlFlow, Range};
+use tfe_runtime::constrained::Trail;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{
@@ -238,6 +239,14 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
 
     fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
         RunErrorKind::of_element(&*self.model, element, at, source)
+    }
+
+    fn leave(stepper: &Self::Stepper, trail: &mut Trail) {
+        stepper.leave(trail);
+    }
+
+    fn foresee(stepper: &mut Self::Stepper, trail: &Trail, step: (f64, f64)) {
+        stepper.foresee(trail, step);
     }
 
     fn set_tolerance(stepper: &mut Stepper<'m, M, N>, tolerance: f64) {

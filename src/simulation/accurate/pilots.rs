@@ -1,7 +1,8 @@
 //! Two elements over the same steps, for a pilot run.
 
 use super::super::mesh::{Mesh, up_to_break};
-use super::{MOST_ITERATIONS, Repeatable};
+use super::repeatable::Repeatable;
+use super::runs::MOST_ITERATIONS;
 use crate::accuracy::{Course, Pair, Trace, next};
 use crate::error::RunErrorKind;
 use tfe_runtime::{Element, Statistics, StepError};

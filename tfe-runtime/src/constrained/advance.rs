@@ -49,7 +49,8 @@ where
     } = interval;
     let count = M::CONSTRAINTS.len();
     let mut parts = Parts::of(workspace, &element, M::FORM, count)?;
-    let warm = method.prepare(memory, &mut parts, h, state)?;
+    let is_foreseen = core::mem::take(&mut memory.is_foreseen) && memory.has_reached(state);
+    let warm = is_foreseen || method.prepare(memory, &mut parts, h, state)?;
     set_kicks(&scheme, &interval, parts.kicks);
     let kicks: &[[f64; N]] = parts.kicks;
     let layout = Layout::new(&element, N, count);

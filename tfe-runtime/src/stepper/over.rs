@@ -7,6 +7,7 @@ use crate::error::{ConstraintError, StepError};
 use crate::method::Impulse;
 use crate::model::{Model, State};
 use crate::newton::Solve;
+use crate::scheme::Tables;
 use alloc::vec::Vec;
 
 /// How far before the node the element over it begins, in parts of the step: one is tried after the other. Farther away less is lost to rounding, nearer the polynomial is
@@ -81,6 +82,11 @@ where
         let ahead = self.ahead.take().filter(|_| impulses.is_empty());
         if let Some(ahead) = ahead.filter(|one| one.serves(t, h, state)) {
             return self.go_on(ahead, (t, h), state);
+        }
+        if self.memory.has_reached(state) {
+            let scheme = self.table.view();
+            let foreseen = &mut self.foreseen;
+            self.memory.is_foreseen = foreseen.take::<M, N>(&scheme, (t, h), &mut self.numbers);
         }
         let (start, cuts) = (*state, self.memory.statistics.cuts);
         let outcome = self.advance_plainly(t, h, state, impulses);

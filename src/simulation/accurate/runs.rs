@@ -1,0 +1,256 @@
+//! Makes the runs that a search asks for.
+
+use super::place::Place;
+use super::repeatable::{Passing, Repeatable};
+use super::watcher::{Watcher, follow};
+use crate::accuracy::{Beside, Failed, Judge, Ran, RanBeside, Runner, Trace, Way};
+use crate::error::RunErrorKind;
+use crate::simulation::mesh::Mesh;
+use std::mem;
+use std::ops::ControlFlow;
+use tfe_runtime::constrained::Trail;
+use tfe_runtime::{Element, Solve, Statistics};
+
+/// An iteration that takes more is no bargain.
+pub(super) const MOST_ITERATIONS: u32 = 25;
+
+/// What there is of the motion: the last one that was recorded; as long as there is none, the state that went farthest.
+pub(super) enum Kept<T, S> {
+    Nothing,
+    Part(f64, S),
+    Motion(T),
+}
+
+impl<T, S> Kept<T, S> {
+    fn keep_part(&mut self, start: f64, t: f64, state: S) {
+        let farthest = match self {
+            Self::Nothing => start,
+            Self::Part(farthest, _) => *farthest,
+            Self::Motion(_) => return,
+        };
+        if (t - start).abs() >= (farthest - start).abs() {
+            *self = Self::Part(t, state);
+        }
+    }
+}
+
+/// Makes the runs of a search.
+pub(super) struct Runs<'a, R: Repeatable<N>, const N: usize> {
+    run: &'a R,
+    start: (f64, &'a R::State),
+    /// The last ones.
+    steppers: Vec<Reusable<R::Stepper>>,
+    place: Place,
+    /// What the better run of the last pair has found.
+    trail: Trail,
+    kept: &'a mut Kept<R::Motion, R::State>,
+    work: &'a mut Statistics,
+}
+
+/// A stepper, and what it is for.
+struct Reusable<T> {
+    by_iteration: bool,
+    element: Element,
+    stepper: T,
+}
+
+impl<'a, R: Repeatable<N>, const N: usize> Runs<'a, R, N> {
+    /// How many steppers are kept: of two elements.
+    const MOST_STEPPERS: usize = 2;
+
+    /// Makes runs from a start, and has what there is of the motion and what all of them cost kept.
+    pub(super) fn new(
+        run: &'a R,
+        start: (f64, &'a R::State),
+        kept: &'a mut Kept<R::Motion, R::State>,
+        work: &'a mut Statistics,
+    ) -> Self {
+        Self {
+            run,
+            start,
+            steppers: Vec::new(),
+            place: Place::default(),
+            trail: Trail::new(),
+            kept,
+            work,
+        }
+    }
+
+    /// Takes the stepper for a way from those that are kept, or makes one.
+    fn take_stepper(&mut self, way: &Way<'_>) -> Result<Reusable<R::Stepper>, RunErrorKind> {
+        let is_known = |one: &Reusable<R::Stepper>| {
+            (one.by_iteration, one.element) == (way.by_iteration, way.element)
+        };
+        if let Some(known) = self.steppers.iter().position(is_known) {
+            return Ok(self.steppers.remove(known));
+        }
+        let mut control = self.run.control();
+        if way.by_iteration {
+            control.solve = Solve::FixedPoint;
+            control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
+        }
+        Ok(Reusable {
+            by_iteration: way.by_iteration,
+            element: way.element,
+            stepper: self.run.stepper(way.element, control, true)?,
+        })
+    }
+
+    /// Counts what a stepper has done, and keeps it for the next run. What it has done in this one is returned.
+    fn keep_stepper(&mut self, mut reusable: Reusable<R::Stepper>) -> Statistics {
+        let taken = R::take_statistics(&mut reusable.stepper);
+        self.work.merge(&taken);
+        self.steppers.insert(0, reusable);
+        self.steppers.truncate(Self::MOST_STEPPERS);
+        taken
+    }
+
+    fn mesh(&self, way: &Way<'_>) -> Result<Mesh<N>, RunErrorKind> {
+        match way.grading {
+            Some(grading) => self.run.through(&way.nodes(grading)),
+            None => self.run.even(way.cuts, way.step),
+        }
+    }
+
+    /// A run that may be the motion that is asked for.
+    fn record(
+        &mut self,
+        stepper: &mut R::Stepper,
+        mesh: &Mesh<N>,
+        passed: &mut Passing<'_, R::Stepper, R::State>,
+    ) -> Result<(), Failed> {
+        match self.run.record(stepper, mesh, self.start, passed) {
+            Ok(motion) => {
+                *self.kept = Kept::Motion(motion);
+                Ok(())
+            }
+            Err(broken) => {
+                let (kind, part) = *broken;
+                if !matches!(self.kept, Kept::Motion(_)) {
+                    *self.kept = Kept::Motion(part);
+                }
+                Err(Failed::from(kind))
+            }
+        }
+    }
+
+    fn trace(
+        &mut self,
+        stepper: &mut R::Stepper,
+        way: &Way<'_>,
+        mesh: &Mesh<N>,
+    ) -> Result<Trace, Failed> {
+        let (run, times) = (self.run, &way.cuts[1..]);
+        if way.keeps {
+            let mut watcher = Watcher::new(run, stepper, self.start);
+            let mut times = times.iter().peekable();
+            self.record(stepper, mesh, &mut |stepper, t, state, acts| {
+                let keeps = times.next_if_eq(&&t).is_some();
+                watcher.pass(run, stepper, (t, state), acts, keeps);
+                ControlFlow::Continue(())
+            })?;
+            return Ok(watcher.trace);
+        }
+        follow(run, stepper, self.start, mesh, times).map_err(|(kind, t, state)| {
+            let mut failed = Failed::from(kind);
+            if !run.has_events() {
+                let stopped = (&failed.kind, &state);
+                failed.is_final |= (self.place).is_an_end(run, self.start.0, (way, mesh), stopped);
+            }
+            self.kept.keep_part(self.start.0, t, state);
+            failed
+        })
+    }
+}
+
+impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
+    fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
+        let mesh = self.mesh(way)?;
+        let mut reusable = self.take_stepper(way)?;
+        R::set_tolerance(&mut reusable.stepper, way.tolerance);
+        let trace = self.trace(&mut reusable.stepper, way, &mesh);
+        let taken = self.keep_stepper(reusable);
+        Ok(Ran {
+            trace: trace?,
+            contracts: taken.newton_iterations == 0
+                && taken.products == 0
+                && !self.run.crosses_kinks(),
+        })
+    }
+
+    fn run_beside(
+        &mut self,
+        way: &Way<'_>,
+        better: &Way<'_>,
+        judge: &mut Judge<'_>,
+    ) -> Result<RanBeside, Failed> {
+        let (run, (t0, start)) = (self.run, self.start);
+        let mesh = self.mesh(way)?;
+        let (mut first, mut second) = (self.take_stepper(way)?, self.take_stepper(better)?);
+        R::set_tolerance(&mut first.stepper, way.tolerance);
+        R::set_tolerance(&mut second.stepper, better.tolerance);
+        let mut watchers = [
+            Watcher::new(run, &mut first.stepper, self.start),
+            Watcher::new(run, &mut second.stepper, self.start),
+        ];
+        let mut elements = mesh.elements().enumerate().peekable();
+        // What the last pair has found, this one has, and its lower element has in this step.
+        let before = mem::take(&mut self.trail);
+        let (mut trail, mut here) = (Trail::new(), Trail::new());
+        let mut state = start.clone();
+        let mut times = Vec::new();
+        let mut failure = None;
+        let mut goes_on = ControlFlow::Continue(());
+        let (mut apart, mut sizes) = (Vec::new(), Vec::new());
+        let passed = self.record(&mut first.stepper, &mesh, &mut |stepper, t, end, acts| {
+            let [one, other] = &mut watchers;
+            // The other one makes the same step.
+            let Some((element, (from, next, h))) = elements.next() else {
+                return ControlFlow::Continue(());
+            };
+            here.clear();
+            R::leave(stepper, &mut here);
+            R::foresee(&mut second.stepper, &here, (from, h));
+            let step = run.advance(&mut second.stepper, (from, next, h), &mesh, &mut state);
+            if let Err(source) = step {
+                failure = Some(run.failed(element, (from, h), source));
+                return ControlFlow::Break(());
+            }
+            R::leave(&second.stepper, &mut trail);
+            if let Some((_, (from, _, h))) = elements.peek() {
+                R::foresee(stepper, &before, (*from, *h));
+            }
+            times.push(t);
+            one.pass(run, stepper, (t, end), acts, true);
+            other.pass(run, &mut second.stepper, (t, &state), acts, true);
+            other.trace.apart(&one.row, &other.row, &mut apart);
+            other.trace.sizes_with(&one.row, &mut sizes);
+            goes_on = judge(&Beside {
+                time: t,
+                apart: &apart,
+                sizes: &sizes,
+            });
+            goes_on
+        });
+        // An earlier pair may have gone farther.
+        let reach = |trail: &Trail| trail.end().map_or(0.0, |end| (end - t0).abs());
+        self.trail = if reach(&trail) > reach(&before) {
+            trail
+        } else {
+            before
+        };
+        self.keep_stepper(second);
+        self.keep_stepper(first);
+        let failed = passed.err().or(failure.map(Failed::from));
+        if let Some(mut failed) = failed {
+            let stopped = (&failed.kind, &state);
+            failed.is_final |= self.place.is_an_end(run, t0, (way, &mesh), stopped);
+            return Err(failed);
+        }
+        Ok(RanBeside {
+            traces: watchers.map(|watcher| watcher.trace),
+            times,
+            is_complete: goes_on.is_continue(),
+        })
+    }
+}

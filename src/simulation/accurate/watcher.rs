@@ -1,0 +1,87 @@
+//! What runs are compared by.
+
+use super::repeatable::Repeatable;
+use crate::accuracy::Trace;
+use crate::error::RunErrorKind;
+use crate::simulation::mesh::Mesh;
+use crate::simulation::progress::Bar;
+use std::ops::ControlFlow;
+
+/// What is seen of a run.
+pub(super) struct Watcher {
+    pub(super) trace: Trace,
+    /// Room for one time.
+    pub(super) row: Vec<f64>,
+}
+
+impl Watcher {
+    /// One that has seen the start.
+    pub(super) fn new<R: Repeatable<N>, const N: usize>(
+        run: &R,
+        stepper: &mut R::Stepper,
+        (t, start): (f64, &R::State),
+    ) -> Self {
+        let trace = Trace::new(run.coordinates(), run.columns());
+        let mut watcher = Self {
+            row: vec![0.0; trace.width()],
+            trace,
+        };
+        watcher.pass(run, stepper, (t, start), 0, false);
+        watcher
+    }
+
+    pub(super) fn pass<R: Repeatable<N>, const N: usize>(
+        &mut self,
+        run: &R,
+        stepper: &mut R::Stepper,
+        (t, state): (f64, &R::State),
+        acts: usize,
+        keeps: bool,
+    ) {
+        run.row(stepper, t, state, &mut self.row);
+        self.trace.pass(&self.row, acts, keeps);
+    }
+}
+
+/// Why a run has stopped, and where.
+pub(super) type Stop<S> = (RunErrorKind, f64, S);
+
+/// A run of which nothing is kept but what it is compared by, at `times`.
+pub(super) fn follow<R: Repeatable<N>, const N: usize>(
+    run: &R,
+    stepper: &mut R::Stepper,
+    (t0, start): (f64, &R::State),
+    mesh: &Mesh<N>,
+    times: &[f64],
+) -> Result<Trace, Stop<R::State>> {
+    let mut watcher = Watcher::new(run, stepper, (t0, start));
+    let mut times = times.iter().peekable();
+    if run.has_events() {
+        let passed = run.record(
+            stepper,
+            mesh,
+            (t0, start),
+            &mut |stepper, t, state, acts| {
+                let keeps = times.next_if_eq(&&t).is_some();
+                watcher.pass(run, stepper, (t, state), acts, keeps);
+                ControlFlow::Continue(())
+            },
+        );
+        return match passed {
+            Ok(_) => Ok(watcher.trace),
+            Err(broken) => Err((broken.0, t0, start.clone())),
+        };
+    }
+    let mut state = start.clone();
+    let mut bar = Bar::new(run.progress(), mesh.steps());
+    for (element, (t, next, h)) in mesh.elements().enumerate() {
+        if let Err(source) = run.advance(stepper, (t, next, h), mesh, &mut state) {
+            let kind = run.failed(element, (t, h), source);
+            return Err((kind, t, state));
+        }
+        let keeps = times.next_if_eq(&&next).is_some();
+        watcher.pass(run, stepper, (next, &state), 0, keeps);
+        bar.advance();
+    }
+    Ok(watcher.trace)
+}

@@ -1,0 +1,279 @@
+//! What the iterations of one run have found, element after element: where those of another run of the same motion may start.
+
+use crate::basis::{MAX_NODES, legendre};
+use crate::constrained::element::slopes;
+use crate::constrained::layout::Layout;
+use crate::model::{Constraint, Model};
+use crate::scheme::SchemeRef;
+use alloc::vec::Vec;
+
+/// The polynomials of rates and multipliers of the elements of a run; written by [`Stepper::leave`](crate::step::Stepper::leave), read by
+/// [`Stepper::foresee`](crate::step::Stepper::foresee).
+#[derive(Clone, Debug, Default)]
+pub struct Trail {
+    /// Start and length of each element.
+    spans: Vec<(f64, f64)>,
+    /// Legendre coefficients of the rates, multipliers inside, multipliers of the nodes; of all elements, one after the other.
+    numbers: Vec<f64>,
+    /// The degree of their elements.
+    degree: usize,
+}
+
+/// Where the iteration of a coming step may start.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Foreseen {
+    /// Its start and its length.
+    step: Option<(f64, f64)>,
+    unknowns: Vec<f64>,
+}
+
+impl Foreseen {
+    /// Looks up a step; without one nothing is foreseen.
+    pub(crate) fn look<M, const N: usize>(
+        &mut self,
+        trail: &Trail,
+        scheme: &SchemeRef<'_>,
+        step: (f64, f64),
+    ) where
+        M: Model<N>,
+    {
+        let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
+        self.unknowns.resize(layout.size(), 0.0);
+        let is_known = trail.foresee::<M, N>(scheme, step, &mut self.unknowns);
+        self.step = is_known.then_some(step);
+    }
+
+    /// Writes what was foreseen for a step, all but the velocity at its end; false where that is nothing.
+    pub(crate) fn take<M, const N: usize>(
+        &mut self,
+        scheme: &SchemeRef<'_>,
+        step: (f64, f64),
+        unknowns: &mut [f64],
+    ) -> bool
+    where
+        M: Model<N>,
+    {
+        if self.step.take() != Some(step) {
+            return false;
+        }
+        let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
+        let (end, node) = (layout.end(0), layout.node(0));
+        unknowns[..end].copy_from_slice(&self.unknowns[..end]);
+        unknowns[node..layout.size()].copy_from_slice(&self.unknowns[node..]);
+        true
+    }
+}
+
+/// An element of a trail.
+#[derive(Clone, Copy)]
+struct Found<'a> {
+    span: (f64, f64),
+    numbers: &'a [f64],
+    degree: usize,
+}
+
+impl Trail {
+    /// Without elements.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Forgets all elements.
+    pub fn clear(&mut self) {
+        self.spans.clear();
+        self.numbers.clear();
+    }
+
+    /// The time up to which it goes; nothing without elements.
+    #[must_use]
+    pub fn end(&self) -> Option<f64> {
+        self.spans.last().map(|(start, length)| start + length)
+    }
+
+    /// Adds an element of Gauss points; one of another degree than those before replaces them.
+    pub(crate) fn push<M, const N: usize>(
+        &mut self,
+        scheme: &SchemeRef<'_>,
+        span: (f64, f64),
+        unknowns: &[f64],
+    ) where
+        M: Model<N>,
+    {
+        let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
+        let degree = layout.degree();
+        if self.degree != degree {
+            self.clear();
+            self.degree = degree;
+        }
+        let sum = |weights: &[f64], place: &dyn Fn(usize) -> usize| {
+            let pairs = weights.iter().enumerate();
+            pairs.map(|(l, weight)| weight * unknowns[place(l)]).sum()
+        };
+        let rows = scheme.rate.chunks_exact(scheme.unknowns());
+        for weights in rows.clone() {
+            for a in 0..N {
+                self.numbers.push(sum(weights, &|l| l * N + a));
+            }
+        }
+        for (j, weights) in rows.enumerate() {
+            for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+                let number = if constraint.kind.is_holonomic() {
+                    unknowns[layout.inside(j, c)]
+                } else {
+                    sum(weights, &|l| layout.inside(l, c))
+                };
+                self.numbers.push(number);
+            }
+        }
+        for c in 0..M::CONSTRAINTS.len() {
+            self.numbers.push(unknowns[layout.node(c)]);
+        }
+        self.spans.push(span);
+    }
+
+    /// The element at a time, or the nearest one.
+    fn at(&self, t: f64) -> Option<Found<'_>> {
+        let is_before = |(start, h): &(f64, f64)| (t - start) * h.signum() >= 0.0;
+        let number = self.spans.partition_point(is_before).saturating_sub(1);
+        let size = self.numbers.len() / self.spans.len().max(1);
+        Some(Found {
+            span: *self.spans.get(number)?,
+            numbers: &self.numbers[number * size..(number + 1) * size],
+            degree: self.degree,
+        })
+    }
+
+    /// Writes the unknowns of an element of Gauss points from t to t + h, all but the velocity at its end; false, with nothing written, where the trail does not reach that far.
+    pub(crate) fn foresee<M, const N: usize>(
+        &self,
+        scheme: &SchemeRef<'_>,
+        (t, h): (f64, f64),
+        unknowns: &mut [f64],
+    ) -> bool
+    where
+        M: Model<N>,
+    {
+        /// So much of an element may lie beyond the last one.
+        const BEYOND: f64 = 0.1;
+        let reaches = |(start, length): &(f64, f64)| {
+            ((t + h) - (start + length)) * length.signum() <= BEYOND * h.abs()
+        };
+        let Some(middle) = self.at(t + 0.5 * h) else {
+            return false;
+        };
+        let ends = [self.at(t), self.at(t + h)].into_iter().flatten();
+        if !(self.spans.last().is_some_and(reaches)
+            && ends.chain([middle]).all(|one| one.is_resolved::<N>()))
+        {
+            return false;
+        }
+        for (i, node) in scheme.unknown_nodes.iter().enumerate() {
+            let t = t + h * node;
+            let found = self.at(t).unwrap_or(middle);
+            for a in 0..N {
+                unknowns[i * N + a] = found.legendre_sum(t, |j| j * N + a);
+            }
+        }
+        let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
+        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+            let place = Multipliers {
+                of: c,
+                first: middle.degree * N,
+                count: M::CONSTRAINTS.len(),
+            };
+            middle.multipliers(constraint, place, (t, h), scheme, |j, number| {
+                let at = match j {
+                    Some(j) => layout.inside(j, c),
+                    None => layout.node(c),
+                };
+                unknowns[at] = number;
+            });
+        }
+        true
+    }
+}
+
+/// Where the multipliers of a constraint are.
+#[derive(Clone, Copy)]
+struct Multipliers {
+    of: usize,
+    first: usize,
+    count: usize,
+}
+
+impl Multipliers {
+    fn inside(&self, j: usize) -> usize {
+        self.first + j * self.count + self.of
+    }
+}
+
+impl Found<'_> {
+    /// Where a time lies in the element.
+    fn place(&self, t: f64) -> f64 {
+        (t - self.span.0) / self.span.1
+    }
+
+    /// Whether the last Legendre coefficient of the rates is small beside the others. Another element that started from a wrong root of a step that is too long might find one beside
+    /// it, and the two would agree.
+    fn is_resolved<const N: usize>(&self) -> bool {
+        /// Beside the largest.
+        const SMALL: f64 = 0.01;
+        let rates = &self.numbers[..self.degree * N];
+        let size = |rates: &[f64]| rates.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        size(&rates[(self.degree - 1) * N..]) <= SMALL * size(rates)
+    }
+
+    /// A sum of Legendre polynomials at a time.
+    fn legendre_sum(&self, t: f64, place: impl Fn(usize) -> usize) -> f64 {
+        let mut values = [0.0; MAX_NODES];
+        legendre(self.place(t), &mut values);
+        let values = values.iter().take(self.degree).enumerate();
+        values
+            .map(|(j, value)| value * self.numbers[place(j)])
+            .sum()
+    }
+
+    /// Shows the multipliers of a constraint of another element, inside and, without a number, at the node: the part of the same reactions that belongs to it.
+    fn multipliers(
+        &self,
+        constraint: &Constraint,
+        place: Multipliers,
+        (t, h): (f64, f64),
+        scheme: &SchemeRef<'_>,
+        mut show: impl FnMut(Option<usize>, f64),
+    ) {
+        let degree = scheme.element.degree();
+        if !constraint.kind.is_holonomic() {
+            // μ/h, which vanishes in the mean of both ends.
+            let at = |t: f64| self.legendre_sum(t, |j| place.inside(j)) * self.span.1 / h;
+            let mean = 0.5 * (at(t) + at(t + h));
+            for (l, node) in scheme.unknown_nodes.iter().enumerate() {
+                show(Some(l), at(t + h * node) - mean);
+            }
+            return show(None, at(t) - mean);
+        }
+        // μ̇ at the points, and its part along each P_j′, which are orthogonal with the weight 1 − x².
+        show(Some(0), self.numbers[place.inside(0)]);
+        show(
+            None,
+            self.numbers[place.first + self.degree * place.count + place.of],
+        );
+        for j in 1..degree {
+            let mut sum = 0.0;
+            for (node, weight) in scheme.unknown_nodes.iter().zip(scheme.weights) {
+                let rates = slopes(self.place(t + h * node), self.degree);
+                let rate: f64 = (1..self.degree)
+                    .map(|k| rates[k] * self.numbers[place.inside(k)])
+                    .sum();
+                let x = 2.0 * node - 1.0;
+                sum += 2.0 * weight * (1.0 - x * x) * slopes(*node, degree)[j] * rate;
+            }
+            let j = j as f64;
+            show(
+                Some(j as usize),
+                sum * (2.0 * j + 1.0) / (2.0 * j * (j + 1.0)),
+            );
+        }
+    }
+}
