@@ -99,6 +99,7 @@ pub struct Stepper<'m, M, const N: usize> {
     at_kinks: bool,
     /// What was asked for; what is in use may trust more.
     solve: Solve,
+    /// Of a run of the same motion, where the iteration of the next step may start.
     foreseen: Foreseen,
 }
 

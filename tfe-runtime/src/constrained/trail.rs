@@ -4,7 +4,7 @@ use crate::basis::{MAX_NODES, legendre};
 use crate::constrained::element::slopes;
 use crate::constrained::layout::Layout;
 use crate::model::{Constraint, Model};
-use crate::scheme::SchemeRef;
+use crate::scheme::{MAX_RATES, SchemeRef};
 use alloc::vec::Vec;
 
 /// The polynomials of rates and multipliers of the elements of a run; written by [`Stepper::leave`](crate::step::Stepper::leave), read by
@@ -203,6 +203,7 @@ struct Multipliers {
 }
 
 impl Multipliers {
+    /// Those inside, and after the last of them the one of the node.
     fn inside(&self, j: usize) -> usize {
         self.first + j * self.count + self.of
     }
@@ -255,25 +256,22 @@ impl Found<'_> {
         }
         // μ̇ at the points, and its part along each P_j′, which are orthogonal with the weight 1 − x².
         show(Some(0), self.numbers[place.inside(0)]);
-        show(
-            None,
-            self.numbers[place.first + self.degree * place.count + place.of],
-        );
-        for j in 1..degree {
-            let mut sum = 0.0;
-            for (node, weight) in scheme.unknown_nodes.iter().zip(scheme.weights) {
-                let rates = slopes(self.place(t + h * node), self.degree);
-                let rate: f64 = (1..self.degree)
-                    .map(|k| rates[k] * self.numbers[place.inside(k)])
-                    .sum();
-                let x = 2.0 * node - 1.0;
-                sum += 2.0 * weight * (1.0 - x * x) * slopes(*node, degree)[j] * rate;
+        show(None, self.numbers[place.inside(self.degree)]);
+        let mut parts = [0.0; MAX_RATES];
+        for (node, weight) in scheme.unknown_nodes.iter().zip(scheme.weights) {
+            let rates = slopes(self.place(t + h * node), self.degree);
+            let rate: f64 = (1..self.degree)
+                .map(|k| rates[k] * self.numbers[place.inside(k)])
+                .sum();
+            let x = 2.0 * node - 1.0;
+            let weight = 2.0 * weight * (1.0 - x * x) * rate;
+            for (part, slope) in parts.iter_mut().zip(slopes(*node, degree)) {
+                *part += weight * slope;
             }
-            let j = j as f64;
-            show(
-                Some(j as usize),
-                sum * (2.0 * j + 1.0) / (2.0 * j * (j + 1.0)),
-            );
+        }
+        for (j, part) in parts.iter().enumerate().take(degree).skip(1) {
+            let length = (2 * j * (j + 1)) as f64 / (2 * j + 1) as f64;
+            show(Some(j), part / length);
         }
     }
 }

@@ -83,11 +83,8 @@ where
         if let Some(ahead) = ahead.filter(|one| one.serves(t, h, state)) {
             return self.go_on(ahead, (t, h), state);
         }
-        if self.memory.has_reached(state) {
-            let scheme = self.table.view();
-            let foreseen = &mut self.foreseen;
-            self.memory.is_foreseen = foreseen.take::<M, N>(&scheme, (t, h), &mut self.numbers);
-        }
+        let (foreseen, scheme) = (&mut self.foreseen, self.table.view());
+        self.memory.is_foreseen = foreseen.take::<M, N>(&scheme, (t, h), &mut self.numbers);
         let (start, cuts) = (*state, self.memory.statistics.cuts);
         let outcome = self.advance_plainly(t, h, state, impulses);
         if !(impulses.is_empty() && matches!(self.control.solve, Solve::Auto | Solve::Newton)) {
