@@ -188,6 +188,99 @@ fn errors_fall_until_they_are_roundings() {
     each(&Falls);
 }
 
+/// Steps that are far too long: a run that is near the motion, or says that it may not be, or an error where a mechanism turns by more than half a radian within the shortest piece
+/// that a step is cut into.
+#[test]
+fn long_steps_run_or_are_too_long() {
+    /// Steps of each run; of Andrews' squeezer, which turns a thousand times in a second, one.
+    const COUNT: u32 = 4;
+    /// Over the largest coordinate: what an element of few nodes may be off where a step is a third of a period. Roots of other motions are off by the size of the mechanism.
+    const NEAR: f64 = 0.2;
+    /// Of a step.
+    const SHORTEST_PIECE: f64 = 1.0 / 1024.0;
+    #[derive(Default)]
+    struct Long {
+        runs: Cell<u32>,
+        cut: Cell<u32>,
+        warned: Cell<u32>,
+        refused: Cell<u32>,
+    }
+    impl Shown for Long {
+        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
+        where
+            M: tfe::runtime::Model<N>
+                + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
+        {
+            let simulation: Simulation<'_, M, N> = Simulation::new(model);
+            let is_fast = name == "Andrews";
+            let (count, known, short) = if is_fast {
+                (1, 0.4, 5e-5)
+            } else {
+                (COUNT, f64::from(COUNT), span / 300.0)
+            };
+            let fine = simulation.clone().element(Mixed::<7>).step(short);
+            let exact = fine.run(start, 0.0..known).expect("a run");
+            // How far it turns within a time, at most, as far as the motion is known.
+            let turns = |within: f64, step: f64| {
+                let nodes = exact.states().iter().filter(|node| node.t <= step);
+                let pairs = nodes.clone().zip(nodes.skip(1));
+                let speeds = pairs.map(|(from, to)| distance(&from.q, &to.q) / (to.t - from.t));
+                within * speeds.fold(0.0, larger)
+            };
+            let steps = [1.0, 0.7, 0.5, 0.3, 0.2, 0.1].into_iter();
+            // Those would be cut into a thousand pieces each.
+            for step in steps.filter(|step| !is_fast || !(0.15..0.4).contains(step)) {
+                for nodes in 3..=8 {
+                    let count_one = |cell: &Cell<u32>| cell.set(cell.get() + 1);
+                    count_one(&self.runs);
+                    let run = simulation.clone().element(Element::mixed(nodes)).step(step);
+                    let motion = match run.run(start, 0.0..f64::from(count) * step) {
+                        Ok(motion) => motion,
+                        Err(error) => {
+                            count_one(&self.refused);
+                            let turned = turns(SHORTEST_PIECE * step, step);
+                            assert!(
+                                turned > 0.5,
+                                "{name}, {nodes} {step}: {error}, {turned} a piece"
+                            );
+                            continue;
+                        }
+                    };
+                    let recorded = || motion.states().iter();
+                    let size = recorded().flat_map(|node| node.q);
+                    let size = size.fold(0.0, |size: f64, q| larger(size, q.abs()));
+                    let off = recorded().map(|node| {
+                        let there = exact.at(node.t).expect("in the span");
+                        distance(&node.q, &there.q)
+                    });
+                    let off = off.fold(0.0, larger) / size;
+                    let (is_cut, is_warned) =
+                        (motion.statistics().cuts > 0, !motion.warnings().is_empty());
+                    assert!(
+                        off < NEAR || is_warned,
+                        "{name}, {nodes} {step}: off by {off:.1e} without a word, cut: {is_cut}"
+                    );
+                    if is_cut {
+                        count_one(&self.cut);
+                    }
+                    if is_warned {
+                        count_one(&self.warned);
+                    }
+                }
+            }
+        }
+    }
+    let all = Long::default();
+    each(&all);
+    println!(
+        "{} runs, {} with steps that were cut, {} with a warning, {} errors",
+        all.runs.get(),
+        all.cut.get(),
+        all.warned.get(),
+        all.refused.get()
+    );
+}
+
 /// What all runs of an accuracy take, beside a run with the fewest equal steps of the same element from which on the accuracy is met: kernels evaluated. Three times at most on six
 /// mechanisms; a little more on others, where a pair of runs had to be given up shortly before its end.
 #[test]
