@@ -197,8 +197,8 @@ where
         self
     }
 
-    /// What the iteration inside an element may leave, relative to the state: the rest of a geometric series, extrapolated from its last two increments. Elements of a run leave errors of the
-    /// same sign, so that they add up; below some 1e-15 all values do the same, since roundings end the iteration. The default iterates to round-off.
+    /// What the iteration inside an element may leave, relative to the state. It is judged by the rest of the geometric series of its increments, a fixed point by a 64th of that. Elements of a
+    /// run leave errors of the same sign, so that they add up; below some 1e-15 all values do the same, since roundings end the iteration. The default iterates to round-off.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;

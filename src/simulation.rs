@@ -178,8 +178,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         self
     }
 
-    /// What the iteration inside an element may leave, relative to the state: the rest of a geometric series, extrapolated from its last two increments. Elements of a run leave errors of the
-    /// same sign, so that they add up; below some 1e-15 all values do the same, since roundings end the iteration. The default iterates to round-off; above 1e-14
+    /// What the iteration inside an element may leave, relative to the state. It is judged by the rest of the geometric series of its increments, a fixed point by a 64th of that. Elements of a
+    /// run leave errors of the same sign, so that they add up; below some 1e-15 all values do the same, since roundings end the iteration. The default iterates to round-off; above 1e-14
     /// the sums of a step are no longer carried with what rounding takes from them (`docs/theory.md` §10.4). Models with constraints take 1e-9 for anything larger.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {

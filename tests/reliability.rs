@@ -453,6 +453,40 @@ fn an_iteration_that_cycles_ends() {
     }
 }
 
+/// What an iteration leaves in an element is at most the tolerance over the largest number of the state, for each of its values: one step against one iterated to roundings.
+#[test]
+fn a_tolerance_is_what_an_element_leaves() {
+    /// Of one step, in numbers of the size one to three.
+    const ROUNDINGS: f64 = 2e-15;
+    for solve in [Solve::FixedPoint, Solve::Newton] {
+        for element in [Element::mixed(3), Element::mixed(6), Element::radau(4)] {
+            for start in visited().into_iter().step_by(7) {
+                let step = |tolerance: f64| {
+                    let run = Simulation::new(&PENDULUM).element(element).step(0.02);
+                    let run = run.solver(solve).tolerance(tolerance);
+                    let motion = run.run(start, 0.0..0.02).expect("a step");
+                    *motion.last()
+                };
+                let exact = step(0.0);
+                let size =
+                    |numbers: [f64; 2]| numbers.into_iter().fold(1.0, |a: f64, x| a.max(x.abs()));
+                for tolerance in [1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 1e-15] {
+                    let node = step(tolerance);
+                    let off = |one: [f64; 2], other: [f64; 2]| {
+                        let off = (one[0] - other[0]).abs().max((one[1] - other[1]).abs());
+                        off / size(other)
+                    };
+                    let off = off(node.q, exact.q).max(off(node.p, exact.p));
+                    assert!(
+                        off <= tolerance + ROUNDINGS,
+                        "{element} {solve:?} {tolerance:e}: {off:e}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn steps_below_the_resolution_of_the_time_are_refused() {
     let model = Anharmonic { m: 1.0 };

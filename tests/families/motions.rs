@@ -86,6 +86,46 @@ struct Toda {
     n: usize,
 }
 
+/// Steps of very different lengths: an iteration starts from the polynomial of the element before it, which says nothing far behind its end.
+#[test]
+fn a_long_step_after_a_short_one_starts_as_that_of_fixed_size() {
+    let (m, k, a) = (1.3, 0.9, 0.25);
+    let (chain, five) = (Chain { n: 5, m, k, a }, FiveMasses { m, k, a });
+    for shortest in [1e-2, 1e-4, 1e-7] {
+        // Long, short, long, …
+        let mut times = vec![0.0_f64];
+        while times.len() < 60 {
+            let last = times[times.len() - 1];
+            times.push(last + 0.4);
+            times.push(last + 0.4 + shortest);
+        }
+        let end = times[times.len() - 1];
+        for element in [Element::mixed(4), Element::mixed(7), Element::radau(5)] {
+            let start = chain.state(START, PUSH);
+            let simulation = Simulation::new(&chain).element(element);
+            let family = simulation.nodes(times.iter().copied()).run(start, 0.0..end);
+            let family = family.expect("a run");
+            let simulation = Simulation::new(&five).element(element);
+            let fixed = simulation
+                .nodes(times.iter().copied())
+                .run(five.state(START, PUSH), 0.0..end);
+            let fixed = fixed.expect("a run");
+            for (one, other) in family.states().iter().zip(fixed.states()) {
+                let off = (0..5).map(|j| (one.q[j] - other.q[j]).abs());
+                let off = off.fold(0.0, larger);
+                assert!(off < 1e-13, "{element} {shortest} t = {}: {off:e}", one.t);
+            }
+            let (one, other) = (family.statistics(), fixed.statistics());
+            assert!(
+                one.iterations <= other.iterations + 2 * other.steps,
+                "{element} {shortest}: {} iterations, {}",
+                one.iterations,
+                other.iterations
+            );
+        }
+    }
+}
+
 fn lax_eigenvalues(state: &FamilyState) -> Vec<f64> {
     let n = state.q.len();
     let mut lax = DMatrix::zeros(n, n);

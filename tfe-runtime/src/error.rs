@@ -175,7 +175,7 @@ pub enum StepError {
         /// What was asked for.
         tolerance: f64,
     },
-    /// Newton's method converged, but not by contracting from its first iteration on: what it found may be another root of the equations of a long step.
+    /// The iteration converged, but not by contracting from its first step on: what it found may be another root of the equations of a long step.
     Unproven {
         /// The largest ratio of an increment to the one before.
         ratio: f64,
@@ -246,7 +246,7 @@ impl fmt::Display for StepError {
             ),
             Self::Unproven { ratio } => write!(
                 f,
-                "Newton's method wandered (an increment was {ratio:.1e} times the one before) and may have found another root of a long step: take a \
+                "the iteration wandered (an increment was {ratio:.1e} times the one before) and may have found another root of a long step: take a \
                  shorter one, or `Solve::Trusting`"
             ),
             Self::EnergyJump { before, after } => write!(

@@ -154,7 +154,9 @@ pub(crate) fn in_arcs<S: Kinked>(
                 return Err(StepError::Slides);
             }
             let over = 2.0 * margin.copysign(h);
-            if margin > 0.0 && over.abs() < 0.5 * (end - now).abs() {
+            // What the time does not resolve is no step.
+            let is_step = margin > 0.0 && now + over != now;
+            if is_step && over.abs() < 0.5 * (end - now).abs() {
                 // A step across a jump that has no solution: each side leads back to the other.
                 let crossed = stepper.whole(now, over, state, &[]);
                 crossed.map_err(|_| StepError::Slides)?;

@@ -99,6 +99,8 @@ const LARGE: usize = 24;
 /// Judges a sequence of increments.
 pub(crate) struct Monitor {
     tolerance: f64,
+    /// How much the rate before counts.
+    memory: f64,
     last: f64,
     /// By how much it moves the coordinates.
     position: f64,
@@ -112,6 +114,21 @@ pub(crate) struct Monitor {
     /// The smallest increment so far, and for how many iterations it has not been halved.
     best: f64,
     idle: u32,
+}
+
+/// One lucky small increment must not end an iteration: it goes on as if the rate before counted that much.
+const MEMORY: f64 = 0.1;
+
+/// What a fixed point has to come to, and how much the rate before counts, for a tolerance.
+///
+/// Above the roundings both are strict: momenta at the end follow from forces at the rates before the last increment, which are off by more than the rates after it.
+/// By increments alone some are left off by 170 times the tolerance, with a 16th of it by five times, with a 64th by half of it (`a_tolerance_is_what_an_element_leaves`).
+pub(crate) fn of_fixed_point(tolerance: f64) -> (f64, f64) {
+    if tolerance > Control::DEFAULT.tolerance {
+        (tolerance / 64.0, 1.0)
+    } else {
+        (tolerance, MEMORY)
+    }
 }
 
 pub(crate) enum Verdict {
@@ -129,6 +146,7 @@ impl Monitor {
     pub(crate) fn new(tolerance: f64) -> Self {
         Self {
             tolerance,
+            memory: MEMORY,
             last: f64::INFINITY,
             position: f64::INFINITY,
             rate: 1.0,
@@ -141,6 +159,16 @@ impl Monitor {
         }
     }
 
+    /// For a fixed point.
+    #[inline(always)]
+    pub(crate) fn of_fixed_point(tolerance: f64) -> Self {
+        let (tolerance, memory) = of_fixed_point(tolerance);
+        Self {
+            memory,
+            ..Self::new(tolerance)
+        }
+    }
+
     /// By how much the last increment was smaller than the one before.
     pub(crate) fn rate(&self) -> f64 {
         self.rate
@@ -150,6 +178,19 @@ impl Monitor {
     #[inline(always)]
     pub(crate) fn evidence(&self, yielding: bool) -> Evidence {
         Evidence::of_fixed_point(self.wildest, yielding)
+    }
+
+    /// What a fixed point that has come to no end ends with.
+    #[cold]
+    pub(crate) fn stalled(&self, iterations: u32, control: &Control) -> StepError {
+        if !self.last.is_finite() {
+            return StepError::NonFinite;
+        }
+        StepError::FixedPointStalled {
+            iterations,
+            residual: self.last,
+            tolerance: control.tolerance,
+        }
     }
 
     /// The last increment.
@@ -177,9 +218,8 @@ impl Monitor {
             return Ok(Verdict::GoOn);
         }
         let (last, first) = (self.last, self.last.is_infinite());
-        // What is left is the rest of a geometric series, size · ρ/(1 − ρ). One lucky small increment must not end the iteration, hence a
-        // memory of the rate before. Written without quotients: what follows waits for this decision.
-        let memory = 0.1 * self.rate;
+        // What is left is the rest of a geometric series, size · ρ/(1 − ρ). Written without quotients: what follows waits for this decision.
+        let memory = self.memory * self.rate;
         let converged = if first || size >= last {
             size <= self.tolerance
         } else {
@@ -274,7 +314,7 @@ pub(crate) fn fixed_point<E>(
 where
     E: Equations,
 {
-    let mut monitor = Monitor::new(control.tolerance);
+    let mut monitor = Monitor::of_fixed_point(control.tolerance);
     let most = if yielding {
         control.max_iterations.min(PATIENCE)
     } else {
@@ -308,11 +348,7 @@ where
     if monitor.is_at_round_off() {
         return monitor.evidence(yielding).check(control.solve);
     }
-    Err(StepError::FixedPointStalled {
-        iterations,
-        residual: monitor.last(),
-        tolerance: control.tolerance,
-    })
+    Err(monitor.stalled(iterations, control))
 }
 
 /// Newton's method; the matrix is kept while it serves, also from step to step.

@@ -113,11 +113,10 @@ pub(crate) enum Together {
 
 /// What has come of its iteration.
 struct Outcome<const N: usize> {
-    /// The end of the step, if the iteration has converged, and what rounding took from it.
-    end: Option<(State<N>, State<N>)>,
+    /// The end of the step, and what rounding took from it.
+    end: Result<(State<N>, State<N>), StepError>,
     iterations: u32,
-    /// The last increment, relative, and its ratio to that before.
-    residual: f64,
+    /// The ratio of the last increment to that before.
     contraction: f64,
 }
 

@@ -107,10 +107,12 @@ fn beyond<R: Repeatable<N>, const N: usize>(
     /// How far, in steps of the run.
     const FAR: f64 = 4.0;
     const MOST: u32 = 2000;
+    /// Sums of steps may be off by roundings, which are no steps of their own.
+    const ROUNDINGS: f64 = 1.0 - 1e-9;
     let end = time + FAR * step;
     let (mut t, mut h, mut state) = (time, first, state.clone());
     for _ in 0..MOST {
-        let is_last = h.abs() >= (end - t).abs();
+        let is_last = h.abs() >= ROUNDINGS * (end - t).abs();
         let next = if is_last { end } else { t + h };
         if next == t {
             return Beyond::Stopped;

@@ -1,13 +1,15 @@
 //! The stopping rule of single trajectories for several at once, without branches.
 
 use crate::evidence::Evidence;
-use crate::newton::{IDLE, MAX_IDLE, ROUGH_ROUND_OFF, ROUND_OFF, Solve};
+use crate::newton::{IDLE, MAX_IDLE, ROUGH_ROUND_OFF, ROUND_OFF, Solve, of_fixed_point};
 use crate::real::Real;
 
 /// Judges the increments of several trajectories as [`Monitor`](crate::newton::Monitor) judges those of one. Truth values are one and zero.
 #[derive(Clone, Copy)]
 pub(super) struct Judge<V> {
     tolerance: V,
+    /// How much the rate before counts.
+    memory: V,
     last: V,
     rate: V,
     risen: V,
@@ -61,7 +63,9 @@ impl<V: Real> Increments<V> {
 impl<V: Real> Judge<V> {
     #[inline(always)]
     pub(super) fn new(like: V, tolerance: f64, solve: Solve) -> Self {
+        let (tolerance, memory) = of_fixed_point(tolerance);
         Self {
+            memory: like.like(memory),
             worst: like.like(0.0),
             proven: like.like(match solve {
                 Solve::Trusting => f64::INFINITY,
@@ -91,7 +95,7 @@ impl<V: Real> Judge<V> {
         let is_first = infinity.less_or_equal(self.last);
         let rate = V::select(size.less_or_equal(zero), zero, size / self.last);
         // The rest of a geometric series, with a memory of the rate before.
-        let memory = size.like(0.1) * self.rate;
+        let memory = self.memory * self.rate;
         let by_rate = size * size - self.tolerance * (self.last - size);
         let by_memory = size * memory - self.tolerance * (one - memory);
         let beyond = larger(by_rate, by_memory);
@@ -180,8 +184,9 @@ mod tests {
         for seed in 0..4000 {
             let lanes = [0, 1, 2, 3].map(|lane| sequence(4 * seed + lane));
             let like = Lanes([0.0; 4]);
-            let mut judge = Judge::new(like, 1e-17, Solve::Auto);
-            let mut monitors = [(); 4].map(|()| Monitor::new(1e-17));
+            let tolerance = if seed % 2 == 0 { 1e-17 } else { 1e-9 };
+            let mut judge = Judge::new(like, tolerance, Solve::Auto);
+            let mut monitors = [(); 4].map(|()| Monitor::of_fixed_point(tolerance));
             let mut active = [true; 4];
             for step in 0..24 {
                 let increments = Increments::new(

@@ -64,7 +64,7 @@ impl Registers {
         leg: Leg<'_>,
         yielding: bool,
     ) -> Outcome {
-        let mut monitor = Monitor::new(control.tolerance);
+        let mut monitor = Monitor::of_fixed_point(control.tolerance);
         let (mut iterations, mut converged) = (0, false);
         let most = if yielding {
             control.max_iterations.min(PATIENCE)

@@ -89,22 +89,17 @@ where
         statistics.fixed_point_iterations += iterations;
         statistics.residual_evaluations += iterations * points.tables.points as u64;
         statistics.contraction = Contraction::of(outcome.contraction);
-        let Some((end, end_low)) = outcome.end else {
-            if yielding {
+        let (end, end_low) = match outcome.end {
+            Ok(end) => end,
+            Err(_) if yielding => {
                 memory.preference.leave_fixed_point();
                 memory.statistics.fallbacks += 1;
                 return Together::LeftToOthers;
             }
-            memory.last = None;
-            return Together::Stalled(if outcome.residual.is_finite() {
-                StepError::FixedPointStalled {
-                    iterations: outcome.iterations,
-                    residual: outcome.residual,
-                    tolerance: control.tolerance,
-                }
-            } else {
-                StepError::NonFinite
-            });
+            Err(error) => {
+                memory.last = None;
+                return Together::Stalled(error);
+            }
         };
         (points.is_warm, points.last_step) = (true, h);
         memory.last = Some(Last {
@@ -182,7 +177,7 @@ where
             work.speed = largest(&leg.start.p);
         }
         let is_rough = control.is_rough();
-        let mut monitor = Monitor::new(control.tolerance);
+        let mut monitor = Monitor::of_fixed_point(control.tolerance);
         let most = if yielding {
             control.max_iterations.min(PATIENCE)
         } else {
@@ -230,8 +225,8 @@ where
         }
         converged |= monitor.is_at_round_off();
         // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
-        let (mut end, mut residual) = (None, monitor.last());
-        if converged && monitor.evidence(yielding).check(control.solve).is_ok() {
+        let evidence = monitor.evidence(yielding).check(control.solve);
+        let end = if converged && evidence.is_ok() {
             let (state, low) = if const { is_second_order::<M, N>() } {
                 if is_rough {
                     work.finish_second_order::<V, false>(like, &leg)
@@ -244,19 +239,23 @@ where
                 work.finish::<V, true>(like, &leg)
             };
             if is_finite(&state) {
-                end = Some((state, low));
                 // What a failed step would have to start from is kept until here.
                 core::mem::swap(&mut points.forces, &mut work.forces);
                 core::mem::swap(&mut points.rates, &mut work.rates);
                 points.velocity = work.velocity;
+                Ok((state, low))
             } else {
-                residual = f64::NAN;
+                Err(StepError::NonFinite)
             }
-        }
+        } else {
+            Err(match evidence {
+                Err(unproven) if converged => unproven,
+                _ => monitor.stalled(iterations, &control),
+            })
+        };
         Outcome {
             end,
             iterations,
-            residual,
             contraction: monitor.rate(),
         }
     }
