@@ -110,14 +110,22 @@ fn main() -> Result<(), Box<dyn Error>> {
                 "unstable"
             }
         );
+        // From the wall to the wall; the impact closes the curve.
+        let hit = motion.events().first().ok_or("it hits the wall")?.t;
         let (from, period) = (exact.from, orbit.period());
-        let curve: Result<Vec<_>, tfe::AtError> = (0..=600)
-            .map(|k| {
-                let node = motion.at((from + period * f64::from(k) / 600.0).min(motion.last().t))?;
-                Ok((node.q[0], node.v[0]))
-            })
-            .collect();
-        chart = chart.series(format!("{n} periods, ω = {omega}"), Style::Line, curve?);
+        let at = |t: f64| {
+            let node = motion.at(t.clamp(from, motion.last().t))?;
+            Ok::<_, tfe::AtError>((node.q[0], node.v[0]))
+        };
+        let times = (1..600).map(|k| hit + period * f64::from(k) / 600.0);
+        let times = times.map(|t| if t > from + period { t - period } else { t });
+        let mut curve = vec![(0.0, -RESTITUTION * impact)];
+        for t in times {
+            curve.push(at(t)?);
+        }
+        curve.extend([(0.0, impact), (0.0, -RESTITUTION * impact)]);
+        let name = if n > 1.0 { "2 periods" } else { "1 period" };
+        chart = chart.series(format!("{name}, ω = {omega}"), Style::Line, curve);
     }
     assert!(worst < 1e-9, "off by {worst:e}");
     let path = std::env::args().nth(1);

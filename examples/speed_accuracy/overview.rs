@@ -120,7 +120,7 @@ fn panel(
         .flat_map(|power| [1, 2, 5].map(|m| (m, power)));
     for (multiple, power) in marks {
         let log = f64::from(multiple).log10() + f64::from(power);
-        if !(first..=last).contains(&log) || (multiple > 1 && last - first > 1.7) {
+        if !(first..=last).contains(&log) || (multiple > 1 && last - first > 1.2) {
             continue;
         }
         let x = x(log);
