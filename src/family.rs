@@ -36,7 +36,8 @@
 
 pub use crate::motion::family::{FamilyMotion, FamilyNode, FamilyOutputs, FamilyResidual};
 pub use crate::simulation::FamilyCheckpoint;
-pub use crate::simulation::family::{FamilyRunError, FamilySimulation, FamilySteps, Runs};
+pub use crate::simulation::family::{FamilyRunError, FamilySimulation, FamilySteps};
+pub use crate::simulation::kind::Runs;
 pub use tfe_runtime::family::{
     Block, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, FamilySuspended,
     Gradient, Pattern, STRIDE, Sweep, constraint_residual, energy, momenta, state, velocity,

@@ -2,9 +2,9 @@
 
 mod family;
 
-use super::Simulation;
 use super::follow::Nobody;
 use super::mesh::Mesh;
+use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Checkpoint, Motion, Reached};
 use std::ops::Range;

@@ -1,12 +1,15 @@
 //! Events of runs: where an output changes its sign, and what is done there (T-122).
 
-mod act;
-mod on;
+pub(super) mod act;
+pub(super) mod on;
+pub(super) mod remodel;
 mod search;
-mod settings;
-mod value;
+pub(super) mod settings;
+pub(super) mod value;
 
 use crate::error::RunErrorKind;
+use act::{Act, After, Event, On};
+use remodel::Remodel;
 use search::Course;
 use std::cell::RefCell;
 use std::fmt;
@@ -14,14 +17,7 @@ use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper};
 use tfe_runtime::{Arguments, Element, Form, Model, Real, Share, State, constrained};
-
-pub use crate::motion::Event;
-pub use act::{Act, Crossing, Occurrence};
-pub(super) use act::{After, Changed, Near, On, state_after};
-pub(crate) use on::Watching;
-pub use settings::Settings;
-pub(super) use settings::{Remodel, remodel};
-pub(super) use value::{Value, WEIGHTS};
+use value::Value;
 
 /// An event that is looked for.
 pub(super) struct Watched<'m, const N: usize> {

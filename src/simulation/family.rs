@@ -1,10 +1,10 @@
-//! Runs of models of run-time length, and which kind of run `Simulation::new` gives.
+//! Runs of models of run-time length.
 
 use super::accurate::repeatable::{Broken, Passing};
 use super::course::{Course, Leg};
 use super::mesh::{Endless, Mesh};
+use super::progress;
 use super::watch::{Recorded, Watch};
-use super::{Simulation, progress};
 use crate::error::RunErrorKind;
 use crate::motion::family::{FamilyMotion, FamilyNode};
 use crate::motion::{FamilyCheckpoint, Reached};
@@ -12,42 +12,8 @@ use std::error::Error;
 use std::fmt;
 use std::ops::{ControlFlow, Range};
 use tfe_runtime::family::{FamilyError, FamilyModel, FamilyState, FamilyStepper, FamilySuspended};
-use tfe_runtime::length::{FixedLength, RunTimeLength};
 use tfe_runtime::step::Control;
-use tfe_runtime::{Element, Mixed, Model, Solve};
-
-/// The kind of run that models of one kind of length have; what [`Simulation::new`] returns.
-pub trait Runs<M, const N: usize> {
-    /// The run to be.
-    type Simulation<'m>
-    where
-        M: 'm;
-
-    /// With the defaults.
-    fn with_defaults(model: &M) -> Self::Simulation<'_>;
-}
-
-impl<M: Model<N>, const N: usize> Runs<M, N> for FixedLength {
-    type Simulation<'m>
-        = Simulation<'m, M, N>
-    where
-        M: 'm;
-
-    fn with_defaults(model: &M) -> Simulation<'_, M, N> {
-        Simulation::with_defaults(model)
-    }
-}
-
-impl<M: FamilyModel> Runs<M, 0> for RunTimeLength {
-    type Simulation<'m>
-        = FamilySimulation<'m, M>
-    where
-        M: 'm;
-
-    fn with_defaults(model: &M) -> FamilySimulation<'_, M> {
-        FamilySimulation::new(model)
-    }
-}
+use tfe_runtime::{Element, Mixed, Solve};
 
 /// A run to be of a model of run-time length; made by [`Simulation::new`].
 ///

@@ -1,8 +1,8 @@
 //! Gradients of losses, backwards along a run (T-127).
 
-use super::Simulation;
 use super::follow::Nobody;
 use super::sensitive::directions;
+use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::Motion;
 use crate::sensitivity::Sensitive;

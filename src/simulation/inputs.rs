@@ -1,9 +1,10 @@
 //! Runs of models with inputs.
 
-use super::events::{Remodel, remodel};
+use super::events::remodel::{Remodel, remodel};
 use super::held::Held;
-use super::{RunErrorKind, Simulation};
+use super::setup::Simulation;
 use crate::driven::{Cells, Driven, InputError, Interpolation};
+use crate::error::RunErrorKind;
 use std::sync::Arc;
 use tfe_runtime::{Controlled, Model, Share, State};
 

@@ -1,9 +1,9 @@
 //! Runs with the transition matrix of every element.
 
-use super::Simulation;
 use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::sensitive::Tangents;
+use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
 use crate::motion::Motion;

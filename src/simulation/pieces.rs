@@ -1,7 +1,9 @@
 //! One element of the grid of a run, in the pieces into which events cut it.
 
-use super::check_restart;
-use super::events::{After, Changed, Cut, Events, Passage};
+use super::checks::check_restart;
+use super::events::act::After;
+use super::events::remodel::Changed;
+use super::events::{Cut, Events, Passage};
 use super::follow::{Follow, Passed};
 use crate::error::RunErrorKind;
 use std::ops::ControlFlow;

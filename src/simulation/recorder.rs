@@ -1,11 +1,12 @@
 //! Keeps what a run passes as a motion, and notices what is doubtful about it.
 
+use super::checks::conserves_energy;
 use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::pieces::{Broken, Observe, Piece, Side};
+use super::setup::Simulation;
 use super::watch::resolution::{Examined, Resolution};
 use super::watch::{Recorded, Watch};
-use super::{Simulation, conserves_energy};
 use crate::error::RunErrorKind;
 use crate::motion::{Motion, Node};
 use std::ops::ControlFlow;

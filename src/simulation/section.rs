@@ -1,10 +1,11 @@
 //! Sections of Poincaré: where a motion without an end crosses a surface.
 
-use super::Simulation;
-use super::events::{Act, Crossing, Event, On, Severed};
+use super::events::Severed;
+use super::events::act::{Act, Crossing, Event, On};
 use super::follow::{Follow, Passed};
 use super::pieces::{Left, Observe, Side};
 use super::sensitive::Tangents;
+use super::setup::Simulation;
 use super::steps::Way;
 use crate::error::RunErrorKind;
 use nalgebra::DMatrix;

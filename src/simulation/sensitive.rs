@@ -1,8 +1,11 @@
 //! Runs with derivatives by parameters and by the start (T-123, T-124).
 
-use super::Simulation;
-use super::events::{Near, Severed, WEIGHTS, state_after};
+use super::checks::check_start;
+use super::events::Severed;
+use super::events::act::{Near, state_after};
+use super::events::value::WEIGHTS;
 use super::follow::{Follow, Passed};
+use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
 use crate::sensitivity::slopes::{Along, Change, Place};
@@ -324,7 +327,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
                     parameter: parameter.map(|index| (index, s)),
                 };
                 let found = state_after(&*self.model, by, event, &near);
-                let found = found.filter(|found| super::check_start(found).is_ok());
+                let found = found.filter(|found| check_start(found).is_ok());
                 found.ok_or(TransitionError::from(StepError::NonFinite))
             };
             after.column_mut(column).fill(0.0);

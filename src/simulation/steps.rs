@@ -1,16 +1,15 @@
 //! The endless sequence of states.
 
-use super::conserves_energy;
+use super::checks::conserves_energy;
 use super::course::{Course, Leg};
-use super::events::Event;
 use super::follow::{Follow, Passed};
 use super::mesh::{self, Endless};
 use super::pieces::{Left, Observe, Piece, Pieces, Planned, Side};
 use super::watch::resolution::{Again, Examined, Resolution};
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;
-use crate::motion::Node;
 use crate::motion::Warning;
+use crate::motion::{Event, Node};
 use std::collections::VecDeque;
 use tfe_runtime::step::{Impulse, Stepper};
 use tfe_runtime::transition::TransitionError;

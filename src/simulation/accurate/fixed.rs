@@ -1,9 +1,10 @@
 //! Runs of models of fixed size with an estimate of their error.
 
+use super::super::checks::check_constraints;
 use super::super::events::Severed;
 use super::super::follow::{Follow, Passed};
 use super::super::mesh::Mesh;
-use super::super::{Simulation, check_constraints};
+use super::super::setup::Simulation;
 use super::graded::Steps;
 use super::repeatable::{Broken, Passing, Repeatable, trusting};
 use super::{Accurate, accurate, check_accuracy, estimated};

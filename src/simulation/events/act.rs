@@ -1,9 +1,10 @@
 //! What is done at events, and what a caller is told of them.
 
-use super::Value;
-use super::settings::{Remodel, Settings};
+use super::remodel::{Changed, Remodel};
+use super::settings::{Settings, momenta_of};
+use super::value::{Function, Value};
 use crate::error::RunErrorKind;
-use crate::motion::Event;
+pub use crate::motion::Event;
 use crate::sensitivity::slopes::momentum_by;
 use crate::velocity::velocity_from;
 use std::fmt;
@@ -127,10 +128,6 @@ impl<const N: usize> fmt::Debug for Occurrence<'_, N> {
 }
 
 type Action<'m, const N: usize> = Arc<dyn Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm>;
-
-/// A function of time, coordinates and velocities.
-pub(super) type Function<'m, const N: usize> =
-    Arc<dyn Fn(f64, &[f64; N], &[f64; N]) -> f64 + Send + Sync + 'm>;
 
 /// What a run is to look for.
 #[derive(Clone)]
@@ -305,9 +302,6 @@ pub(in crate::simulation) struct After<'m, M, const N: usize> {
     pub(in crate::simulation) model: Option<Changed<'m, M>>,
 }
 
-/// A model with other parameters, and these by their numbers.
-pub(in crate::simulation) type Changed<'m, M> = (tfe_runtime::Share<'m, M>, Vec<(usize, f64)>);
-
 /// What an act lets a run go on with; none where it ends.
 pub(super) fn after<'m, M: Model<N>, const N: usize>(
     model: &M,
@@ -329,15 +323,6 @@ pub(super) fn after<'m, M: Model<N>, const N: usize>(
         }
     };
     Ok(Some(After { state, model: None }))
-}
-
-/// The momenta of velocities at an event; NaN where there are none.
-pub(super) fn momenta_of<M: Model<N>, const N: usize>(
-    model: &M,
-    event: &Event<N>,
-    v: [f64; N],
-) -> [f64; N] {
-    tfe_runtime::__private::state(model, event.t, event.q, v).p
 }
 
 /// The state with momenta that are larger by an impulse, as far as constraints let it act.

@@ -1,7 +1,8 @@
 //! What a run is asked to look for.
 
-use super::{Act, Crossing, Occurrence, On, Remodel, remodel};
-use crate::simulation::Simulation;
+use super::act::{Act, Crossing, Occurrence, On};
+use super::remodel::{Remodel, remodel};
+use crate::simulation::setup::Simulation;
 use std::sync::Arc;
 use tfe_runtime::Model;
 

@@ -1,9 +1,9 @@
 //! Parameters that are set at events.
 
-use super::act::{Changed, momenta_of};
+use super::remodel::{Changed, Remodel};
 use crate::error::RunErrorKind;
 use crate::motion::Event;
-use tfe_runtime::{Model, Share, State};
+use tfe_runtime::{Model, State};
 
 /// New values of parameters, for [`Act::Set`](crate::Act::Set). They hold until they are set again, or the run ends; the model of the caller stays as it is.
 ///
@@ -142,21 +142,11 @@ impl<const N: usize> Settings<N> {
     }
 }
 
-/// Makes a model with other values of some parameters, if that can be.
-pub(in crate::simulation) type Remodel<'m, M> = fn(&M, &[(usize, f64)]) -> Option<Share<'m, M>>;
-
-/// The [`Remodel`] of a model that may go to other threads.
-pub(in crate::simulation) fn remodel<'m, M, const N: usize>(
+/// The momenta of velocities at an event; NaN where there are none.
+pub(super) fn momenta_of<M: Model<N>, const N: usize>(
     model: &M,
-    values: &[(usize, f64)],
-) -> Option<Share<'m, M>>
-where
-    M: Model<N> + Send + Sync + 'm,
-{
-    let ((first, value), others) = values.split_first()?;
-    let mut made = model.with_parameter(*first, *value)?;
-    for (index, value) in others {
-        made = made.with_parameter(*index, *value)?;
-    }
-    Some(Share::own(made))
+    event: &Event<N>,
+    v: [f64; N],
+) -> [f64; N] {
+    tfe_runtime::__private::state(model, event.t, event.q, v).p
 }

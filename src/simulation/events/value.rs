@@ -1,10 +1,14 @@
 //! What changes its sign at an event.
 
-use super::act::Function;
 use crate::motion::Event;
 use crate::sensitivity::slopes::{Along, Change};
+use std::sync::Arc;
 use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::{Form, Model};
+
+/// A function of time, coordinates and velocities.
+pub(super) type Function<'m, const N: usize> =
+    Arc<dyn Fn(f64, &[f64; N], &[f64; N]) -> f64 + Send + Sync + 'm>;
 
 /// An output of the model, or a function.
 #[derive(Clone)]

@@ -1,6 +1,6 @@
 //! Whether elements resolve the motion: a second look at some of those whose iteration did not contract quickly (T-121).
 
-use super::Warning;
+use crate::motion::Warning;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::{Element, Model, Share, Solve, State, Statistics};
 

@@ -1,0 +1,56 @@
+//! What a run asks of a start and of a model before it begins.
+
+use crate::error::RunErrorKind;
+use tfe_runtime::constrained::{self, Residual};
+use tfe_runtime::{Model, State};
+
+/// Whether the energy of a model is known to be conserved, and a jump tells of a step that is too long: linear models have steps of their own kind of error.
+pub(crate) const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
+    let facts = M::FACTS;
+    !(facts.time_dependent || facts.forced || facts.linear) && M::CONSTRAINTS.is_empty()
+}
+
+/// Refuses start values that are not finite.
+pub(crate) fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErrorKind> {
+    for (coordinate, (&q, &p)) in state.q.iter().zip(&state.p).enumerate() {
+        if !(q.is_finite() && p.is_finite()) {
+            return Err(RunErrorKind::Start { coordinate, q, p });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a state from which a run cannot go on.
+pub(super) fn check_restart<M: Model<N>, const N: usize>(
+    model: &M,
+    time: f64,
+    h: f64,
+    state: &State<N>,
+) -> Result<(), RunErrorKind> {
+    check_start(state)?;
+    check_constraints(model, time, h, state)
+}
+
+/// Refuses a start that is not on the constraints.
+pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
+    model: &M,
+    time: f64,
+    h: f64,
+    start: &State<N>,
+) -> Result<(), RunErrorKind> {
+    if const { M::CONSTRAINTS.is_empty() } {
+        return Ok(());
+    }
+    let v = constrained::velocity_of(model, time, &start.q, &start.p, &[0.0; N]);
+    let Ok(v) = v else {
+        // The first element says why.
+        return Ok(());
+    };
+    let residuals = constrained::residuals(model, time, &start.q, &v, h);
+    let holds = |one: &Residual| one.relative() <= constrained::START_TOLERANCE;
+    if residuals.iter().all(holds) {
+        Ok(())
+    } else {
+        Err(RunErrorKind::Inconsistent { time, residuals })
+    }
+}

@@ -1,0 +1,25 @@
+//! Models with other parameters.
+
+use tfe_runtime::{Model, Share};
+
+/// A model with other parameters, and these by their numbers.
+pub(in crate::simulation) type Changed<'m, M> = (tfe_runtime::Share<'m, M>, Vec<(usize, f64)>);
+
+/// Makes a model with other values of some parameters, if that can be.
+pub(in crate::simulation) type Remodel<'m, M> = fn(&M, &[(usize, f64)]) -> Option<Share<'m, M>>;
+
+/// The [`Remodel`] of a model that may go to other threads.
+pub(in crate::simulation) fn remodel<'m, M, const N: usize>(
+    model: &M,
+    values: &[(usize, f64)],
+) -> Option<Share<'m, M>>
+where
+    M: Model<N> + Send + Sync + 'm,
+{
+    let ((first, value), others) = values.split_first()?;
+    let mut made = model.with_parameter(*first, *value)?;
+    for (index, value) in others {
+        made = made.with_parameter(*index, *value)?;
+    }
+    Some(Share::own(made))
+}

@@ -1,0 +1,265 @@
+//! Runs: from a start over a span, or without an end.
+
+use super::checks::{check_constraints, check_start};
+use super::events::Events;
+use super::follow::{Follow, Nobody};
+use super::mesh::{Endless, Mesh};
+use super::pieces::{Broken, Left, Pieces, Planned};
+use super::progress;
+use super::recorder::Recorder;
+use super::setup::Simulation;
+use super::steps::{Beginning, Steps};
+use crate::error::{RunError, RunErrorKind};
+use crate::motion::{Checkpoint, Motion, Reached};
+use std::ops::Range;
+use tfe_runtime::step::Stepper;
+use tfe_runtime::{Model, State};
+
+impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
+    /// Runs over the span, backwards where it ends before it starts. The last node is exactly at the end of the span.
+    ///
+    /// What is doubtful about the result without being an error is in [`Motion::warnings`].
+    ///
+    /// # Errors
+    /// [`RunError`] says where and why the run stopped and holds the motion so far.
+    ///
+    /// ```
+    /// # use tfe::prelude::*;
+    /// # #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2)]
+    /// # struct Oscillator { m: f64, k: f64 }
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let oscillator = Oscillator { m: 1.0, k: 1.0 };
+    /// // The amplitude grows between √10 and √12, where the oscillator's own does not.
+    /// let simulation = Simulation::new(&oscillator).element(Primal::<3>).step(3.3);
+    /// let motion = simulation.run(oscillator.state([1.0], [0.0]), 0.0..330.0)?;
+    /// for warning in motion.warnings() {
+    ///     println!("{warning}");
+    /// }
+    /// assert_eq!(motion.warnings().len(), 1);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn run(&self, start: State<N>, span: Range<f64>) -> Result<Motion<N>, RunError<N>> {
+        let ends_only = self.record_every != 1 && self.events.is_empty();
+        let ready = |stepper: Stepper<'m, M, N>| {
+            let stepper = self.cutting(stepper);
+            if ends_only {
+                stepper.ends_only()
+            } else {
+                stepper
+            }
+        };
+        self.drive(start, &span, ready, Nobody)
+    }
+
+    /// Runs over the span, followed by `follower`.
+    pub(super) fn drive(
+        &self,
+        start: State<N>,
+        span: &Range<f64>,
+        ready: impl FnOnce(Stepper<'m, M, N>) -> Stepper<'m, M, N>,
+        follower: impl Follow<'m, M, N>,
+    ) -> Result<Motion<N>, RunError<N>> {
+        let prepared = self.model.guarded(|| {
+            let motion = Motion::from_start(&*self.model, span.start, &start);
+            (self.prepare(&start, span), motion)
+        });
+        let Ok((prepared, motion)) = prepared else {
+            let motion = Motion::unknown(&*self.model, span.start, &start);
+            return Err(RunError::new(RunErrorKind::panicked(span.start), motion));
+        };
+        let (mesh, stepper) = match prepared {
+            Ok(prepared) => prepared,
+            Err(kind) => return Err(RunError::new(kind, motion)),
+        };
+        let place = (&mesh, 0, span.start);
+        self.drive_on(motion, &start, place, ready(stepper), follower)
+    }
+
+    /// Goes on from the only node of `motion` over a mesh of which some elements are done, and leaves a checkpoint.
+    pub(super) fn drive_on(
+        &self,
+        motion: Motion<N>,
+        start: &State<N>,
+        (mesh, done, origin): (&Mesh<N>, usize, f64),
+        mut stepper: Stepper<'m, M, N>,
+        follower: impl Follow<'m, M, N>,
+    ) -> Result<Motion<N>, RunError<N>> {
+        let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, follower)?;
+        let last = *motion.last();
+        // A run that was stopped has no grid to go on with, and one whose parameters were set no model.
+        if mesh.end().is_some_and(|end| end != last.t) || !motion.settings().is_empty() {
+            return Ok(motion);
+        }
+        motion.set_checkpoint(Checkpoint {
+            reached: Reached::new(origin, self.step, mesh, last.t),
+            state: last.state(),
+            velocity: motion.velocities().last().copied().unwrap_or([0.0; N]),
+            stepper: stepper.suspend(),
+        });
+        Ok(motion)
+    }
+
+    /// Runs over a mesh with a stepper at rest.
+    pub(super) fn drive_over(
+        &self,
+        start: State<N>,
+        t0: f64,
+        mesh: &Mesh<N>,
+        stepper: &mut Stepper<'m, M, N>,
+        follower: impl Follow<'m, M, N>,
+    ) -> Result<Motion<N>, RunError<N>> {
+        let motion = Motion::from_start(&*self.model, t0, &start);
+        self.drive_from(motion, &start, (mesh, 0), stepper, follower)
+    }
+
+    /// The same from the only node of `motion`, after the elements that are done.
+    fn drive_from(
+        &self,
+        motion: Motion<N>,
+        start: &State<N>,
+        (mesh, done): (&Mesh<N>, usize),
+        stepper: &mut Stepper<'m, M, N>,
+        follower: impl Follow<'m, M, N>,
+    ) -> Result<Motion<N>, RunError<N>> {
+        let mut pieces = match self.pieces(stepper) {
+            Ok(pieces) => pieces,
+            Err(kind) => return Err(RunError::new(kind, motion)),
+        };
+        let mut recorder = Recorder::new(self, motion, start, follower);
+        let mut state = *start;
+        let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
+        let mut failure = None;
+        for (number, (t, next, h)) in mesh.elements().enumerate().skip(done) {
+            let is_last = number + 1 == mesh.steps();
+            let planned = Planned {
+                number,
+                t,
+                next,
+                h,
+                begin: mesh.begin(t, h),
+                impulses: mesh.impulses_in(t, next, is_last),
+            };
+            let has_impulses = !planned.impulses.is_empty();
+            recorder.begin(stepper.model(), number, (t, h), &state, has_impulses);
+            let passed = self.model.guarded(|| {
+                let left = pieces.pass(stepper, planned, &mut state, &mut recorder)?;
+                if left == Left::Done {
+                    recorder.end(stepper.model(), number, is_last, next, &state);
+                }
+                Ok(left)
+            });
+            let passed = passed.unwrap_or_else(|_| {
+                let (kind, piece) = (RunErrorKind::panicked(t), None);
+                Err(Box::new(Broken { kind, piece }))
+            });
+            match passed {
+                Ok(Left::Done) => {}
+                Ok(Left::Stopped) => break,
+                Err(broken) => {
+                    recorder.fail(stepper.model(), number, &broken);
+                    failure = Some(broken.kind);
+                    break;
+                }
+            }
+            bar.advance();
+        }
+        let mut motion = recorder.into_motion(stepper, &state);
+        if pieces.is_changed()
+            && let Err(error) = stepper.set_model(self.model.clone())
+        {
+            failure.get_or_insert(RunErrorKind::Element(error));
+        }
+        motion.set_events(pieces.events.met);
+        match failure {
+            None => Ok(motion),
+            Some(kind) => Err(RunError::new(kind, motion)),
+        }
+    }
+
+    /// What passes elements, with a look at events.
+    pub(super) fn pieces(
+        &self,
+        stepper: &Stepper<'m, M, N>,
+    ) -> Result<Pieces<'m, M, N>, RunErrorKind> {
+        let chosen = (stepper.element(), stepper.control());
+        let events = Events::new(self.model.clone(), self.remodel, &self.events, chosen)?;
+        Ok(Pieces::new(self.model.clone(), events))
+    }
+
+    /// Whether the run can begin at `start`.
+    pub(super) fn check_start(&self, start: &State<N>) -> Result<(), RunErrorKind> {
+        match &self.refusal {
+            Some(refusal) => Err(refusal.clone()),
+            None => check_start(start),
+        }
+    }
+
+    /// The elements of a run and its stepper, if all arguments are good.
+    pub(super) fn prepare(
+        &self,
+        start: &State<N>,
+        span: &Range<f64>,
+    ) -> Result<(Mesh<N>, Stepper<'m, M, N>), RunErrorKind> {
+        self.check_start(start)?;
+        let mesh = self.mesh(span)?;
+        if let Some((_, _, h)) = mesh.elements().next() {
+            check_constraints(&*self.model, span.start, h, start)?;
+        }
+        let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control);
+        Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
+    }
+
+    /// The states that follow `start`, one a step, without end and in constant memory; elements end at [breaks](Self::break_at), as in [`run`](Self::run). After an error the iterator
+    /// is finished. [`Steps::warnings`] tells what is doubtful about the steps so far.
+    ///
+    /// A step in which an [event](Self::on) changes the state or a parameter has two more nodes, with the states before and after; after the node at which an event stops the run the
+    /// iterator is finished. [`Steps::events`] tells those of the last step.
+    ///
+    /// ```
+    /// # use tfe::prelude::*;
+    /// # #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2)]
+    /// # struct Oscillator { m: f64, k: f64 }
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let oscillator = Oscillator { m: 1.0, k: 1.0 };
+    /// let simulation = Simulation::new(&oscillator).step(0.1);
+    /// for node in simulation.steps(oscillator.state([1.0], [0.0]), 0.0) {
+    ///     let node = node?;
+    ///     if node.q[0] < 0.0 {
+    ///         println!("passed zero before t = {}", node.t);
+    ///         break;
+    ///     }
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
+        let new = |beginning| {
+            let (model, impulses) = (self.model.clone(), self.impulses.clone());
+            Steps::new(model, beginning, start, t0, impulses, self.again())
+        };
+        let begun = self.model.guarded(|| new(self.endless(&start, t0)));
+        begun.unwrap_or_else(|_| new(Err(RunErrorKind::panicked(t0))))
+    }
+
+    /// The beginning of a course without an end.
+    pub(super) fn endless(&self, start: &State<N>, t0: f64) -> Beginning<'m, M, N> {
+        let step = self.step.unwrap_or(f64::NAN);
+        self.check_start(start)?;
+        check_constraints(&*self.model, t0, step, start)?;
+        if !t0.is_finite() {
+            return Err(RunErrorKind::Span {
+                start: t0,
+                end: f64::INFINITY,
+            });
+        }
+        let elements = Endless::new(t0, step, &self.breaks)?;
+        let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control);
+        let stepper = self.cutting(stepper.map_err(RunErrorKind::Element)?);
+        if self.events.is_empty() {
+            return Ok((stepper.ends_only(), elements, None));
+        }
+        let pieces = self.pieces(&stepper)?;
+        Ok((stepper, elements, Some(pieces)))
+    }
+}
