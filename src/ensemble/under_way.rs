@@ -1,10 +1,13 @@
 //! Ensembles that go on where they have got to.
 
 use super::doubts::{Energy, WarningCounts};
+use super::ends::Ends;
+use super::error::EnsembleError;
 use super::members::{Members, OneModel, some_starts};
 use super::plan::{Failures, Plan, WIDTH, bad_starts, start_of};
 use super::progress::Progress;
-use super::{Ends, Ensemble, EnsembleError, Results, lock, summed, unlock};
+use super::results::{Results, lock, summed, unlock};
+use super::setup::Ensemble;
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use crate::simulation::Reached;

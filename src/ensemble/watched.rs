@@ -1,7 +1,7 @@
 //! Ensembles whose runs look for events, or are cut at kinks.
 
-use super::Ensemble;
 use super::members::Members;
+use super::setup::Ensemble;
 use crate::error::RunErrorKind;
 use crate::motion::Node;
 use crate::simulation::{Act, Crossing, Occurrence, Simulation};

@@ -1,7 +1,9 @@
 //! The least-squares problem of a fit, as the library that solves it wants it.
 
 use super::data::{Column, Observed};
-use super::{Fit, FitError, Fitted, Trial};
+use super::error::FitError;
+use super::fitted::{Fitted, Trial};
+use super::setup::Fit;
 use crate::sensitivity::Sensitive;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::DMatrix;

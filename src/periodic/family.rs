@@ -1,85 +1,30 @@
-//! Periodic orbits of models of run-time length, and which kind of orbit `PeriodicOrbit::of` gives.
+//! Periodic orbits of models of run-time length.
 
-#[cfg(feature = "sparse")]
 mod orbit;
-#[cfg(feature = "sparse")]
 mod shooting;
 
-#[cfg(feature = "sparse")]
 pub use orbit::FamilyOrbit;
 
-use super::PeriodicOrbit;
-use tfe_runtime::Model;
-use tfe_runtime::length::FixedLength;
-
-#[cfg(feature = "sparse")]
-use super::{OrbitError, Period, Phase, problem::Global};
-#[cfg(feature = "sparse")]
+use super::error::OrbitError;
+use super::phase::{Period, Phase};
+use super::problem::Global;
 use crate::assembly::{Control, Mesh};
-#[cfg(feature = "sparse")]
 use crate::family::FamilySimulation;
-#[cfg(feature = "sparse")]
 use shooting::Shooting;
-#[cfg(feature = "sparse")]
 use tfe_runtime::family::{self, FamilyModel, FamilyState};
-#[cfg(feature = "sparse")]
-use tfe_runtime::length::RunTimeLength;
-#[cfg(feature = "sparse")]
 use tfe_runtime::{Element, Mixed};
 
-/// The kind of orbit that models of one kind of length have; what [`PeriodicOrbit::of`] returns.
-#[cfg_attr(
-    not(feature = "sparse"),
-    diagnostic::on_unimplemented(
-        message = "periodic orbits of models of run-time length need the feature `sparse`"
-    )
-)]
-pub trait Orbits<M, const N: usize> {
-    /// The orbit to be found.
-    type Orbit<'m>
-    where
-        M: 'm;
-
-    /// With the defaults.
-    fn with_defaults(model: &M) -> Self::Orbit<'_>;
-}
-
-impl<M: Model<N>, const N: usize> Orbits<M, N> for FixedLength {
-    type Orbit<'m>
-        = PeriodicOrbit<'m, M, N>
-    where
-        M: 'm;
-
-    fn with_defaults(model: &M) -> PeriodicOrbit<'_, M, N> {
-        PeriodicOrbit::with_defaults(model)
-    }
-}
-
-#[cfg(feature = "sparse")]
-impl<M: FamilyModel> Orbits<M, 0> for RunTimeLength {
-    type Orbit<'m>
-        = FamilyPeriodicOrbit<'m, M>
-    where
-        M: 'm;
-
-    fn with_defaults(model: &M) -> FamilyPeriodicOrbit<'_, M> {
-        FamilyPeriodicOrbit::new(model)
-    }
-}
-
 /// A curve t ↦ (q, dq/dt).
-#[cfg(feature = "sparse")]
 type LongCurve<'m> = Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>) + 'm>;
 
 /// Where Newton's method starts.
-#[cfg(feature = "sparse")]
 enum LongGuess<'m> {
     Rest,
     Curve(LongCurve<'m>),
     Start(FamilyState),
 }
 
-/// A periodic orbit of a model of run-time length, to be found; made by [`PeriodicOrbit::of`], whose methods and rules are the same.
+/// A periodic orbit of a model of run-time length, to be found; made by [`PeriodicOrbit::of`](crate::PeriodicOrbit::of), whose methods and rules are the same.
 ///
 /// Elements are stepped from all nodes, with their derivatives by implicit differentiation of the step ([`FamilyTransition`](crate::stability::FamilyTransition)):
 /// multiple shooting.
@@ -115,7 +60,6 @@ enum LongGuess<'m> {
 /// # Ok(())
 /// # }
 /// ```
-#[cfg(feature = "sparse")]
 pub struct FamilyPeriodicOrbit<'m, M> {
     model: &'m M,
     element: Element,
@@ -129,9 +73,8 @@ pub struct FamilyPeriodicOrbit<'m, M> {
     control: Control,
 }
 
-#[cfg(feature = "sparse")]
 impl<'m, M: FamilyModel> FamilyPeriodicOrbit<'m, M> {
-    /// An orbit of `model` with the defaults: what [`PeriodicOrbit::of`] gives, for code that is generic over the model.
+    /// An orbit of `model` with the defaults: what [`PeriodicOrbit::of`](crate::PeriodicOrbit::of) gives, for code that is generic over the model.
     pub fn new(model: &'m M) -> Self {
         Self {
             model,

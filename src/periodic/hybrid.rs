@@ -1,7 +1,9 @@
 //! Periodic orbits of motions with events that change the state: impacts, switches.
 
-use super::orbit::{sort, trivial_of};
-use super::{OrbitError, PeriodicOrbit, Verdict};
+use super::error::OrbitError;
+use super::orbit::{Verdict, sort, trivial_of};
+use super::phase::Period;
+use super::setup::PeriodicOrbit;
 use crate::linearised::Linearised;
 use crate::motion::Motion;
 use crate::periodic_schur::Multiplier;
@@ -50,7 +52,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             simulation: simulation.clone(),
             elements: 40,
             start: 0.0,
-            period: super::Period::Missing,
+            period: Period::Missing,
             guess: None,
             advance: [0.0; N],
             tolerance: 1e-13,
@@ -74,7 +76,7 @@ pub struct HybridOrbits<'m, M, const N: usize> {
     simulation: Simulation<'m, M, N>,
     elements: usize,
     start: f64,
-    period: super::Period,
+    period: Period,
     guess: Option<State<N>>,
     advance: [f64; N],
     tolerance: f64,
@@ -99,14 +101,14 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     /// The period, known: of the forcing, or a multiple of it.
     #[must_use]
     pub fn period(mut self, period: f64) -> Self {
-        self.period = super::Period::Known(period);
+        self.period = Period::Known(period);
         self
     }
 
     /// The period is to be found, near `guess`; for models that do not depend on time.
     #[must_use]
     pub fn unknown_period(mut self, guess: f64) -> Self {
-        self.period = super::Period::Guess(guess);
+        self.period = Period::Guess(guess);
         self
     }
 
@@ -151,7 +153,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
             return Err(OrbitError::HybridConstraints);
         }
         let mut period = self.period.checked()?;
-        let is_free = matches!(self.period, super::Period::Guess(_));
+        let is_free = matches!(self.period, Period::Guess(_));
         if is_free && M::FACTS.time_dependent {
             return Err(OrbitError::ForcedPeriod);
         }

@@ -1,6 +1,6 @@
 //! A periodic orbit, solved.
 
-use super::OrbitError;
+use super::error::OrbitError;
 use super::problem::Periodic;
 use crate::assembly::{Assembly, Iterate, Solution};
 use crate::constraints::reduced;

@@ -1,6 +1,7 @@
 //! The equations of a periodic orbit.
 
-use super::{OrbitError, Phase};
+use super::error::OrbitError;
+use super::phase::Phase;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem};
 use tfe_runtime::condenser::Direction;
 use tfe_runtime::{LegendreError, Model, State, legendre};

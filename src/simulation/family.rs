@@ -15,7 +15,7 @@ use tfe_runtime::family::{FamilyError, FamilyModel, FamilyState, FamilyStepper, 
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Solve};
 
-/// A run to be of a model of run-time length; made by [`Simulation::new`].
+/// A run to be of a model of run-time length; made by [`Simulation::new`](crate::Simulation::new).
 ///
 /// A family costs the same to compile at any length. A step takes time and memory linear in the number of coordinates and terms: one fixed-point iteration for the forces
 /// at all points of the element, four points to a register.
@@ -71,7 +71,7 @@ impl<M> Clone for FamilySimulation<'_, M> {
 }
 
 impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
-    /// A run of `model` with the defaults: what [`Simulation::new`] gives, for code that is generic over the model.
+    /// A run of `model` with the defaults: what [`Simulation::new`](crate::Simulation::new) gives, for code that is generic over the model.
     pub fn new(model: &'m M) -> Self {
         Self {
             model,

@@ -149,7 +149,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     }
 
     /// Records every `k`-th node (and always the first and the last). With `k` > 1 the elements' polynomials are not kept, so a long run takes
-    /// little memory but [`Motion::at`] knows the recorded nodes only. 0 counts as 1.
+    /// little memory but [`Motion::at`](crate::Motion::at) knows the recorded nodes only. 0 counts as 1.
     #[must_use]
     pub fn record_every(mut self, k: usize) -> Self {
         self.record_every = k.max(1);

@@ -1,5 +1,5 @@
-//! The plan of the workspace by its imports: no circles among the files of the engine and of the macro crate, folders of the engine in layers, the circles that are left in
-//! the other crates by name, and a line in `ARCHITECTURE.md` for every module.
+//! The plan of the workspace by its imports: no circles among the files of `tfe`, of the engine and of the macro crate, folders of the engine in layers, the circles that are left in
+//! the runtime by name, and a line in `ARCHITECTURE.md` for every module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -64,7 +64,7 @@ fn the_other_crates_have_these_circles_and_no_more() {
     let folders = |root: &str| circles(&by_folder(&imports(&sources(root))));
     let sizes = |circles: &[Vec<String>]| circles.iter().map(Vec::len).collect::<Vec<_>>();
     assert_eq!(folders("../src"), [[""; 0]; 0]);
-    assert_eq!(sizes(&files("../src")), [2, 2, 7]);
+    assert_eq!(files("../src"), [[""; 0]; 0]);
     let runtime: [&[&str]; 4] = [
         &[
             "bundle",

@@ -1,7 +1,7 @@
 //! A periodic orbit of a model of run-time length, solved.
 
-use super::super::orbit::{sort, trivial_of};
-use super::super::{Exponent, OrbitError, Verdict};
+use super::super::error::OrbitError;
+use super::super::orbit::{Exponent, Verdict, sort, trivial_of};
 use super::shooting::Shooting;
 use crate::motion::family::{FamilyMotion, FamilyNode};
 use crate::numbers::larger;

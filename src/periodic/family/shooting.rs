@@ -1,7 +1,8 @@
 //! Multiple shooting: the nodes of all elements as unknowns, each element solved by itself.
 
+use super::super::error::OrbitError;
+use super::super::phase::Phase;
 use super::super::problem::Global;
-use super::super::{OrbitError, Phase};
 use crate::assembly::{AssemblyError, Chain, Control, Convergence, Mesh};
 use nalgebra::DMatrix;
 use tfe_runtime::family::{

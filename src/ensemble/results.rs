@@ -1,0 +1,81 @@
+//! Results of batches, put together.
+
+use super::doubts::WarningCounts;
+use super::ends::Ends;
+use crate::error::RunErrorKind;
+use crate::motion::Node;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tfe_runtime::Statistics;
+
+/// Results as they come, in no particular order.
+pub(super) struct Results<const N: usize> {
+    results: Vec<Option<Result<Node<N>, RunErrorKind>>>,
+    warnings: WarningCounts,
+}
+
+impl<const N: usize> Results<N> {
+    pub(super) fn new(count: usize) -> Self {
+        Self {
+            results: vec![None; count],
+            warnings: WarningCounts::default(),
+        }
+    }
+
+    pub(super) fn put(
+        &mut self,
+        index: usize,
+        result: Result<Node<N>, RunErrorKind>,
+        warnings: WarningCounts,
+    ) {
+        if let Some(place) = self.results.get_mut(index) {
+            *place = Some(result);
+        }
+        self.warnings.add(warnings);
+    }
+
+    /// When all are there, which are moved within the same memory.
+    pub(super) fn into_ends(self, statistics: Statistics) -> Ends<N> {
+        let results = self.results.into_iter().map_while(|result| result);
+        Ends::new(results.collect(), statistics, self.warnings)
+    }
+}
+
+/// A panic elsewhere leaves what is locked as good as it was.
+pub(super) fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
+    place.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+pub(super) fn unlock<T>(place: Mutex<T>) -> T {
+    place.into_inner().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The sum of what all batches have cost. What `place` makes serves many of them, one after the other.
+#[cfg(feature = "parallel")]
+pub(super) fn summed<P>(
+    batches: usize,
+    place: impl Fn() -> P + Send + Sync,
+    batch: impl Fn(&mut P, usize) -> Statistics + Send + Sync,
+) -> Statistics {
+    use rayon::iter::{IntoParallelIterator, ParallelIterator};
+    (0..batches)
+        .into_par_iter()
+        .map_init(place, batch)
+        .reduce(Statistics::default, merged)
+}
+
+#[cfg(not(feature = "parallel"))]
+pub(super) fn summed<P>(
+    batches: usize,
+    place: impl Fn() -> P,
+    batch: impl Fn(&mut P, usize) -> Statistics,
+) -> Statistics {
+    let mut place = place();
+    (0..batches)
+        .map(|number| batch(&mut place, number))
+        .fold(Statistics::default(), merged)
+}
+
+fn merged(mut sum: Statistics, other: Statistics) -> Statistics {
+    sum.merge(&other);
+    sum
+}

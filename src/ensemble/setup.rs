@@ -1,0 +1,347 @@
+//! Many runs to be, and all of them at once.
+
+use super::doubts::{Energy, WarningCounts};
+use super::ends::Ends;
+use super::error::EnsembleError;
+use super::members::{ManyModels, Members, OneModel, some_starts};
+use super::plan::{Plan, WIDTH, bad_starts, start_of};
+use super::progress::Progress;
+use super::results::{Results, lock, summed, unlock};
+use crate::error::RunErrorKind;
+use crate::motion::Node;
+use crate::simulation::Watching;
+use crate::simulation::mesh::Mesh;
+use std::marker::PhantomData;
+use std::ops::Range;
+use std::sync::Mutex;
+use tfe_runtime::bundle::Bundle;
+use tfe_runtime::step::Control;
+use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
+
+/// Many runs that differ in their starts, or in their parameters, of which only the ends are wanted.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + cos(theta))]
+/// struct Pendulum {}
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let pendulum = Pendulum {};
+/// let starts: Vec<_> = (0..100).map(|k| pendulum.state([0.03 * f64::from(k)], [0.0])).collect();
+/// let ends = Ensemble::new(&pendulum).element(Mixed::<6>).step(0.1).run(&starts, 0.0..10.0)?;
+/// assert_eq!((ends.nodes().count(), ends.failures().count()), (100, 0));
+/// // The last one, from the highest start, is the slowest.
+/// if let Ok(end) = &ends[99] {
+///     println!("{:.6} after {}", end.q[0], ends.statistics());
+/// }
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # How it runs
+/// With the feature `parallel` trajectories are shared among all processors. With one model, on each of them eight run side by side
+/// in vector instructions ([`Bundle`]), if the element is a Runge–Kutta method in the form at hand (two-field elements are) and the model has no
+/// constraints; all others run one after the other. Parameter sets ([`of_models`](Self::of_models)) go side by side, too: each lane computes with the parameters of its own model.
+/// Those of hand-written models that do not number their [parameters](Model::parameters) run one after the other.
+///
+/// Results depend neither on the number of processors nor on the order or number of the other starts, not by one bit. From a
+/// [`Simulation`](crate::Simulation) of one start they differ by rounding, if at all.
+///
+/// Defaults are those of `Simulation`: `Mixed::<4>` (order 6), a thousandth of the span as step, iteration to round-off.
+#[derive(Debug)]
+pub struct Ensemble<'m, M, const N: usize, K = OneModel<'m, M>> {
+    pub(super) models: K,
+    pub(super) element: Element,
+    pub(super) step: Option<f64>,
+    pub(super) control: Control,
+    pub(super) breaks: Vec<f64>,
+    pub(super) at_kinks: bool,
+    pub(super) progress: bool,
+    pub(super) events: Watching<'m, M, N>,
+    pub(super) of: PhantomData<&'m M>,
+}
+
+impl<M, const N: usize, K: Copy> Clone for Ensemble<'_, M, N, K> {
+    fn clone(&self) -> Self {
+        Self {
+            breaks: self.breaks.clone(),
+            events: self.events.clone(),
+            ..*self
+        }
+    }
+}
+
+impl<'m, M, const N: usize> Ensemble<'m, M, N>
+where
+    M: Model<N> + Sync,
+{
+    /// Runs of one model from many starts.
+    pub fn new(model: &'m M) -> Self {
+        Self::with(OneModel(model))
+    }
+}
+
+impl<'m, M, const N: usize> Ensemble<'m, M, N, ManyModels<'m, M>>
+where
+    M: Model<N> + Sync,
+{
+    /// Runs of many models of one kind: parameter sets, with one start for each or one for all.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k/2*x^2)]
+    /// struct Oscillator { k: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let oscillators: Vec<_> = (1..=10).map(|k| Oscillator { k: f64::from(k) }).collect();
+    /// let start = oscillators[0].state([1.0], [0.0]); // all have the same momentum, zero
+    /// let ends = Ensemble::of_models(&oscillators).step(0.01).run(&[start], 0.0..1.0)?;
+    /// for (oscillator, end) in oscillators.iter().zip(ends.iter()) {
+    ///     let expected = oscillator.k.sqrt().cos();
+    ///     assert!((end.as_ref().unwrap().q[0] - expected).abs() < 1e-12);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn of_models(models: &'m [M]) -> Self {
+        Self::with(ManyModels(models))
+    }
+}
+
+impl<'m, M, const N: usize, K> Ensemble<'m, M, N, K>
+where
+    M: Model<N> + Sync,
+    K: Members<'m, M, N>,
+{
+    fn with(models: K) -> Self {
+        Self {
+            events: Watching::NOTHING,
+            of: PhantomData,
+            models,
+            element: Element::from(Mixed::<4>),
+            step: None,
+            control: Control::default(),
+            breaks: Vec::new(),
+            at_kinks: false,
+            progress: false,
+        }
+    }
+
+    /// The element: `Mixed::<6>`, `Radau::<3>`, `Element::mixed(n)`, …
+    #[must_use]
+    pub fn element(mut self, element: impl Into<Element>) -> Self {
+        self.element = element.into();
+        self
+    }
+
+    /// The step h, in the units of time. Where the span is no whole number of steps the last one is shorter.
+    #[must_use]
+    pub fn step(mut self, step: f64) -> Self {
+        self.step = Some(step);
+        self
+    }
+
+    /// What the iteration inside an element may leave, relative to the state. It is judged by the rest of the geometric series of its increments, a fixed point by a 64th of that. Elements of a
+    /// run leave errors of the same sign, so that they add up; below some 1e-15 all values do the same, since roundings end the iteration. The default iterates to round-off.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.control.tolerance = tolerance;
+        self
+    }
+
+    /// The most iterations an element may take before its run stops with an error.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: u32) -> Self {
+        self.control.max_iterations = iterations;
+        self
+    }
+
+    /// How the element's equations are solved; `Solve::Auto` by default. `Solve::Newton` runs one trajectory after the other.
+    #[must_use]
+    pub fn solver(mut self, solve: Solve) -> Self {
+        self.control.solve = solve;
+        self
+    }
+
+    /// Makes an element end at `time`: where a force jumps, an element across the jump would lose its order.
+    #[must_use]
+    pub fn break_at(mut self, time: f64) -> Self {
+        self.breaks.push(time);
+        self
+    }
+
+    /// Whether steps are cut where a force has a kink or a jump, as by [`Simulation::at_kinks`](crate::Simulation::at_kinks). Runs of models with kinks are made one by one then, on all
+    /// processors; a motion that would slide along a jump is the failure of its run.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// /// A mass that falls onto a spring.
+    /// #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y - k/2*min(y, 0)^2)]
+    /// struct Landing { g: f64, k: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let landing = Landing { g: 10.0, k: 1e4 };
+    /// let starts: Vec<_> = (1..=20).map(|k| landing.state([0.01 * f64::from(k)], [0.0])).collect();
+    /// let ends = Ensemble::new(&landing).element(Mixed::<6>).step(0.02).at_kinks(true).run(&starts, 0.0..1.0)?;
+    /// assert!(ends.statistics().kinks > 20);
+    /// for (start, end) in starts.iter().zip(ends.nodes()) {
+    ///     let energy = end.p[0] * end.p[0] / 2.0 + 10.0 * end.q[0] + 5e3 * end.q[0].min(0.0).powi(2);
+    ///     assert!((energy - 10.0 * start.q[0]).abs() < 1e-11);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn at_kinks(mut self, are_cut: bool) -> Self {
+        self.at_kinks = are_cut;
+        self
+    }
+
+    /// Whether runs are made one by one, since events or kinks cut their elements.
+    pub(super) fn is_watched(&self) -> bool {
+        !self.events.is_empty() || (self.at_kinks && const { !M::FACTS.smooth })
+    }
+
+    /// Shows the progress on standard error, once a second.
+    #[must_use]
+    pub fn progress(mut self) -> Self {
+        self.progress = true;
+        self
+    }
+
+    /// Runs all trajectories over the span, backwards where it ends before it starts. Each result is the node at the end, or why its run
+    /// stopped; a failure stops no other run.
+    ///
+    /// # Errors
+    /// [`EnsembleError`] where nothing can run: the element does not exist, step or span are not finite, the number of starts is not that of
+    /// models. A bad start is a failure of its own run only.
+    pub fn run(&self, starts: &[State<N>], span: Range<f64>) -> Result<Ends<N>, EnsembleError> {
+        let count = self.models.count(starts)?;
+        let results = Mutex::new(Results::new(count));
+        let (from, to) = (span.start, span.end);
+        let statistics = self.for_each(starts, span, |index, result| {
+            let model = self.models.model(index);
+            let warnings = match &result {
+                // Events may change the energy.
+                Ok(node) if self.events.is_empty() => {
+                    let before = Energy::of(model, from, start_of(starts, index));
+                    WarningCounts::of::<M, N>(before, Energy::of(model, to, &node.state()))
+                }
+                _ => WarningCounts::default(),
+            };
+            lock(&results).put(index, result, warnings);
+        })?;
+        Ok(unlock(results).into_ends(statistics))
+    }
+
+    /// Runs all trajectories and hands over each result, with the index of its run, as soon as it is known: in no particular order, and with
+    /// the feature `parallel` from several threads. For results that are too many to keep, or to be seen while others still run.
+    ///
+    /// Returns what all runs together have cost.
+    ///
+    /// # Errors
+    /// As from [`run`](Self::run).
+    ///
+    /// ```
+    /// # use tfe::prelude::*;
+    /// use std::sync::atomic::{AtomicUsize, Ordering};
+    ///
+    /// # #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + cos(theta))]
+    /// # struct Pendulum {}
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let pendulum = Pendulum {};
+    /// let starts: Vec<_> = (0..40).map(|k| pendulum.state([0.0], [0.1 * f64::from(k)])).collect();
+    /// let turned_over = AtomicUsize::new(0);
+    /// Ensemble::new(&pendulum).step(0.1).for_each(&starts, 0.0..20.0, |_, end| {
+    ///     if end.is_ok_and(|end| end.q[0].abs() > std::f64::consts::PI) {
+    ///         turned_over.fetch_add(1, Ordering::Relaxed);
+    ///     }
+    /// })?;
+    /// // Those with more than the energy of the upper rest: velocities above 2.
+    /// assert_eq!(turned_over.into_inner(), 19);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn for_each<F>(
+        &self,
+        starts: &[State<N>],
+        span: Range<f64>,
+        finished: F,
+    ) -> Result<Statistics, EnsembleError>
+    where
+        F: Fn(usize, Result<Node<N>, RunErrorKind>) + Send + Sync,
+    {
+        let count = self.models.count(starts)?;
+        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        let mesh = Mesh::new(&span, step, &self.breaks, &[])?;
+        self.element.validate().map_err(RunErrorKind::Element)?;
+        let plan = Plan {
+            element: self.element,
+            control: self.control,
+            end: span.end,
+            mesh,
+            done: 0,
+        };
+        let progress = Progress::new(self.progress, count);
+        if count == 0 {
+            return Ok(Statistics::default());
+        }
+        let statistics = if self.is_watched() {
+            summed(
+                count,
+                || (),
+                |_: &mut (), index| {
+                    let start = start_of(starts, index);
+                    let model = self.models.model(index);
+                    let (result, statistics) = self.run_watched(model, start, &span);
+                    finished(index, result);
+                    progress.advance(1);
+                    statistics
+                },
+            )
+        } else if self.width() == WIDTH {
+            // Made once, and one batch after the other runs in a copy.
+            let empty = self.models.bundle(self.element, self.control);
+            let empty = empty.map_err(RunErrorKind::Element)?;
+            let batch = |bundle: &mut Bundle<'m, M, N, WIDTH, K::Lanes>, number: usize| {
+                let from = number * WIDTH;
+                let starts = some_starts(starts, from, count);
+                self.models.place(bundle, from, &starts);
+                let mut failures = bad_starts(&starts);
+                let statistics =
+                    plan.drive_together(bundle, starts.len(), &mut failures, |lane, result| {
+                        finished(from + lane, result);
+                    });
+                progress.advance(starts.len());
+                statistics
+            };
+            summed(count.div_ceil(WIDTH), || empty.clone(), batch)
+        } else {
+            summed(
+                count,
+                || (),
+                |_: &mut (), index| {
+                    let start = start_of(starts, index);
+                    let (result, statistics) = plan.run_alone(self.models.model(index), start);
+                    finished(index, result);
+                    progress.advance(1);
+                    statistics
+                },
+            )
+        };
+        Ok(statistics)
+    }
+
+    /// How many trajectories are stepped side by side: [`WIDTH`] or one.
+    pub(super) fn width(&self) -> usize {
+        let uses_lanes = Bundle::<M, N, WIDTH, K::Lanes>::uses_lanes(&self.element, &self.control);
+        if uses_lanes && self.models.share_kernels() {
+            WIDTH
+        } else {
+            1
+        }
+    }
+}

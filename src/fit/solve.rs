@@ -1,0 +1,31 @@
+//! Solves a fit.
+
+use super::error::FitError;
+use super::fitted::Fitted;
+use super::problem::{Least, Unknowns};
+use super::setup::Fit;
+use tfe_runtime::Model;
+
+impl<M: Model<N>, const N: usize> Fit<'_, M, N> {
+    /// Looks for the parameters.
+    ///
+    /// # Errors
+    /// [`FitError`] says what cannot be fitted, or why it was not.
+    pub fn solve(&self) -> Result<Fitted<M, N>, FitError> {
+        let columns = self.columns()?;
+        let (t0, guess, start_is_known) = self.first(&columns)?;
+        let unknowns = Unknowns::new(
+            self.model,
+            (&self.parameters, &self.bounds),
+            (guess, start_is_known),
+        )?;
+        let count: usize = columns.iter().map(|one| one.times.len()).sum();
+        if count < unknowns.len() {
+            return Err(FitError::TooFew {
+                values: count,
+                unknowns: unknowns.len(),
+            });
+        }
+        Least::new(self, columns, unknowns, t0)?.solve()
+    }
+}

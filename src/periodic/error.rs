@@ -1,0 +1,136 @@
+//! Why there is no periodic orbit.
+
+use crate::assembly::{AssemblyError, MeshError};
+use crate::error::RunErrorKind;
+use crate::periodic_schur::PeriodicSchurError;
+use std::fmt;
+use tfe_runtime::{LegendreError, StepError};
+
+/// Why there is no orbit.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum OrbitError {
+    /// No period was given, neither a known one nor a guess.
+    NoPeriod,
+    /// The period is not positive: as given, or as found.
+    Period {
+        /// Its value.
+        period: f64,
+    },
+    /// The model depends on time: the period of its orbits is that of the forcing (or a multiple), not an unknown.
+    ForcedPeriod,
+    /// The mesh makes no sense.
+    Mesh(MeshError),
+    /// The condition of phase names a coordinate that does not exist.
+    Phase {
+        /// Which.
+        index: usize,
+    },
+    /// The run that was to give the guess failed.
+    Guess(RunErrorKind),
+    /// A motion of an orbit with events failed.
+    Run(RunErrorKind),
+    /// An event stopped a motion before its period had passed.
+    Stopped {
+        /// When.
+        time: f64,
+    },
+    /// Corrections no longer bring the end of a motion with events nearer to its start.
+    Stalled {
+        /// How far they are apart, in parts of the motion.
+        residual: f64,
+        /// Corrections so far.
+        iterations: u32,
+    },
+    /// Orbits with events are not found for models with constraints: minimal coordinates are needed.
+    HybridConstraints,
+    /// The assembled equations were not solved.
+    Assembly(AssemblyError),
+    /// An autonomous model has no orbit of this period: the equations can only be met with an additional force γ v.
+    NoFamily {
+        /// The γ that would be needed.
+        unfolding: f64,
+    },
+    /// The constraints do not span the same motions at all nodes, or the model has no velocity at one.
+    Constraints(StepError),
+    /// The multipliers could not be computed.
+    Multipliers(PeriodicSchurError),
+    /// A model of run-time length does not fit together, or its steps cannot be differentiated.
+    #[cfg(feature = "sparse")]
+    Family(tfe_runtime::family::FamilyTransitionError),
+}
+
+impl From<AssemblyError> for OrbitError {
+    fn from(error: AssemblyError) -> Self {
+        Self::Assembly(error)
+    }
+}
+
+impl From<MeshError> for OrbitError {
+    fn from(error: MeshError) -> Self {
+        Self::Mesh(error)
+    }
+}
+
+impl From<LegendreError> for OrbitError {
+    fn from(error: LegendreError) -> Self {
+        Self::Assembly(error.into())
+    }
+}
+
+impl fmt::Display for OrbitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoPeriod => {
+                f.write_str("no period: give `.period(T)`, or `.unknown_period(guess)` for an autonomous model")
+            }
+            Self::Period { period } => write!(f, "the period is {period}, it must be positive"),
+            Self::ForcedPeriod => f.write_str(
+                "the model depends on time, so its orbits have the period of the forcing: give it with `.period(T)`",
+            ),
+            Self::Mesh(error) => error.fmt(f),
+            Self::Phase { index } => {
+                write!(f, "the condition of phase names coordinate {index}, which does not exist")
+            }
+            Self::Guess(error) => write!(f, "the motion that was to be the guess: {error}"),
+            Self::Run(error) => write!(f, "a motion on the way to the orbit: {error}"),
+            Self::Stopped { time } => {
+                write!(f, "an event ends the motion at t = {time}, before a period has passed")
+            }
+            Self::Stalled {
+                residual,
+                iterations,
+            } => write!(
+                f,
+                "no orbit near the guess: after {iterations} corrections end and start are {residual:.1e} of the motion apart"
+            ),
+            Self::HybridConstraints => f.write_str(
+                "orbits with events are found for models without constraints only: declare minimal coordinates",
+            ),
+            Self::Assembly(error) => error.fmt(f),
+            Self::NoFamily { unfolding } => write!(
+                f,
+                "no orbit of this period near the guess: only an additional force {unfolding:.1e} v closes it; \
+                 if the model has an isolated orbit, give `.unknown_period(guess)`"
+            ),
+            Self::Constraints(error) => write!(f, "the constraints: {error}"),
+            Self::Multipliers(error) => write!(f, "the multipliers: {error}"),
+            #[cfg(feature = "sparse")]
+            Self::Family(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for OrbitError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Mesh(error) => Some(error),
+            Self::Guess(error) | Self::Run(error) => Some(error),
+            Self::Assembly(error) => error.source(),
+            Self::Multipliers(error) => Some(error),
+            #[cfg(feature = "sparse")]
+            Self::Family(error) => error.source(),
+            _ => None,
+        }
+    }
+}

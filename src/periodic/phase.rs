@@ -1,0 +1,46 @@
+//! Which orbit is meant, and its period.
+
+use super::error::OrbitError;
+
+/// Which of the orbits of an autonomous model is meant: they differ in where the time begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub enum Phase {
+    /// Each correction is orthogonal to the flow, ∫ ẏ·δy dt = 0: the phase stays that of the guess.
+    #[default]
+    Orthogonal,
+    /// A coordinate has this value at the start. The flow must cross it: q̇ ≠ 0 there.
+    Coordinate {
+        /// Which coordinate.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A momentum has this value at the start; zero for a turning point of a coordinate with a momentum of its own.
+    Momentum {
+        /// Which momentum.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// The period of an orbit: known, or a first guess.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Period {
+    Missing,
+    Known(f64),
+    Guess(f64),
+}
+
+impl Period {
+    pub(super) fn checked(self) -> Result<f64, OrbitError> {
+        match self {
+            Self::Missing => Err(OrbitError::NoPeriod),
+            Self::Known(period) | Self::Guess(period) if period.is_finite() && period > 0.0 => {
+                Ok(period)
+            }
+            Self::Known(period) | Self::Guess(period) => Err(OrbitError::Period { period }),
+        }
+    }
+}

@@ -1,0 +1,308 @@
+//! A periodic orbit to be found, and how it is found.
+
+use super::error::OrbitError;
+use super::orbit::Orbit;
+use super::phase::{Period, Phase};
+use super::problem::{Global, Periodic};
+use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh};
+use crate::motion::Motion;
+use crate::simulation::Simulation;
+use tfe_runtime::{Element, Mixed, Model, State, constrained, legendre};
+
+/// Where Newton's method starts.
+enum Guess<'m, const N: usize> {
+    Rest,
+    Curve(Curve<'m, N>),
+    Start(State<N>),
+}
+
+/// A periodic orbit to be found.
+///
+/// - *Forced*: the model depends on time, its [`period`](Self::period) T is known. The default guess, rest, is enough for linear models.
+/// - *Autonomous with damping or forces*: isolated orbits; T is unknown ([`unknown_period`](Self::unknown_period)) and a [`Phase`] is chosen.
+/// - *Conservative*: orbits come in families. Give the period, or with an unknown one the [`energy`](Self::energy) (that of the guess if none
+///   is given). The equations are made regular by an unfolding force γ v, which vanishes in the solution ([`Orbit::unfolding`]).
+///
+/// Defaults: `Mixed::<4>` (order 6), 40 equal elements, a solution to round-off.
+///
+/// ```
+/// use std::f64::consts::TAU;
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - alpha/2*x^2 - beta/4*x^4,
+///            force(x) = f*cos(omega*t) - delta*dot(x))]
+/// struct Duffing { alpha: f64, beta: f64, delta: f64, f: f64, omega: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let duffing = Duffing { alpha: 1.0, beta: 1.0, delta: 0.2, f: 0.3, omega: 1.4 };
+/// let orbit = PeriodicOrbit::of(&duffing)
+///     .element(Mixed::<6>)
+///     .elements(40)
+///     .period(TAU / duffing.omega)
+///     .guess(|t| ([-0.3 * (1.4 * t).cos()], [0.42 * (1.4 * t).sin()]))
+///     .solve()?;
+/// assert!((orbit.start().q[0] + 0.3096102638785593).abs() < 1e-12);
+/// assert!((orbit.multipliers()[0].norm().powi(2) - (-0.2 * orbit.period()).exp()).abs() < 1e-12);
+/// assert!(orbit.is_stable());
+/// # Ok(())
+/// # }
+/// ```
+pub struct PeriodicOrbit<'m, M, const N: usize> {
+    model: &'m M,
+    element: Element,
+    elements: usize,
+    weights: Vec<f64>,
+    start: f64,
+    period: Period,
+    guess: Guess<'m, N>,
+    phase: Phase,
+    energy: Option<f64>,
+    advance: [f64; N],
+    control: Control,
+}
+
+impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
+    pub(super) fn with_defaults(model: &'m M) -> Self {
+        Self {
+            model,
+            element: Mixed::<4>.into(),
+            elements: 40,
+            weights: Vec::new(),
+            start: 0.0,
+            period: Period::Missing,
+            guess: Guess::Rest,
+            phase: Phase::default(),
+            energy: None,
+            advance: [0.0; N],
+            control: Control::default(),
+        }
+    }
+
+    /// The element: `Mixed::<6>`, `Element::primal(n)`, …
+    #[must_use]
+    pub fn element(mut self, element: impl Into<Element>) -> Self {
+        self.element = element.into();
+        self
+    }
+
+    /// The number of elements, equally long unless [`graded`](Self::graded).
+    #[must_use]
+    pub fn elements(mut self, elements: usize) -> Self {
+        self.elements = elements;
+        self
+    }
+
+    /// One element a weight, each as long as its weight says beside the others: short where much happens.
+    #[must_use]
+    pub fn graded(mut self, weights: impl IntoIterator<Item = f64>) -> Self {
+        self.weights = weights.into_iter().collect();
+        self.elements = self.weights.len();
+        self
+    }
+
+    /// The time at which the period begins; 0 by default. What counts is where a forced model is then.
+    #[must_use]
+    pub fn start_time(mut self, time: f64) -> Self {
+        self.start = time;
+        self
+    }
+
+    /// The period, known.
+    #[must_use]
+    pub fn period(mut self, period: f64) -> Self {
+        self.period = Period::Known(period);
+        self
+    }
+
+    /// The period is to be found, near `guess`.
+    #[must_use]
+    pub fn unknown_period(mut self, guess: f64) -> Self {
+        self.period = Period::Guess(guess);
+        self
+    }
+
+    /// Where to begin: a curve t ↦ (q, dq/dt), roughly the orbit.
+    #[must_use]
+    pub fn guess(mut self, curve: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
+        self.guess = Guess::Curve(Box::new(curve));
+        self
+    }
+
+    /// Where to begin: the motion that starts here, over one (guessed) period.
+    #[must_use]
+    pub fn guess_from(mut self, state: State<N>) -> Self {
+        self.guess = Guess::Start(state);
+        self
+    }
+
+    /// Which of the orbits that differ in phase; for autonomous models.
+    #[must_use]
+    pub fn phase(mut self, phase: Phase) -> Self {
+        self.phase = phase;
+        self
+    }
+
+    /// The energy of the orbit of a conservative model with unknown period.
+    #[must_use]
+    pub fn energy(mut self, energy: f64) -> Self {
+        self.energy = Some(energy);
+        self
+    }
+
+    /// How much the coordinates grow over a period: a full turn for an angle that rotates. Zero by default.
+    #[must_use]
+    pub fn advance(mut self, advance: [f64; N]) -> Self {
+        self.advance = advance;
+        self
+    }
+
+    /// When the iteration is done: the relative size of the last correction, 10⁻¹³ by default. The correction that meets it is applied.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.control.tolerance = tolerance;
+        self
+    }
+
+    /// The most iterations of Newton's method, 50 by default.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: u32) -> Self {
+        self.control.max_iterations = iterations;
+        self
+    }
+
+    /// Finds the orbit and its multipliers.
+    ///
+    /// # Errors
+    /// [`OrbitError`]: what was asked for makes no sense, or there is no solution near the guess.
+    pub fn solve(&self) -> Result<Orbit<'m, M, N>, OrbitError> {
+        let (problem, iterate, assembly) = self.solved()?;
+        let unfolded = problem.globals.contains(&Global::Unfolding);
+        let unfolding = unfolded.then_some(problem.unfolding);
+        Orbit::new(self.element, &problem, iterate, &assembly, unfolding)
+    }
+
+    /// The equations and their solution.
+    pub(crate) fn solved(&self) -> Result<Solved<'m, M, N>, OrbitError> {
+        let period = self.period.checked()?;
+        let autonomous = !M::FACTS.time_dependent;
+        let conservative = autonomous && !M::FACTS.forced;
+        let mut problem = Periodic {
+            model: self.model,
+            mesh: Mesh::new(self.elements, &self.weights)?,
+            start: self.start,
+            period,
+            unfolding: 0.0,
+            globals: Vec::new(),
+            advance: self.advance,
+            phase: None,
+            energy: None,
+        };
+        let curve = self.curve(period)?;
+        let at_rest = autonomous
+            && matches!(self.period, Period::Known(_))
+            && self.is_constant(&curve, period);
+        if matches!(self.period, Period::Guess(_)) {
+            if !autonomous {
+                return Err(OrbitError::ForcedPeriod);
+            }
+            problem.globals.push(Global::Period);
+        }
+        if autonomous && !at_rest {
+            problem.phase = Some(self.checked_phase()?);
+            if conservative || problem.globals.is_empty() {
+                problem.globals.push(Global::Unfolding);
+            }
+            if problem.globals.len() == 2 {
+                problem.energy = Some(self.energy_of(&curve)?);
+            }
+        }
+        let globals: Vec<f64> = problem
+            .globals
+            .iter()
+            .map(|global| match global {
+                Global::Period => period,
+                Global::Unfolding => 0.0,
+            })
+            .collect();
+        let mut assembly =
+            Assembly::new::<M>(self.element, self.elements, globals.len(), problem.dense())
+                .map_err(AssemblyError::Element)?;
+        let mut iterate = assembly
+            .along(&problem, &curve, globals)
+            .map_err(AssemblyError::Legendre)?;
+        assembly.solve(&mut problem, &mut iterate, self.control)?;
+        problem.check()?;
+        Ok((problem, iterate, assembly))
+    }
+
+    /// The element, and how a solution is iterated.
+    pub(crate) fn method(&self) -> (Element, Control) {
+        (self.element, self.control)
+    }
+
+    fn checked_phase(&self) -> Result<Phase, OrbitError> {
+        match self.phase {
+            Phase::Coordinate { index, .. } | Phase::Momentum { index, .. } if index >= N => {
+                Err(OrbitError::Phase { index })
+            }
+            phase => Ok(phase),
+        }
+    }
+
+    /// The guess as a curve.
+    fn curve(&self, period: f64) -> Result<Curve<'_, N>, OrbitError> {
+        Ok(match &self.guess {
+            Guess::Rest => {
+                let (advance, start) = (self.advance, self.start);
+                Box::new(move |t| {
+                    let turn = (t - start) / period;
+                    (advance.map(|a| a * turn), advance.map(|a| a / period))
+                })
+            }
+            Guess::Curve(curve) => Box::new(curve),
+            Guess::Start(state) => {
+                let motion = Simulation::new(self.model)
+                    .element(self.element)
+                    .step(period / self.elements as f64)
+                    .run(*state, self.start..self.start + period)
+                    .map_err(|error| OrbitError::Guess(error.kind().clone()))?;
+                let model = self.model;
+                Box::new(move |t| along_motion(model, &motion, t))
+            }
+        })
+    }
+
+    /// Whether the guess does not move: an equilibrium, whose multipliers are asked for.
+    fn is_constant(&self, curve: &Curve<'_, N>, period: f64) -> bool {
+        let (first, _) = curve(self.start);
+        (0..=16).all(|k| {
+            let (q, v) = curve(self.start + period * f64::from(k) / 16.0);
+            q == first && v == [0.0; N]
+        }) && self.advance == [0.0; N]
+    }
+
+    fn energy_of(&self, curve: &Curve<'_, N>) -> Result<f64, OrbitError> {
+        if let Some(energy) = self.energy {
+            return Ok(energy);
+        }
+        let (q, v) = curve(self.start);
+        let energy = legendre::state(self.model, self.start, &q, &v)
+            .and_then(|state| legendre::energy(self.model, self.start, &state.q, &state.p))
+            .map_err(AssemblyError::Legendre)?;
+        Ok(energy)
+    }
+}
+
+/// The equations of an orbit, their solution and the memory that it took.
+pub(crate) type Solved<'m, M, const N: usize> = (Periodic<'m, M, N>, Iterate<N>, Assembly<N>);
+
+/// Coordinates and velocities of a motion; its last ones beyond its end.
+pub(crate) fn along_motion<M: Model<N>, const N: usize>(
+    model: &M,
+    motion: &Motion<N>,
+    t: f64,
+) -> ([f64; N], [f64; N]) {
+    let node = motion.at(t).unwrap_or(*motion.last());
+    let velocity = constrained::velocity(model, t, &node.q, &node.p, &[0.0; N]);
+    (node.q, velocity.unwrap_or([0.0; N]))
+}
