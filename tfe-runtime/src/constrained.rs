@@ -12,6 +12,8 @@ pub(crate) mod layout;
 mod node;
 pub(crate) mod residual;
 pub(crate) mod rows;
+#[cfg(feature = "alloc")]
+mod states;
 mod tangent;
 #[cfg(feature = "alloc")]
 mod trail;
@@ -20,7 +22,7 @@ pub use crate::control::START_TOLERANCE;
 #[cfg(feature = "alloc")]
 pub use instant::{Gradients, gradients, reactions};
 #[cfg(feature = "alloc")]
-pub use node::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
+pub use states::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
 #[cfg(feature = "alloc")]
 pub(crate) use trail::Foreseen;
 #[cfg(feature = "alloc")]

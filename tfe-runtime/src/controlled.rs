@@ -6,21 +6,6 @@ use crate::real::Real;
 /// The most inputs that a model can have.
 pub const MAX_INPUTS: usize = 16;
 
-/// What was wrong with a function that was given for an input.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InputFailure {
-    /// The input.
-    pub input: &'static str,
-    /// The time that the function was asked for.
-    pub time: f64,
-    /// What it gave.
-    pub value: f64,
-}
-
-/// A function that was given for an input has panicked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct InputPanicked;
-
 /// The kernels of a model with inputs u: L(q, v, t, u) or H(q, p, t, u), forces Q(q, z, t, u) and observables.
 ///
 /// Implemented by `#[dynamics]` where `input(…)` stands; the model itself, as a [`Model`], is the one all of whose inputs are zero. Every kernel is that of [`Model`] with

@@ -13,6 +13,7 @@ mod forces;
 mod inertia;
 mod kernel;
 mod lanes;
+mod largest;
 mod model;
 #[cfg(feature = "sparse")]
 mod newton;
@@ -20,10 +21,14 @@ mod newton;
 mod node;
 mod pattern;
 #[cfg(feature = "sparse")]
+mod point;
+#[cfg(feature = "sparse")]
 mod rates;
 mod registers;
 #[cfg(feature = "sparse")]
 mod rows;
+mod running;
+mod scale;
 mod space;
 mod stepper;
 #[cfg(feature = "sparse")]
@@ -129,7 +134,7 @@ pub fn constraint_residual<M: FamilyModel>(model: &M, t: f64, q: &[f64], v: &[f6
     for (rate, drift) in rates.rates.iter_mut().zip(&drift) {
         *rate += drift;
     }
-    (lanes::largest(&values), lanes::largest(&rates.rates))
+    (largest::largest(&values), largest::largest(&rates.rates))
 }
 
 /// One of the observables.

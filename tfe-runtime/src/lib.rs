@@ -38,8 +38,10 @@ pub mod error;
 mod evidence;
 #[cfg(feature = "alloc")]
 pub mod family;
+mod input;
 #[cfg(feature = "alloc")]
 mod kinks;
+pub mod lanes;
 pub mod legendre;
 pub mod length;
 pub mod lu;
@@ -78,19 +80,21 @@ pub mod weak_form;
 pub mod workspace;
 
 pub use condense::{Direction, Parameter};
-pub use controlled::{Controlled, InputFailure, InputPanicked, MAX_INPUTS};
+pub use controlled::{Controlled, MAX_INPUTS};
 #[cfg(feature = "std")]
 pub use dense::bounds::Arguments;
 pub use element::{
     Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule, ThreeField,
 };
 pub use error::{ConstraintError, LegendreError, StepError};
+pub use input::{InputFailure, InputPanicked};
+pub use lanes::Lanes;
 pub use model::{
     By, Constraint, ConstraintKind, ConstraintSecond, CoordinateName, Facts, First, Form, Model,
     Second, State,
 };
 pub use newton::Solve;
-pub use real::{Lanes, Real};
+pub use real::Real;
 #[cfg(feature = "alloc")]
 pub use share::Share;
 pub use statistics::{Choice, Contraction, Statistics};

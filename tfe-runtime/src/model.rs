@@ -4,7 +4,7 @@
 //! kernels evaluate that function and its partial derivatives at one instant; everything else
 //! (Legendre transform, elements, Newton) lives in this crate. In the names below **z** stands for the velocity v of a Lagrangian and for the momentum p of a Hamiltonian.
 
-use crate::controlled::{InputFailure, InputPanicked};
+use crate::input::{InputFailure, InputPanicked};
 use crate::real::Real;
 
 /// First derivatives at one instant.

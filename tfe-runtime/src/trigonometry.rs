@@ -277,7 +277,7 @@ pub(crate) fn reduced<R: Turn>(x: R) -> (R, R) {
 mod tests {
     use super::*;
     use crate::double_double::DoubleDouble;
-    use crate::real::Lanes;
+    use crate::lanes::Lanes;
 
     /// sin (x + quarters π/2) by a series in double-double arithmetic.
     fn exact(x: f64, quarters: f64) -> DoubleDouble {

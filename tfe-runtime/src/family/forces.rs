@@ -3,12 +3,12 @@
 use super::dense::FamilyDense;
 use super::error::FamilyError;
 use super::inertia::Inertia;
-#[cfg(feature = "sparse")]
-use super::lanes::Scale;
 use super::model::{FamilyModel, FamilyState};
 #[cfg(feature = "sparse")]
 use super::newton::Tangent;
 use super::registers::{Outcome, Registers};
+#[cfg(feature = "sparse")]
+use super::scale::Scale;
 use super::space::{Kind, Leg, Problem};
 use crate::error::StepError;
 #[cfg(feature = "sparse")]

@@ -1,10 +1,10 @@
 //! The one thing that the iteration of families asks of a model, so that everything else is compiled once, not once a model.
 
 use super::model::FamilyModel;
-use super::registers::Running;
+use super::running::Running;
+use crate::lanes::Lanes;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use crate::quad::Quad;
-use crate::real::Lanes;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use pulp::x86::V3;
 

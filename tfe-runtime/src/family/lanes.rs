@@ -1,10 +1,7 @@
-//! Arithmetic of the iteration of families, and the sizes that it is judged by.
+//! Arithmetic of the iteration of families.
 
-use super::space::{Leg, Problem, Sizes};
-use crate::equations::Increment;
 use crate::points::four::Four;
 use crate::points::storage::Heap;
-use crate::points::sweep::relative;
 use crate::points::tables::Matrix;
 
 /// The forces at one coordinate at all points, times a number.
@@ -58,44 +55,4 @@ pub(super) fn add_exactly<V: Four>(sum: &mut (V, V), (weight, weight_low): (f64,
     let (high, lost) = sum.0.exact_sum(product);
     let rest = (rest + value.like(weight_low) * value) + lost;
     *sum = (high, sum.1 + rest);
-}
-
-/// What increments are compared with.
-#[derive(Clone, Copy)]
-pub(super) struct Scale {
-    h: f64,
-    q: f64,
-    velocity: f64,
-}
-
-impl Scale {
-    pub(super) fn of(problem: &Problem, leg: Leg<'_>) -> Self {
-        Self {
-            h: leg.h,
-            q: largest(&leg.start.q),
-            velocity: largest(&problem.velocity),
-        }
-    }
-
-    pub(super) fn increment(&self, Sizes { changed, size }: Sizes) -> Increment {
-        let h = self.h;
-        let velocity = relative(h, self.velocity, size, changed);
-        let moved = self.velocity + h.abs() * size;
-        let position = relative(h, self.q, moved, 0.5 * h.abs() * changed);
-        // Both are NaN, or none is.
-        let relative = velocity.max(position);
-        Increment { relative, position }
-    }
-}
-
-/// The largest magnitude; NaN if one is.
-pub(super) fn largest(values: &[f64]) -> f64 {
-    let larger = |a: f64, b: &f64| {
-        if a.is_nan() || a >= b.abs() {
-            a
-        } else {
-            b.abs()
-        }
-    };
-    values.iter().fold(0.0, larger)
 }

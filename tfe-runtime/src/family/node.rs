@@ -1,7 +1,7 @@
 //! The velocity of a momentum at one instant, under constraints, by a sparse factorisation (T-74).
 
 use super::blocked::{Blocked, Place};
-use super::lanes::largest;
+use super::largest::largest;
 use super::model::{FamilyModel, Gradient};
 use super::pattern::Pattern;
 use super::rows::Rows;

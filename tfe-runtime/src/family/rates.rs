@@ -11,9 +11,10 @@
 use super::blocked::Blocked;
 use super::dense::FamilyDense;
 use super::error::FamilyError;
-use super::lanes::largest;
+use super::largest::largest;
 use super::model::{FamilyModel, FamilyState, Gradient};
 use super::node::Node;
+use super::point::Point;
 use super::rows::Rows;
 use super::tangent::Parts;
 use crate::constrained::element::slopes;
@@ -24,7 +25,7 @@ use crate::error::{ConstraintError, StepError};
 use crate::evidence::Evidence;
 use crate::method::{continued_ratio, set_extrapolation};
 use crate::newton::{Control, Monitor, SERVES, Solve, Verdict};
-use crate::scheme::{MAX_RATES, SchemeTable, Tables as _};
+use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::Statistics;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -61,39 +62,6 @@ pub(super) struct Rates<M> {
     low: FamilyState,
     impulse: Vec<f64>,
     force: Vec<f64>,
-}
-
-/// The model at one point of the element.
-#[derive(Clone, Debug)]
-pub(super) struct Point {
-    pub(super) q: Vec<f64>,
-    pub(super) v: Vec<f64>,
-    /// L_v
-    pub(super) momentum: Vec<f64>,
-    /// F
-    pub(super) force: Vec<f64>,
-    /// A
-    pub(super) rows: Vec<f64>,
-    phi: Vec<f64>,
-    /// μ̇
-    pub(super) mu_rate: Vec<f64>,
-    /// P_j′ there, which takes multipliers to μ̇.
-    pub(super) slopes: [f64; MAX_RATES],
-}
-
-impl Point {
-    fn new(n: usize, rows: usize, constraints: usize, slopes: [f64; MAX_RATES]) -> Self {
-        Self {
-            q: vec![0.0; n],
-            v: vec![0.0; n],
-            momentum: vec![0.0; n],
-            force: vec![0.0; n],
-            rows: vec![0.0; rows],
-            phi: vec![0.0; constraints],
-            mu_rate: vec![0.0; constraints],
-            slopes,
-        }
-    }
 }
 
 impl<M> Rates<M> {

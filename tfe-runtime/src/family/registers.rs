@@ -1,14 +1,14 @@
 //! The unknowns in the widest registers of the processor, and the fixed-point iteration.
 
 use super::kernel::Kernel;
-use super::lanes::Scale;
-use super::model::{FamilyState, Gradient, Sweep};
+use super::model::FamilyState;
+use super::running::{Passes, Place, Running};
+use super::scale::Scale;
 use super::space::{Kind, Leg, Pass, Problem, Sizes, Space};
+use crate::lanes::Lanes;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
-use crate::points::four::Four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use crate::quad::Quad;
-use crate::real::Lanes;
 
 /// The unknowns of a step.
 #[derive(Clone, Debug)]
@@ -214,120 +214,5 @@ impl Registers {
             Self::Quads(space, isa) => isa.run(pass, space, problem, leg),
             Self::Lanes(space) => ().run(pass, space, problem, leg),
         }
-    }
-}
-
-/// Runs passes in code for one instruction set.
-pub(super) trait Passes<V>: Copy {
-    fn run(self, pass: Pass<'_>, space: &mut Space<V>, problem: &Problem, leg: Leg<'_>) -> Sizes;
-}
-
-impl Passes<Lanes<4>> for () {
-    fn run(
-        self,
-        pass: Pass<'_>,
-        space: &mut Space<Lanes<4>>,
-        problem: &Problem,
-        leg: Leg<'_>,
-    ) -> Sizes {
-        pass.run(space, problem, leg)
-    }
-}
-
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl Passes<Quad> for pulp::x86::V3 {
-    fn run(
-        self,
-        pass: Pass<'_>,
-        space: &mut Space<Quad>,
-        problem: &Problem,
-        leg: Leg<'_>,
-    ) -> Sizes {
-        self.vectorize(InRegisters {
-            space,
-            problem,
-            leg,
-            pass,
-        })
-    }
-}
-
-/// Where a kernel runs.
-#[derive(Clone, Copy)]
-struct Place<'a> {
-    problem: &'a Problem,
-    leg: Leg<'a>,
-    group: usize,
-    settles: bool,
-}
-
-/// A kernel that runs through the sites of a group, and what follows behind it.
-pub(super) struct Running<'a, V, P> {
-    space: &'a mut Space<V>,
-    passes: P,
-    place: Place<'a>,
-    /// Coordinates whose forces are settled.
-    settled: usize,
-    sizes: Sizes,
-}
-
-impl<'a, V: Four, P: Passes<V>> Running<'a, V, P> {
-    fn new(space: &'a mut Space<V>, passes: P, place: Place<'a>) -> Self {
-        Self {
-            space,
-            passes,
-            place,
-            settled: 0,
-            sizes: Sizes::NONE,
-        }
-    }
-
-    fn finish(mut self) -> Sizes {
-        let n = self.space.len();
-        self.passed(n);
-        self.sizes
-    }
-}
-
-impl<V: Four, P: Passes<V>> Sweep<V> for Running<'_, V, P> {
-    #[inline(always)]
-    fn slices(&mut self) -> (&[V], &[V], Gradient<'_, V>) {
-        self.space.slices()
-    }
-
-    fn passed(&mut self, below: usize) {
-        let Place {
-            problem,
-            leg,
-            group,
-            settles,
-        } = self.place;
-        if !settles || below <= self.settled {
-            return;
-        }
-        let range = self.settled..below;
-        let pass = Pass::Settle { group, range };
-        let sizes = self.passes.run(pass, self.space, problem, leg);
-        self.sizes = self.sizes.and(sizes);
-        self.settled = below;
-    }
-}
-
-/// A pass in code for one instruction set.
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-struct InRegisters<'a> {
-    space: &'a mut Space<Quad>,
-    problem: &'a Problem,
-    leg: Leg<'a>,
-    pass: Pass<'a>,
-}
-
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl pulp::NullaryFnOnce for InRegisters<'_> {
-    type Output = Sizes;
-
-    #[inline(always)]
-    fn call(self) -> Sizes {
-        self.pass.run(self.space, self.problem, self.leg)
     }
 }

@@ -4,7 +4,7 @@ use super::dense::FamilyDense;
 use super::error::FamilyError;
 use super::forces::Forces;
 use super::inertia::Legendre;
-use super::lanes::largest;
+use super::largest::largest;
 use super::model::{FamilyModel, FamilyState};
 #[cfg(feature = "sparse")]
 use super::rates::Rates;

@@ -8,7 +8,7 @@
 use super::blocked::{Blocked, Place};
 use super::model::{Block, FamilyModel, Gradient};
 use super::pattern::Pattern;
-use super::rates::Point;
+use super::point::Point;
 use super::rows::Rows;
 use crate::scheme::SchemeRef;
 use alloc::vec;

@@ -4,8 +4,9 @@ use super::Row;
 use super::storage::Storage;
 use super::tables::Matrix;
 use crate::double_double::DoubleDouble;
+use crate::lanes::Lanes;
 use crate::model::{First, Model};
-use crate::real::{Lanes, Real, fused};
+use crate::real::{Real, fused};
 
 /// Numbers whose products and sums can be had exactly.
 pub trait Precise: Real {

@@ -1,0 +1,155 @@
+//! What belongs to one state: the velocity of its momentum, independent rows, residuals.
+
+use super::node::{Bordered, own_velocity, solve_velocity};
+use crate::constrained::residual::relative_residual;
+use crate::constrained::rows::{Rows, rows_len};
+use crate::error::StepError;
+use crate::model::Model;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// By how much a state violates one constraint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// Its name.
+    pub constraint: &'static str,
+    /// φ; zero for a constraint on velocities.
+    pub position: f64,
+    /// A v + a
+    pub velocity: f64,
+    /// The distance |φ| / |A| relative to the positions.
+    pub relative_position: f64,
+    /// |A v + a| / |A| relative to the velocities.
+    pub relative_velocity: f64,
+}
+
+impl Residual {
+    /// The larger one of the relative residuals; NaN if one is.
+    #[must_use]
+    pub fn relative(&self) -> f64 {
+        let (position, velocity) = (self.relative_position, self.relative_velocity);
+        if position.is_nan() || velocity.is_nan() {
+            f64::NAN
+        } else {
+            position.max(velocity)
+        }
+    }
+}
+
+/// By how much positions and velocities violate the constraints of a model, one entry for each.
+///
+/// Velocities are small or large beside those that matter in a time of length `h`, such as a step.
+#[must_use]
+pub fn residuals<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+    h: f64,
+) -> Vec<Residual>
+where
+    M: Model<N>,
+{
+    let count = M::CONSTRAINTS.len();
+    let mut memory = vec![0.0; rows_len(N, count)];
+    let mut rows = Rows::of(&mut memory, count);
+    rows.evaluate(model, t, q);
+    let of = |(c, constraint): (usize, &crate::model::Constraint)| {
+        let (relative_position, relative_velocity) = relative_residual(&rows, c, q, v, h);
+        Residual {
+            constraint: constraint.name,
+            position: rows.values[c],
+            velocity: rows.psi(c, v),
+            relative_position,
+            relative_velocity,
+        }
+    };
+    M::CONSTRAINTS.iter().enumerate().map(of).collect()
+}
+
+/// Which constraints are independent at a position: the others follow from them there.
+#[must_use]
+pub fn independent<M, const N: usize>(model: &M, t: f64, q: &[f64; N]) -> Vec<bool>
+where
+    M: Model<N>,
+{
+    let count = M::CONSTRAINTS.len();
+    let mut memory = vec![0.0; rows_len(N, count)];
+    let mut rows = Rows::of(&mut memory, count);
+    rows.evaluate(model, t, q);
+    let mut active = vec![0; count];
+    rows.choose::<M>(&mut active);
+    active.into_iter().map(|mark| mark != 0).collect()
+}
+
+/// The velocity that belongs to a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, the Legendre transform.
+///
+/// # Errors
+/// [`StepError`] if there is none: the kinetic energy is singular for motions that the constraints allow.
+pub fn velocity<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    p: &[f64; N],
+    guess: &[f64; N],
+) -> Result<[f64; N], StepError>
+where
+    M: Model<N>,
+{
+    if const { M::CONSTRAINTS.is_empty() } {
+        return Ok(crate::legendre::velocity(model, t, q, p, guess)?);
+    }
+    let count = M::CONSTRAINTS.len();
+    let size = N + count;
+    let mut numbers = vec![0.0; rows_len(N, count)];
+    let mut rows = Rows::of(&mut numbers, count);
+    rows.evaluate(model, t, q);
+    let mut active = vec![0; count];
+    rows.choose::<M>(&mut active);
+    let mut memory = Bordered {
+        matrix: &mut vec![0.0; size * size],
+        vector: &mut vec![0.0; size],
+        pivots: &mut vec![0; size],
+    };
+    solve_velocity(model, t, (q, p), guess, &rows, &active, &mut memory)
+}
+
+/// The velocity of a state as its momentum has it, whether or not it fulfils the constraints; where the mass matrix is singular, the one that the constraints
+/// leave.
+///
+/// # Errors
+/// As for [`velocity`].
+pub fn velocity_of<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    p: &[f64; N],
+    guess: &[f64; N],
+) -> Result<[f64; N], StepError>
+where
+    M: Model<N>,
+{
+    let v = velocity(model, t, q, p, guess)?;
+    Ok(if const { M::CONSTRAINTS.is_empty() } {
+        v
+    } else {
+        own_velocity(model, t, q, p, &v)
+    })
+}
+
+/// The velocity nearest to `v`, in the metric of the kinetic energy, that the constraints allow: that of the momentum L_v(q, v, t).
+///
+/// # Errors
+/// As for [`velocity`].
+pub fn velocity_for<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+) -> Result<[f64; N], StepError>
+where
+    M: Model<N>,
+{
+    let p = crate::legendre::momentum(model, t, q, v)?;
+    velocity(model, t, q, &p, v)
+}

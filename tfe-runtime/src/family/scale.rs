@@ -1,0 +1,34 @@
+//! The sizes that the iteration of families is judged by.
+
+use super::largest::largest;
+use super::space::{Leg, Problem, Sizes};
+use crate::equations::Increment;
+use crate::points::sweep::relative;
+
+/// What increments are compared with.
+#[derive(Clone, Copy)]
+pub(super) struct Scale {
+    h: f64,
+    q: f64,
+    velocity: f64,
+}
+
+impl Scale {
+    pub(super) fn of(problem: &Problem, leg: Leg<'_>) -> Self {
+        Self {
+            h: leg.h,
+            q: largest(&leg.start.q),
+            velocity: largest(&problem.velocity),
+        }
+    }
+
+    pub(super) fn increment(&self, Sizes { changed, size }: Sizes) -> Increment {
+        let h = self.h;
+        let velocity = relative(h, self.velocity, size, changed);
+        let moved = self.velocity + h.abs() * size;
+        let position = relative(h, self.q, moved, 0.5 * h.abs() * changed);
+        // Both are NaN, or none is.
+        let relative = velocity.max(position);
+        Increment { relative, position }
+    }
+}
