@@ -12,7 +12,6 @@ mod engine;
 mod first_order;
 mod group;
 mod judge;
-pub(crate) mod pair;
 mod products;
 mod second_order;
 mod step;
@@ -25,6 +24,7 @@ use crate::legendre::largest;
 use crate::model::{Model, State};
 use crate::newton::{Control, Preference, Solve};
 use crate::points::has_form;
+use crate::registers::pair::LANES;
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
 use crate::stepper::Stepper;
@@ -35,7 +35,6 @@ use engine::Engine;
 #[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
 pub(crate) use engine::tests::Pendulums;
 use group::Group;
-use pair::LANES;
 pub use together::{One, Together, Trajectories};
 pub use varied::Varied;
 

@@ -3,13 +3,12 @@
 //! Elements hold them exactly at their nodes; this module answers what belongs to one instant: the velocity of a constrained momentum,
 //! residuals, and which rows are independent.
 
-mod advance;
 mod derivative;
 pub(crate) mod element;
 #[cfg(feature = "alloc")]
 mod instant;
 pub(crate) mod layout;
-mod node;
+pub(crate) mod node;
 pub(crate) mod residual;
 pub(crate) mod rows;
 #[cfg(feature = "alloc")]
@@ -28,7 +27,6 @@ pub(crate) use trail::Foreseen;
 #[cfg(feature = "alloc")]
 pub use trail::Trail;
 
-pub(crate) use advance::advance;
 pub(crate) use derivative::{linearise, product};
 #[cfg(feature = "alloc")]
 pub(crate) use layout::refused;

@@ -1,6 +1,6 @@
 //! Why a step failed.
 
-use crate::element::Element;
+use crate::element::{Element, ElementError};
 use crate::model::CoordinateName;
 use core::fmt;
 
@@ -270,6 +270,63 @@ impl core::error::Error for StepError {
             // Its text is the source's own.
             Self::Legendre(source) => source.source(),
             Self::Constraint(source) => source.source(),
+            _ => None,
+        }
+    }
+}
+
+/// Why there is no transition matrix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum TransitionError {
+    /// The element is none.
+    Element(ElementError),
+    /// The step itself failed, or its tangent is singular.
+    Step(StepError),
+    /// No step has been done whose matrix could be meant.
+    NoStep,
+    /// The result needs more room.
+    Shape {
+        /// Numbers that are needed.
+        needed: usize,
+        /// Numbers that were given.
+        given: usize,
+    },
+}
+
+impl From<ElementError> for TransitionError {
+    fn from(error: ElementError) -> Self {
+        Self::Element(error)
+    }
+}
+
+impl From<StepError> for TransitionError {
+    fn from(error: StepError) -> Self {
+        Self::Step(error)
+    }
+}
+
+impl fmt::Display for TransitionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Element(error) => error.fmt(f),
+            Self::Step(error) => error.fmt(f),
+            Self::NoStep => f.write_str("no step has been done"),
+            Self::Shape { needed, given } => {
+                write!(
+                    f,
+                    "the transition matrix needs {needed} numbers, not {given}"
+                )
+            }
+        }
+    }
+}
+
+impl core::error::Error for TransitionError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Element(error) => error.source(),
+            Self::Step(error) => error.source(),
             _ => None,
         }
     }

@@ -23,6 +23,7 @@ mod condense;
 #[cfg(feature = "alloc")]
 pub mod condenser;
 pub mod constrained;
+mod constrained_step;
 mod control;
 mod controlled;
 mod cut;
@@ -48,16 +49,13 @@ pub mod lu;
 mod method;
 pub mod model;
 mod newton;
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-mod octet;
 mod phase_form;
 mod points;
 #[cfg(feature = "alloc")]
 mod propagator;
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-mod quad;
 pub mod quadrature;
 pub mod real;
+mod registers;
 #[cfg(feature = "alloc")]
 mod root;
 pub mod scheme;
@@ -117,9 +115,8 @@ pub mod __private {
         Model, Second, State,
     };
     pub use crate::newton::{Control, Solve};
-    pub use crate::points::storage::Inline;
-    pub use crate::points::tables::Fixed;
     pub use crate::real::Real;
+    pub use crate::registers::storage::{Fixed, Inline};
     #[cfg(feature = "alloc")]
     pub use crate::root::root;
     pub use crate::scheme::{Scheme, SchemeRef, Tables};

@@ -12,11 +12,11 @@
 //! rounding took from the tables is summed once a step, at the start of the iteration. A step whose iteration contracts badly is left to
 //! the other forms.
 
+#[cfg(feature = "alloc")]
+mod computed;
 pub(crate) mod end;
-pub(crate) mod four;
 mod second_order;
 mod step;
-pub(crate) mod storage;
 pub(crate) mod sweep;
 pub(crate) mod tables;
 
@@ -25,19 +25,13 @@ use crate::element::Element;
 use crate::error::StepError;
 use crate::lanes::Lanes;
 use crate::lu::Block;
-use crate::method::{Memory, cold_rate, cold_rates, may_be_phase};
+use crate::method::{cold_rate, cold_rates, may_be_phase};
 use crate::model::{First, Form, Model, State};
-use crate::newton::Asked;
+use crate::registers::four::{Apart, Four};
+use crate::registers::storage::{Fixed, Keep, List, MAX_GROUPS, Row, Storage};
 use crate::scheme::Tables;
 use crate::workspace::width;
 use core::marker::PhantomData;
-use four::{Apart, Four};
-use step::Job;
-use storage::{Keep, List, Storage};
-use tables::Fixed;
-
-/// A number for every coordinate at each of four points.
-type Row<const N: usize> = [[f64; 4]; N];
 
 /// What steps with all points at once carry from one to the next: rows for groups of four points.
 #[derive(Clone, Debug)]
@@ -148,30 +142,6 @@ impl<const N: usize, S: Storage> Points<N, S> {
         self.is_warm = false;
     }
 
-    /// A step of a stepper, with what it remembers.
-    #[inline]
-    pub(crate) fn step<M>(
-        &mut self,
-        (model, tables, asked): (&M, &impl Tables, &impl Asked),
-        memory: &mut Memory<N>,
-        place: (f64, f64),
-        state: &mut State<N>,
-    ) -> Together
-    where
-        M: Model<N>,
-    {
-        let job = Job {
-            points: self,
-            model,
-            tables,
-            asked,
-            memory,
-            place,
-            state,
-        };
-        job.run()
-    }
-
     /// Rates and forces of the last step to where an ordinary step has them; false if there is none.
     pub(crate) fn write_back<M>(&mut self, tables: &impl Tables, numbers: &mut [f64]) -> bool
     where
@@ -232,7 +202,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
     {
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
         if let Some(isa) = self.isa {
-            let like = crate::quad::Quad::of(isa, [0.0; 4]);
+            let like = crate::registers::quad::Quad::of(isa, [0.0; 4]);
             return like.apart(Velocities::<M, S, N>::of(self, rates));
         }
         Velocities::<M, S, N>::of(self, rates).run(Lanes([0.0; 4]));
@@ -326,7 +296,7 @@ pub(crate) const fn are_possible<M, const N: usize>(element: &Element) -> bool
 where
     M: Model<N>,
 {
-    let is_small = element.points() <= 4 * tables::MAX_GROUPS;
+    let is_small = element.points() <= 4 * MAX_GROUPS;
     N > 0 && is_small && !M::FACTS.linear && M::CONSTRAINTS.is_empty() && has_form::<M, N>(element)
 }
 
@@ -482,9 +452,11 @@ fn is_finite<const N: usize>(state: &State<N>) -> bool {
 pub(crate) mod tests {
     use super::*;
     use crate::bundle::Pendulums;
+    use crate::method::Memory;
     use crate::model::{CoordinateName, Facts, Second};
     use crate::newton::Control;
     use crate::real::Real;
+    use crate::registers::storage::Heap;
     use crate::scheme::SchemeTable;
     use crate::{Mixed, Radau};
 
@@ -577,7 +549,7 @@ pub(crate) mod tests {
         for element in [Mixed::<4>.into(), Mixed::<9>.into(), Radau::<11>.into()] {
             let table = SchemeTable::new(element).unwrap();
             let tables = tables::Tables::of(&table.view());
-            let with = Points::<N, storage::Heap>::new(model, tables).unwrap();
+            let with = Points::<N, Heap>::new(model, tables).unwrap();
             if with.isa.is_none() {
                 return; // Nothing to compare with on this processor.
             }

@@ -6,9 +6,9 @@ use crate::error::StepError;
 use crate::method::{Interval, Memory, Method};
 use crate::model::{Model, State};
 use crate::newton::{Control, Solve, Standard};
-use crate::points::storage::Storage;
 use crate::points::tables::Tables;
 use crate::points::{Points, Together, are_possible, is_second_order};
+use crate::registers::storage::Storage;
 use crate::scheme::Scheme;
 use crate::statistics::Statistics;
 use crate::workspace::Workspace;
@@ -21,7 +21,7 @@ const IS_LARGE: bool = cfg!(feature = "alloc");
 /// A step of so many registers of unknowns is made anew; more are kept, as they live in memory anyway.
 const MOST_IN_REGISTERS: usize = 8;
 
-/// The sizes of [`Inline`](crate::points::storage::Inline) for a model and an element; zeros where steps go one point after the other.
+/// The sizes of [`Inline`](crate::registers::storage::Inline) for a model and an element; zeros where steps go one point after the other.
 #[must_use]
 pub const fn sizes<M, const N: usize>(element: Element) -> [usize; 6]
 where

@@ -49,7 +49,7 @@ where
             return Err(StepError::InvalidStep { step: h });
         }
         if const { !M::CONSTRAINTS.is_empty() } {
-            return crate::constrained::advance(self, memory, workspace, interval, state);
+            return crate::constrained_step::advance(self, memory, workspace, interval, state);
         }
         let scheme = self.tables.view();
         let mut parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;

@@ -3,8 +3,6 @@
 //! Rows are solved for the unknown rates given (p₀, q₀); the interior block of a primal element,
 //! singular at isolated steps, is never inverted.
 
-use core::fmt;
-
 #[cfg(feature = "alloc")]
 use crate::backwards::{Backwards, are_parameters, iterated};
 use crate::condense::{
@@ -14,9 +12,9 @@ use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
 use crate::constrained::rows::Rows;
 use crate::constrained::{linearise, product as constrained_product};
-use crate::element::ElementError;
 use crate::equations::Span;
 use crate::error::StepError;
+pub use crate::error::TransitionError;
 use crate::method::{Impulse, Interval, Memory, Method, may_be_phase, set_kicks, total};
 use crate::model::Model;
 #[cfg(feature = "alloc")]
@@ -25,63 +23,6 @@ use crate::phase_form::PhaseForm;
 use crate::scheme::Tables;
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Workspace, linearised_len};
-
-/// Why there is no transition matrix.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum TransitionError {
-    /// The element is none.
-    Element(ElementError),
-    /// The step itself failed, or its tangent is singular.
-    Step(StepError),
-    /// No step has been done whose matrix could be meant.
-    NoStep,
-    /// The result needs more room.
-    Shape {
-        /// Numbers that are needed.
-        needed: usize,
-        /// Numbers that were given.
-        given: usize,
-    },
-}
-
-impl From<ElementError> for TransitionError {
-    fn from(error: ElementError) -> Self {
-        Self::Element(error)
-    }
-}
-
-impl From<StepError> for TransitionError {
-    fn from(error: StepError) -> Self {
-        Self::Step(error)
-    }
-}
-
-impl fmt::Display for TransitionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Element(error) => error.fmt(f),
-            Self::Step(error) => error.fmt(f),
-            Self::NoStep => f.write_str("no step has been done"),
-            Self::Shape { needed, given } => {
-                write!(
-                    f,
-                    "the transition matrix needs {needed} numbers, not {given}"
-                )
-            }
-        }
-    }
-}
-
-impl core::error::Error for TransitionError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            Self::Element(error) => error.source(),
-            Self::Step(error) => error.source(),
-            _ => None,
-        }
-    }
-}
 
 /// Writes the transition matrix of one step from `state`, 2N × 2N, row by row, ordered (p, q);
 /// returns the end of the step.

@@ -1,15 +1,15 @@
 //! What all trajectories share, and the choice of the instruction set.
 
 use super::group::{Group, Work};
-use super::pair::{Eight, LANES, Pair};
 use super::step::Step;
 use super::together::Together;
 use crate::double_double::DoubleDouble;
 use crate::model::Model;
 use crate::newton::Control;
 use crate::points::Inertia;
-use crate::points::storage::Heap;
 use crate::points::tables::Tables;
+use crate::registers::pair::{Eight, LANES, Pair};
+use crate::registers::storage::Heap;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::{Contraction, Statistics};
 
@@ -172,7 +172,7 @@ impl<T: Together<N>, const N: usize> pulp::NullaryFnOnce for OfFour<'_, T, N> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
-        let like = crate::quad::Quad::of(self.isa, [0.0; 4]);
+        let like = crate::registers::quad::Quad::of(self.isa, [0.0; 4]);
         self.job.run(Pair(like, like));
     }
 }
@@ -190,7 +190,7 @@ impl<T: Together<N>, const N: usize> pulp::NullaryFnOnce for OfEight<'_, T, N> {
     #[inline(always)]
     fn call(self) {
         self.job
-            .run(crate::octet::Octet::of(self.isa, [0.0; LANES]));
+            .run(crate::registers::octet::Octet::of(self.isa, [0.0; LANES]));
     }
 }
 

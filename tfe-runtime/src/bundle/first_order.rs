@@ -2,13 +2,13 @@
 
 use super::group::{Group, Row, Work, load, replace};
 use super::judge::{Increments, larger};
-use super::pair::Eight;
 use super::products::{apply, sum};
 use super::second_order::largest;
 use super::step::Step;
 use crate::model::Model;
 use crate::points::end::moved;
 use crate::points::sweep::{Largest, factor, no_derivatives};
+use crate::registers::pair::Eight;
 
 impl<M, const N: usize> Step<'_, M, N>
 where

@@ -1,7 +1,7 @@
 //! Eight trajectories side by side, and what the iteration of their elements needs.
 
-use super::pair::{Eight, LANES};
 use crate::model::State;
+use crate::registers::pair::{Eight, LANES};
 use alloc::vec;
 use alloc::vec::Vec;
 

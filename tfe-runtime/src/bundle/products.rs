@@ -1,9 +1,8 @@
 //! Products of the tables with numbers of eight trajectories.
 
 use super::group::Row;
-use super::pair::{Apart, Eight};
-use crate::points::storage::Heap;
-use crate::points::tables::{Matrix, Weights};
+use crate::registers::pair::{Apart, Eight};
+use crate::registers::storage::{Heap, Matrix, Weights};
 
 /// The product of a K × K matrix with a vector over the points, for every coordinate.
 #[inline(always)]
@@ -139,9 +138,9 @@ pub(super) fn sum<V: Eight, const N: usize, const EXACT: bool>(
 mod tests {
     use super::*;
     use crate::Lanes;
-    use crate::bundle::pair::{LANES, Pair};
     use crate::element::Element;
     use crate::points::tables::Tables;
+    use crate::registers::pair::{LANES, Pair};
     use crate::scheme::{SchemeTable, Tables as _};
 
     /// Tables of all sizes, against sums written down.

@@ -2,13 +2,13 @@
 
 use super::group::{Group, Row, Work, load, replace};
 use super::judge::Increments;
-use super::pair::Eight;
 use super::products::{apply, sum};
 use super::step::Step;
 use crate::double_double::DoubleDouble;
 use crate::model::{Form, Model};
 use crate::points::end::moved;
 use crate::points::sweep::no_derivatives;
+use crate::registers::pair::Eight;
 
 impl<M, const N: usize> Step<'_, M, N>
 where

@@ -2,14 +2,14 @@
 
 use super::group::{Group, Row, Work, flags, replace};
 use super::judge::{Increments, Judge, larger};
-use super::pair::{Eight, LANES};
 use super::products::apply;
 use super::together::Together;
 use crate::model::Model;
 use crate::newton::{Control, PATIENCE, Solve};
-use crate::points::storage::Heap;
 use crate::points::tables::Tables;
 use crate::points::{Inertia, is_phase, is_second_order};
+use crate::registers::pair::{Eight, LANES};
+use crate::registers::storage::Heap;
 use crate::statistics::{Contraction, Statistics};
 use alloc::vec::Vec;
 

@@ -1,8 +1,8 @@
 //! Whose trajectories go side by side.
 
-use super::pair::Eight;
 use crate::model::{Model, State};
 use crate::points::constant_rates;
+use crate::registers::pair::Eight;
 
 /// What eight trajectories side by side compute with.
 pub trait Together<const N: usize>: Clone {

@@ -3,12 +3,12 @@
 //! A kernel makes its parameters of the time that it is given ([`Real::parameter`]). Here that number knows eight values of each parameter, so that lane k computes with those of
 //! model k, and the kernel is the one that serves a single model.
 
-use super::pair::{Apart, Eight, LANES};
 use super::together::{Together, Trajectories};
 use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
 use crate::points::constant_rates;
-use crate::points::four::Precise;
 use crate::real::Real;
+use crate::registers::four::Precise;
+use crate::registers::pair::{Apart, Eight, LANES};
 use alloc::vec::Vec;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 

@@ -4,7 +4,7 @@ use super::model::FamilyModel;
 use super::running::Running;
 use crate::lanes::Lanes;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-use crate::quad::Quad;
+use crate::registers::quad::Quad;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use pulp::x86::V3;
 

@@ -1,8 +1,7 @@
 //! Arithmetic of the iteration of families.
 
-use crate::points::four::Four;
-use crate::points::storage::Heap;
-use crate::points::tables::Matrix;
+use crate::registers::four::Four;
+use crate::registers::storage::{Heap, Matrix};
 
 /// The forces at one coordinate at all points, times a number.
 #[inline(always)]

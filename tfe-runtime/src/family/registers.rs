@@ -8,7 +8,7 @@ use super::space::{Kind, Leg, Pass, Problem, Sizes, Space};
 use crate::lanes::Lanes;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-use crate::quad::Quad;
+use crate::registers::quad::Quad;
 
 /// The unknowns of a step.
 #[derive(Clone, Debug)]

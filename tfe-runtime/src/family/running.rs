@@ -3,9 +3,9 @@
 use super::model::{Gradient, Sweep};
 use super::space::{Leg, Pass, Problem, Sizes, Space};
 use crate::lanes::Lanes;
-use crate::points::four::Four;
+use crate::registers::four::Four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-use crate::quad::Quad;
+use crate::registers::quad::Quad;
 
 /// Runs passes in code for one instruction set.
 pub(super) trait Passes<V>: Copy {

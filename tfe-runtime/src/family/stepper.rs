@@ -13,7 +13,7 @@ use crate::element::Element;
 use crate::error::StepError;
 use crate::model::Form;
 use crate::newton::Control;
-use crate::points::tables::MAX_GROUPS;
+use crate::registers::storage::MAX_GROUPS;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::Statistics;
 use alloc::boxed::Box;

@@ -1,9 +1,9 @@
 //! The end of an element, to more than the working precision where that is asked for.
 
-use super::four::{Four, Precise, block, put};
-use super::storage::Storage;
 use super::{Leg, Work};
 use crate::model::State;
+use crate::registers::four::{Four, Precise, block, put};
+use crate::registers::storage::Storage;
 
 impl<const N: usize, S: Storage> Work<N, S> {
     /// Start plus h times the integrals of the rates of first-order equations.

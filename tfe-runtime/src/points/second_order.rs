@@ -1,12 +1,12 @@
 //! M q̈ = f(q, q̇): forces are the only unknowns.
 
-use super::four::{Four, block, put};
-use super::storage::Storage;
 use super::sweep::{Magnitude, larger, no_derivatives};
 use super::{Leg, Work};
 use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
 use crate::model::{Form, Model};
+use crate::registers::four::{Four, block, put};
+use crate::registers::storage::Storage;
 
 impl<const N: usize, S: Storage> Work<N, S> {
     /// Velocity at the start, and what it lost by rounding.

@@ -1,17 +1,43 @@
 //! A step of one trajectory: start of the iteration, the iteration, the end.
 
-use super::four::Four;
-use super::storage::Storage;
 use super::{Leg, Outcome, Points, Together, Work, is_finite, is_phase, is_second_order, largest};
 use crate::error::StepError;
 use crate::method::{Last, Memory};
 use crate::model::{Model, State};
 use crate::newton::{Asked, Control, Monitor, PATIENCE, Solve, Verdict};
+use crate::registers::four::Four;
+use crate::registers::storage::Storage;
 use crate::scheme;
 use crate::statistics::Contraction;
 
+impl<const N: usize, S: Storage> Points<N, S> {
+    /// A step of a stepper, with what it remembers.
+    #[inline]
+    pub(crate) fn step<M>(
+        &mut self,
+        (model, tables, asked): (&M, &impl scheme::Tables, &impl Asked),
+        memory: &mut Memory<N>,
+        place: (f64, f64),
+        state: &mut State<N>,
+    ) -> Together
+    where
+        M: Model<N>,
+    {
+        let job = Job {
+            points: self,
+            model,
+            tables,
+            asked,
+            memory,
+            place,
+            state,
+        };
+        job.run()
+    }
+}
+
 /// A step to be done.
-pub(super) struct Job<'a, M, T, A, S: Storage, const N: usize> {
+struct Job<'a, M, T, A, S: Storage, const N: usize> {
     pub(super) points: &'a mut Points<N, S>,
     pub(super) model: &'a M,
     pub(super) tables: &'a T,
@@ -274,6 +300,7 @@ impl<M: Model<N>, T: scheme::Tables, A: Asked, S: Storage, const N: usize> pulp:
     type Output = Together;
     #[inline(always)]
     fn call(self) -> Together {
-        self.job.step(crate::quad::Quad::of(self.isa, [0.0; 4]))
+        self.job
+            .step(crate::registers::quad::Quad::of(self.isa, [0.0; 4]))
     }
 }

@@ -1,14 +1,14 @@
 //! First-order equations, and what all iterations share.
 
-use super::four::Four;
-#[cfg(feature = "alloc")]
-use super::four::Precise;
-use super::storage::Storage;
 use super::{Inertia, Leg, Row, Work};
 use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
 use crate::model::{First, Model};
 use crate::real::Real;
+use crate::registers::four::Four;
+#[cfg(feature = "alloc")]
+use crate::registers::four::Precise;
+use crate::registers::storage::Storage;
 
 /// The largest magnitude so far in each lane. NaN is left out: the end of a step is not finite where one of its forces is not, and that is looked at once a step.
 #[derive(Clone, Copy)]

@@ -1,6 +1,7 @@
 //! Steps over nodes at which constraints lose rank (T-120): the element next to such a node ends behind it.
 
-use super::{Piece, Stepper};
+use super::piece::{Ahead, Piece};
+use super::setup::Stepper;
 use crate::constrained::rows::Independence;
 use crate::cut::Halving;
 use crate::error::{ConstraintError, StepError};
@@ -25,24 +26,6 @@ const LOST_HERE: f64 = 0.125;
 
 /// A row that has become so much shorter is about to vanish.
 const VANISHING: f64 = 1e-3;
-
-/// Where the motion has got behind the last node.
-#[derive(Clone, Debug)]
-pub(super) struct Ahead<const N: usize> {
-    node: State<N>,
-    t: f64,
-    state: State<N>,
-    /// From the node to there.
-    piece: Piece<N>,
-}
-
-impl<const N: usize> Ahead<N> {
-    /// Whether a step begins at the node and ends behind what was done.
-    fn serves(&self, t: f64, h: f64, state: &State<N>) -> bool {
-        let done = (self.t - t) / h;
-        self.node.is_same(state) && done > 0.0 && done < 1.0
-    }
-}
 
 /// Whether much of the constraints' independence is lost from the start of a step to its end.
 fn is_lost(start: &Independence, end: &Independence) -> bool {

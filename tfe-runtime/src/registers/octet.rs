@@ -1,11 +1,11 @@
-//! Eight numbers in one register of a processor with AVX-512, for eight trajectories side by side. The rules are those of [`quad`](crate::quad).
+//! Eight numbers in one register of a processor with AVX-512, for eight trajectories side by side. The rules are those of [`quad`](crate::registers::quad).
 
-use crate::bundle::pair::Apart;
+use crate::registers::pair::{Apart, Eight, LANES};
 use crate::trigonometry::LIMIT;
 use pulp::x86::V4;
 use pulp::{Simd, b8, f64x8, u64x8};
 
-crate::quad::register! {
+crate::registers::quad::register! {
     /// Eight numbers, and the proof that the processor has registers for them.
     Octet: 8 of V4,
     f64x8, b8, u64x8, mul_sub_f64x8, mul_add_f64x8, shl_const_u64x8
@@ -51,5 +51,27 @@ impl<W: Apart> pulp::NullaryFnOnce for Call<W> {
     #[inline(always)]
     fn call(self) {
         self.work.run(Octet::of(self.isa, [0.0; 8]));
+    }
+}
+
+impl Eight for Octet {
+    #[inline(always)]
+    fn with(self, lanes: [f64; LANES]) -> Self {
+        self.with(lanes)
+    }
+
+    #[inline(always)]
+    fn lanes(self) -> [f64; LANES] {
+        self.lanes()
+    }
+
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        self.any_positive()
+    }
+
+    #[inline(always)]
+    fn apart<W: Apart>(self, work: W) {
+        self.apart(work);
     }
 }

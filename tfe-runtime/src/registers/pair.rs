@@ -1,8 +1,8 @@
 //! Eight numbers: one register, or two of four. Written side by side the operations of two overlap, where one chain of them would wait for
 //! itself.
 
-use crate::points::four::{self, Four, Precise};
 use crate::real::Real;
+use crate::registers::four::{self, Four, Precise};
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// So many trajectories share a kernel call.
@@ -85,29 +85,6 @@ impl<V: Four> Precise for Pair<V> {
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
         Self(self.0.larger(other.0), self.1.larger(other.1))
-    }
-}
-
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl Eight for crate::octet::Octet {
-    #[inline(always)]
-    fn with(self, lanes: [f64; LANES]) -> Self {
-        self.with(lanes)
-    }
-
-    #[inline(always)]
-    fn lanes(self) -> [f64; LANES] {
-        self.lanes()
-    }
-
-    #[inline(always)]
-    fn any_positive(self) -> bool {
-        self.any_positive()
-    }
-
-    #[inline(always)]
-    fn apart<W: Apart>(self, work: W) {
-        self.apart(work);
     }
 }
 

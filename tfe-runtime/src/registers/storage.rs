@@ -1,6 +1,5 @@
-//! Where the numbers of an element at its points are kept.
+//! Where the numbers of an element at its points are kept, and what of its tables no step changes.
 
-use super::tables::Fixed;
 use core::fmt::Debug;
 use core::ops::{Deref, DerefMut};
 
@@ -23,6 +22,48 @@ pub trait Storage: Clone + Debug + Sized {
     type Square<const N: usize>: List<[f64; N]>;
     /// The tables that no step changes.
     type Fixed: Deref<Target = Fixed<Self>> + Clone + Debug;
+}
+
+/// Elements have up to 16 points at once; beyond, one point after the other.
+pub(crate) const MAX_GROUPS: usize = 4;
+
+/// A number for every coordinate at each of four points.
+pub(crate) type Row<const N: usize> = [[f64; 4]; N];
+
+/// A K × K matrix by columns, the rows in groups of four. Rows beyond the last are copies of it, so that nothing extraordinary happens there.
+#[derive(Clone, Debug)]
+pub struct Matrix<S: Storage> {
+    #[cfg(feature = "alloc")]
+    pub(crate) groups: usize,
+    pub(crate) columns: S::Lines,
+}
+
+/// A weight for each point and what rounding took from it; zeros beyond the last.
+#[derive(Clone, Debug)]
+pub(crate) struct Weights<S: Storage>(pub(crate) S::Groups<[[f64; 4]; 2]>);
+
+/// What no step changes; `low` is what rounding took.
+#[derive(Clone, Debug)]
+pub struct Fixed<S: Storage> {
+    pub(crate) points: usize,
+    pub(crate) groups: usize,
+    /// c
+    pub(crate) nodes: S::Groups<[f64; 4]>,
+    /// A 1: how far a constant velocity reaches. It is c for collocation methods only.
+    pub(crate) reach: S::Groups<[f64; 4]>,
+    pub(crate) reach_low: S::Groups<[f64; 4]>,
+    /// A
+    pub(crate) once: Matrix<S>,
+    pub(crate) once_low: Matrix<S>,
+    /// A²: what two integrations make of accelerations.
+    pub(crate) twice: Matrix<S>,
+    pub(crate) twice_low: Matrix<S>,
+    /// b
+    pub(crate) weights: Weights<S>,
+    /// bᵀA
+    pub(crate) lever: Weights<S>,
+    /// From one element to the next that is as long.
+    pub(crate) continued: Matrix<S>,
 }
 
 /// A list whose length was decided when it was made.
@@ -126,7 +167,7 @@ impl<
 
 /// An array as a list.
 #[derive(Clone, Copy, Debug)]
-pub struct Array<T, const C: usize>(pub(super) [T; C]);
+pub struct Array<T, const C: usize>(pub(crate) [T; C]);
 
 impl<T, const C: usize> Deref for Array<T, C> {
     type Target = [T];
@@ -152,7 +193,7 @@ impl<T: Copy + Debug, const C: usize> List<T> for Array<T, C> {
 
 /// The lines of a table.
 #[derive(Clone, Copy, Debug)]
-pub struct Lines<const K: usize, const C: usize>(pub(super) [[[f64; 4]; C]; K]);
+pub struct Lines<const K: usize, const C: usize>(pub(crate) [[[f64; 4]; C]; K]);
 
 impl<const K: usize, const C: usize> Deref for Lines<K, C> {
     type Target = [[f64; 4]];

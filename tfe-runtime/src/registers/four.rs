@@ -1,8 +1,6 @@
 //! Four points side by side.
 
-use super::Row;
-use super::storage::Storage;
-use super::tables::Matrix;
+use super::storage::{Matrix, Row, Storage};
 use crate::double_double::DoubleDouble;
 use crate::lanes::Lanes;
 use crate::model::{First, Model};
@@ -212,7 +210,7 @@ impl Four for Lanes<4> {
 }
 
 /// One number.
-trait One: Real {
+pub(super) trait One: Real {
     fn value(self) -> f64;
 }
 
@@ -229,7 +227,7 @@ impl One for Lanes<1> {
 }
 
 /// The kernel for one point after the other.
-fn each_point<R: One, M, const N: usize>(
+pub(super) fn each_point<R: One, M, const N: usize>(
     model: &M,
     t: Lanes<4>,
     q: &[Lanes<4>; N],
@@ -261,111 +259,6 @@ fn each_point<R: One, M, const N: usize>(
             first.z[a].0[lane] = one.z[a].value();
             first.q[a].0[lane] = one.q[a].value();
             first.force[a].0[lane] = one.force[a].value();
-        }
-    }
-}
-
-/// In registers of the processor, the kernel for all four points at once.
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl Four for crate::quad::Quad {
-    #[inline(always)]
-    fn with(self, lanes: [f64; 4]) -> Self {
-        self.with(lanes)
-    }
-
-    #[inline(always)]
-    fn lanes(self) -> [f64; 4] {
-        self.lanes()
-    }
-
-    #[inline(always)]
-    fn apply<S: Storage, const N: usize>(
-        self,
-        matrix: &Matrix<S>,
-        rows: &[Row<N>],
-        products: &mut [Row<N>],
-    ) {
-        matrix.apply_inline(self, rows, products);
-    }
-
-    #[inline(always)]
-    fn apart<W: Apart>(self, work: W) {
-        self.apart(work);
-    }
-
-    #[inline(always)]
-    fn sin_cos_of_two(self, other: Self) -> ((Self, Self), (Self, Self)) {
-        self.sin_cos_of_two(other)
-    }
-
-    #[inline(always)]
-    fn first<M, const N: usize>(
-        model: &M,
-        t: Self,
-        q: &[Self; N],
-        z: &[Self; N],
-        first: &mut First<Self, N>,
-    ) where
-        M: Model<N>,
-    {
-        if M::LANES {
-            model.first_inline(t, q, z, first);
-        } else {
-            in_turn(t, model, q, z, first, None);
-        }
-    }
-
-    #[inline(always)]
-    fn first_and_mass<M, const N: usize>(
-        model: &M,
-        t: Self,
-        q: &[Self; N],
-        z: &[Self; N],
-        first: &mut First<Self, N>,
-        mass: &mut [[Self; N]; N],
-    ) where
-        M: Model<N>,
-    {
-        if M::LANES {
-            model.first_and_mass_inline(t, q, z, first, mass);
-        } else {
-            in_turn(t, model, q, z, first, Some(mass));
-        }
-    }
-}
-
-/// A kernel that is not made for registers, for one point after the other.
-#[cfg(all(feature = "simd", target_arch = "x86_64"))]
-#[inline(always)]
-fn in_turn<V: Four, M, const N: usize>(
-    t: V,
-    model: &M,
-    q: &[V; N],
-    z: &[V; N],
-    first: &mut First<V, N>,
-    mass: Option<&mut [[V; N]; N]>,
-) where
-    M: Model<N>,
-{
-    let none = Lanes([0.0; 4]);
-    let (mut q_lanes, mut z_lanes) = ([none; N], [none; N]);
-    for a in 0..N {
-        (q_lanes[a], z_lanes[a]) = (Lanes(q[a].lanes()), Lanes(z[a].lanes()));
-    }
-    let mut first_lanes = First::zero();
-    let (time, mut mass_lanes) = (Lanes(t.lanes()), [[none; N]; N]);
-    let wanted = mass.is_some().then_some(&mut mass_lanes);
-    each_point::<f64, M, N>(model, time, &q_lanes, &z_lanes, &mut first_lanes, wanted);
-    for a in 0..N {
-        first.z[a] = t.with(first_lanes.z[a].0);
-        first.q[a] = t.with(first_lanes.q[a].0);
-        first.force[a] = t.with(first_lanes.force[a].0);
-    }
-    if let Some(mass) = mass {
-        for a in 0..N {
-            for b in 0..N {
-                mass[a][b] = t.with(mass_lanes[a][b].0);
-            }
         }
     }
 }

@@ -5,9 +5,9 @@
 //! and cosine are those of [`trigonometry`](crate::trigonometry). Code that computes with these numbers has to be compiled for that
 //! instruction set, hence everything is written into the place of its call, and the outermost call goes through [`pulp`].
 
-use crate::bundle::pair::Pair;
-use crate::points::four::Apart;
 use crate::real::Real;
+use crate::registers::four::Apart;
+use crate::registers::pair::Pair;
 use crate::trigonometry::{LIMIT, Turn, reduced};
 use pulp::x86::V3;
 use pulp::{Simd, f64x4, m64x4, u64x4};
@@ -77,7 +77,7 @@ macro_rules! register {
             }
         }
 
-        impl crate::points::four::Precise for $name {
+        impl crate::registers::four::Precise for $name {
             /// By a fused instruction the second is exact.
             #[inline(always)]
             fn product(self, other: Self) -> (Self, Self) {
@@ -106,7 +106,7 @@ macro_rules! register {
             }
         }
 
-        crate::quad::operators! {
+        crate::registers::quad::operators! {
             $name: Add add add_f64s; Sub sub sub_f64s; Mul mul mul_f64s; Div div div_f64s;
         }
 
@@ -184,7 +184,7 @@ macro_rules! register {
                 )
             }
 
-            crate::quad::lane_by_lane! {
+            crate::registers::quad::lane_by_lane! {
                 tan(); asin(); acos(); atan(); atan2(x); sinh(); cosh(); tanh(); asinh(); acosh(); atanh(); exp(); ln(); hypot(other);
                 powf(exponent); sign(); min(other); max(other);
             }
@@ -226,7 +226,7 @@ macro_rules! register {
         impl crate::trigonometry::Turn for $name {
             #[inline(always)]
             fn fused(self, factor: Self, term: Self) -> Self {
-                crate::points::four::Precise::times_plus(self, factor, term)
+                crate::registers::four::Precise::times_plus(self, factor, term)
             }
 
             #[inline(always)]
@@ -278,7 +278,7 @@ macro_rules! lane_by_lane {
     ($($name:ident($($argument:ident),*);)*) => {$(
         #[inline(always)]
         fn $name(self $(, $argument: Self)*) -> Self {
-            crate::quad::lane_by_lane!(@ self, $name $(, $argument)*)
+            crate::registers::quad::lane_by_lane!(@ self, $name $(, $argument)*)
         }
     )*};
     (@ $self:ident, $name:ident) => { $self.each(<f64 as crate::real::Real>::$name) };

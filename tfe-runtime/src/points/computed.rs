@@ -1,0 +1,85 @@
+//! Tables that are computed when the program runs.
+
+use super::tables::{Tables, Target};
+use crate::registers::storage::{Fixed, Heap, Matrix, Weights};
+use crate::scheme::SchemeRef;
+use alloc::sync::Arc;
+use alloc::vec;
+
+/// The tables computed so far.
+#[cfg(feature = "std")]
+static KNOWN: std::sync::Mutex<std::vec::Vec<(crate::Element, Arc<Fixed<Heap>>)>> =
+    std::sync::Mutex::new(std::vec::Vec::new());
+
+impl Tables<Heap> {
+    /// Of an element that is a Runge–Kutta method; clones share what no step changes. With the feature `std` they are computed once in a program.
+    pub(crate) fn of(scheme: &SchemeRef<'_>) -> Self {
+        Self::new(Self::shared(scheme))
+    }
+
+    #[cfg(feature = "std")]
+    fn shared(scheme: &SchemeRef<'_>) -> Arc<Fixed<Heap>> {
+        // A panic elsewhere leaves the list as good as it was.
+        let mut known = KNOWN
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, fixed)) = known.iter().find(|(of, _)| *of == scheme.element) {
+            return fixed.clone();
+        }
+        let fixed = Arc::new(Fixed::computed(scheme));
+        known.push((scheme.element, fixed.clone()));
+        fixed
+    }
+
+    #[cfg(not(feature = "std"))]
+    fn shared(scheme: &SchemeRef<'_>) -> Arc<Fixed<Heap>> {
+        Arc::new(Fixed::computed(scheme))
+    }
+}
+
+impl Matrix<Heap> {
+    fn empty(points: usize) -> Self {
+        let groups = points.div_ceil(4);
+        Self {
+            groups,
+            columns: vec![[0.0; 4]; points * groups],
+        }
+    }
+}
+
+impl Fixed<Heap> {
+    fn computed(scheme: &SchemeRef<'_>) -> Self {
+        let points = scheme.points();
+        let groups = points.div_ceil(4);
+        let (row, matrix) = (vec![[0.0; 4]; groups], Matrix::empty(points));
+        let weights = Weights(vec![[[0.0; 4]; 2]; groups]);
+        let mut fixed = Self {
+            points,
+            groups,
+            nodes: row.clone(),
+            reach: row.clone(),
+            reach_low: row,
+            once: matrix.clone(),
+            once_low: matrix.clone(),
+            twice: matrix.clone(),
+            twice_low: matrix.clone(),
+            weights: weights.clone(),
+            lever: weights,
+            continued: matrix,
+        };
+        let mut target = Target {
+            nodes: &mut fixed.nodes,
+            reach: &mut fixed.reach,
+            reach_low: &mut fixed.reach_low,
+            once: &mut fixed.once.columns,
+            once_low: &mut fixed.once_low.columns,
+            twice: &mut fixed.twice.columns,
+            twice_low: &mut fixed.twice_low.columns,
+            weights: &mut fixed.weights.0,
+            lever: &mut fixed.lever.0,
+            continued: &mut fixed.continued.columns,
+        };
+        target.fill(scheme);
+        fixed
+    }
+}

@@ -1,0 +1,216 @@
+//! Products of the tables of an element with numbers at its points.
+
+use super::four::{Four, Precise};
+use super::storage::{MAX_GROUPS, Matrix, Row, Storage, Weights};
+
+impl<S: Storage> Matrix<S> {
+    /// The product with a vector over the points for every coordinate.
+    #[inline(always)]
+    pub(crate) fn apply<V: Four, const N: usize>(
+        &self,
+        like: V,
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
+        like.apply(self, rows, products);
+    }
+
+    #[inline(always)]
+    pub(super) fn apply_inline<V: Four, const N: usize>(
+        &self,
+        like: V,
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
+        // Conditions that are constants, so that of a known size one is compiled.
+        if const { S::GROUPS == 1 } || const { S::GROUPS == 0 } && rows.len() == 1 {
+            self.apply_to::<V, N, 1>(like, rows, products);
+        } else if const { S::GROUPS == 2 } || const { S::GROUPS == 0 } && rows.len() == 2 {
+            self.apply_to::<V, N, 2>(like, rows, products);
+        } else if const { S::GROUPS == 3 } || const { S::GROUPS == 0 } && rows.len() == 3 {
+            self.apply_to::<V, N, 3>(like, rows, products);
+        } else {
+            self.apply_to::<V, N, MAX_GROUPS>(like, rows, products);
+        }
+    }
+
+    #[inline(always)]
+    fn apply_to<V: Four, const N: usize, const C: usize>(
+        &self,
+        like: V,
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
+        let (columns, zero) = (self.columns.as_chunks::<C>().0, like.like(0.0));
+        let (whole, rest) = columns.as_chunks::<4>();
+        let ([rows], [products]) = (rows.as_chunks::<C>().0, products.as_chunks_mut::<C>().0)
+        else {
+            return;
+        };
+        // Two sums, of even and of odd columns: with few coordinates, additions in a row are what takes time.
+        if let ([whole], []) = (whole.as_chunks::<C>().0, rest) {
+            // Groups without gaps are written out by the compiler.
+            for a in 0..N {
+                let mut sums = first_two(like, &whole[0], &rows[0][a]);
+                add(like, &mut sums, &whole[0][2..], &rows[0][a][2..]);
+                for (columns, row) in whole[1..].iter().zip(&rows[1..]) {
+                    add(like, &mut sums, columns, &row[a]);
+                }
+                for c in 0..C {
+                    products[c][a] = (sums[0][c] + sums[1][c]).lanes();
+                }
+            }
+            return;
+        }
+        for a in 0..N {
+            let mut sums = [[zero; C]; 2];
+            for (columns, row) in whole.iter().zip(rows) {
+                add(like, &mut sums, columns, &row[a]);
+            }
+            if let Some(row) = rows.get(whole.len()) {
+                for (column, value) in rest.iter().zip(&row[a]) {
+                    let value = like.like(*value);
+                    for c in 0..C {
+                        sums[0][c] = like.with(column[c]).times_plus(value, sums[0][c]);
+                    }
+                }
+            }
+            for c in 0..C {
+                products[c][a] = (sums[0][c] + sums[1][c]).lanes();
+            }
+        }
+    }
+
+    /// The columns one after the other, in groups of four lines.
+    #[cfg(feature = "alloc")]
+    #[inline(always)]
+    pub(crate) fn groups(&self) -> &[[f64; 4]] {
+        &self.columns
+    }
+
+    /// The columns, padded to groups of four.
+    #[cfg(feature = "alloc")]
+    #[inline(always)]
+    pub(crate) fn columns(&self) -> core::slice::ChunksExact<'_, f64> {
+        self.columns.as_flattened().chunks_exact(4 * self.groups)
+    }
+}
+
+/// The products of the first two columns with their values.
+#[inline(always)]
+fn first_two<V: Four, const C: usize>(
+    like: V,
+    columns: &[[[f64; 4]; C]; 4],
+    values: &[f64; 4],
+) -> [[V; C]; 2] {
+    let mut products = [[like; C]; 2];
+    for lane in 0..2 {
+        let value = like.like(values[lane]);
+        for c in 0..C {
+            products[lane][c] = like.with(columns[lane][c]) * value;
+        }
+    }
+    products
+}
+
+/// Adds the products of columns with their values.
+#[inline(always)]
+fn add<V: Four, const C: usize>(
+    like: V,
+    sums: &mut [[V; C]; 2],
+    columns: &[[[f64; 4]; C]],
+    values: &[f64],
+) {
+    for (lane, (column, value)) in columns.iter().zip(values).enumerate() {
+        let value = like.like(*value);
+        for c in 0..C {
+            let sum = &mut sums[lane % 2][c];
+            *sum = like.with(column[c]).times_plus(value, *sum);
+        }
+    }
+}
+
+impl<S: Storage> Weights<S> {
+    /// Σ weight · value over the points of four coordinates at most from `from` on, and what rounding takes from it.
+    ///
+    /// This is what all steps add up. With products of one rounding each, the energy of a Kepler orbit drifts ten times as fast: weights
+    /// and step are the same numbers in every step, and what their products lose is no chance. Without `EXACT` that is left out.
+    #[inline(always)]
+    pub(crate) fn sums<V: Four, const N: usize, const EXACT: bool>(
+        &self,
+        like: V,
+        rows: &[Row<N>],
+        from: usize,
+    ) -> (V, V) {
+        let (mut high, mut low) = ([like.like(0.0); 4], [like.like(0.0); 4]);
+        for (group, ([weight, weight_low], row)) in self.0.iter().zip(rows).enumerate() {
+            let (weight, weight_low) = (like.with(*weight), like.with(*weight_low));
+            for a in 0..4.min(N - from) {
+                let value = like.with(row[from + a]);
+                if const { !EXACT } {
+                    high[a] = weight.times_plus(value, high[a]);
+                    continue;
+                }
+                let (product, rest) = weight.product(value);
+                let rest = weight_low.times_plus(value, rest);
+                if group == 0 {
+                    (high[a], low[a]) = (product, rest);
+                } else {
+                    let (sum, lost) = high[a].exact_sum(product);
+                    (high[a], low[a]) = (sum, low[a] + (rest + lost));
+                }
+            }
+        }
+        if const { N == 1 } {
+            // One number at four points: nothing fills registers.
+            let (high, low) = sum_of::<_, EXACT>(high[0].lanes(), low[0].lanes());
+            return (like.like(high), like.like(low));
+        }
+        // From a register for each coordinate to one for each of four points.
+        sum_of::<_, EXACT>(transposed(high), transposed(low))
+    }
+
+    /// The weight of one point and what rounding took from it.
+    #[cfg(feature = "alloc")]
+    #[inline(always)]
+    pub(crate) fn of(&self, point: usize) -> (f64, f64) {
+        let [weight, low] = &self.0[point / 4];
+        (weight[point % 4], low[point % 4])
+    }
+}
+
+/// The sum of four numbers and what rounding takes from it, and from each.
+#[inline(always)]
+fn sum_of<V: Precise, const EXACT: bool>([a, b, c, d]: [V; 4], [e, f, g, h]: [V; 4]) -> (V, V) {
+    if const { !EXACT } {
+        return ((a + b) + (c + d), a.like(0.0));
+    }
+    let (left, left_low) = a.exact_sum(b);
+    let (right, right_low) = c.exact_sum(d);
+    let (all, all_low) = left.exact_sum(right);
+    let lost = (left_low + right_low) + all_low;
+    (all, ((e + f) + (g + h)) + lost)
+}
+
+#[inline(always)]
+fn transposed<V: Four>(rows: [V; 4]) -> [V; 4] {
+    let like = rows[0];
+    let lanes = [
+        rows[0].lanes(),
+        rows[1].lanes(),
+        rows[2].lanes(),
+        rows[3].lanes(),
+    ];
+    let mut columns = [[0.0; 4]; 4];
+    for i in 0..4 {
+        for j in 0..4 {
+            columns[i][j] = lanes[j][i];
+        }
+    }
+    [
+        like.with(columns[0]),
+        like.with(columns[1]),
+        like.with(columns[2]),
+        like.with(columns[3]),
+    ]
+}

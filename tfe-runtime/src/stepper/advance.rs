@@ -1,0 +1,345 @@
+//! Steps: plain ones, in halves, in arcs between kinks, by the matrix of a linear model.
+
+use super::piece::Piece;
+use super::setup::Stepper;
+use crate::cut::{Halving, Instant, in_halves, may_be_cut};
+use crate::dense::DenseElement;
+use crate::error::StepError;
+use crate::kinks::{Kinked, in_arcs, switches};
+use crate::method::{Impulse, Interval, Last, Memory, Method};
+use crate::model::{Model, State};
+use crate::newton::{Control, Solve};
+use crate::points::Together;
+use crate::propagator::Propagator;
+use crate::scheme::Tables;
+use crate::workspace::Workspace;
+use alloc::vec::Vec;
+
+impl<M, const N: usize> Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    /// Moves `state` from t to t + h. The first iterate continues the last step if `state` is
+    /// where that ended; a state of one's own is as welcome.
+    ///
+    /// A step whose iteration fails, or does not prove that it found the root that continues the motion (T-115), is cut into halves, and these again, up to 1024
+    /// pieces; [`Statistics::cuts`] counts such steps, and [`dense`](Self::dense) and [`transition`](Self::transition) are those of all pieces together.
+    ///
+    /// # Errors
+    /// [`StepError`]; `state` is unchanged then.
+    pub fn advance(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+        impulses: &[Impulse<N>],
+    ) -> Result<(), StepError> {
+        self.pieces.clear();
+        if Self::MAY_HAVE_KINKS && self.at_kinks && self.has_kinks(t, state) {
+            return self.advance_in_arcs(t, h, state, impulses);
+        }
+        if Self::HAS_CONSTRAINTS {
+            return self.advance_constrained(t, h, state, impulses);
+        }
+        self.advance_plainly(t, h, state, impulses)
+    }
+
+    /// A step without a look at kinks.
+    pub(super) fn advance_plainly(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+        impulses: &[Impulse<N>],
+    ) -> Result<(), StepError> {
+        let error = match self.whole(t, h, state, impulses) {
+            Err(error) if may_be_cut(&error, M::FACTS.linear, self.control.solve) => error,
+            outcome => return outcome,
+        };
+        let (start, low, steps) = (*state, self.memory.low, self.memory.statistics.steps);
+        let arrived = in_halves(self, (t, h), state, impulses, 1);
+        self.memory.statistics.steps = steps;
+        if !arrived {
+            (*state, self.memory.low, self.memory.last) = (start, low, None);
+            self.pieces.clear();
+            return Err(error);
+        }
+        self.memory.statistics.steps += 1;
+        self.memory.statistics.cuts += 1;
+        Ok(())
+    }
+
+    /// Whether kernels choose by the sign of anything; where they do not nobody asks again.
+    fn has_kinks(&mut self, t: f64, state: &State<N>) -> bool {
+        let mut switches = Vec::new();
+        self.switches(t, state, &mut switches);
+        self.at_kinks = !switches.is_empty();
+        // The inside of every step is looked at.
+        self.ends_only &= !self.at_kinks;
+        self.at_kinks
+    }
+
+    #[cold]
+    fn advance_in_arcs(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+        impulses: &[Impulse<N>],
+    ) -> Result<(), StepError> {
+        let (start, low, steps) = (*state, self.memory.low, self.memory.statistics.steps);
+        let outcome = in_arcs(self, (t, h), state, impulses);
+        self.trust(false);
+        self.memory.statistics.steps = steps + u64::from(outcome.is_ok());
+        if outcome.is_err() {
+            (*state, self.memory.low, self.memory.last) = (start, low, None);
+            self.pieces.clear();
+        }
+        outcome
+    }
+
+    /// Whether a matrix is asked for.
+    fn is_propagated(&self) -> bool {
+        self.ends_only && !matches!(self.control.solve, Solve::FixedPoint)
+    }
+
+    /// Moves `state` by the matrix of a linear model; false where an ordinary step is to be done.
+    ///
+    /// The matrix costs 2N + 1 steps: it is made after as many of the same length.
+    fn propagate(&mut self, t: f64, h: f64, state: &mut State<N>) -> bool {
+        self.alike = if self.alike.0 == h {
+            (h, self.alike.1.saturating_add(1))
+        } else {
+            (h, 1)
+        };
+        if self.alike.1 <= 2 * N + 1 {
+            return false;
+        }
+        if !self.propagator.as_ref().is_some_and(|one| one.is_of(h)) {
+            let Ok(made) = Propagator::of(h, |start| self.increment(h, start)) else {
+                return false;
+            };
+            self.propagator = Some(made);
+        }
+        let Some(propagator) = &self.propagator else {
+            return false;
+        };
+        let start = *state;
+        let mut low = match &self.memory.last {
+            Some(last) if last.end.is_same(&start) => self.memory.low,
+            _ => State::ZERO,
+        };
+        let start_low = low;
+        if !propagator.advance(state, &mut low) {
+            // The ordinary step says why.
+            return false;
+        }
+        self.memory.last = Some(Last {
+            t,
+            h,
+            start,
+            start_low,
+            end: *state,
+        });
+        self.memory.low = low;
+        self.memory.statistics.steps += 1;
+        self.memory.statistics.products += 1;
+        self.skipped = true;
+        true
+    }
+
+    /// Moves `state` with all points of the element at once.
+    fn together(&mut self, t: f64, h: f64, state: &mut State<N>) -> Together {
+        let Some(points) = &mut self.points else {
+            return Together::LeftToOthers;
+        };
+        let method = (&*self.model, &self.table, &self.control);
+        let outcome = points.step(method, &mut self.memory, (t, h), state);
+        match outcome {
+            Together::Arrived if self.ends_only => self.skipped = true,
+            Together::Arrived => {
+                self.write_back();
+                self.skipped = false;
+            }
+            Together::LeftToOthers => {
+                // An ordinary step continues what is in its workspace.
+                if self.skipped && !self.write_back() {
+                    self.memory.last = None;
+                }
+                self.forget_points();
+            }
+            Together::Stalled(_) => {}
+        }
+        outcome
+    }
+
+    /// Says that the next step with all points at once continues nothing.
+    fn forget_points(&mut self) {
+        if let Some(points) = &mut self.points {
+            points.forget();
+        }
+    }
+
+    /// Rates and forces of the last step to where an ordinary step has them; false if there is none.
+    fn write_back(&mut self) -> bool {
+        self.make_room();
+        let points = self.points.as_mut();
+        points.is_some_and(|points| points.write_back::<M>(&self.table, &mut self.numbers))
+    }
+
+    /// By how much an ordinary step moves a state, rounding included.
+    fn increment(&self, h: f64, start: &State<N>) -> Result<State<N>, StepError> {
+        let mut memory = Memory::new();
+        let mut end = *start;
+        let (mut numbers, mut pivots) = (self.numbers.clone(), self.pivots.clone());
+        self.ordinary(&mut memory, (&mut numbers, &mut pivots), (0.0, h), &mut end)?;
+        for a in 0..N {
+            end.p[a] = (end.p[a] - start.p[a]) + memory.low.p[a];
+            end.q[a] = (end.q[a] - start.q[a]) + memory.low.q[a];
+        }
+        Ok(end)
+    }
+
+    /// A step that was done before, or that nothing can mislead.
+    pub(super) fn ordinary(
+        &self,
+        memory: &mut Memory<N>,
+        (numbers, pivots): (&mut [f64], &mut [usize]),
+        (start, length): (f64, f64),
+        state: &mut State<N>,
+    ) -> Result<(), StepError> {
+        let method = Method {
+            model: &*self.model,
+            tables: &self.table,
+            control: Control {
+                solve: Solve::Trusting,
+                ..self.control
+            },
+        };
+        let interval = Interval {
+            start,
+            length,
+            impulses: &[],
+        };
+        method.advance(memory, Workspace { numbers, pivots }, interval, state)
+    }
+}
+
+impl<M, const N: usize> Halving for Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    type State = State<N>;
+    type Kick = Impulse<N>;
+    type Kicks = Vec<Impulse<N>>;
+
+    fn whole(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut State<N>,
+        impulses: &[Impulse<N>],
+    ) -> Result<(), StepError> {
+        self.impulses.clear();
+        self.impulses.extend_from_slice(impulses);
+        if Self::MAY_BE_PROPAGATED
+            && self.is_propagated()
+            && impulses.is_empty()
+            && self.propagate(t, h, state)
+        {
+            return Ok(());
+        }
+        if Self::MAY_HAVE_POINTS && impulses.is_empty() && h.is_finite() && h != 0.0 {
+            match self.together(t, h, state) {
+                Together::Arrived => return Ok(()),
+                Together::Stalled(error) => return Err(error),
+                Together::LeftToOthers => {}
+            }
+        }
+        self.skipped = false;
+        self.make_room();
+        let interval = Interval {
+            start: t,
+            length: h,
+            impulses,
+        };
+        let workspace = Workspace {
+            numbers: &mut self.numbers,
+            pivots: &mut self.pivots,
+        };
+        let method = Method {
+            model: &*self.model,
+            tables: &self.table,
+            control: self.control,
+        };
+        method.advance(&mut self.memory, workspace, interval, state)
+    }
+
+    fn passed(&mut self, t: f64, h: f64, kicks: Vec<Impulse<N>>) {
+        if let Some(numbers) = self.retrace() {
+            self.numbers = numbers;
+            self.skipped = false;
+        }
+        let dense = self.dense_of_last(None, t, t + h);
+        if let Some(last) = self.memory.last {
+            self.pieces.push(Piece {
+                last,
+                impulses: kicks,
+                dense,
+                independence: self.memory.independence,
+                numbers: self.numbers.clone(),
+                pivots: self.pivots.clone(),
+            });
+        }
+    }
+}
+
+impl<M, const N: usize> Kinked for Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    type Inside = DenseElement<N>;
+
+    fn inside(&self) -> DenseElement<N> {
+        self.dense_of_last(None, 0.0, 1.0)
+    }
+
+    fn at(inside: &DenseElement<N>, tau: f64) -> State<N> {
+        inside.at(tau)
+    }
+
+    fn forget(&mut self) {
+        self.memory.last = None;
+    }
+
+    fn switches(&self, t: f64, state: &State<N>, values: &mut Vec<f64>) {
+        switches(&*self.model, t, state, values);
+    }
+
+    fn points(&self) -> (usize, bool) {
+        let scheme = self.table.view();
+        let has_ends = scheme.nodes.first() == Some(&0.0) || scheme.nodes.last() == Some(&1.0);
+        (scheme.points(), has_ends)
+    }
+
+    fn crossed(&mut self) {
+        self.memory.statistics.kinks += 1;
+    }
+
+    fn cuts(&self) -> bool {
+        matches!(self.solve, Solve::Auto | Solve::Newton)
+    }
+
+    fn trust(&mut self, all: bool) {
+        self.control.solve = match (self.solve, all) {
+            (Solve::Auto, true) => Solve::Trusting,
+            (solve, _) => solve,
+        };
+    }
+}
+
+impl<const N: usize> Instant for Impulse<N> {
+    fn time(&self) -> f64 {
+        self.time
+    }
+}

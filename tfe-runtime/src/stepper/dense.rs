@@ -1,0 +1,89 @@
+//! The inside of the last step.
+
+use super::setup::Stepper;
+use crate::dense::DenseElement;
+use crate::method::{Interval, Memory, may_be_phase};
+use crate::model::{Model, State};
+use crate::scheme::Tables;
+use crate::workspace::{interior_len, width};
+use alloc::vec::Vec;
+
+impl<M, const N: usize> Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    /// The workspace of the last step, where it was gone past.
+    pub(super) fn retrace(&self) -> Option<Vec<f64>> {
+        let last = self.memory.last.filter(|_| self.skipped)?;
+        let (mut numbers, mut pivots) = self.room();
+        let mut state = last.start;
+        let (mut memory, place) = (Memory::new(), (last.t, last.h));
+        self.ordinary(&mut memory, (&mut numbers, &mut pivots), place, &mut state)
+            .ok()
+            .map(|()| numbers)
+    }
+
+    /// The polynomial of the last step, from time `start` to time `end`.
+    ///
+    /// Before the first step, and after a failed one, it is the constant zero.
+    #[must_use]
+    pub fn dense(&self, start: f64, end: f64) -> DenseElement<N> {
+        self.dense_in(None, start, end)
+    }
+
+    /// The same in the memory of one that is not needed any more.
+    #[must_use]
+    pub fn dense_in(
+        &self,
+        spare: Option<DenseElement<N>>,
+        start: f64,
+        end: f64,
+    ) -> DenseElement<N> {
+        let pieces = self.pieces.iter().map(|piece| piece.dense.clone());
+        DenseElement::of_pieces((start, end), pieces.collect())
+            .unwrap_or_else(|| self.dense_of_last(spare, start, end))
+    }
+
+    pub(super) fn dense_of_last(
+        &self,
+        spare: Option<DenseElement<N>>,
+        start: f64,
+        end: f64,
+    ) -> DenseElement<N> {
+        let scheme = self.table.view();
+        let Some(last) = self.memory.last else {
+            return DenseElement::constant(start, end, State::ZERO);
+        };
+        let retraced = self.retrace();
+        let numbers = retraced.as_ref().unwrap_or(&self.numbers);
+        if const { !M::CONSTRAINTS.is_empty() } {
+            let m = interior_len(&scheme.element, M::FORM, N, M::CONSTRAINTS.len());
+            let points = scheme.points() * N;
+            let momenta = &numbers[3 * m + points..3 * m + 2 * points];
+            let rates = &numbers[..scheme.unknowns() * N];
+            let (rates, momenta) = (rates.as_chunks().0, momenta.as_chunks().0);
+            let ends = (&last.start, &last.end);
+            return DenseElement::constrained(&scheme, (start, end), last.h, ends, rates, momenta);
+        }
+        // The workspace begins with the unknowns, their start and the increments.
+        let m = scheme.unknowns() * width(&scheme.element, M::FORM, N);
+        let unknowns = numbers[..m].as_chunks().0;
+        let (rates, forces) = if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form()
+        {
+            let (pi, kappa) = unknowns.split_at(scheme.points());
+            (kappa, pi)
+        } else {
+            (
+                unknowns,
+                numbers[3 * m..3 * m + scheme.points() * N].as_chunks().0,
+            )
+        };
+        let interval = Interval {
+            start: last.t,
+            length: last.h,
+            impulses: &self.impulses,
+        };
+        let times = (start, end);
+        DenseElement::of(&scheme, times, &last, rates, forces, &interval, spare)
+    }
+}

@@ -1,0 +1,185 @@
+//! Derivatives of the last step by its start and by parameters, forwards and backwards.
+
+use super::setup::Stepper;
+use crate::condense::Direction;
+use crate::error::{ConstraintError, StepError, TransitionError};
+use crate::method::{Impulse, Last, Memory, Method};
+use crate::model::Model;
+use crate::scheme::{SchemeTable, Tables};
+use crate::workspace::{Workspace, linearised_len};
+use alloc::vec;
+use alloc::vec::Vec;
+
+impl<M, const N: usize> Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    /// Writes the transition matrix of the last step, 2N × 2N, row by row, ordered (p, q).
+    ///
+    /// # Errors
+    /// [`TransitionError`] if there is no last step, its tangent
+    /// is singular, or `matrix` is too short.
+    pub fn transition(&mut self, matrix: &mut [f64]) -> Result<(), TransitionError> {
+        self.linearise(&[], matrix)
+    }
+
+    /// Writes the derivative of the end of the last step by its start and by g directions, 2N × (2N + g), row by row, the first columns and all rows ordered (p, q).
+    ///
+    /// Impulses stay at their times, and the crossings of kinks at which the step was cut at theirs.
+    ///
+    /// # Errors
+    /// As [`transition`](Self::transition).
+    pub fn linearise(
+        &mut self,
+        directions: &[Direction],
+        matrix: &mut [f64],
+    ) -> Result<(), TransitionError> {
+        if self.passes_node {
+            // Where constraints lose rank the tangents of the motion are open.
+            return Err(StepError::from(ConstraintError::RankChanged).into());
+        }
+        if self.pieces.is_empty() {
+            return self.linearise_last(directions, matrix);
+        }
+        let width = 2 * N;
+        let columns = width + directions.len();
+        let needed = width * columns;
+        if matrix.len() < needed {
+            let given = matrix.len();
+            return Err(TransitionError::Shape { needed, given });
+        }
+        let mut product = vec![0.0; needed];
+        for row in 0..width {
+            product[row * columns + row] = 1.0;
+        }
+        let (mut factor, mut next) = (vec![0.0; needed], vec![0.0; needed]);
+        // The last one leaves the stepper as the step has left it.
+        for piece in 0..self.pieces.len() {
+            let own = self.of_piece(directions, piece);
+            self.recall(piece);
+            self.linearise_last(&own, &mut factor)?;
+            for row in 0..width {
+                for column in 0..columns {
+                    let own = if column < width {
+                        0.0
+                    } else {
+                        factor[row * columns + column]
+                    };
+                    next[row * columns + column] = (0..width)
+                        .map(|k| factor[row * columns + k] * product[k * columns + column])
+                        .sum::<f64>()
+                        + own;
+                }
+            }
+            core::mem::swap(&mut product, &mut next);
+        }
+        matrix[..needed].copy_from_slice(&product);
+        Ok(())
+    }
+
+    /// Multiplies the matrix of [`linearise`](Self::linearise) with `lambda`, 2N numbers ordered (p, q), from the left: its columns of the start take the place of `lambda`,
+    /// those of the directions are added to `by_direction`. Without constraints the cost does not grow with the number of directions but for their explicit derivatives.
+    ///
+    /// # Errors
+    /// As [`transition`](Self::transition).
+    pub fn adjoint(
+        &mut self,
+        directions: &[Direction],
+        lambda: &mut [f64],
+        by_direction: &mut [f64],
+    ) -> Result<(), TransitionError> {
+        if self.passes_node {
+            return Err(StepError::from(ConstraintError::RankChanged).into());
+        }
+        if self.pieces.is_empty() {
+            return self.adjoint_of_last(directions, lambda, by_direction);
+        }
+        for piece in (0..self.pieces.len()).rev() {
+            let own = self.of_piece(directions, piece);
+            self.recall(piece);
+            self.adjoint_of_last(&own, lambda, by_direction)?;
+        }
+        // The stepper is where the step has left it.
+        self.recall(self.pieces.len() - 1);
+        Ok(())
+    }
+
+    /// The directions of a piece of the last step, as parts of those of the whole.
+    fn of_piece(&self, directions: &[Direction], piece: usize) -> Vec<Direction> {
+        let begin = self.pieces[0].last.t;
+        let length: f64 = self.pieces.iter().map(|piece| piece.last.h).sum();
+        let Last { t, h, .. } = self.pieces[piece].last;
+        let own = |direction: &Direction| Direction {
+            time: direction.time + (t - begin) / length * direction.length,
+            length: h / length * direction.length,
+            ..*direction
+        };
+        directions.iter().map(own).collect()
+    }
+
+    /// Goes back to where a piece of the last step has ended.
+    fn recall(&mut self, piece: usize) {
+        let piece = &self.pieces[piece];
+        self.memory.last = Some(piece.last);
+        self.memory.forget_factors();
+        self.numbers.clone_from(&piece.numbers);
+        self.pivots.clone_from(&piece.pivots);
+        self.impulses.clone_from(&piece.impulses);
+        self.skipped = false;
+    }
+
+    fn linearise_last(
+        &mut self,
+        directions: &[Direction],
+        matrix: &mut [f64],
+    ) -> Result<(), TransitionError> {
+        self.of_last(directions, |method, memory, workspace, extra, given| {
+            method.linearise(memory, workspace, extra, given, matrix)
+        })
+    }
+
+    fn adjoint_of_last(
+        &mut self,
+        directions: &[Direction],
+        lambda: &mut [f64],
+        by_direction: &mut [f64],
+    ) -> Result<(), TransitionError> {
+        self.of_last(directions, |method, memory, workspace, extra, given| {
+            method.adjoint(memory, workspace, extra, given, (lambda, by_direction))
+        })
+    }
+
+    /// Differentiates the last step with what is known of it.
+    fn of_last(
+        &mut self,
+        directions: &[Direction],
+        differentiate: impl FnOnce(
+            Method<'_, M, SchemeTable>,
+            &mut Memory<N>,
+            Workspace<'_>,
+            &mut [f64],
+            (&[Impulse<N>], &[Direction]),
+        ) -> Result<(), TransitionError>,
+    ) -> Result<(), TransitionError> {
+        let element = self.table.element();
+        let constraints = M::CONSTRAINTS.len();
+        let length = linearised_len(element, M::FORM, N, constraints, directions.len());
+        let mut extra = vec![0.0; length];
+        self.make_room();
+        if let Some(numbers) = self.retrace() {
+            self.numbers = numbers;
+            self.skipped = false;
+        }
+        let workspace = Workspace {
+            numbers: &mut self.numbers,
+            pivots: &mut self.pivots,
+        };
+        let method = Method {
+            model: &*self.model,
+            tables: &self.table,
+            control: self.control,
+        };
+        let given = (self.impulses.as_slice(), directions);
+        differentiate(method, &mut self.memory, workspace, &mut extra, given)
+    }
+}

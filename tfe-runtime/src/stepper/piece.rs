@@ -1,0 +1,37 @@
+//! Parts of a step, and what is done behind its end.
+
+use crate::constrained::rows::Independence;
+use crate::dense::DenseElement;
+use crate::method::{Impulse, Last};
+use crate::model::State;
+use alloc::vec::Vec;
+
+/// A part of a step that was cut.
+#[derive(Clone, Debug)]
+pub(super) struct Piece<const N: usize> {
+    pub(super) last: Last<N>,
+    pub(super) impulses: Vec<Impulse<N>>,
+    pub(super) dense: DenseElement<N>,
+    pub(super) independence: Option<[Independence; 2]>,
+    /// The workspace after it.
+    pub(super) numbers: Vec<f64>,
+    pub(super) pivots: Vec<usize>,
+}
+
+/// Where the motion has got behind the last node.
+#[derive(Clone, Debug)]
+pub(super) struct Ahead<const N: usize> {
+    pub(super) node: State<N>,
+    pub(super) t: f64,
+    pub(super) state: State<N>,
+    /// From the node to there.
+    pub(super) piece: Piece<N>,
+}
+
+impl<const N: usize> Ahead<N> {
+    /// Whether a step begins at the node and ends behind what was done.
+    pub(super) fn serves(&self, t: f64, h: f64, state: &State<N>) -> bool {
+        let done = (self.t - t) / h;
+        self.node.is_same(state) && done > 0.0 && done < 1.0
+    }
+}

@@ -1,0 +1,276 @@
+//! A stepper and its memory.
+
+use super::piece::{Ahead, Piece};
+use crate::constrained::Foreseen;
+use crate::element::{Element, ElementError};
+use crate::method::{Impulse, Memory};
+use crate::model::Model;
+use crate::newton::{Control, Solve};
+use crate::points::tables;
+use crate::points::{Points, are_possible};
+use crate::propagator::Propagator;
+use crate::registers::storage::Heap;
+use crate::scheme::{SchemeTable, Tables};
+use crate::share::Share;
+use crate::statistics::Statistics;
+use crate::workspace::{numbers_len, pivots_len};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Steps a model with one element, on memory of its own.
+///
+/// # Example
+/// ```
+/// # use tfe_runtime::{CoordinateName, Facts, First, Form, Mixed, Model, Real, Second, State};
+/// use tfe_runtime::step::{Control, Stepper};
+///
+/// # struct Oscillator;
+/// # impl Model<1> for Oscillator {
+/// #     const FORM: Form = Form::Hamiltonian;
+/// #     const FACTS: Facts = Facts::UNKNOWN;
+/// #     fn energy_function<R: Real>(&self, _: R, q: &[R; 1], p: &[R; 1]) -> R {
+/// #         (q[0] * q[0] + p[0] * p[0]) * R::from_f64(0.5)
+/// #     }
+/// #     fn first<R: Real>(&self, _: R, q: &[R; 1], p: &[R; 1], first: &mut First<R, 1>) {
+/// #         (first.z, first.q) = (*p, *q);
+/// #     }
+/// #     fn first_and_mass<R: Real>(
+/// #         &self, t: R, q: &[R; 1], p: &[R; 1], first: &mut First<R, 1>, zz: &mut [[R; 1]; 1],
+/// #     ) {
+/// #         self.first(t, q, p, first);
+/// #         zz[0][0] = R::from_f64(1.0);
+/// #     }
+/// #     fn second<R: Real>(
+/// #         &self, t: R, q: &[R; 1], p: &[R; 1], first: &mut First<R, 1>, second: &mut Second<R, 1>,
+/// #     ) {
+/// #         self.first_and_mass(t, q, p, first, &mut second.zz);
+/// #         second.qq[0][0] = R::from_f64(1.0);
+/// #     }
+/// #     fn coordinate_name(_: usize) -> CoordinateName {
+/// #         CoordinateName { name: "x", index: None }
+/// #     }
+/// # }
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut stepper = Stepper::new(&Oscillator, Mixed::<4>.into(), Control::default())?;
+/// let mut state = State { q: [1.0], p: [0.0] };
+/// for step in 0..10 {
+///     stepper.advance(0.1 * step as f64, 0.1, &mut state, &[])?;
+/// }
+/// assert!((state.q[0] - 1.0_f64.cos()).abs() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Stepper<'m, M, const N: usize> {
+    pub(super) model: Share<'m, M>,
+    pub(super) table: SchemeTable,
+    pub(super) control: Control,
+    pub(super) memory: Memory<N>,
+    pub(super) numbers: Vec<f64>,
+    pub(super) pivots: Vec<usize>,
+    pub(super) impulses: Vec<Impulse<N>>,
+    /// Nobody asks for the inside of every element.
+    pub(super) ends_only: bool,
+    /// Of a linear model, once it has paid.
+    pub(super) propagator: Option<Propagator<N>>,
+    /// All points at once, where model and element allow it.
+    pub(super) points: Option<Points<N, Heap>>,
+    /// Steps of one length so far.
+    pub(super) alike: (f64, usize),
+    /// The workspace does not hold the last step.
+    pub(super) skipped: bool,
+    /// Of a last step that was cut.
+    pub(super) pieces: Vec<Piece<N>>,
+    /// Where the last element has ended, if that was behind the node.
+    pub(super) ahead: Option<Ahead<N>>,
+    /// An element of the last step went over one of its nodes.
+    pub(super) passes_node: bool,
+    /// Steps are cut at kinks, if there are any.
+    pub(super) at_kinks: bool,
+    /// What was asked for; what is in use may trust more.
+    pub(super) solve: Solve,
+    /// Of a run of the same motion, where the iteration of the next step may start.
+    pub(super) foreseen: Foreseen,
+}
+
+// Not derived: the model is borrowed, it need not be `Clone`.
+impl<M, const N: usize> Clone for Stepper<'_, M, N> {
+    fn clone(&self) -> Self {
+        Self {
+            model: self.model.clone(),
+            table: self.table.clone(),
+            control: self.control,
+            memory: self.memory.clone(),
+            numbers: self.numbers.clone(),
+            pivots: self.pivots.clone(),
+            impulses: self.impulses.clone(),
+            ends_only: self.ends_only,
+            propagator: self.propagator.clone(),
+            points: self.points.clone(),
+            alike: self.alike,
+            skipped: self.skipped,
+            pieces: self.pieces.clone(),
+            ahead: self.ahead.clone(),
+            passes_node: self.passes_node,
+            at_kinks: self.at_kinks,
+            solve: self.solve,
+            foreseen: self.foreseen.clone(),
+        }
+    }
+}
+
+impl<'m, M, const N: usize> Stepper<'m, M, N>
+where
+    M: Model<N>,
+{
+    /// Constants, so that nothing is compiled for models that have none.
+    pub(super) const MAY_HAVE_KINKS: bool = !M::FACTS.smooth;
+    pub(super) const HAS_CONSTRAINTS: bool = !M::CONSTRAINTS.is_empty();
+
+    /// Likewise, for models that never step like this.
+    pub(super) const MAY_HAVE_POINTS: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
+
+    /// Likewise a constant: whether all steps of one length have the same matrix.
+    pub(super) const MAY_BE_PROPAGATED: bool =
+        M::FACTS.linear && !M::FACTS.time_dependent && M::CONSTRAINTS.is_empty();
+
+    /// A stepper at rest.
+    ///
+    /// # Errors
+    /// [`ElementError`] if the element is none.
+    pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
+        Self::sharing(Share::Borrowed(model), element, control)
+    }
+
+    /// The same of a model that may belong to the stepper.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn sharing(
+        model: Share<'m, M>,
+        element: Element,
+        control: Control,
+    ) -> Result<Self, ElementError> {
+        let table = SchemeTable::new(element)?;
+        let scheme = table.view();
+        let is_possible = are_possible::<M, N>(&scheme.element) && control.solve != Solve::Newton;
+        let points = if Self::MAY_HAVE_POINTS && is_possible {
+            Points::new(&*model, tables::Tables::of(&scheme))
+        } else {
+            None
+        };
+        let mut stepper = Self {
+            model,
+            table,
+            control,
+            memory: Memory::new(),
+            numbers: Vec::new(),
+            pivots: Vec::new(),
+            impulses: Vec::new(),
+            ends_only: false,
+            propagator: None,
+            points,
+            alike: (0.0, 0),
+            skipped: false,
+            pieces: Vec::new(),
+            ahead: None,
+            passes_node: false,
+            at_kinks: false,
+            solve: control.solve,
+            foreseen: Foreseen::default(),
+        };
+        if stepper.points.is_none() {
+            stepper.make_room();
+        }
+        Ok(stepper)
+    }
+
+    /// Memory for the tangent of an element, if there is none yet: megabytes for thirty coordinates, and no use while a fixed point contracts.
+    pub(super) fn make_room(&mut self) {
+        if self.numbers.is_empty() {
+            (self.numbers, self.pivots) = self.room();
+        }
+    }
+
+    pub(super) fn room(&self) -> (Vec<f64>, Vec<usize>) {
+        let element = self.table.element();
+        let numbers = numbers_len(element, M::FORM, N, M::CONSTRAINTS.len());
+        let pivots = pivots_len(element, M::FORM, N, M::CONSTRAINTS.len());
+        (vec![0.0; numbers], vec![0; pivots])
+    }
+
+    /// Goes on with another model, of which nothing is known yet; what the steps so far have cost stays counted.
+    ///
+    /// # Errors
+    /// None that [`new`](Self::new) did not have.
+    pub fn set_model(&mut self, model: Share<'m, M>) -> Result<(), ElementError> {
+        let control = Control {
+            solve: self.solve,
+            ..self.control
+        };
+        let mut other = Self::sharing(model, self.table.element(), control)?;
+        (other.ends_only, other.at_kinks) = (self.ends_only, self.at_kinks);
+        other.memory.statistics = self.memory.statistics;
+        *self = other;
+        Ok(())
+    }
+
+    /// Changes what iterations may leave from the next step on: [`Control::tolerance`].
+    pub fn set_tolerance(&mut self, tolerance: f64) {
+        self.control.tolerance = tolerance;
+    }
+
+    /// Says that [`dense`](Self::dense) and [`transition`](Self::transition) will be asked for now and then only.
+    ///
+    /// Linear models with constant coefficients then step by a matrix, y₁ = y₀ + D y₀ + c, made after 2N + 1 steps of one length: a product of a
+    /// 2N × 2N matrix and a vector a step. Afterwards the inside of an element costs a step of its own.
+    #[must_use]
+    pub fn ends_only(self) -> Self {
+        Self {
+            ends_only: true,
+            ..self
+        }
+    }
+
+    /// Cuts steps where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the arguments of a `min` or `max` changes its sign, so that
+    /// elements keep their order (T-119); [`Statistics::kinks`] counts the crossings. Models without such functions step as before.
+    #[must_use]
+    pub fn at_kinks(self) -> Self {
+        Self {
+            at_kinks: true,
+            ..self
+        }
+    }
+
+    /// The element with which it steps.
+    #[must_use]
+    pub fn element(&self) -> Element {
+        self.table.element()
+    }
+
+    /// How it solves elements.
+    #[must_use]
+    pub fn control(&self) -> Control {
+        Control {
+            solve: self.solve,
+            ..self.control
+        }
+    }
+
+    /// The model that is stepped.
+    #[must_use]
+    pub fn model(&self) -> &M {
+        &self.model
+    }
+
+    /// What the steps so far have cost.
+    #[must_use]
+    pub fn statistics(&self) -> &Statistics {
+        &self.memory.statistics
+    }
+
+    /// The same since the last call.
+    pub fn take_statistics(&mut self) -> Statistics {
+        core::mem::take(&mut self.memory.statistics)
+    }
+}

@@ -1,0 +1,36 @@
+//! Steps that leave to another run, or take from one, where iterations may start.
+
+use super::setup::Stepper;
+use crate::constrained::Trail;
+use crate::element::Element;
+use crate::model::Model;
+use crate::scheme::Tables;
+
+impl<M, const N: usize> Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    /// Adds the last step to a trail, for models with constraints and elements of Gauss points; a step that was cut is left out.
+    pub fn leave(&self, trail: &mut Trail) {
+        let scheme = self.table.view();
+        if let Some(last) = &self.memory.last
+            && self.may_foresee()
+        {
+            trail.push::<M, N>(&scheme, (last.t, last.h), &self.numbers);
+        }
+    }
+
+    /// Has the iteration of the step from t to t + h start from what another run has found there, if a trail reaches that far and the last step is continued.
+    pub fn foresee(&mut self, trail: &Trail, (t, h): (f64, f64)) {
+        if self.may_foresee() {
+            let scheme = self.table.view();
+            self.foreseen.look::<M, N>(trail, &scheme, (t, h));
+        }
+    }
+
+    fn may_foresee(&self) -> bool {
+        let element = self.table.element();
+        let is_gauss = element == Element::mixed(element.nodes());
+        Self::HAS_CONSTRAINTS && is_gauss && self.ahead.is_none() && self.pieces.is_empty()
+    }
+}
