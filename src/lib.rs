@@ -55,9 +55,10 @@ pub use simulation::{
 pub use tfe_macros::dynamics;
 /// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
 pub use tfe_runtime as runtime;
+/// Elements by name, with the number of nodes in the type.
+pub use tfe_runtime::element::markers::*;
 pub use tfe_runtime::{
-    Element, EnergyConserving, Family, Mixed, Model, Primal, Radau, Rule, Solve, State, Statistics,
-    StepError, Structure, ThreeField,
+    Element, Family, Model, Rule, Solve, State, Statistics, StepError, Structure,
 };
 pub use velocity::{FamilyVelocity, Velocity};
 pub use work_precision::WorkPrecision;
@@ -68,11 +69,12 @@ pub mod prelude {
     pub use crate::Fit;
     pub use crate::stability::Blocks;
     pub use crate::{
-        Act, BoundaryValue, ConsistentState, Continuation, Crossing, Element, EnergyConserving,
-        Ensemble, FamilyVelocity, Fidelity, Interpolation, Mixed, Modal, Model, Motion, Node,
-        OptimalControl, PeriodicOrbit, Primal, Radau, Settings, Simulation, Solve, State,
-        ThreeField, Velocity, WorkPrecision, dynamics, stability,
+        Act, BoundaryValue, ConsistentState, Continuation, Crossing, Element, Ensemble,
+        FamilyVelocity, Fidelity, Interpolation, Modal, Model, Motion, Node, OptimalControl,
+        PeriodicOrbit, Settings, Simulation, Solve, State, Velocity, WorkPrecision, dynamics,
+        stability,
     };
+    pub use tfe_runtime::element::markers::*;
 }
 
 /// The examples on the page of `dynamics`, tested here because its own crate cannot use this one.

@@ -3,7 +3,6 @@
 pub(super) mod resolution;
 
 use crate::motion::{Node, Warning};
-use crate::stability::growth::is_a_stable;
 use crate::stability::linear_model::LinearModel;
 use nalgebra::DMatrix;
 use tfe_runtime::legendre::energy_at;
@@ -27,7 +26,7 @@ pub(super) struct Watch {
 impl Watch {
     pub(super) fn new(element: Element) -> Self {
         Self {
-            element: (!is_a_stable(element)).then_some(element),
+            element: (!element.is_a_stable()).then_some(element),
             next: 0,
             last: None,
             is_unstable: false,

@@ -4,21 +4,7 @@ use super::eigenvalues::{balanced, eigenvalues_of_finite};
 use super::linear_model::LinearModel;
 use super::sign_functions::Measure;
 use nalgebra::DMatrix;
-use tfe_runtime::{Element, Family, Rule};
-
-/// Whether an element never lets a linear model with constant coefficients grow that does not grow itself, at any step.
-///
-/// Mixed elements and energy-conserving ones integrate such models exactly by every rule that they accept, and are the diagonal Padé
-/// approximant (T-53) then; reduced primal ones are by definition. Radau's are subdiagonal ones. All map the left half plane of λh into the
-/// unit disk, so there is nothing to look for. What is left are the primal elements with other rules.
-pub(crate) fn is_a_stable(element: Element) -> bool {
-    match (element.family(), element.rule()) {
-        (Family::Mixed | Family::EnergyConserving | Family::Radau, _) => true,
-        (Family::ThreeField, Rule::Default) => true,
-        (Family::Primal | Family::ThreeField, Rule::Gauss(points)) => points == element.degree(),
-        (Family::Primal, Rule::Default) | (_, Rule::Lobatto(_)) => false,
-    }
-}
+use tfe_runtime::Element;
 
 /// A mode that an element makes grow although the frozen model does not.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,6 +95,7 @@ fn descending(mut values: Vec<f64>) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::stability::{spectral_radius, transition_matrix};
+    use tfe_runtime::Rule;
     use tfe_runtime::{Second, State};
 
     /// H = ½ p² + ½ ω² q² with the force −2ξω p.
@@ -173,7 +160,7 @@ mod tests {
             // Undamped ones have radius one; the entries are of the size of ρ, times some roundings.
             assert_eq!(
                 largest <= 1.0 + 1e-11,
-                is_a_stable(element),
+                element.is_a_stable(),
                 "{element}: {largest}"
             );
         }

@@ -3,9 +3,10 @@
 use crate::docs::Docs;
 use crate::indices::{identifier, index};
 use proc_macro2::{Literal, TokenStream};
-use quote::quote;
+use quote::{format_ident, quote};
 use syn::ItemStruct;
-use tfe_symbolic::model::declared::{Declared, Family, Form, Rule, Solver};
+use tfe_symbolic::model::declared::{Declared, Form, Solver};
+use tfe_symbolic::vocabulary::element::Rule;
 
 /// The struct `solver.name` with everything that it needs as constants: element, tables, sizes.
 pub(crate) fn expand(
@@ -31,7 +32,7 @@ pub(crate) fn expand(
         .collect();
     let title = format!(
         " Steps [`{model}`] with one element, `{}`: no generics, no allocation, tables and sizes constant.",
-        described(solver)
+        solver.element
     );
     let text = name.to_string();
     let own = docs.attributes("solver", &solver.name);
@@ -110,15 +111,9 @@ pub(crate) fn expand(
 }
 
 fn element(solver: &Solver, path: &TokenStream) -> TokenStream {
-    let nodes = Literal::u32_unsuffixed(solver.nodes);
-    let constructor = match solver.family {
-        Family::Primal => quote!(primal),
-        Family::Mixed => quote!(mixed),
-        Family::ThreeField => quote!(three_field),
-        Family::EnergyConserving => quote!(energy_conserving),
-        Family::Radau => quote!(radau),
-    };
-    let rule = match solver.rule {
+    let nodes = Literal::u32_unsuffixed(solver.element.nodes);
+    let constructor = format_ident!("{}", solver.element.family.constructor());
+    let rule = match solver.element.rule {
         Rule::Default => TokenStream::new(),
         Rule::Reduced => quote!(.reduced()),
         Rule::Lobatto => quote!(.lobatto()),
@@ -128,21 +123,4 @@ fn element(solver: &Solver, path: &TokenStream) -> TokenStream {
         }
     };
     quote!(#path::Element::#constructor(#nodes)#rule)
-}
-
-fn described(solver: &Solver) -> String {
-    let family = match solver.family {
-        Family::Primal => "Primal",
-        Family::Mixed => "Mixed",
-        Family::ThreeField => "ThreeField",
-        Family::EnergyConserving => "EnergyConserving",
-        Family::Radau => "Radau",
-    };
-    let rule = match solver.rule {
-        Rule::Default => String::new(),
-        Rule::Reduced => ".reduced()".to_owned(),
-        Rule::Lobatto => ".lobatto()".to_owned(),
-        Rule::Gauss(points) => format!(".quadrature({points})"),
-    };
-    format!("{family}::<{}>{rule}", solver.nodes)
 }

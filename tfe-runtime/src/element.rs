@@ -28,6 +28,55 @@ pub enum Family {
     Radau,
 }
 
+/// Trial and test space of a two-field family and its boundary jumps.
+pub(crate) struct Spaces {
+    /// Number of trial polynomials.
+    pub(crate) trials: usize,
+    /// Number of test polynomials.
+    pub(crate) tests: usize,
+    pub(crate) left_jump: bool,
+    pub(crate) right_jump: bool,
+}
+
+impl Family {
+    /// Whether coordinates of degree s and their derivatives are the unknowns.
+    pub(crate) const fn is_by_displacements(self) -> bool {
+        matches!(self, Self::Primal | Self::ThreeField)
+    }
+
+    /// Whether energy that a model conserves may get lost.
+    pub(crate) const fn damps(self) -> bool {
+        matches!(self, Self::Radau)
+    }
+
+    /// The spaces of degree s.
+    pub(crate) const fn spaces(self, s: usize) -> Spaces {
+        let (trials, tests, left_jump, right_jump) = match self {
+            Self::Mixed => (s, s + 1, true, true),
+            Self::Radau => (s, s, true, false),
+            // A primal element is no two-field form; its q alone is continuous like this.
+            Self::EnergyConserving | Self::Primal | Self::ThreeField => (s + 1, s, false, false),
+        };
+        Spaces {
+            trials,
+            tests,
+            left_jump,
+            right_jump,
+        }
+    }
+
+    /// The name of its marker.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Primal => "Primal",
+            Self::Mixed => "Mixed",
+            Self::ThreeField => "ThreeField",
+            Self::EnergyConserving => "EnergyConserving",
+            Self::Radau => "Radau",
+        }
+    }
+}
+
 /// Where the forces of an element are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rule {
@@ -173,9 +222,10 @@ impl Element {
     /// The number of unknown rates a coordinate: one a point, or n − 1 for a primal element.
     #[must_use]
     pub const fn unknowns(&self) -> usize {
-        match self.family {
-            Family::Primal | Family::ThreeField => self.degree(),
-            _ => self.points(),
+        if self.family.is_by_displacements() {
+            self.degree()
+        } else {
+            self.points()
         }
     }
 
@@ -188,6 +238,35 @@ impl Element {
             (Family::Primal | Family::ThreeField, Rule::Gauss(points)) => points == self.degree(),
             (Family::Primal, _) | (Family::ThreeField, Rule::Lobatto(_)) => false,
             _ => true,
+        }
+    }
+
+    /// Whether the element never lets a linear model with constant coefficients grow that does not grow itself, at any step.
+    ///
+    /// Mixed elements and energy-conserving ones integrate such models exactly by every rule that they accept, and are the diagonal Padé
+    /// approximant (T-53) then; reduced primal ones are by definition. Radau's are subdiagonal ones. All map the left half plane of λh into the
+    /// unit disk. What is left are the primal elements with other rules.
+    #[must_use]
+    pub const fn is_a_stable(&self) -> bool {
+        match (self.family, self.rule) {
+            (Family::Mixed | Family::EnergyConserving | Family::Radau, _) => true,
+            (Family::ThreeField, Rule::Default) => true,
+            (Family::Primal | Family::ThreeField, Rule::Gauss(points)) => points == self.degree(),
+            (Family::Primal, Rule::Default) | (_, Rule::Lobatto(_)) => false,
+        }
+    }
+
+    /// Whether the element can hold constraints (T-75), of positions or of velocities: the multipliers need spaces that fit the trial functions.
+    pub(crate) const fn holds(&self, are_holonomic: bool) -> bool {
+        let gauss = match self.rule {
+            Rule::Default => matches!(self.family, Family::Mixed | Family::ThreeField),
+            Rule::Gauss(points) => points == self.degree(),
+            Rule::Lobatto(_) => false,
+        };
+        match self.family {
+            Family::Mixed => gauss,
+            Family::Primal | Family::ThreeField => gauss || are_holonomic,
+            Family::EnergyConserving | Family::Radau => false,
         }
     }
 
@@ -259,13 +338,7 @@ impl Element {
 
 impl fmt::Display for Element {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let family = match self.family {
-            Family::Primal => "Primal",
-            Family::Mixed => "Mixed",
-            Family::ThreeField => "ThreeField",
-            Family::EnergyConserving => "EnergyConserving",
-            Family::Radau => "Radau",
-        };
+        let family = self.family.name();
         write!(f, "{family}::<{}>", self.nodes)?;
         match self.rule {
             Rule::Default => Ok(()),
@@ -316,68 +389,73 @@ impl fmt::Display for ElementError {
 
 impl core::error::Error for ElementError {}
 
-/// One unit struct a family, with the number of nodes in the type.
-macro_rules! markers {
-    ($($(#[$doc:meta])* $name:ident, $constructor:ident;)*) => {$(
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        pub struct $name<const NODES: usize>;
+/// One unit struct a family, with the number of nodes in the type: `Mixed::<4>`.
+pub mod markers {
+    use super::Element;
 
-        impl<const NODES: usize> $name<NODES> {
-            /// As a value; a number of nodes outside 2..=12 does not compile.
-            #[must_use]
-            pub const fn element(self) -> Element {
-                const {
-                    assert!(
-                        NODES >= Element::MIN_NODES && NODES <= Element::MAX_NODES,
-                        "an element has 2 to 12 nodes"
-                    );
+    macro_rules! markers {
+        ($($(#[$doc:meta])* $name:ident, $constructor:ident;)*) => {$(
+            $(#[$doc])*
+            #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+            pub struct $name<const NODES: usize>;
+
+            impl<const NODES: usize> $name<NODES> {
+                /// As a value; a number of nodes outside 2..=12 does not compile.
+                #[must_use]
+                pub const fn element(self) -> Element {
+                    const {
+                        assert!(
+                            NODES >= Element::MIN_NODES && NODES <= Element::MAX_NODES,
+                            "an element has 2 to 12 nodes"
+                        );
+                    }
+                    Element::$constructor(NODES)
                 }
-                Element::$constructor(NODES)
+
+                /// The same with n − 1 Gauss points.
+                #[must_use]
+                pub const fn reduced(self) -> Element {
+                    self.element().reduced()
+                }
+
+                /// The same with n Lobatto points.
+                #[must_use]
+                pub const fn lobatto(self) -> Element {
+                    self.element().lobatto()
+                }
+
+                /// The same with so many Gauss points.
+                #[must_use]
+                pub const fn quadrature(self, points: usize) -> Element {
+                    self.element().quadrature(points)
+                }
             }
 
-            /// The same with n − 1 Gauss points.
-            #[must_use]
-            pub const fn reduced(self) -> Element {
-                self.element().reduced()
+            impl<const NODES: usize> From<$name<NODES>> for Element {
+                fn from(marker: $name<NODES>) -> Self {
+                    marker.element()
+                }
             }
+        )*};
+    }
 
-            /// The same with n Lobatto points.
-            #[must_use]
-            pub const fn lobatto(self) -> Element {
-                self.element().lobatto()
-            }
-
-            /// The same with so many Gauss points.
-            #[must_use]
-            pub const fn quadrature(self, points: usize) -> Element {
-                self.element().quadrature(points)
-            }
-        }
-
-        impl<const NODES: usize> From<$name<NODES>> for Element {
-            fn from(marker: $name<NODES>) -> Self {
-                marker.element()
-            }
-        }
-    )*};
-}
-
-markers! {
-    /// Displacement form: N nodes, full quadrature.
-    Primal, primal;
-    /// Two-field form: N nodes, N − 1 Gauss points.
-    Mixed, mixed;
-    /// Three-field form: velocities are unknowns of their own.
-    ThreeField, three_field;
-    /// Continuous trial and discontinuous test functions.
-    EnergyConserving, energy_conserving;
-    /// One-sided jump: L-stable, dissipative.
-    Radau, radau;
+    markers! {
+        /// Displacement form: N nodes, full quadrature.
+        Primal, primal;
+        /// Two-field form: N nodes, N − 1 Gauss points.
+        Mixed, mixed;
+        /// Three-field form: velocities are unknowns of their own.
+        ThreeField, three_field;
+        /// Continuous trial and discontinuous test functions.
+        EnergyConserving, energy_conserving;
+        /// One-sided jump: L-stable, dissipative.
+        Radau, radau;
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::markers::*;
     use super::*;
 
     #[test]

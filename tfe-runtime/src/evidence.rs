@@ -1,7 +1,7 @@
 //! What speaks for the solution of an element (T-115, T-117).
 
 use crate::control::{POSITION_ROUND_OFF, Solve};
-use crate::element::{Element, Family};
+use crate::element::Element;
 use crate::equations::Increment;
 use crate::error::StepError;
 use crate::legendre::energy_at;
@@ -178,7 +178,7 @@ impl Energy {
         let change = self.after - self.before;
         let rounding = 1e-9 * self.before.abs().max(self.after.abs());
         let allowed = most * self.turned + rounding;
-        let is_damped = element.family() as u8 == Family::Radau as u8 && self.is_forward;
+        let is_damped = element.family().damps() && self.is_forward;
         // NaN is not kept.
         change <= allowed && (is_damped || -change <= allowed)
     }

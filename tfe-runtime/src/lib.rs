@@ -81,9 +81,8 @@ pub use condense::{Direction, Parameter};
 pub use controlled::{Controlled, MAX_INPUTS};
 #[cfg(feature = "std")]
 pub use dense::bounds::Arguments;
-pub use element::{
-    Element, ElementError, EnergyConserving, Family, Mixed, Primal, Radau, Rule, ThreeField,
-};
+pub use element::markers::*;
+pub use element::{Element, ElementError, Family, Rule};
 pub use error::{ConstraintError, LegendreError, StepError};
 pub use input::{InputFailure, InputPanicked};
 pub use lanes::Lanes;
@@ -102,7 +101,8 @@ pub use structure::{Operations, Structure};
 #[doc(hidden)]
 pub mod __private {
     pub use crate::controlled::{Controlled, MAX_INPUTS};
-    pub use crate::element::{Element, EnergyConserving, Mixed, Primal, Radau, Rule, ThreeField};
+    pub use crate::element::markers::*;
+    pub use crate::element::{Element, Rule};
     pub use crate::error::StepError;
     #[cfg(feature = "alloc")]
     pub use crate::family::{

@@ -2,7 +2,7 @@
 
 use crate::basis::{MAX_NODES, MAX_RATES, exact_integrals, exact_legendre};
 use crate::double_double::DoubleDouble;
-use crate::element::{Element, Family};
+use crate::element::{Element, Spaces};
 use crate::quadrature::{MAX_POINTS, Quadrature};
 
 /// Where the tables are written to; the same parts as in [`SchemeRef`].
@@ -41,16 +41,17 @@ impl Target<'_> {
             l += 1;
         }
         project(&rule, s, self.force_rate);
-        match element.family() {
-            Family::Primal | Family::ThreeField => self.primal(element, &rule),
-            _ => self.two_field(element, &rule),
+        if element.family().is_by_displacements() {
+            self.primal(element, &rule);
+        } else {
+            self.two_field(element, &rule);
         }
     }
 
     /// A two-field family: stages from the weak form.
     const fn two_field(&mut self, element: Element, rule: &Quadrature) {
         let k = element.points();
-        let weak = WeakForm::of(element);
+        let weak = element.family().spaces(element.degree());
         let inverse = weak.inverse();
         let mut l = 0;
         while l < k {
@@ -199,38 +200,10 @@ const fn project(rule: &Quadrature, s: usize, matrix: &mut [f64]) {
     }
 }
 
-/// Trial and test space of a two-field family and its boundary jumps.
-struct WeakForm {
-    /// Number of trial polynomials.
-    trials: usize,
-    /// Number of test polynomials.
-    tests: usize,
-    left_jump: bool,
-    right_jump: bool,
-}
-
 const MAX_ROWS: usize = MAX_NODES + 1;
 type Square = [[DoubleDouble; MAX_ROWS]; MAX_ROWS];
 
-impl WeakForm {
-    const fn of(element: Element) -> Self {
-        let s = element.degree();
-        let (trials, tests, left_jump, right_jump) = match element.family() {
-            Family::Mixed => (s, s + 1, true, true),
-            Family::Radau => (s, s, true, false),
-            // A primal element is no two-field form; its q alone is continuous like this.
-            Family::EnergyConserving | Family::Primal | Family::ThreeField => {
-                (s + 1, s, false, false)
-            }
-        };
-        Self {
-            trials,
-            tests,
-            left_jump,
-            right_jump,
-        }
-    }
-
+impl Spaces {
     /// The inverse of the matrix of the weak form: unknowns are the trial coefficients and, with a
     /// right jump, y₁; rows are the test polynomials and, without a left jump, y(0) = y₀.
     ///

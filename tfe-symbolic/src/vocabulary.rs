@@ -1,7 +1,10 @@
 //! The words of the language, with its arguments in one table: what the parser, the checks, and the help of messages go by. May import
 //! `expr` only.
 
+pub mod element;
+
 use crate::expr::function::Function;
+pub use element::ELEMENTS;
 
 /// The arguments of the attribute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -177,9 +180,6 @@ pub fn function_names() -> impl Iterator<Item = &'static str> {
     let special = SPECIAL_FUNCTIONS.iter().map(|(name, _)| *name);
     special.chain(Function::ALL.into_iter().map(Function::name))
 }
-
-/// The elements a solver can be specialised for.
-pub const ELEMENTS: &[&str] = &["Primal", "Mixed", "ThreeField", "EnergyConserving", "Radau"];
 
 /// The rules of quadrature.
 pub const RULES: &[&str] = &["reduced", "lobatto", "quadrature"];

@@ -1,8 +1,8 @@
 //! Where the unknowns of a constrained element are.
 
-use crate::element::{Element, Family, Rule};
+use crate::element::Element;
 
-use crate::model::{ConstraintKind, Model};
+use crate::model::Model;
 
 /// The unknowns, and in the same order the equations: rates, multipliers inside, velocity at the end, multipliers of the nodes.
 ///
@@ -98,20 +98,6 @@ impl Layout {
     }
 }
 
-/// Whether an element can hold such constraints (T-75): the multipliers need spaces that fit the trial functions.
-pub(crate) const fn admits(element: &Element, kind: ConstraintKind) -> bool {
-    let gauss = match element.rule() {
-        Rule::Default => matches!(element.family(), Family::Mixed | Family::ThreeField),
-        Rule::Gauss(points) => points == element.degree(),
-        Rule::Lobatto(_) => false,
-    };
-    match element.family() {
-        Family::Mixed => gauss,
-        Family::Primal | Family::ThreeField => gauss || kind.is_holonomic(),
-        Family::EnergyConserving | Family::Radau => false,
-    }
-}
-
 /// The first constraint of a model that the element cannot hold.
 pub(crate) fn refused<M, const N: usize>(element: &Element) -> Option<&'static str>
 where
@@ -119,7 +105,7 @@ where
 {
     M::CONSTRAINTS
         .iter()
-        .find(|constraint| !admits(element, constraint.kind))
+        .find(|constraint| !element.holds(constraint.kind.is_holonomic()))
         .map(|constraint| constraint.name)
 }
 
@@ -138,8 +124,6 @@ mod tests {
 
     #[test]
     fn who_admits_what() {
-        let rod = ConstraintKind::Holonomic { quadratic: true };
-        let blade = ConstraintKind::Velocity { integrable: false };
         for (element, holonomic, velocity) in [
             (Element::mixed(4), true, true),
             (Element::mixed(4).quadrature(5), false, false),
@@ -151,8 +135,8 @@ mod tests {
             (Element::radau(4), false, false),
             (Element::energy_conserving(4), false, false),
         ] {
-            assert_eq!(admits(&element, rod), holonomic, "{element}");
-            assert_eq!(admits(&element, blade), velocity, "{element}");
+            assert_eq!(element.holds(true), holonomic, "{element}");
+            assert_eq!(element.holds(false), velocity, "{element}");
         }
     }
 }

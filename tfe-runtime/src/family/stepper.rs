@@ -151,7 +151,7 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
             if !by_rates {
                 return Err(FamilyError::ConstraintsNotSupported);
             }
-            if !(element.is_collocated() && admits(&element)) {
+            if !(element.is_collocated() && element.holds(true)) {
                 return Err(FamilyError::ElementNotSupported { element });
             }
         } else if has_form && table.view().points() <= 4 * MAX_GROUPS {
@@ -288,11 +288,4 @@ impl<M: FamilyModel> Halving for FamilyStepper<'_, M> {
         let dense = self.dense_of_last(t, t + h);
         self.pieces.push(dense);
     }
-}
-
-/// Whether an element can hold holonomic constraints.
-fn admits(element: &Element) -> bool {
-    use crate::constrained::layout::admits;
-    use crate::model::ConstraintKind;
-    admits(element, ConstraintKind::Holonomic { quadratic: false })
 }

@@ -23,7 +23,7 @@ where
     /// where that ended; a state of one's own is as welcome.
     ///
     /// A step whose iteration fails, or does not prove that it found the root that continues the motion (T-115), is cut into halves, and these again, up to 1024
-    /// pieces; [`Statistics::cuts`] counts such steps, and [`dense`](Self::dense) and [`transition`](Self::transition) are those of all pieces together.
+    /// pieces; [`Statistics::cuts`](crate::Statistics::cuts) counts such steps, and [`dense`](Self::dense) and [`transition`](Self::transition) are those of all pieces together.
     ///
     /// # Errors
     /// [`StepError`]; `state` is unchanged then.

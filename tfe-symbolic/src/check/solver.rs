@@ -2,9 +2,10 @@
 
 use super::{Model, unusable_type_name};
 use crate::diagnostic::{Bag, Kind, Role, nearest};
-use crate::model::declared::{Family, Rule, Solver};
+use crate::model::declared::Solver;
 use crate::syntax::ast::{ElementSyntax, Name, Spanned};
 use crate::syntax::context::Context;
+use crate::vocabulary::element::{Element, Family, Rule};
 use crate::vocabulary::{ELEMENTS, MAX_POINTS, RULES};
 
 /// The most nodes an element can have.
@@ -38,22 +39,14 @@ impl Model {
         }
         self.solver_names.push(name.node.clone());
         let syntax = &element.node;
-        let family = match syntax.family.node.as_str() {
-            "Primal" => Some(Family::Primal),
-            "Mixed" => Some(Family::Mixed),
-            "ThreeField" => Some(Family::ThreeField),
-            "EnergyConserving" => Some(Family::EnergyConserving),
-            "Radau" => Some(Family::Radau),
-            unknown => {
-                let nearest = nearest(unknown, ELEMENTS.iter().copied());
-                let kind = Kind::UnknownElement {
-                    name: unknown.to_owned(),
-                    nearest,
-                };
-                bag.push(syntax.family.span, kind);
-                None
-            }
-        };
+        let family = Family::named(&syntax.family.node);
+        if family.is_none() {
+            let kind = Kind::UnknownElement {
+                name: syntax.family.node.clone(),
+                nearest: nearest(&syntax.family.node, ELEMENTS.iter().copied()),
+            };
+            bag.push(syntax.family.span, kind);
+        }
         let nodes = syntax.nodes.node;
         let count = u32::try_from(nodes).ok();
         let count = count.filter(|count| (2..=MAX_NODES).contains(count));
@@ -65,9 +58,11 @@ impl Model {
         if let (Some(family), Some(rule), Some(nodes)) = (family, rule, count) {
             self.solvers.push(Solver {
                 name: name.node.clone(),
-                family,
-                nodes,
-                rule,
+                element: Element {
+                    family,
+                    nodes,
+                    rule,
+                },
             });
             self.solver_elements
                 .push((element.to_string(), element.span));

@@ -3,7 +3,7 @@
 use super::Model;
 use crate::diagnostic::{Bag, Kind, Role};
 use crate::expr::input::IndexSymbol;
-use crate::model::declared::{CLOCK_MOMENTUM, Family, Form, Rule, Solver};
+use crate::model::declared::{CLOCK_MOMENTUM, Form};
 
 impl Model {
     /// A Hamiltonian, a number of coordinates known here, and nothing that p_t = −H stands in the way of.
@@ -28,8 +28,8 @@ impl Model {
             }
         }
         for (solver, (element, span)) in self.solvers.iter().zip(&self.solver_elements) {
-            if needs_velocities(solver) {
-                let (element, nodes) = (element.clone(), solver.nodes);
+            if solver.element.needs_velocities() {
+                let (element, nodes) = (element.clone(), solver.element.nodes);
                 bag.push(*span, Kind::SolverOfTransformation { element, nodes });
             }
         }
@@ -56,15 +56,5 @@ impl Model {
             name: name.to_owned(),
             taken: Role::Momentum,
         })
-    }
-}
-
-/// Whether velocities are unknowns of the element: p_t has none, H̃ is linear in it.
-fn needs_velocities(solver: &Solver) -> bool {
-    match (solver.family, solver.rule) {
-        (Family::ThreeField, _) => true,
-        (Family::Primal, Rule::Gauss(points)) => points + 1 != solver.nodes,
-        (Family::Primal, rule) => rule != Rule::Reduced,
-        (Family::Mixed | Family::EnergyConserving | Family::Radau, _) => false,
     }
 }

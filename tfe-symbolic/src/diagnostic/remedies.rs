@@ -89,7 +89,7 @@ impl Kind {
                 format!("declare `{name}` as a field of the struct, a coordinate or a `let`")
             }
             Self::UnknownElement { nearest: None, .. } => {
-                format!("the elements are {}", backticked(vocabulary::ELEMENTS))
+                format!("the elements are {}", backticked(&vocabulary::ELEMENTS))
             }
             Self::UnknownRule { nearest: None, .. } => {
                 format!("the rules are {}", backticked(vocabulary::RULES))

@@ -6,7 +6,7 @@ use crate::derive::constraint::{holds_state, is_affine, kind, normal};
 use crate::diagnostic::{Kind, Span};
 use crate::expr::graph::ExprId;
 use crate::expr::input::{Affine, Input};
-use crate::model::declared::{Constraint, ConstraintKind, Family, Parameter, Rule, Solver};
+use crate::model::declared::{Constraint, ConstraintKind, Parameter};
 use crate::syntax::ast::{Expr, ExprKind, Name, Range};
 
 /// One scalar equation of a declaration.
@@ -242,12 +242,11 @@ impl Lowerer<'_> {
             .any(|constraint| matches!(constraint.kind, ConstraintKind::Velocity { .. }));
         let model = self.model;
         for (solver, (element, span)) in model.solvers.iter().zip(&model.solver_elements) {
-            if !admits(solver, velocity) {
+            if !solver.element.holds(velocity) {
                 let kind = Kind::SolverOfConstraints {
                     element: element.clone(),
-                    nodes: solver.nodes,
-                    velocity: velocity
-                        && matches!(solver.family, Family::Primal | Family::ThreeField),
+                    nodes: solver.element.nodes,
+                    velocity: velocity && solver.element.family.is_by_displacements(),
                 };
                 self.report(*span, kind);
             }
@@ -272,22 +271,6 @@ impl Lowerer<'_> {
         constraints
             .iter()
             .find(|constraint| self.graph.inputs_of(constraint.value).iter().any(is_it))
-    }
-}
-
-/// Whether an element can be specialised for a model with constraints.
-fn admits(solver: &Solver, velocity: bool) -> bool {
-    let points = match solver.rule {
-        Rule::Default | Rule::Lobatto => None,
-        Rule::Reduced => Some(solver.nodes - 1),
-        Rule::Gauss(points) => Some(points),
-    };
-    let reduced = points == Some(solver.nodes - 1);
-    match solver.family {
-        Family::Mixed => reduced || solver.rule == Rule::Default,
-        Family::ThreeField => reduced || solver.rule == Rule::Default || !velocity,
-        Family::Primal => reduced || !velocity,
-        Family::EnergyConserving | Family::Radau => false,
     }
 }
 

@@ -1,5 +1,6 @@
 //! The model after checking and lowering: names resolved, vectors in components, `dot()` expanded.
 
+use crate::vocabulary::element::Element;
 use std::fmt;
 
 use crate::expr::graph::{ExprId, Graph, SumRange};
@@ -247,40 +248,8 @@ impl fmt::Display for ConstraintKind {
 pub struct Solver {
     /// The name of the struct to emit.
     pub name: String,
-    /// The kind of element.
-    pub family: Family,
-    /// The number of nodes, 2 to 12.
-    pub nodes: u32,
-    /// The rule of quadrature.
-    pub rule: Rule,
-}
-
-/// The kinds of element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Family {
-    /// Displacement form.
-    Primal,
-    /// Two-field form.
-    Mixed,
-    /// Three-field form.
-    ThreeField,
-    /// Continuous trial, discontinuous test functions.
-    EnergyConserving,
-    /// One-sided jump.
-    Radau,
-}
-
-/// The rules of quadrature.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Rule {
-    /// The rule that the element comes with.
-    Default,
-    /// One Gauss point less than nodes.
-    Reduced,
-    /// Lobatto points at the nodes.
-    Lobatto,
-    /// So many Gauss points.
-    Gauss(u32),
+    /// The element.
+    pub element: Element,
 }
 
 /// A model made from another one.
