@@ -183,9 +183,11 @@ impl<'a, const N: usize> Rows<'a, N> {
         if holonomic().all(|c| active[c] != 0) {
             return;
         }
-        // The middle is known but to the order h², and off the constraints there may be more independent rows.
         let rank = holonomic().filter(|&c| active[c] != 0).count();
-        let [start, middle] = places;
+        let [start, (time, middle)] = places;
+        // The middle is known but to the order h², and off the constraints there are more independent rows: which are given would be seen.
+        let middle = self.nearest(model, (time, middle), rank);
+        let middle = (time, &middle);
         self.evaluate_declared(model, middle.0, middle.1);
         self.weights.fill(0.0);
         for c in 0..count {
@@ -223,6 +225,71 @@ impl<'a, const N: usize> Rows<'a, N> {
         self.is_combined = true;
         self.evaluate(model, start.0, start.1);
         self.start.copy_from_slice(self.rows);
+    }
+
+    /// The point of the holonomic constraints, `rank` of which are independent there, that is nearest to a position: q ← q₀ − A⁺ (φ + A (q₀ − q)) (T-151).
+    ///
+    /// The position itself where that leads nowhere.
+    fn nearest<M: Model<N>>(
+        &mut self,
+        model: &M,
+        (t, from): (f64, &[f64; N]),
+        rank: usize,
+    ) -> [f64; N] {
+        const MOST: u32 = 12;
+        const NEAR: f64 = 4.0 * f64::EPSILON;
+        let count = M::CONSTRAINTS.len();
+        let mut at = *from;
+        for _ in 0..MOST {
+            self.evaluate_declared(model, t, &at);
+            // Rows of length one, and what they are to take away.
+            for c in 0..count {
+                let length = norm(&self.rows[c]);
+                if !M::CONSTRAINTS[c].kind.is_holonomic() || length == 0.0 {
+                    (self.spare[c], self.values[c]) = ([0.0; N], 0.0);
+                    continue;
+                }
+                let mut value = self.values[c];
+                for a in 0..N {
+                    value += self.rows[c][a] * (from[a] - at[a]);
+                }
+                self.values[c] = value / length;
+                self.spare[c] = scaled(&self.rows[c], length * length);
+            }
+            let mut next = *from;
+            for _ in 0..rank {
+                let (mut own, mut best) = (DEPENDENT, None);
+                for (c, row) in self.spare.iter().enumerate() {
+                    if norm(row) > own {
+                        (own, best) = (norm(row), Some(c));
+                    }
+                }
+                let Some(best) = best else { break };
+                let direction = scaled(&self.spare[best], own * own);
+                let step = -self.values[best] / own;
+                for a in 0..N {
+                    next[a] += step * direction[a];
+                }
+                for c in 0..count {
+                    let part = dot(&self.spare[c], &direction);
+                    self.values[c] += part * step;
+                    for a in 0..N {
+                        self.spare[c][a] -= part * direction[a];
+                    }
+                }
+            }
+            let (mut change, mut size) = (0.0_f64, 0.0_f64);
+            for a in 0..N {
+                change = change.max((next[a] - at[a]).abs());
+                size = size.max(next[a].abs());
+            }
+            at = next;
+            // NaN is not near, and ends the search below.
+            if change <= NEAR * size {
+                return at;
+            }
+        }
+        *from
     }
 
     /// Adds combinations of constraints whose gradients vanish in the middle to those that were chosen, so that the gradients of these turn least.
