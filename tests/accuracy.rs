@@ -324,6 +324,70 @@ fn what_cannot_be_met_is_an_error_with_a_horizon() {
     assert!(true_error(error.partial(), PENDULUM_END) < 1e-12);
 }
 
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2 - x^2/2 - x^4/4,
+    dissipation = c/2*dot(x)^2,
+    force(x) = a*cos(w*t),
+)]
+struct DrivenDuffing {
+    c: f64,
+    a: f64,
+    w: f64,
+}
+
+/// All runs of a search, in evaluations, beside a run with the fewest equal steps of the same element from which on the accuracy is met, none of them cut.
+#[test]
+fn a_search_costs_a_few_runs() {
+    let model = DrivenDuffing {
+        c: 0.2,
+        a: 0.5,
+        w: 1.2,
+    };
+    let (start, span) = (model.state([0.5], [0.0]), 0.0..50.0);
+    let simulation = Simulation::new(&model);
+    let fine = simulation.clone().element(Mixed::<9>).step(0.05);
+    let exact = fine.run(start, span.clone()).expect("short steps");
+    // At all nodes: the motion forgets its start.
+    let off = |motion: &Motion<1>| {
+        let largest = |part: fn(&tfe::Node<1>) -> f64| {
+            let nodes = motion.states().iter();
+            let off = nodes.clone().map(|node| {
+                let there = exact.at(node.t).expect("in the span");
+                (part(node) - part(&there)).abs()
+            });
+            let size = nodes.map(|node| part(node).abs()).fold(0.0, larger);
+            off.fold(0.0, larger) / size
+        };
+        larger(largest(|node| node.q[0]), largest(|node| node.p[0]))
+    };
+    let work = |one: &tfe::Statistics| one.residual_evaluations + one.tangent_evaluations;
+    for accuracy in [1e-3, 1e-5, 1e-7, 1e-9, 1e-11] {
+        let motion = simulation.clone().accuracy(accuracy);
+        let motion = motion.run(start, span.clone()).expect("an oscillator");
+        assert!(off(&motion) <= accuracy, "{accuracy:e}");
+        let picked = motion.picked().expect("picked");
+        let made = |count: u32| {
+            let run = simulation.clone().element(picked.element);
+            let run = run.step(50.0 / f64::from(count)).tolerance(1e-3 * accuracy);
+            let motion = run.run(start, span.clone()).ok()?;
+            let is_by_hand = motion.statistics().cuts == 0;
+            (is_by_hand && off(&motion) <= accuracy).then(|| work(motion.statistics()))
+        };
+        // Not by chance.
+        let meets = |count: u32| (count..count + 3).all(|count| made(count).is_some());
+        let fewest = (1..5000).find(|count| meets(*count)).expect("enough");
+        let least = made(fewest).expect("it was made");
+        let ratio = work(&picked.work) as f64 / least as f64;
+        println!(
+            "{accuracy:e}: {} steps of {}, {ratio:.1} times {fewest} steps",
+            motion.statistics().steps,
+            picked.element
+        );
+        assert!(ratio < 6.0, "{accuracy:e}: {ratio}");
+    }
+}
+
 #[test]
 fn what_is_no_accuracy_is_refused() {
     for accuracy in [0.0, -1e-3, 1.0, f64::NAN, f64::INFINITY] {

@@ -105,6 +105,40 @@ fn equations_of_first_order_have_them_too() {
     }
 }
 
+/// Robertson's reaction, whose rates differ by nine powers of ten, declared by H = p·f.
+#[dynamics(
+    coordinates(a, b, c), momenta(pa, pb, pc),
+    hamiltonian = pa*(1e4*b*c - 0.04*a) + pb*(0.04*a - 1e4*b*c - 3e7*b^2) + pc*3e7*b^2,
+)]
+struct Robertson;
+
+#[test]
+fn a_stiff_reaction_takes_few_steps() {
+    let start = State {
+        q: [1.0, 0.0, 0.0],
+        p: [0.0; 3],
+    };
+    let by_mesh = |count: u32| {
+        let nodes = (0..=count).map(|k| 40.0 * (f64::from(k) / f64::from(count)).powi(5));
+        let run = Simulation::new(&Robertson).element(Radau::<7>);
+        let motion = run.nodes(nodes).run(start, 0.0..40.0).expect("a mesh");
+        motion.last().q
+    };
+    let off = |one: [f64; 3], other: [f64; 3]| {
+        largest(one.iter().zip(other).map(|(one, other)| one - other))
+    };
+    let exact = by_mesh(400);
+    assert!(off(by_mesh(300), exact) < 1e-12);
+    for accuracy in [1e-3, 1e-6, 1e-9] {
+        let motion = Simulation::new(&Robertson).accuracy(accuracy);
+        let motion = motion.run(start, 0.0..40.0).expect("a reaction");
+        let (off, count) = (off(motion.last().q, exact), motion.states().len());
+        println!("{accuracy:e}: off by {off:.1e}, {count} nodes");
+        assert!(off <= accuracy, "{accuracy:e}: {off:.1e}");
+        assert!(count < 500, "{count}");
+    }
+}
+
 /// What is recorded is a motion as any other: between nodes, and as the mesh of another run.
 #[test]
 fn nodes_of_one_run_serve_another() {
