@@ -160,7 +160,7 @@ fn shown(model: &Declared) -> String {
         let _ = writeln!(out, "{:?}", model.sensitivities);
     }
     for solver in &model.solvers {
-        let _ = writeln!(out, "{solver:?}");
+        let _ = writeln!(out, "solver {}: {}", solver.name, solver.element);
     }
     if let Some(path) = &model.crate_path {
         let _ = writeln!(out, "crate {path}");
