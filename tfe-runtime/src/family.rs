@@ -13,7 +13,6 @@ mod forces;
 mod inertia;
 mod kernel;
 mod lanes;
-mod largest;
 mod model;
 #[cfg(feature = "sparse")]
 mod newton;
@@ -46,6 +45,7 @@ pub use stepper::{FamilyStepper, FamilySuspended};
 #[cfg(feature = "sparse")]
 pub use transition::{FamilyTransition, FamilyTransitionError};
 
+use crate::legendre::largest;
 use crate::model::Form;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -134,7 +134,7 @@ pub fn constraint_residual<M: FamilyModel>(model: &M, t: f64, q: &[f64], v: &[f6
     for (rate, drift) in rates.rates.iter_mut().zip(&drift) {
         *rate += drift;
     }
-    (largest::largest(&values), largest::largest(&rates.rates))
+    (largest(&values), largest(&rates.rates))
 }
 
 /// One of the observables.

@@ -13,13 +13,10 @@ const fn weights_len(constraints: usize) -> usize {
 }
 
 /// The mark of a row that is a combination of all holonomic ones.
-const COMBINED: usize = 3;
+pub(super) const COMBINED: usize = 3;
 
 /// What is left of a row beside the independent ones, relative to the row: below it the row is dependent.
-const DEPENDENT: f64 = 1e-10;
-
-/// Functions whose gradients vanish in the middle of an element, and turn there by less than this part of what others do, are not combined with these: the weights would be large.
-const STILL: f64 = 0.01;
+pub(super) const DEPENDENT: f64 = 1e-10;
 
 /// A row that was chosen before stays chosen while it has so much of its own.
 const KEPT: f64 = 0.1;
@@ -34,7 +31,7 @@ pub(crate) struct Rows<'a, const N: usize> {
     pub(crate) psi_q: &'a mut [[f64; N]],
     /// Ȧ
     pub(crate) rates: &'a mut [[f64; N]],
-    spare: &'a mut [[f64; N]],
+    pub(super) spare: &'a mut [[f64; N]],
     /// a
     pub(crate) drift: &'a mut [f64],
     /// φ of holonomic ones.
@@ -42,12 +39,12 @@ pub(crate) struct Rows<'a, const N: usize> {
     /// Multipliers to differentiate with.
     pub(crate) mu: &'a mut [f64],
     /// The weights of constraints in combined rows, a row for each.
-    weights: &'a mut [f64],
+    pub(super) weights: &'a mut [f64],
     /// U, with which multipliers are combined, a row for each column of it.
-    basis: &'a mut [f64],
+    pub(super) basis: &'a mut [f64],
     /// The squared lengths of the rows of A where they were combined.
-    squares: &'a mut [f64],
-    is_combined: bool,
+    pub(super) squares: &'a mut [f64],
+    pub(super) is_combined: bool,
 }
 
 /// What multipliers bend: the derivatives of Aᵀμ and of Ȧᵀμ.
@@ -164,289 +161,6 @@ impl<'a, const N: usize> Rows<'a, N> {
     #[cfg(feature = "alloc")]
     pub(crate) fn combination(&self) -> Option<&[f64]> {
         self.is_combined.then_some(&*self.weights)
-    }
-
-    /// Replaces the rows of holonomic constraints that depend on one another by as many combinations as are independent, functions W φ with W constant in the element
-    /// (T-118): for each gradient that the rows span in the middle of the element, of all combinations with this gradient there the one whose gradient turns least on the
-    /// way. So the others stay independent for as long as can be, and which rows are given, or how they are scaled or combined, makes no difference.
-    ///
-    /// `places` are time and position at the start and in the middle, as far as that is known, and `rate` is the velocity there.
-    pub(crate) fn combine<M: Model<N>>(
-        &mut self,
-        model: &M,
-        places: [(f64, &[f64; N]); 2],
-        rate: &[f64; N],
-        active: &mut [usize],
-    ) {
-        let count = M::CONSTRAINTS.len();
-        let holonomic = || (0..count).filter(|&c| M::CONSTRAINTS[c].kind.is_holonomic());
-        if holonomic().all(|c| active[c] != 0) {
-            return;
-        }
-        let rank = holonomic().filter(|&c| active[c] != 0).count();
-        let [start, (time, middle)] = places;
-        // The middle is known but to the order h², and off the constraints there are more independent rows: which are given would be seen.
-        let middle = self.nearest(model, (time, middle), rank);
-        let middle = (time, &middle);
-        self.evaluate_declared(model, middle.0, middle.1);
-        self.weights.fill(0.0);
-        for c in 0..count {
-            let length = norm(&self.rows[c]);
-            self.squares[c] = length * length;
-            self.spare[c] = [0.0; N];
-        }
-        for c in holonomic().filter(|&c| self.squares[c] > 0.0) {
-            self.spare[c] = scaled(&self.rows[c], self.squares[c]);
-        }
-        for c in holonomic() {
-            active[c] = 0;
-        }
-        for place in holonomic().take(rank) {
-            if !self.add_basis(place) {
-                break;
-            }
-            active[place] = COMBINED;
-        }
-        self.basis.copy_from_slice(self.weights);
-        self.turn_least(model, middle, rate, active);
-        for c in 0..count {
-            if !M::CONSTRAINTS[c].kind.is_holonomic() {
-                self.weights[c * count + c] = 1.0;
-                self.basis[c * count + c] = 1.0;
-                self.squares[c] = 1.0;
-                continue;
-            }
-            let length = crate::real::Real::sqrt(self.squares[c]);
-            for place in 0..count {
-                let weight = &mut self.weights[place * count + c];
-                *weight = if length > 0.0 { *weight / length } else { 0.0 };
-            }
-        }
-        self.is_combined = true;
-        self.evaluate(model, start.0, start.1);
-        self.start.copy_from_slice(self.rows);
-    }
-
-    /// The point of the holonomic constraints, `rank` of which are independent there, that is nearest to a position: q ← q₀ − A⁺ (φ + A (q₀ − q)) (T-151).
-    ///
-    /// The position itself where that leads nowhere.
-    fn nearest<M: Model<N>>(
-        &mut self,
-        model: &M,
-        (t, from): (f64, &[f64; N]),
-        rank: usize,
-    ) -> [f64; N] {
-        const MOST: u32 = 12;
-        const NEAR: f64 = 4.0 * f64::EPSILON;
-        let count = M::CONSTRAINTS.len();
-        let mut at = *from;
-        for _ in 0..MOST {
-            self.evaluate_declared(model, t, &at);
-            // Rows of length one, and what they are to take away.
-            for c in 0..count {
-                let length = norm(&self.rows[c]);
-                if !M::CONSTRAINTS[c].kind.is_holonomic() || length == 0.0 {
-                    (self.spare[c], self.values[c]) = ([0.0; N], 0.0);
-                    continue;
-                }
-                let mut value = self.values[c];
-                for a in 0..N {
-                    value += self.rows[c][a] * (from[a] - at[a]);
-                }
-                self.values[c] = value / length;
-                self.spare[c] = scaled(&self.rows[c], length * length);
-            }
-            let mut next = *from;
-            for _ in 0..rank {
-                let (mut own, mut best) = (DEPENDENT, None);
-                for (c, row) in self.spare.iter().enumerate() {
-                    if norm(row) > own {
-                        (own, best) = (norm(row), Some(c));
-                    }
-                }
-                let Some(best) = best else { break };
-                let direction = scaled(&self.spare[best], own * own);
-                let step = -self.values[best] / own;
-                for a in 0..N {
-                    next[a] += step * direction[a];
-                }
-                for c in 0..count {
-                    let part = dot(&self.spare[c], &direction);
-                    self.values[c] += part * step;
-                    for a in 0..N {
-                        self.spare[c][a] -= part * direction[a];
-                    }
-                }
-            }
-            let (mut change, mut size) = (0.0_f64, 0.0_f64);
-            for a in 0..N {
-                change = change.max((next[a] - at[a]).abs());
-                size = size.max(next[a].abs());
-            }
-            at = next;
-            // NaN is not near, and ends the search below.
-            if change <= NEAR * size {
-                return at;
-            }
-        }
-        *from
-    }
-
-    /// Adds combinations of constraints whose gradients vanish in the middle to those that were chosen, so that the gradients of these turn least.
-    ///
-    /// With B the rates of the scaled rows and R = (1 − U Uᵀ) B, the least |(u + v)ᵀ B| over all v ⊥ U, for each column u of U: v in the space of columns of R.
-    fn turn_least<M: Model<N>>(
-        &mut self,
-        model: &M,
-        (t, q): (f64, &[f64; N]),
-        rate: &[f64; N],
-        active: &[usize],
-    ) {
-        let count = M::CONSTRAINTS.len();
-        let holonomic = |c: usize| M::CONSTRAINTS[c].kind.is_holonomic();
-        // Kernels write only what can be non-zero.
-        self.is_combined = false;
-        self.psi_q.fill([0.0; N]);
-        self.rates.fill([0.0; N]);
-        self.mu.fill(0.0);
-        // At rest any direction will do.
-        let is_at_rest = rate.iter().all(|rate| *rate == 0.0);
-        let rate = if is_at_rest { &[1.0; N] } else { rate };
-        self.differentiate(model, t, q, rate);
-        let mut largest = 0.0_f64;
-        for c in 0..count {
-            let (rates, square) = (&mut self.rates[c], self.squares[c]);
-            *rates = if holonomic(c) && square > 0.0 {
-                scaled(rates, square)
-            } else {
-                [0.0; N]
-            };
-            largest = largest.max(norm(rates));
-            self.spare[c] = *rates;
-        }
-        let combined = || (0..count).filter(|&place| active[place] == COMBINED);
-        for place in combined() {
-            self.take_from_columns(place);
-        }
-        // In the places of combinations that are left out: what is added, and by how much that turns.
-        let open = || (0..count).filter(|&c| holonomic(c) && active[c] == 0);
-        let mut found = 0;
-        for place in open() {
-            if !self.add_column(place, STILL * largest) {
-                break;
-            }
-            found += 1;
-        }
-        let combination = |weights: &[f64], place: usize, rates: &[[f64; N]]| {
-            let mut sum = [0.0; N];
-            for (weight, rate) in weights[place * count..].iter().zip(rates) {
-                for a in 0..N {
-                    sum[a] += weight * rate[a];
-                }
-            }
-            sum
-        };
-        for place in open().take(found) {
-            let mut turn = combination(self.weights, place, self.rates);
-            // Twice is enough for orthogonality to rounding.
-            for _ in 0..2 {
-                for before in open().take_while(|&before| before < place) {
-                    let part = dot(&turn, &self.psi_q[before]);
-                    for a in 0..N {
-                        turn[a] -= part * self.psi_q[before][a];
-                    }
-                    add_row(self.weights, (before, place), -part);
-                }
-            }
-            let length = norm(&turn);
-            for entry in &mut turn {
-                *entry /= length;
-            }
-            for entry in &mut self.weights[place * count..(place + 1) * count] {
-                *entry /= length;
-            }
-            self.psi_q[place] = turn;
-        }
-        for place in combined() {
-            let turn = combination(self.weights, place, self.rates);
-            for added in open().take(found) {
-                add_row(
-                    self.weights,
-                    (added, place),
-                    -dot(&turn, &self.psi_q[added]),
-                );
-            }
-        }
-        for place in open() {
-            self.weights[place * count..(place + 1) * count].fill(0.0);
-        }
-    }
-
-    /// Gram–Schmidt on the columns of `spare`: the one that has most of its own becomes a row of the basis. False where none has anything.
-    fn add_basis(&mut self, place: usize) -> bool {
-        self.add_column(place, DEPENDENT)
-    }
-
-    /// The same where none has more than `least`.
-    fn add_column(&mut self, place: usize, least: f64) -> bool {
-        let count = self.spare.len();
-        let (mut best, mut column) = (least, None);
-        for a in 0..N {
-            let own: f64 = self.spare.iter().map(|row| row[a] * row[a]).sum();
-            let own = crate::real::Real::sqrt(own);
-            if own > best {
-                (best, column) = (own, Some(a));
-            }
-        }
-        let Some(column) = column else { return false };
-        let basis = &mut self.weights[place * count..(place + 1) * count];
-        for (entry, row) in basis.iter_mut().zip(&*self.spare) {
-            *entry = row[column] / best;
-        }
-        self.take_from_columns(place);
-        true
-    }
-
-    /// Leaves of the columns of `spare` what is orthogonal to a row of weights.
-    fn take_from_columns(&mut self, place: usize) {
-        let count = self.spare.len();
-        let direction = &self.weights[place * count..(place + 1) * count];
-        // Twice is enough for orthogonality to rounding.
-        for _ in 0..2 {
-            for a in 0..N {
-                let part: f64 = (direction.iter().zip(&*self.spare))
-                    .map(|(entry, row)| entry * row[a])
-                    .sum();
-                for (entry, row) in direction.iter().zip(self.spare.iter_mut()) {
-                    row[a] -= part * entry;
-                }
-            }
-        }
-    }
-
-    /// Multipliers of the constraints as declared to those of combined rows, one number for each.
-    pub(crate) fn combine_multipliers(&mut self, multipliers: &mut [f64]) {
-        let count = multipliers.len();
-        for place in 0..count {
-            let basis = &self.basis[place * count..(place + 1) * count];
-            let mut sum = 0.0;
-            for c in 0..count {
-                sum += basis[c] * crate::real::Real::sqrt(self.squares[c]) * multipliers[c];
-            }
-            self.mu[place] = sum;
-        }
-        multipliers.copy_from_slice(self.mu);
-    }
-
-    /// Back again.
-    pub(crate) fn declared_multipliers(&mut self, multipliers: &mut [f64]) {
-        let count = multipliers.len();
-        for c in 0..count {
-            self.mu[c] = (0..count)
-                .map(|place| self.weights[place * count + c] * multipliers[place])
-                .sum();
-        }
-        multipliers.copy_from_slice(self.mu);
     }
 
     /// Evaluates ψ_q and Ȧ, and what the multipliers `mu` bend.
@@ -591,13 +305,13 @@ pub(crate) struct Independence {
 }
 
 /// The longest row.
-fn longest<const N: usize>(rows: &[[f64; N]]) -> Option<(usize, f64)> {
+pub(super) fn longest<const N: usize>(rows: &[[f64; N]]) -> Option<(usize, f64)> {
     let lengths = rows.iter().map(norm).enumerate();
     lengths.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Leaves what is orthogonal to a direction. Twice is enough for that to rounding.
-fn subtract_part<const N: usize>(row: &mut [f64; N], direction: &[f64; N]) {
+pub(super) fn subtract_part<const N: usize>(row: &mut [f64; N], direction: &[f64; N]) {
     for _ in 0..2 {
         let part = dot(row, direction);
         for a in 0..N {
@@ -607,7 +321,7 @@ fn subtract_part<const N: usize>(row: &mut [f64; N], direction: &[f64; N]) {
 }
 
 /// Adds so much of one row of a square matrix to another.
-fn add_row(matrix: &mut [f64], (from, to): (usize, usize), part: f64) {
+pub(super) fn add_row(matrix: &mut [f64], (from, to): (usize, usize), part: f64) {
     let count = matrix.len().isqrt();
     for c in 0..count {
         matrix[to * count + c] += part * matrix[from * count + c];
@@ -615,7 +329,7 @@ fn add_row(matrix: &mut [f64], (from, to): (usize, usize), part: f64) {
 }
 
 /// A row over the root of `square`.
-fn scaled<const N: usize>(row: &[f64; N], square: f64) -> [f64; N] {
+pub(super) fn scaled<const N: usize>(row: &[f64; N], square: f64) -> [f64; N] {
     let length = crate::real::Real::sqrt(square);
     let mut scaled = *row;
     for entry in &mut scaled {
@@ -649,7 +363,7 @@ pub(crate) fn norm<const N: usize>(row: &[f64; N]) -> f64 {
     crate::real::Real::sqrt(dot(row, row))
 }
 
-fn unit<const N: usize>(row: &[f64; N]) -> [f64; N] {
+pub(super) fn unit<const N: usize>(row: &[f64; N]) -> [f64; N] {
     let length = norm(row);
     let mut unit = *row;
     for entry in &mut unit {

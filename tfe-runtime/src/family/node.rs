@@ -1,11 +1,11 @@
 //! The velocity of a momentum at one instant, under constraints, by a sparse factorisation (T-74).
 
 use super::blocked::{Blocked, Place};
-use super::largest::largest;
 use super::model::{FamilyModel, Gradient};
 use super::pattern::Pattern;
 use super::rows::Rows;
 use crate::error::{ConstraintError, LegendreError, StepError};
+use crate::legendre::largest;
 use alloc::vec;
 use alloc::vec::Vec;
 

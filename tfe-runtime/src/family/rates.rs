@@ -11,7 +11,6 @@
 use super::blocked::Blocked;
 use super::dense::FamilyDense;
 use super::error::FamilyError;
-use super::largest::largest;
 use super::model::{FamilyModel, FamilyState, Gradient};
 use super::node::Node;
 use super::point::Point;
@@ -23,6 +22,7 @@ use crate::double_double::DoubleDouble;
 use crate::equations::{Increment, relative};
 use crate::error::{ConstraintError, StepError};
 use crate::evidence::Evidence;
+use crate::legendre::largest;
 use crate::method::{continued_ratio, set_extrapolation};
 use crate::newton::{Control, Monitor, SERVES, Solve, Verdict};
 use crate::scheme::{SchemeTable, Tables as _};

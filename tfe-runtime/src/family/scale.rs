@@ -1,8 +1,8 @@
 //! The sizes that the iteration of families is judged by.
 
-use super::largest::largest;
 use super::space::{Leg, Problem, Sizes};
 use crate::equations::Increment;
+use crate::legendre::largest;
 use crate::points::sweep::relative;
 
 /// What increments are compared with.

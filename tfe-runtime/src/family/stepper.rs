@@ -4,13 +4,13 @@ use super::dense::FamilyDense;
 use super::error::FamilyError;
 use super::forces::Forces;
 use super::inertia::Legendre;
-use super::largest::largest;
 use super::model::{FamilyModel, FamilyState};
 #[cfg(feature = "sparse")]
 use super::rates::Rates;
 use crate::cut::{Halving, in_halves, may_be_cut};
 use crate::element::Element;
 use crate::error::StepError;
+use crate::legendre::largest;
 use crate::model::Form;
 use crate::newton::Control;
 use crate::registers::storage::MAX_GROUPS;

@@ -1,0 +1,294 @@
+//! Redundant holonomic constraints in an element: as many combinations of them as are independent (T-118, T-132).
+
+use super::rows::{
+    COMBINED, DEPENDENT, Rows, add_row, dot, longest, norm, scaled, subtract_part, unit,
+};
+use crate::legendre::largest;
+use crate::model::Model;
+
+/// Functions whose gradients vanish in the middle of an element, and turn there by less than this part of what others do, are not combined with these: the weights would be large.
+const STILL: f64 = 0.01;
+
+impl<const N: usize> Rows<'_, N> {
+    /// Replaces the rows of holonomic constraints that depend on one another by as many combinations as are independent, functions W φ with W constant in the element
+    /// (T-118): for each gradient that the rows span in the middle of the element, of all combinations with this gradient there the one whose gradient turns least on the
+    /// way. So the others stay independent for as long as can be, and which rows are given, or how they are scaled or combined, makes no difference.
+    ///
+    /// `places` are time and position at the start and in the middle, as far as that is known, and `rate` is the velocity there.
+    pub(crate) fn combine<M: Model<N>>(
+        &mut self,
+        model: &M,
+        places: [(f64, &[f64; N]); 2],
+        rate: &[f64; N],
+        active: &mut [usize],
+    ) {
+        let count = M::CONSTRAINTS.len();
+        let holonomic = || (0..count).filter(|&c| M::CONSTRAINTS[c].kind.is_holonomic());
+        if holonomic().all(|c| active[c] != 0) {
+            return;
+        }
+        let rank = holonomic().filter(|&c| active[c] != 0).count();
+        let [start, (time, middle)] = places;
+        // The middle is known but to the order h², and off the constraints there are more independent rows: which are given would be seen.
+        let middle = self.nearest(model, (time, middle), rank);
+        let middle = (time, &middle);
+        self.evaluate_declared(model, middle.0, middle.1);
+        self.weights.fill(0.0);
+        for c in 0..count {
+            let length = norm(&self.rows[c]);
+            self.squares[c] = length * length;
+            self.spare[c] = [0.0; N];
+        }
+        for c in holonomic().filter(|&c| self.squares[c] > 0.0) {
+            self.spare[c] = scaled(&self.rows[c], self.squares[c]);
+        }
+        for c in holonomic() {
+            active[c] = 0;
+        }
+        for place in holonomic().take(rank) {
+            if !self.add_basis(place) {
+                break;
+            }
+            active[place] = COMBINED;
+        }
+        self.basis.copy_from_slice(self.weights);
+        self.turn_least(model, middle, rate, active);
+        for c in 0..count {
+            if !M::CONSTRAINTS[c].kind.is_holonomic() {
+                self.weights[c * count + c] = 1.0;
+                self.basis[c * count + c] = 1.0;
+                self.squares[c] = 1.0;
+                continue;
+            }
+            let length = crate::real::Real::sqrt(self.squares[c]);
+            for place in 0..count {
+                let weight = &mut self.weights[place * count + c];
+                *weight = if length > 0.0 { *weight / length } else { 0.0 };
+            }
+        }
+        self.is_combined = true;
+        self.evaluate(model, start.0, start.1);
+        self.start.copy_from_slice(self.rows);
+    }
+
+    /// The point of the holonomic constraints, `rank` of which are independent there, that is nearest to a position: q ← q₀ − A⁺ (φ + A (q₀ − q)) (T-151).
+    ///
+    /// The position itself where that leads nowhere.
+    fn nearest<M: Model<N>>(
+        &mut self,
+        model: &M,
+        (t, from): (f64, &[f64; N]),
+        rank: usize,
+    ) -> [f64; N] {
+        const MOST: u32 = 12;
+        const NEAR: f64 = 4.0 * f64::EPSILON;
+        let mut at = *from;
+        for _ in 0..MOST {
+            let mut change = at;
+            at = self.moved_to_tangents(model, t, [from, &at], rank);
+            for a in 0..N {
+                change[a] -= at[a];
+            }
+            // NaN is not near.
+            if largest(&change) <= NEAR * largest(&at) {
+                return at;
+            }
+        }
+        *from
+    }
+
+    /// q₀ − A⁺ (φ + A (q₀ − q)), with `rank` rows.
+    fn moved_to_tangents<M: Model<N>>(
+        &mut self,
+        model: &M,
+        t: f64,
+        [from, at]: [&[f64; N]; 2],
+        rank: usize,
+    ) -> [f64; N] {
+        self.evaluate_declared(model, t, at);
+        // Rows of length one, and what they are to take away.
+        for (c, row) in self.rows.iter().enumerate() {
+            let length = norm(row);
+            if !M::CONSTRAINTS[c].kind.is_holonomic() || length == 0.0 {
+                (self.spare[c], self.values[c]) = ([0.0; N], 0.0);
+                continue;
+            }
+            let back: f64 = (0..N).map(|a| row[a] * (from[a] - at[a])).sum();
+            self.values[c] = (self.values[c] + back) / length;
+            self.spare[c] = unit(row);
+        }
+        let mut moved = *from;
+        for _ in 0..rank {
+            let Some((row, own)) = longest(self.spare).filter(|(_, own)| *own > DEPENDENT) else {
+                break;
+            };
+            let direction = unit(&self.spare[row]);
+            let step = -self.values[row] / own;
+            for a in 0..N {
+                moved[a] += step * direction[a];
+            }
+            for (row, value) in self.spare.iter_mut().zip(&mut *self.values) {
+                *value += step * dot(row, &direction);
+                subtract_part(row, &direction);
+            }
+        }
+        moved
+    }
+
+    /// Adds combinations of constraints whose gradients vanish in the middle to those that were chosen, so that the gradients of these turn least.
+    ///
+    /// With B the rates of the scaled rows and R = (1 − U Uᵀ) B, the least |(u + v)ᵀ B| over all v ⊥ U, for each column u of U: v in the space of columns of R.
+    fn turn_least<M: Model<N>>(
+        &mut self,
+        model: &M,
+        (t, q): (f64, &[f64; N]),
+        rate: &[f64; N],
+        active: &[usize],
+    ) {
+        let count = M::CONSTRAINTS.len();
+        let holonomic = |c: usize| M::CONSTRAINTS[c].kind.is_holonomic();
+        // Kernels write only what can be non-zero.
+        self.is_combined = false;
+        self.psi_q.fill([0.0; N]);
+        self.rates.fill([0.0; N]);
+        self.mu.fill(0.0);
+        // At rest any direction will do.
+        let is_at_rest = rate.iter().all(|rate| *rate == 0.0);
+        let rate = if is_at_rest { &[1.0; N] } else { rate };
+        self.differentiate(model, t, q, rate);
+        let mut largest = 0.0_f64;
+        for c in 0..count {
+            let (rates, square) = (&mut self.rates[c], self.squares[c]);
+            *rates = if holonomic(c) && square > 0.0 {
+                scaled(rates, square)
+            } else {
+                [0.0; N]
+            };
+            largest = largest.max(norm(rates));
+            self.spare[c] = *rates;
+        }
+        let combined = || (0..count).filter(|&place| active[place] == COMBINED);
+        for place in combined() {
+            self.take_from_columns(place);
+        }
+        // In the places of combinations that are left out: what is added, and by how much that turns.
+        let open = || (0..count).filter(|&c| holonomic(c) && active[c] == 0);
+        let mut found = 0;
+        for place in open() {
+            if !self.add_column(place, STILL * largest) {
+                break;
+            }
+            found += 1;
+        }
+        let combination = |weights: &[f64], place: usize, rates: &[[f64; N]]| {
+            let mut sum = [0.0; N];
+            for (weight, rate) in weights[place * count..].iter().zip(rates) {
+                for a in 0..N {
+                    sum[a] += weight * rate[a];
+                }
+            }
+            sum
+        };
+        for place in open().take(found) {
+            let mut turn = combination(self.weights, place, self.rates);
+            // Twice is enough for orthogonality to rounding.
+            for _ in 0..2 {
+                for before in open().take_while(|&before| before < place) {
+                    let part = dot(&turn, &self.psi_q[before]);
+                    for a in 0..N {
+                        turn[a] -= part * self.psi_q[before][a];
+                    }
+                    add_row(self.weights, (before, place), -part);
+                }
+            }
+            let length = norm(&turn);
+            for entry in &mut turn {
+                *entry /= length;
+            }
+            for entry in &mut self.weights[place * count..(place + 1) * count] {
+                *entry /= length;
+            }
+            self.psi_q[place] = turn;
+        }
+        for place in combined() {
+            let turn = combination(self.weights, place, self.rates);
+            for added in open().take(found) {
+                add_row(
+                    self.weights,
+                    (added, place),
+                    -dot(&turn, &self.psi_q[added]),
+                );
+            }
+        }
+        for place in open() {
+            self.weights[place * count..(place + 1) * count].fill(0.0);
+        }
+    }
+
+    /// Gram–Schmidt on the columns of `spare`: the one that has most of its own becomes a row of the basis. False where none has anything.
+    fn add_basis(&mut self, place: usize) -> bool {
+        self.add_column(place, DEPENDENT)
+    }
+
+    /// The same where none has more than `least`.
+    fn add_column(&mut self, place: usize, least: f64) -> bool {
+        let count = self.spare.len();
+        let (mut best, mut column) = (least, None);
+        for a in 0..N {
+            let own: f64 = self.spare.iter().map(|row| row[a] * row[a]).sum();
+            let own = crate::real::Real::sqrt(own);
+            if own > best {
+                (best, column) = (own, Some(a));
+            }
+        }
+        let Some(column) = column else { return false };
+        let basis = &mut self.weights[place * count..(place + 1) * count];
+        for (entry, row) in basis.iter_mut().zip(&*self.spare) {
+            *entry = row[column] / best;
+        }
+        self.take_from_columns(place);
+        true
+    }
+
+    /// Leaves of the columns of `spare` what is orthogonal to a row of weights.
+    fn take_from_columns(&mut self, place: usize) {
+        let count = self.spare.len();
+        let direction = &self.weights[place * count..(place + 1) * count];
+        // Twice is enough for orthogonality to rounding.
+        for _ in 0..2 {
+            for a in 0..N {
+                let part: f64 = (direction.iter().zip(&*self.spare))
+                    .map(|(entry, row)| entry * row[a])
+                    .sum();
+                for (entry, row) in direction.iter().zip(self.spare.iter_mut()) {
+                    row[a] -= part * entry;
+                }
+            }
+        }
+    }
+
+    /// Multipliers of the constraints as declared to those of combined rows, one number for each.
+    pub(crate) fn combine_multipliers(&mut self, multipliers: &mut [f64]) {
+        let count = multipliers.len();
+        for place in 0..count {
+            let basis = &self.basis[place * count..(place + 1) * count];
+            let mut sum = 0.0;
+            for c in 0..count {
+                sum += basis[c] * crate::real::Real::sqrt(self.squares[c]) * multipliers[c];
+            }
+            self.mu[place] = sum;
+        }
+        multipliers.copy_from_slice(self.mu);
+    }
+
+    /// Back again.
+    pub(crate) fn declared_multipliers(&mut self, multipliers: &mut [f64]) {
+        let count = multipliers.len();
+        for c in 0..count {
+            self.mu[c] = (0..count)
+                .map(|place| self.weights[place * count + c] * multipliers[place])
+                .sum();
+        }
+        multipliers.copy_from_slice(self.mu);
+    }
+}
