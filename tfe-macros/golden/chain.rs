@@ -62,7 +62,7 @@ const _: () = {
             separable: true,
             smooth: true,
         };
-        /// L(q, v, t): 4 +−, 8 ×
+        /// L(q, v, t): 4 +−, 8 ×; those of a loop for one turn
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
             let () = Self::__TFE_LENGTHS;
             let a = t.parameter(N + 1, self.a);
@@ -86,7 +86,7 @@ const _: () = {
             t0
         }
         const LANES: bool = true;
-        /// L_v, L_q and Q: 6 +−, 7 ×, 1 sin/cos
+        /// L_v, L_q and Q: 6 +−, 7 ×, 1 sin/cos; those of a loop for one turn
         #[inline(always)]
         fn first_inline<R: __tfe::Real>(
             &self,
@@ -103,9 +103,11 @@ const _: () = {
             let omega = t.parameter(N + 4, self.omega);
             first.q.fill(t.like(0.0));
             first.force.fill(t.like(0.0));
+            /// Q
             let t0 = t * omega;
             let t1 = t0.sin();
             first.force[N.saturating_sub(1)] += f * t1;
+            /// L_q
             for i in 0..N.saturating_sub(1) {
                 let t2 = q[i] - q[i + 1];
                 let t3 = t2 * t2;
@@ -115,13 +117,14 @@ const _: () = {
                 first.q[i] -= t6;
                 first.q[i + 1] += t6;
             }
+            /// L_v, Q
             for i in 0..N {
                 first.z[i] = t.parameter(i, self.m[i]) * z[i];
                 let t7 = c * z[i];
                 first.force[i] -= t7;
             }
         }
-        /// L_v, L_q and Q, and L_vv: 6 +−, 7 ×, 1 sin/cos
+        /// L_v, L_q and Q, and L_vv: 6 +−, 7 ×, 1 sin/cos; those of a loop for one turn
         #[inline(always)]
         fn first_and_mass_inline<R: __tfe::Real>(
             &self,
@@ -139,9 +142,11 @@ const _: () = {
             let omega = t.parameter(N + 4, self.omega);
             first.q.fill(t.like(0.0));
             first.force.fill(t.like(0.0));
+            /// Q
             let t0 = t * omega;
             let t1 = t0.sin();
             first.force[N.saturating_sub(1)] += f * t1;
+            /// L_q
             for i in 0..N.saturating_sub(1) {
                 let t2 = q[i] - q[i + 1];
                 let t3 = t2 * t2;
@@ -151,6 +156,7 @@ const _: () = {
                 first.q[i] -= t6;
                 first.q[i + 1] += t6;
             }
+            /// L_v, Q, L_vv
             for i in 0..N {
                 let t7 = c * z[i];
                 first.z[i] = t.parameter(i, self.m[i]) * z[i];
@@ -177,7 +183,7 @@ const _: () = {
         ) {
             self.first_and_mass_inline(t, q, z, first, zz);
         }
-        /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 11 +−, 8 ×, 1 sin/cos
+        /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 11 +−, 8 ×, 1 sin/cos; those of a loop for one turn
         fn second<R: __tfe::Real>(
             &self,
             t: R,
@@ -197,10 +203,13 @@ const _: () = {
             for row in &mut second.qq {
                 row.fill(t.like(0.0));
             }
+            /// Q
             let t0 = t * omega;
             let t1 = t0.sin();
             first.force[N.saturating_sub(1)] += f * t1;
+            /// L_q, L_qq
             for i in 0..N.saturating_sub(1) {
+                /// L_q
                 let t2 = q[i] - q[i + 1];
                 let t3 = t2 * t2;
                 let t4 = a * t3;
@@ -208,6 +217,7 @@ const _: () = {
                 let t6 = t5 * t2;
                 first.q[i] -= t6;
                 first.q[i + 1] += t6;
+                /// L_qq
                 let t7 = t.like(3.0) * t4;
                 let t8 = k + t7;
                 let t9 = -t8;
@@ -216,6 +226,7 @@ const _: () = {
                 second.qq[i + 1][i] += t8;
                 second.qq[i + 1][i + 1] += t9;
             }
+            /// L_v, Q, L_vv, Q_v
             let t10 = -c;
             for i in 0..N {
                 let t11 = c * z[i];
@@ -357,7 +368,23 @@ impl<const N: usize> Chain<N> {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = Σ_{i = 0..N} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..N − 1} (½ k (q[i + 1] − q[i])² + a/4 (q[i + 1] − q[i])⁴))\nQ(q[i]) = −c q\u{307}[i]\nQ(q[N − 1]) = f sin(ω t)\ncoordinates: q[N]      parameters: m, k, a, c, f, ω\noperations, value: 4 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 6 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 11 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, N coordinates\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (i,i)\npattern L_vq            zero\npattern L_qq            (i,i) (i,i+1) (i+1,i) (i+1,i+1)\npattern Q_v             (i,i)\npattern Q_q             zero",
+            page: ::core::concat!(
+                "L = Σ_{i = 0..N} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..N − 1} (½ k (q[i + 1] − q[i])² + a/4 (q[i + 1] − q[i])⁴))\n",
+                "Q(q[i]) = −c q\u{307}[i]\n", "Q(q[N − 1]) = f sin(ω t)\n",
+                "coordinates: q[N]      parameters: m, k, a, c, f, ω\n",
+                "operations, value: 4 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient: 6 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 11 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "declared by             Lagrangian, N coordinates\n",
+                "depends on time         yes\n", "forces                  yes\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      none\n", "pattern L_vv            (i,i)\n",
+                "pattern L_vq            zero\n",
+                "pattern L_qq            (i,i) (i,i+1) (i+1,i) (i+1,i+1)\n",
+                "pattern Q_v             (i,i)\n", "pattern Q_q             zero"
+            ),
         }
     }
     /// The observable `extension` at time `t`, coordinates `q` and velocities `v`.

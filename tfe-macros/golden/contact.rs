@@ -351,7 +351,25 @@ impl Contact {
                 sines: 1,
                 functions: 5,
             },
-            page: "gap = x − r cos θ\nL = ½ m (x\u{307}² + r² θ\u{307}²) − m g x − (½ k gap² if gap < 0 else 0)\nD = ½ c θ\u{307}²\ncoordinates: x, θ      parameters: m, r, g, k, c\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other\noperations, gradient: 2 +−, 10 ×, 0 ÷, 1 sin/cos, 2 other\noperations, gradient and second derivatives: 3 +−, 13 ×, 0 ÷, 1 sin/cos, 5 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  no\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_v             (1,1)\npattern Q_q             zero",
+            page: ::core::concat!(
+                "gap = x − r cos θ\n",
+                "L = ½ m (x\u{307}² + r² θ\u{307}²) − m g x − (½ k gap² if gap < 0 else 0)\n",
+                "D = ½ c θ\u{307}²\n",
+                "coordinates: x, θ      parameters: m, r, g, k, c\n",
+                "operations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 1 other\n",
+                "operations, gradient: 2 +−, 10 ×, 0 ÷, 1 sin/cos, 2 other\n",
+                "operations, gradient and second derivatives: 3 +−, 13 ×, 0 ÷, 1 sin/cos, 5 other\n",
+                "declared by             Lagrangian, 2 coordinates\n",
+                "depends on time         no\n", "forces                  yes\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  no\n",
+                "cyclic coordinates      none\n",
+                "pattern L_vv            (0,0) (1,1)\n",
+                "pattern L_vq            zero\n",
+                "pattern L_qq            (0,0) (0,1) (1,0) (1,1)\n",
+                "pattern Q_v             (1,1)\n", "pattern Q_q             zero"
+            ),
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.

@@ -215,7 +215,20 @@ impl Spring {
                 sines: 0,
                 functions: 0,
             },
-            page: "stretch = x − l\nL = ½ m x\u{307}² − ½ k stretch²\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: ::core::concat!(
+                "stretch = x − l\n", "L = ½ m x\u{307}² − ½ k stretch²\n",
+                "coordinates: x      parameters: m, k, l\n",
+                "operations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "declared by             Lagrangian, 1 coordinate\n",
+                "depends on time         no\n", "forces                  no\n",
+                "linear                  yes\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      none\n", "pattern L_vv            (0,0)\n",
+                "pattern L_vq            zero\n", "pattern L_qq            (0,0)"
+            ),
         }
     }
     /// Above the support, in metres.
@@ -542,7 +555,21 @@ impl Rigid {
                 sines: 0,
                 functions: 0,
             },
-            page: "Spring: truncated to degree 2 about x = l\nL = 0.5 (m x\u{307}² − k (x − l)²)\ncoordinates: x      parameters: m, k, l\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  yes\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: ::core::concat!(
+                "Spring: truncated to degree 2 about x = l\n",
+                "L = 0.5 (m x\u{307}² − k (x − l)²)\n",
+                "coordinates: x      parameters: m, k, l\n",
+                "operations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 1 +−, 2 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "declared by             Lagrangian, 1 coordinate\n",
+                "depends on time         no\n", "forces                  no\n",
+                "linear                  yes\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      none\n", "pattern L_vv            (0,0)\n",
+                "pattern L_vq            zero\n", "pattern L_qq            (0,0)"
+            ),
         }
     }
     /// Above the support, in metres.

@@ -408,7 +408,23 @@ impl DoublePendulum {
                 sines: 2,
                 functions: 0,
             },
-            page: "x₁ = l₁ sin θ₁\ny₁ = −l₁ cos θ₁\nx₂ = x₁ + l₂ sin θ₂\ny₂ = y₁ − l₂ cos θ₂\nL = ½ m₁ (x\u{307}₁² + y\u{307}₁²) + ½ m₂ (x\u{307}₂² + y\u{307}₂²) − g (m₁ y₁ + m₂ y₂)\ncoordinates: θ₁, θ₂      parameters: m₁, m₂, l₁, l₂, g\noperations, value: 7 +−, 17 ×, 0 ÷, 2 sin/cos, 0 other\noperations, gradient: 7 +−, 20 ×, 0 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 9 +−, 25 ×, 0 ÷, 2 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           no\nseparable (L_vq = 0)    no\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0) (0,1) (1,0) (1,1)\npattern L_vq            (0,0) (0,1) (1,0) (1,1)\npattern L_qq            (0,0) (0,1) (1,0) (1,1)",
+            page: ::core::concat!(
+                "x₁ = l₁ sin θ₁\n", "y₁ = −l₁ cos θ₁\n",
+                "x₂ = x₁ + l₂ sin θ₂\n", "y₂ = y₁ − l₂ cos θ₂\n",
+                "L = ½ m₁ (x\u{307}₁² + y\u{307}₁²) + ½ m₂ (x\u{307}₂² + y\u{307}₂²) − g (m₁ y₁ + m₂ y₂)\n",
+                "coordinates: θ₁, θ₂      parameters: m₁, m₂, l₁, l₂, g\n",
+                "operations, value: 7 +−, 17 ×, 0 ÷, 2 sin/cos, 0 other\n",
+                "operations, gradient: 7 +−, 20 ×, 0 ÷, 2 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 9 +−, 25 ×, 0 ÷, 2 sin/cos, 0 other\n",
+                "declared by             Lagrangian, 2 coordinates\n",
+                "depends on time         no\n", "forces                  no\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           no\n", "separable (L_vq = 0)    no\n",
+                "smooth                  yes\n", "cyclic coordinates      none\n",
+                "pattern L_vv            (0,0) (0,1) (1,0) (1,1)\n",
+                "pattern L_vq            (0,0) (0,1) (1,0) (1,1)\n",
+                "pattern L_qq            (0,0) (0,1) (1,0) (1,1)"
+            ),
         }
     }
     /// The observable `tip_x` at time `t`, coordinates `q` and velocities `v`.

@@ -35,7 +35,7 @@ const _: () = {
         type Length = __tfe::RunTimeLength;
     }
     #[automatically_derived]
-    #[allow(unused_variables, non_snake_case)]
+    #[allow(unused, non_snake_case)]
     impl __tfe::FamilyModel for Family {
         const FORM: __tfe::Form = __tfe::Form::Lagrangian;
         const FACTS: __tfe::Facts = __tfe::Facts {
@@ -70,6 +70,7 @@ const _: () = {
             __tfe::checks::index(("q", "n-1", ""), (self.n as i64) - 1, self.n)?;
             ::core::result::Result::Ok(())
         }
+        /// L(q, v, t): 6 +−, 11 ×, 1 ÷; those of a loop for one turn
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R]) -> R {
             let __tfe_length = 1usize.saturating_add(self.n);
             let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
@@ -99,6 +100,7 @@ const _: () = {
             }
             t6
         }
+        /// L_v, L_q and Q: 7 +−, 4 ×; those of a loop for one turn
         fn first<R: __tfe::Real>(
             &self,
             t: R,
@@ -116,15 +118,18 @@ const _: () = {
             let a = t.like(self.a);
             let k = t.like(self.k);
             first.q.fill(t.like(0.0));
+            /// L_v, L_q, Q
             let t0 = q[0] - q[1];
             let t1 = k * t0;
             let mut t2 = t1;
             first.z[0] = z[0];
             first.q[0] -= t1;
             first.force[self.n] = -z[self.n];
+            /// L_v
             for i in 0..self.n {
                 first.z[i + 1] = t.like(self.m[i]) * z[i + 1];
             }
+            /// L_q
             for i in 0..self.w {
                 let t3 = q[i + 1] - q[i + 2];
                 let t4 = a * t3;
@@ -135,6 +140,7 @@ const _: () = {
             }
             first.q[self.w + 1] += t2;
         }
+        /// L_q and Q: 7 +−, 3 ×; those of a loop for one turn
         #[inline(always)]
         fn forces_inline<R: __tfe::Real>(
             &self,
@@ -152,11 +158,13 @@ const _: () = {
             };
             let a = t.like(self.a);
             let k = t.like(self.k);
+            /// L_q, Q
             let t0 = q[0] - q[1];
             let t1 = k * t0;
             let mut t2 = t1;
             first.q[0] -= t1;
             first.force[self.n] = -z[self.n];
+            /// L_q
             for i in 0..self.w {
                 let t3 = q[i + 1] - q[i + 2];
                 let t4 = a * t3;
@@ -167,6 +175,7 @@ const _: () = {
             }
             first.q[self.w + 1] += t2;
         }
+        /// L_vv: no operations
         fn mass<R: __tfe::Real, __E: __tfe::Entries<R>>(
             &self,
             t: R,
@@ -181,6 +190,7 @@ const _: () = {
                 entries.add(__tfe::Block::ZZ, i + 1, i + 1, t.like(self.m[i]));
             }
         }
+        /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 16 +−, 4 ×; those of a loop for one turn
         fn second<R: __tfe::Real, __E: __tfe::Entries<R>>(
             &self,
             t: R,
@@ -199,6 +209,7 @@ const _: () = {
             let a = t.like(self.a);
             let k = t.like(self.k);
             first.q.fill(t.like(0.0));
+            /// L_v, L_q, Q, L_vv, L_qq, Q_v
             let t0 = q[0] - q[1];
             let t1 = k * t0;
             let mut t2 = t1;
@@ -212,11 +223,14 @@ const _: () = {
             entries.add(__tfe::Block::QQ, 0, 1, k);
             entries.add(__tfe::Block::QQ, 1, 0, k);
             entries.add(__tfe::Block::ForceZ, self.n, self.n, t.like(-1.0));
+            /// L_v, L_vv
             for i in 0..self.n {
                 entries.add(__tfe::Block::ZZ, i + 1, i + 1, t.like(self.m[i]));
                 first.z[i + 1] = t.like(self.m[i]) * z[i + 1];
             }
+            /// L_q, L_qq
             for i in 0..self.w {
+                /// L_qq
                 let t5 = q[i + 1] - q[i + 2];
                 let t6 = a * t5;
                 let t7 = k - t6;
@@ -224,6 +238,7 @@ const _: () = {
                 let t9 = -t8;
                 entries.add(__tfe::Block::QQ, i + 1, i + 2, t9);
                 entries.add(__tfe::Block::QQ, i + 2, i + 1, t9);
+                /// L_q
                 let t10 = t7 * t5;
                 first.q[i + 1] += t2 - t10;
                 t2 = t10;
@@ -304,7 +319,24 @@ impl Family {
                 sines: 0,
                 functions: 0,
             },
-            page: "L = ½ s\u{307}² + Σ_{i = 0..n} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..w} (½ k (q[i + 1] − q[i])² + a/3 (q[i + 1] − q[i])³)) − ½ k (q[0] − s)²\nQ(q[n − 1]) = −q\u{307}[n − 1]\ncoordinates: s, q[n]      parameters: n, w, m, k, a\noperations, value: 6 +−, 11 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 7 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 16 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, n+1 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0) (i+1,i+1)\npattern L_vq            zero\npattern L_qq            (0,0) (0,1) (1,0) (1,1) (i+1,i+1) (i+1,i+2) (i+2,i+1) (i+2,i+2)\npattern Q_v             (n,n)\npattern Q_q             zero",
+            page: ::core::concat!(
+                "L = ½ s\u{307}² + Σ_{i = 0..n} ½ m[i] q\u{307}[i]² − (Σ_{i = 0..w} (½ k (q[i + 1] − q[i])² + a/3 (q[i + 1] − q[i])³)) − ½ k (q[0] − s)²\n",
+                "Q(q[n − 1]) = −q\u{307}[n − 1]\n",
+                "coordinates: s, q[n]      parameters: n, w, m, k, a\n",
+                "operations, value: 6 +−, 11 ×, 1 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient: 7 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 16 +−, 4 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "declared by             Lagrangian, n+1 coordinates\n",
+                "depends on time         no\n", "forces                  yes\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      none\n",
+                "pattern L_vv            (0,0) (i+1,i+1)\n",
+                "pattern L_vq            zero\n",
+                "pattern L_qq            (0,0) (0,1) (1,0) (1,1) (i+1,i+1) (i+1,i+2) (i+2,i+1) (i+2,i+2)\n",
+                "pattern Q_v             (n,n)\n", "pattern Q_q             zero"
+            ),
         }
     }
     /// The observable `extension` at time `t`, coordinates `q` and velocities `v`.

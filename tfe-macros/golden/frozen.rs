@@ -323,7 +323,21 @@ impl SpringPendulum {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m (r\u{307}² + r² θ\u{307}²) + m g r cos θ − ½ k (r − l)²\ncoordinates: r, θ      parameters: m, l, g, k\noperations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           no, diagonal\nseparable (L_vq = 0)    no\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            (1,0)\npattern L_qq            (0,0) (0,1) (1,0) (1,1)",
+            page: ::core::concat!(
+                "L = ½ m (r\u{307}² + r² θ\u{307}²) + m g r cos θ − ½ k (r − l)²\n",
+                "coordinates: r, θ      parameters: m, l, g, k\n",
+                "operations, value: 4 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "operations, gradient: 3 +−, 10 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 4 +−, 15 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "declared by             Lagrangian, 2 coordinates\n",
+                "depends on time         no\n", "forces                  no\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           no, diagonal\n", "separable (L_vq = 0)    no\n",
+                "smooth                  yes\n", "cyclic coordinates      none\n",
+                "pattern L_vv            (0,0) (1,1)\n",
+                "pattern L_vq            (1,0)\n",
+                "pattern L_qq            (0,0) (0,1) (1,0) (1,1)"
+            ),
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.
@@ -609,7 +623,21 @@ impl Rod {
                 sines: 0,
                 functions: 0,
             },
-            page: "SpringPendulum: frozen r = l; truncated to degree 4\nL = 0.5 m l² θ\u{307}² + m g l − 0.5 m g l θ² + 1/24 m g l θ⁴\ncoordinates: θ      parameters: m, l, g\noperations, value: 3 +−, 9 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: ::core::concat!(
+                "SpringPendulum: frozen r = l; truncated to degree 4\n",
+                "L = 0.5 m l² θ\u{307}² + m g l − 0.5 m g l θ² + 1/24 m g l θ⁴\n",
+                "coordinates: θ      parameters: m, l, g\n",
+                "operations, value: 3 +−, 9 ×, 1 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient: 1 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 2 +−, 8 ×, 1 ÷, 0 sin/cos, 0 other\n",
+                "declared by             Lagrangian, 1 coordinate\n",
+                "depends on time         no\n", "forces                  no\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      none\n", "pattern L_vv            (0,0)\n",
+                "pattern L_vq            zero\n", "pattern L_qq            (0,0)"
+            ),
         }
     }
     /// The observable `height` at time `t`, coordinates `q` and velocities `v`.

@@ -241,7 +241,22 @@ impl HenonHeiles {
                 sines: 0,
                 functions: 0,
             },
-            page: "H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)\ncoordinates: x, y      momenta: px, py      parameters: λ\noperations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\noperations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 4 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in p          yes\nconstant H_pp           yes, diagonal\nseparable (H_pq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern H_pp            (0,0) (1,1)\npattern H_pq            zero\npattern H_qq            (0,0) (0,1) (1,0) (1,1)",
+            page: ::core::concat!(
+                "H = ½ (px² + py²) + ½ (x² + y²) + λ (x² y − y³/3)\n",
+                "coordinates: x, y      momenta: px, py      parameters: λ\n",
+                "operations, value: 5 +−, 7 ×, 1 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient: 3 +−, 6 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 4 +−, 7 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "declared by             Hamiltonian, 2 coordinates\n",
+                "depends on time         no\n", "forces                  no\n",
+                "linear                  no\n", "quadratic in p          yes\n",
+                "constant H_pp           yes, diagonal\n",
+                "separable (H_pq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      none\n",
+                "pattern H_pp            (0,0) (1,1)\n",
+                "pattern H_pq            zero\n",
+                "pattern H_qq            (0,0) (0,1) (1,0) (1,1)"
+            ),
         }
     }
 }

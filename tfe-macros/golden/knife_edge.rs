@@ -149,6 +149,7 @@ const _: () = {
                 },
             },
         ];
+        /// A and a of ψ = A v + a: 1 sin/cos
         fn constraint_rows<R: __tfe::Real>(
             &self,
             t: R,
@@ -163,6 +164,7 @@ const _: () = {
             rows[0][0] = sin_phi;
             rows[0][1] = -cos_phi;
         }
+        /// ∂ψ/∂q, Ȧ, ∂(Aᵀμ)/∂q, ∂(Ȧᵀμ)/∂q and ∂(Ȧᵀμ)/∂v: 1 +−, 8 ×, 1 sin/cos
         fn constraint_second<R: __tfe::Real>(
             &self,
             t: R,
@@ -183,20 +185,26 @@ const _: () = {
                 .first_chunk_mut::<1>() else {
                 return;
             };
+            /// ∂ψ/∂q
             let (sin_phi, cos_phi) = q[2].sin_cos();
             let t0 = v[0] * cos_phi;
             let t1 = v[1] * sin_phi;
             psi_q[0][2] = t0 + t1;
+            /// Ȧ
             let t2 = v[2] * cos_phi;
             row_rates[0][0] = t2;
+            /// Ȧ
             let t3 = v[2] * sin_phi;
             row_rates[0][1] = t3;
+            /// ∂(Aᵀμ)/∂q, ∂(Ȧᵀμ)/∂v
             let t4 = mu[0] * cos_phi;
             second.bend[0][2] = t4;
             second.rate_v[0][2] = t4;
+            /// ∂(Aᵀμ)/∂q, ∂(Ȧᵀμ)/∂v
             let t5 = mu[0] * sin_phi;
             second.bend[1][2] = t5;
             second.rate_v[1][2] = t5;
+            /// ∂(Ȧᵀμ)/∂q
             let t6 = mu[0] * t3;
             second.rate_q[1][2] = mu[0] * t2;
             second.rate_q[0][2] = -t6;
@@ -302,7 +310,23 @@ impl KnifeEdge {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m (x\u{307}² + y\u{307}²) + ½ j φ\u{307}² + m g sin α x\n0 = x\u{307} sin φ − y\u{307} cos φ      (blade)\ncoordinates: x, y, φ      parameters: m, j, g, α\noperations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 3 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      q[2]\nconserved momenta       p[2]\npattern L_vv            (0,0) (1,1) (2,2)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             blade (velocity)",
+            page: ::core::concat!(
+                "L = ½ m (x\u{307}² + y\u{307}²) + ½ j φ\u{307}² + m g sin α x\n",
+                "0 = x\u{307} sin φ − y\u{307} cos φ      (blade)\n",
+                "coordinates: x, y, φ      parameters: m, j, g, α\n",
+                "operations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "operations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "declared by             Lagrangian, 3 coordinates\n",
+                "depends on time         no\n", "forces                  no\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      q[2]\n", "conserved momenta       p[2]\n",
+                "pattern L_vv            (0,0) (1,1) (2,2)\n",
+                "pattern L_vq            zero\n", "pattern L_qq            zero\n",
+                "constraints             blade (velocity)"
+            ),
         }
     }
 }

@@ -247,7 +247,20 @@ impl Pendulum {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m l² θ\u{307}² + m g l cos θ\ncoordinates: θ      parameters: m, l, g\noperations, value: 1 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)",
+            page: ::core::concat!(
+                "L = ½ m l² θ\u{307}² + m g l cos θ\n",
+                "coordinates: θ      parameters: m, l, g\n",
+                "operations, value: 1 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "operations, gradient: 0 +−, 5 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 0 +−, 6 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "declared by             Lagrangian, 1 coordinate\n",
+                "depends on time         no\n", "forces                  no\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      none\n", "pattern L_vv            (0,0)\n",
+                "pattern L_vq            zero\n", "pattern L_qq            (0,0)"
+            ),
         }
     }
 }

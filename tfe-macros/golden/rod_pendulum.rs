@@ -118,6 +118,7 @@ const _: () = {
                 },
             },
         ];
+        /// φ(q, t): 2 +−, 3 ×
         fn constraint_values<R: __tfe::Real>(&self, t: R, q: &[R; 2], values: &mut [R]) {
             let ::core::option::Option::Some(values) = values.first_chunk_mut::<1>()
             else {
@@ -130,6 +131,7 @@ const _: () = {
             let t3 = l * l;
             values[0] = t2 - t3;
         }
+        /// A and a of ψ = A v + a: 2 ×
         fn constraint_rows<R: __tfe::Real>(
             &self,
             t: R,
@@ -143,6 +145,7 @@ const _: () = {
             rows[0][0] = t.like(2.0) * q[0];
             rows[0][1] = t.like(2.0) * q[1];
         }
+        /// ∂ψ/∂q, Ȧ, ∂(Aᵀμ)/∂q, ∂(Ȧᵀμ)/∂q and ∂(Ȧᵀμ)/∂v: 3 ×
         fn constraint_second<R: __tfe::Real>(
             &self,
             t: R,
@@ -163,12 +166,15 @@ const _: () = {
                 .first_chunk_mut::<1>() else {
                 return;
             };
+            /// ∂ψ/∂q, Ȧ
             let t0 = t.like(2.0) * v[0];
             psi_q[0][0] = t0;
             row_rates[0][0] = t0;
+            /// ∂ψ/∂q, Ȧ
             let t1 = t.like(2.0) * v[1];
             psi_q[0][1] = t1;
             row_rates[0][1] = t1;
+            /// ∂(Aᵀμ)/∂q, ∂(Ȧᵀμ)/∂v
             let t2 = t.like(2.0) * mu[0];
             second.bend[0][0] = t2;
             second.bend[1][1] = t2;
@@ -268,7 +274,23 @@ impl RodPendulum {
                 sines: 0,
                 functions: 0,
             },
-            page: "L = ½ m (x\u{307}² + y\u{307}²) − m g y\n0 = x² + y² − l²      (rod)\ncoordinates: x, y      parameters: m, l, g\noperations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient and second derivatives: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\ndeclared by             Lagrangian, 2 coordinates\ndepends on time         no\nforces                  no\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0) (1,1)\npattern L_vq            zero\npattern L_qq            zero\nconstraints             rod (holonomic, quadratic)",
+            page: ::core::concat!(
+                "L = ½ m (x\u{307}² + y\u{307}²) − m g y\n",
+                "0 = x² + y² − l²      (rod)\n",
+                "coordinates: x, y      parameters: m, l, g\n",
+                "operations, value: 2 +−, 5 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 0 +−, 3 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "declared by             Lagrangian, 2 coordinates\n",
+                "depends on time         no\n", "forces                  no\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      none\n",
+                "pattern L_vv            (0,0) (1,1)\n",
+                "pattern L_vq            zero\n", "pattern L_qq            zero\n",
+                "constraints             rod (holonomic, quadratic)"
+            ),
         }
     }
 }

@@ -172,6 +172,7 @@ const _: () = {
             let t9 = t.parameter(1, self.k[0]) + t8;
             second.qq[0][0] = -t9;
         }
+        /// Derivatives of L_v, L_q and Q by the time and by parameters
         fn first_by<R: __tfe::Real>(
             &self,
             by: __tfe::By,
@@ -181,6 +182,7 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
         ) {
             match by {
+                /// ∂/∂t: 3 ×, 1 sin/cos
                 __tfe::By::Time => {
                     let amplitude = t.parameter(4, self.amplitude);
                     let omega = t.parameter(5, self.omega);
@@ -190,6 +192,7 @@ const _: () = {
                     let t3 = t1 * t2;
                     first.force[0] = -t3;
                 }
+                /// ∂/∂ω: 3 ×, 1 sin/cos
                 __tfe::By::Parameter(0) => {
                     let amplitude = t.parameter(4, self.amplitude);
                     let omega = t.parameter(5, self.omega);
@@ -199,11 +202,13 @@ const _: () = {
                     let t3 = t * t2;
                     first.force[0] = -t3;
                 }
+                /// ∂/∂k[1]: 2 ×
                 __tfe::By::Parameter(1) => {
                     let t0 = q[0] * q[0];
                     let t1 = q[0] * t0;
                     first.q[0] = -t1;
                 }
+                /// ∂/∂c: no operations
                 __tfe::By::Parameter(2) => {
                     first.force[0] = -z[0];
                 }
@@ -334,7 +339,22 @@ impl Duffing {
                 sines: 1,
                 functions: 0,
             },
-            page: "L = ½ m x\u{307}² − ½ k[0] x² − k[1]/4 x⁴\nD = ½ c x\u{307}²\nQ(x) = amplitude cos(ω t)\ncoordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c\noperations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\noperations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\noperations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\ndeclared by             Lagrangian, 1 coordinate\ndepends on time         yes\nforces                  yes\nlinear                  no\nquadratic in v          yes\nconstant L_vv           yes, diagonal\nseparable (L_vq = 0)    yes\nsmooth                  yes\ncyclic coordinates      none\npattern L_vv            (0,0)\npattern L_vq            zero\npattern L_qq            (0,0)\npattern Q_v             (0,0)\npattern Q_q             zero",
+            page: ::core::concat!(
+                "L = ½ m x\u{307}² − ½ k[0] x² − k[1]/4 x⁴\n",
+                "D = ½ c x\u{307}²\n", "Q(x) = amplitude cos(ω t)\n",
+                "coordinates: x      parameters: m, k, c, amplitude, ω      sensitivity: ω, k[1], c\n",
+                "operations, value: 2 +−, 8 ×, 0 ÷, 0 sin/cos, 0 other\n",
+                "operations, gradient: 2 +−, 7 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 3 +−, 8 ×, 0 ÷, 1 sin/cos, 0 other\n",
+                "declared by             Lagrangian, 1 coordinate\n",
+                "depends on time         yes\n", "forces                  yes\n",
+                "linear                  no\n", "quadratic in v          yes\n",
+                "constant L_vv           yes, diagonal\n",
+                "separable (L_vq = 0)    yes\n", "smooth                  yes\n",
+                "cyclic coordinates      none\n", "pattern L_vv            (0,0)\n",
+                "pattern L_vq            zero\n", "pattern L_qq            (0,0)\n",
+                "pattern Q_v             (0,0)\n", "pattern Q_q             zero"
+            ),
         }
     }
 }

@@ -393,7 +393,24 @@ impl Forced {
                 sines: 2,
                 functions: 0,
             },
-            page: "H = ½ p² − cos q − a q cos(ω t)\ndt/dτ = 1/(1 + q²)\nH\u{303} = dt/dτ (H + p_t)\nQ(q) = −c p\ncoordinates: q, t      momenta: p, p_t      parameters: a, ω, c\noperations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient: 6 +−, 15 ×, 1 ÷, 2 sin/cos, 0 other\noperations, gradient and second derivatives: 9 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\ndeclared by             Hamiltonian, 2 coordinates\ndepends on time         no\nforces                  yes\nlinear                  no\nquadratic in p          yes\nconstant H_pp           no, diagonal\nseparable (H_pq = 0)    no\nsmooth                  yes\ncyclic coordinates      none\npattern H_pp            (0,0)\npattern H_pq            (0,0) (1,0)\npattern H_qq            (0,0) (0,1) (1,0) (1,1)\npattern Q_p             (0,0) (1,0)\npattern Q_q             (0,0) (1,0)",
+            page: ::core::concat!(
+                "H = ½ p² − cos q − a q cos(ω t)\n", "dt/dτ = 1/(1 + q²)\n",
+                "H\u{303} = dt/dτ (H + p_t)\n", "Q(q) = −c p\n",
+                "coordinates: q, t      momenta: p, p_t      parameters: a, ω, c\n",
+                "operations, value: 4 +−, 6 ×, 1 ÷, 2 sin/cos, 0 other\n",
+                "operations, gradient: 6 +−, 15 ×, 1 ÷, 2 sin/cos, 0 other\n",
+                "operations, gradient and second derivatives: 9 +−, 32 ×, 1 ÷, 2 sin/cos, 0 other\n",
+                "declared by             Hamiltonian, 2 coordinates\n",
+                "depends on time         no\n", "forces                  yes\n",
+                "linear                  no\n", "quadratic in p          yes\n",
+                "constant H_pp           no, diagonal\n", "separable (H_pq = 0)    no\n",
+                "smooth                  yes\n", "cyclic coordinates      none\n",
+                "pattern H_pp            (0,0)\n",
+                "pattern H_pq            (0,0) (1,0)\n",
+                "pattern H_qq            (0,0) (0,1) (1,0) (1,1)\n",
+                "pattern Q_p             (0,0) (1,0)\n",
+                "pattern Q_q             (0,0) (1,0)"
+            ),
         }
     }
     /// The observable `energy` at time `tau`, coordinates `q` and momenta `p`.

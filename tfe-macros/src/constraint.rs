@@ -1,7 +1,9 @@
 //! The constraints of a model: their names and kinds, and their kernels.
 
 use crate::emit::Emitter;
+use crate::headings::Headings;
 use crate::indices;
+use crate::page;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use std::collections::BTreeMap;
@@ -9,6 +11,11 @@ use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::model::declared::{Constraint, ConstraintKind, Declared};
 use tfe_symbolic::program::{Array, Program, Request, Statement};
+
+/// What the kernels compute: φ(q, t), ψ(q, v, t) = A(q, t) v + a(q, t), and what Newton's method needs besides.
+pub(crate) const VALUES: &str = "φ(q, t)";
+pub(crate) const ROWS: &str = "A and a of ψ = A v + a";
+const SECOND: &str = "∂ψ/∂q, Ȧ, ∂(Aᵀμ)/∂q, ∂(Ȧᵀμ)/∂q and ∂(Ȧᵀμ)/∂v";
 
 /// What an implementation of `Model` holds of constraints: nothing where there are none.
 pub(crate) fn members(
@@ -20,6 +27,7 @@ pub(crate) fn members(
         return TokenStream::new();
     }
     let kernels = Kernels {
+        declared,
         derivation,
         coordinates,
         places,
@@ -47,6 +55,7 @@ fn constant(constraint: &Constraint) -> TokenStream {
 }
 
 struct Kernels<'a> {
+    declared: &'a Declared,
     derivation: &'a Derivation,
     coordinates: &'a [String],
     /// The numbers of the parameters.
@@ -60,6 +69,7 @@ impl Kernels<'_> {
         Emitter::new(self.coordinates, quote!(second.))
             .with_velocity()
             .with_parameters(self.places)
+            .with_headings(Headings::of(self.declared))
             .body(program)
             .statements
     }
@@ -86,7 +96,9 @@ impl Kernels<'_> {
         let dof = &self.dof;
         let (values, body) = (quote!(values), self.emitted(&program));
         let values = self.chunk(&values, &values);
+        let doc = page::kernel(VALUES, &program);
         quote! {
+            #[doc = #doc]
             fn constraint_values<R: __tfe::Real>(&self, t: R, q: &[R; #dof], values: &mut [R]) {
                 #values
                 #body
@@ -106,7 +118,9 @@ impl Kernels<'_> {
             .then(|| self.chunk(&rows, &rows));
         let drift = writes(&program, |array| matches!(array, Array::Drift(_)))
             .then(|| self.chunk(&drift, &drift));
+        let doc = page::kernel(ROWS, &program);
         quote! {
+            #[doc = #doc]
             fn constraint_rows<R: __tfe::Real>(
                 &self,
                 t: R,
@@ -146,7 +160,9 @@ impl Kernels<'_> {
             .then(|| self.chunk(&quote!(psi_q), &quote!(second.psi_q)));
         let row_rates = writes(&program, |array| matches!(array, Array::RowRate(_)))
             .then(|| self.chunk(&quote!(row_rates), &quote!(second.row_rates)));
+        let doc = page::kernel(SECOND, &program);
         quote! {
+            #[doc = #doc]
             fn constraint_second<R: __tfe::Real>(
                 &self,
                 t: R,

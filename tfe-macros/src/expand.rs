@@ -5,9 +5,10 @@ use crate::emit::{self, Emitter, Signature};
 use crate::headings::Headings;
 use crate::indices;
 use crate::lengths::Lengths;
+use crate::page::{self, Formulas};
 use crate::parameters::Parameters;
 use crate::source_map::SourceMap;
-use crate::{constraint, fallback, family, input, page, solver, state, variant};
+use crate::{constraint, fallback, family, input, solver, state, variant};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::BTreeMap;
@@ -16,6 +17,7 @@ use tfe_symbolic::compile;
 use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::model::declared::{Declared, Form, Observable, Parameter, names};
+use tfe_symbolic::model::notation;
 use tfe_symbolic::program::{By, Program, Request};
 use tfe_symbolic::syntax::context::{FieldKind, Length};
 
@@ -515,22 +517,16 @@ impl<'a> Kernels<'a> {
             first: true,
             ..nothing
         };
-        let (letter, z) = match self.declared.form {
-            Form::Lagrangian => ('L', 'v'),
-            Form::Hamiltonian => ('H', 'p'),
-        };
-        let forced = self.derivation.structure().forced;
-        let firsts = match forced {
-            true => format!("{letter}_{z}, {letter}_q and Q"),
-            false => format!("{letter}_{z} and {letter}_q"),
-        };
-        let second = match forced {
-            true => format!("{firsts}, {letter}_{z}{z}, {letter}_{z}q, {letter}_qq, Q_{z} and Q_q"),
-            false => format!("{firsts}, {letter}_{z}{z}, {letter}_{z}q and {letter}_qq"),
-        };
+        let Formulas {
+            value,
+            first: firsts,
+            mass,
+            second,
+            ..
+        } = Formulas::of(self.declared, self.derivation);
         let all = [
             (
-                format!("{letter}(q, {z}, t)"),
+                value,
                 Request {
                     value: true,
                     ..nothing
@@ -538,21 +534,21 @@ impl<'a> Kernels<'a> {
             ),
             (firsts.clone(), first),
             (
-                format!("{firsts}, and {letter}_{z}{z}"),
+                format!("{firsts}, and {mass}"),
                 Request {
                     mass: true,
                     ..first
                 },
             ),
             (
-                second,
+                format!("{firsts}, {second}"),
                 Request {
                     second: true,
                     ..first
                 },
             ),
         ];
-        all.map(|(formula, request)| page::kernel(&formula, &self.derivation.counts(request)))
+        all.map(|(formula, request)| page::kernel(&formula, &self.derivation.program(request)))
     }
 
     fn coordinate_name(&self) -> TokenStream {
@@ -665,15 +661,17 @@ impl<'a> Kernels<'a> {
         let dof = &self.dof;
         let arm = |by: By| {
             let program = self.derivation.program_by(by);
-            let pattern = match by {
-                By::Time => quote!(__tfe::By::Time),
+            let (pattern, name) = match by {
+                By::Time => (quote!(__tfe::By::Time), "t".to_owned()),
                 By::Parameter(k) => {
+                    let name = notation::element(&self.declared.sensitivities[k].to_string());
                     let k = Literal::usize_unsuffixed(k);
-                    quote!(__tfe::By::Parameter(#k))
+                    (quote!(__tfe::By::Parameter(#k)), name)
                 }
             };
+            let doc = page::kernel(&format!("∂/∂{name}"), &program);
             let body = self.emitted(&program, TokenStream::new()).statements;
-            (!program.statements.is_empty()).then(|| quote!(#pattern => { #body }))
+            (!program.statements.is_empty()).then(|| quote!(#[doc = #doc] #pattern => { #body }))
         };
         let parameters = 0..self.declared.sensitivities.len();
         let arms: Vec<_> = std::iter::once(By::Time)
@@ -684,7 +682,13 @@ impl<'a> Kernels<'a> {
             return TokenStream::new();
         }
         let (given, kernel) = (Given::of(self.declared).parameter, self.kernel("first_by"));
+        let formulas = Formulas::of(self.declared, self.derivation);
+        let doc = format!(
+            " Derivatives of {} by the time and by parameters",
+            formulas.first
+        );
         quote! {
+            #[doc = #doc]
             fn #kernel<R: __tfe::Real>(
                 &self,
                 by: __tfe::By,

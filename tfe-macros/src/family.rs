@@ -7,8 +7,9 @@ pub(crate) mod strides;
 
 use crate::docs::Docs;
 use crate::emit::{Body, Emitter};
+use crate::headings::Headings;
 use crate::indices;
-use crate::page;
+use crate::page::{self, Formulas};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use std::collections::BTreeMap;
@@ -57,7 +58,7 @@ impl Kernels<'_> {
     /// The body of a kernel, with its slices cut to the length of the model so that the compiler knows it.
     fn body(&self, program: &Program, given: Given) -> Body {
         let cut = self.cut(given);
-        let emitter = Emitter::new(&[], TokenStream::new()).by_entries();
+        let emitter = self.emitter();
         let emitter = match given {
             Given::Forces => {
                 let strides = self.strides(program);
@@ -75,6 +76,12 @@ impl Kernels<'_> {
             },
             ..body
         }
+    }
+
+    fn emitter(&self) -> Emitter<'_> {
+        Emitter::new(&[], TokenStream::new())
+            .by_entries()
+            .with_headings(Headings::of(self.declared))
     }
 
     /// Cuts the slices to the length of the model.
@@ -120,12 +127,13 @@ impl Kernels<'_> {
             let (q, z, first) = __sweep.slices();
             #cut
         };
-        let body = Emitter::new(&[], TokenStream::new())
-            .by_entries()
+        let body = self
+            .emitter()
             .onto_zeros()
             .assigning(strides.assigns)
             .in_strides(program, strides, &lend)?;
         Some(quote! {
+            /// The same, several sites at a time.
             #[inline(always)]
             fn forces_in_strides<R: __tfe::Real, __S: __tfe::Sweep<R>>(
                 &self,
@@ -163,6 +171,9 @@ impl Kernels<'_> {
             value: true,
             ..nothing
         };
+        let formulas = Formulas::of(self.declared, self.derivation);
+        let doc = |formula: &str, program: &Program| page::kernel(formula, program);
+        let value_doc = doc(&formulas.value, &self.program(value));
         let value = self.body(&self.program(value), Given::Nothing);
         let (value_statements, value) = (value.statements, value.value);
         let value = value.unwrap_or_else(|| quote!(t.like(0.0)));
@@ -178,6 +189,10 @@ impl Kernels<'_> {
             second: true,
             ..first
         };
+        let first_doc = doc(&formulas.first, &self.program(first));
+        let mass_doc = doc(&formulas.mass, &self.program(mass));
+        let seconds = format!("{}, {}", formulas.first, formulas.second);
+        let second_doc = doc(&seconds, &self.program(second));
         let first = self.body(&self.program(first), Given::First).statements;
         let forces = self.derivation.forces();
         let assigns = self.strides(&forces).filter(|strides| strides.assigns);
@@ -187,6 +202,7 @@ impl Kernels<'_> {
             )
         });
         let in_strides = self.in_strides(&forces);
+        let forces_doc = doc(&formulas.forces, &forces);
         let forces = self.body(&forces, Given::Forces).statements;
         let mass = self.body(&self.program(mass), Given::Nothing).statements;
         let second = self.body(&self.program(second), Given::First).statements;
@@ -210,7 +226,7 @@ impl Kernels<'_> {
                 }
 
                 #[automatically_derived]
-                #[allow(unused_variables, non_snake_case)]
+                #[allow(unused, non_snake_case)]
                 impl #impl_generics __tfe::FamilyModel for #name #type_generics #where_clause {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;
@@ -226,11 +242,13 @@ impl Kernels<'_> {
                         ::core::result::Result::Ok(())
                     }
 
+                    #[doc = #value_doc]
                     fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R]) -> R {
                         #value_statements
                         #value
                     }
 
+                    #[doc = #first_doc]
                     fn first<R: __tfe::Real>(
                         &self,
                         t: R,
@@ -241,6 +259,7 @@ impl Kernels<'_> {
                         #first
                     }
 
+                    #[doc = #forces_doc]
                     #[inline(always)]
                     fn forces_inline<R: __tfe::Real>(
                         &self,
@@ -254,6 +273,7 @@ impl Kernels<'_> {
 
                     #in_strides
 
+                    #[doc = #mass_doc]
                     fn mass<R: __tfe::Real, __E: __tfe::Entries<R>>(
                         &self,
                         t: R,
@@ -264,6 +284,7 @@ impl Kernels<'_> {
                         #mass
                     }
 
+                    #[doc = #second_doc]
                     fn second<R: __tfe::Real, __E: __tfe::Entries<R>>(
                         &self,
                         t: R,

@@ -79,21 +79,25 @@ impl Headings {
         headings
     }
 
-    /// What the results of a group are, where all have names, and whether other results need some of it.
+    /// What the results of a group are, and whether other results need some of it. Where a result has no name of its own, as in a loop, the arrays are told.
     fn heading(&self, group: &[Statement]) -> Option<String> {
-        let mut results: Vec<&Place> = group.iter().filter_map(result).collect();
+        let mut results: Vec<&Place> = group.iter().flat_map(results).collect();
         results.sort_unstable();
         let names: Option<Vec<String>> = results.iter().map(|place| self.name(place)).collect();
-        let mut names = names?;
         let mut seen = BTreeSet::new();
-        names.retain(|name| seen.insert(name.clone()));
-        if names.len() > MAX_RESULTS {
-            let arrays: BTreeSet<Array> = results.iter().map(|place| place.array).collect();
-            names = arrays
-                .into_iter()
-                .filter_map(|array| self.array(array))
-                .collect();
-        }
+        let names = names.map(|mut names| {
+            names.retain(|name| seen.insert(name.clone()));
+            names
+        });
+        let names = match names {
+            Some(names) if names.len() <= MAX_RESULTS => names,
+            _ => {
+                let arrays: BTreeSet<Array> = results.iter().map(|place| place.array).collect();
+                let arrays: Option<Vec<String>> =
+                    arrays.into_iter().map(|array| self.array(array)).collect();
+                arrays?
+            }
+        };
         let names = (!names.is_empty()).then(|| names.join(", "))?;
         Some(match needs_all(group) {
             true => format!(" {names}"),
@@ -150,16 +154,30 @@ impl Headings {
             Array::QQ => format!("{letter}_qq"),
             Array::ForceZ => format!("Q_{z}"),
             Array::ForceQ => "Q_q".to_owned(),
+            Array::SiteRow => "A".to_owned(),
+            Array::SiteDrift => "a".to_owned(),
+            Array::SitePhi => "φ".to_owned(),
+            Array::PsiQ(_) => "∂ψ/∂q".to_owned(),
+            Array::RowRate(_) => "Ȧ".to_owned(),
+            Array::Bend => "∂(Aᵀμ)/∂q".to_owned(),
+            Array::RateQ => "∂(Ȧᵀμ)/∂q".to_owned(),
+            Array::RateV => "∂(Ȧᵀμ)/∂v".to_owned(),
             _ => return None,
         })
     }
 }
 
-/// Statements up to results, and the results, again and again; what is left behind the last result is no group.
+/// Statements up to results, and the results, again and again; what is left behind the last result is no group. A loop with results belongs to what stands before it.
 fn groups(statements: &[Statement], reads: &BTreeMap<Temporary, usize>) -> Vec<Range<usize>> {
     let (mut groups, mut begin, mut end) = (Vec::new(), 0, 0);
     for (at, statement) in statements.iter().enumerate() {
         if result(statement).is_some() {
+            end = at + 1;
+        } else if !results(statement).is_empty() {
+            if end > begin {
+                groups.push(begin..end);
+                begin = end;
+            }
             end = at + 1;
         } else if end > begin && !is_written_in_place(&statements[at..], reads) {
             groups.push(begin..end);
@@ -176,6 +194,23 @@ fn result(statement: &Statement) -> Option<&Place> {
     match statement {
         Statement::Store { output, .. } => Some(output),
         _ => None,
+    }
+}
+
+/// Those of a statement with all that it repeats.
+fn results(statement: &Statement) -> Vec<&Place> {
+    match statement {
+        Statement::Loop { body, .. } => body.iter().flat_map(results).collect(),
+        Statement::Balance { output, .. } => vec![output],
+        statement => result(statement).into_iter().collect(),
+    }
+}
+
+/// All that a statement reads, with what it repeats.
+fn reads_of(statement: &Statement) -> Vec<&Operand> {
+    match statement {
+        Statement::Loop { body, .. } => body.iter().flat_map(reads_of).collect(),
+        statement => statement.operands(),
     }
 }
 
@@ -200,7 +235,7 @@ fn needs_all(group: &[Statement]) -> bool {
             }
             _ => true,
         };
-        for operand in statement.operands() {
+        for operand in reads_of(statement) {
             if let Operand::Temporary(temporary) = operand {
                 needed.insert(*temporary);
             }

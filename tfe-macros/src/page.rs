@@ -5,8 +5,8 @@ use quote::quote;
 use std::fmt::Write as _;
 use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::model::declared::{Declared, Form, names};
-use tfe_symbolic::program::Request;
 use tfe_symbolic::program::count::Counts;
+use tfe_symbolic::program::{Program, Request, Statement};
 
 /// Beyond so many operations the compiler's time for a kernel is felt.
 const LARGE: usize = 10_000;
@@ -102,14 +102,14 @@ fn told(counts: &Counts) -> String {
 }
 
 /// A line of documentation for a kernel: what it computes, and of how many operations.
-pub(crate) fn kernel(formula: &str, counts: &Counts) -> String {
+pub(crate) fn kernel(formula: &str, program: &Program) -> String {
     let Operations {
         additions,
         multiplications,
         divisions,
         sines,
         functions,
-    } = operations(counts);
+    } = operations(&Counts::of(program));
     let kinds = [
         (additions, "+−"),
         (multiplications, "×"),
@@ -121,8 +121,15 @@ pub(crate) fn kernel(formula: &str, counts: &Counts) -> String {
     let counted: Vec<String> = counted
         .map(|(count, kind)| format!("{count} {kind}"))
         .collect();
+    let has_loops = |statement: &Statement| matches!(statement, Statement::Loop { .. });
     match counted.is_empty() {
         true => format!(" {formula}: no operations"),
+        false if program.statements.iter().any(has_loops) => {
+            format!(
+                " {formula}: {}; those of a loop for one turn",
+                counted.join(", ")
+            )
+        }
         false => format!(" {formula}: {}", counted.join(", ")),
     }
 }
@@ -143,6 +150,47 @@ fn operations(counts: &Counts) -> Operations {
         divisions: counts.divisions,
         sines: counts.sine_cosine_pairs + counts.lone_sines,
         functions: counts.functions + counts.selections,
+    }
+}
+
+/// What the kernels of a model compute, in formulas.
+pub(crate) struct Formulas {
+    pub(crate) value: String,
+    /// First derivatives and forces.
+    pub(crate) first: String,
+    /// The same without derivatives by rates.
+    pub(crate) forces: String,
+    pub(crate) mass: String,
+    /// All that the kernel of second derivatives adds to the first.
+    pub(crate) second: String,
+}
+
+impl Formulas {
+    pub(crate) fn of(declared: &Declared, derivation: &Derivation) -> Self {
+        let (letter, z) = match declared.form {
+            Form::Lagrangian => ('L', 'v'),
+            Form::Hamiltonian => ('H', 'p'),
+        };
+        let forced = derivation.structure().forced;
+        let first = match forced {
+            true => format!("{letter}_{z}, {letter}_q and Q"),
+            false => format!("{letter}_{z} and {letter}_q"),
+        };
+        let forces = match forced {
+            true => format!("{letter}_q and Q"),
+            false => format!("{letter}_q"),
+        };
+        let second = match forced {
+            true => format!("{letter}_{z}{z}, {letter}_{z}q, {letter}_qq, Q_{z} and Q_q"),
+            false => format!("{letter}_{z}{z}, {letter}_{z}q and {letter}_qq"),
+        };
+        Self {
+            value: format!("{letter}(q, {z}, t)"),
+            first,
+            forces,
+            mass: format!("{letter}_{z}{z}"),
+            second,
+        }
     }
 }
 
@@ -217,6 +265,8 @@ pub(crate) fn structure(
     };
     let facts = facts(derivation, &private);
     let (name, page) = (&declared.name, page(declared, derivation));
+    // A line of code for each of the page.
+    let page = page.split_inclusive('\n');
     quote! {
         #private::Structure {
             name: #name,
@@ -228,7 +278,7 @@ pub(crate) fn structure(
             value: #value,
             first: #first,
             second: #second,
-            page: #page,
+            page: ::core::concat!(#(#page),*),
         }
     }
 }

@@ -1,7 +1,10 @@
 //! The constraints of a model of run-time length: how many there are, their names, and their kernels.
 
 use super::sites::{self, Sites};
+use crate::constraint::{ROWS, VALUES};
 use crate::emit::Emitter;
+use crate::headings::Headings;
+use crate::page;
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::derive::derivation::Derivation;
@@ -23,7 +26,11 @@ pub(super) fn members(
         .map(|constraint| (constraint.name.as_str(), constraint.ranges.as_slice()))
         .collect();
     let (count, name) = (sites::count(&sites), sites::name(&sites, &quote!(row)));
-    let kernels = Kernels { derivation, dof };
+    let kernels = Kernels {
+        declared,
+        derivation,
+        dof,
+    };
     let (values, rows_and_drift, second) = (kernels.values(), kernels.rows(), kernels.second());
     quote! {
         const CONSTRAINED: bool = true;
@@ -43,6 +50,7 @@ pub(super) fn members(
 }
 
 struct Kernels<'a> {
+    declared: &'a Declared,
     derivation: &'a Derivation,
     /// The number of coordinates.
     dof: &'a TokenStream,
@@ -58,6 +66,7 @@ impl Kernels<'_> {
         let dof = self.dof;
         let statements = Emitter::new(&[], TokenStream::new())
             .by_entries()
+            .with_headings(Headings::of(self.declared))
             .body(program)
             .statements;
         quote! {
@@ -67,11 +76,13 @@ impl Kernels<'_> {
     }
 
     fn values(&self) -> TokenStream {
-        let body = self.body(&self.program(Request {
+        let program = self.program(Request {
             constraint_values: true,
             ..Request::default()
-        }));
+        });
+        let (body, doc) = (self.body(&program), page::kernel(VALUES, &program));
         quote! {
+            #[doc = #doc]
             fn constraint_values<R: __tfe::Real>(&self, t: R, q: &[R], values: &mut [R]) {
                 let values = &mut values[..__tfe::FamilyModel::constraints(self)];
                 #body
@@ -80,11 +91,13 @@ impl Kernels<'_> {
     }
 
     fn rows(&self) -> TokenStream {
-        let body = self.body(&self.program(Request {
+        let program = self.program(Request {
             constraint_rows: true,
             ..Request::default()
-        }));
+        });
+        let (body, doc) = (self.body(&program), page::kernel(ROWS, &program));
         quote! {
+            #[doc = #doc]
             fn constraint_rows<R: __tfe::Real, __E: __tfe::Entries<R>>(
                 &self,
                 t: R,
@@ -109,8 +122,9 @@ impl Kernels<'_> {
         if program.statements.is_empty() {
             return TokenStream::new();
         }
-        let body = self.body(&program);
+        let (body, doc) = (self.body(&program), page::kernel("∂(Aᵀμ)/∂q", &program));
         quote! {
+            #[doc = #doc]
             fn constraint_second<R: __tfe::Real, __E: __tfe::Entries<R>>(
                 &self,
                 t: R,
