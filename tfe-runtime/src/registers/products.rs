@@ -22,6 +22,11 @@ impl<S: Storage> Matrix<S> {
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
+        // Without optimisation nothing is gained by a text for each number of groups, and a third of the time of compiling is lost.
+        if const { S::GROUPS == 0 } && cfg!(debug_assertions) {
+            self.apply_in_turn(like, rows, products);
+            return;
+        }
         // Conditions that are constants, so that of a known size one is compiled.
         if const { S::GROUPS == 1 } || const { S::GROUPS == 0 } && rows.len() == 1 {
             self.apply_to::<V, N, 1>(like, rows, products);
@@ -31,6 +36,35 @@ impl<S: Storage> Matrix<S> {
             self.apply_to::<V, N, 3>(like, rows, products);
         } else {
             self.apply_to::<V, N, MAX_GROUPS>(like, rows, products);
+        }
+    }
+
+    /// The same to the bit for any number of groups, in the least code.
+    #[inline(always)]
+    fn apply_in_turn<V: Four, const N: usize>(
+        &self,
+        like: V,
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
+        let groups = rows.len();
+        let points = self.columns.len() / groups;
+        let (has_gaps, paired) = (points != 4 * groups, points / 4 * 4);
+        for a in 0..N {
+            for c in 0..groups {
+                let mut sums = [like.like(0.0); 2];
+                for point in 0..points {
+                    let column = like.with(self.columns[point * groups + c]);
+                    let value = like.like(rows[point / 4][a][point % 4]);
+                    let sum = &mut sums[if point < paired { point % 2 } else { 0 }];
+                    *sum = if has_gaps || point > 1 {
+                        column.times_plus(value, *sum)
+                    } else {
+                        column * value
+                    };
+                }
+                products[c][a] = (sums[0] + sums[1]).lanes();
+            }
         }
     }
 
@@ -213,4 +247,53 @@ fn transposed<V: Four>(rows: [V; 4]) -> [V; 4] {
         like.with(columns[2]),
         like.with(columns[3]),
     ]
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::lanes::Lanes;
+    use crate::registers::storage::Heap;
+
+    /// A matrix and a vector of numbers of all signs and sizes, zeros of both signs among them.
+    fn given<const N: usize>(points: usize) -> (Matrix<Heap>, Vec<Row<N>>) {
+        let groups = points.div_ceil(4);
+        let number = |i: usize| match i % 7 {
+            0 => -0.0,
+            1 => 0.0,
+            k => ((i * i + 3 * i) as f64).sin() * 10.0_f64.powi(k as i32 - 4),
+        };
+        let columns = (0..points * groups)
+            .map(|i| [0, 1, 2, 3].map(|lane| number(4 * i + lane)))
+            .collect();
+        let row = |group| {
+            core::array::from_fn(|a| [0, 1, 2, 3].map(|lane| number(5 * group + 3 * a + lane)))
+        };
+        let rows = (0..groups).map(row).collect();
+        (Matrix { groups, columns }, rows)
+    }
+
+    fn compared<const N: usize, const C: usize>(points: usize) {
+        let (matrix, rows) = given::<N>(points);
+        let like = Lanes([0.0; 4]);
+        let mut products = [[[[f64::NAN; 4]; N]; C]; 2];
+        matrix.apply_to::<_, N, C>(like, &rows, &mut products[0]);
+        matrix.apply_in_turn(like, &rows, &mut products[1]);
+        let [written_out, in_turn] = products.map(|one| one.as_flattened().as_flattened().to_vec());
+        for (a, b) in written_out.iter().zip(&in_turn) {
+            assert_eq!(a.to_bits(), b.to_bits(), "{points} points: {a} and {b}");
+        }
+    }
+
+    #[test]
+    fn products_by_constant_sizes_are_those_of_any_size() {
+        for points in 1..=16_usize {
+            match points.div_ceil(4) {
+                1 => (compared::<1, 1>(points), compared::<3, 1>(points)),
+                2 => (compared::<1, 2>(points), compared::<3, 2>(points)),
+                3 => (compared::<1, 3>(points), compared::<3, 3>(points)),
+                _ => (compared::<1, 4>(points), compared::<3, 4>(points)),
+            };
+        }
+    }
 }
