@@ -41,7 +41,7 @@ where
         crossing: Crossing,
         act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
     ) -> Self {
-        self.events.push(name.into(), crossing, act);
+        self.events.push(name, crossing, None, act);
         self
     }
 }
@@ -67,7 +67,7 @@ where
         for time in &self.breaks {
             run = run.break_at(*time);
         }
-        match self.events.watched_by(run).run(*start, span.clone()) {
+        match run.watching(&self.events).run(*start, span.clone()) {
             Ok(motion) => (Ok(*motion.last()), *motion.statistics()),
             Err(error) => (Err(error.kind().clone()), *error.partial().statistics()),
         }

@@ -9,6 +9,7 @@ pub(super) mod value;
 
 use crate::error::RunErrorKind;
 use act::{Act, After, Event, On};
+use on::Watching;
 use remodel::Remodel;
 use search::Course;
 use std::cell::RefCell;
@@ -25,10 +26,15 @@ pub(super) struct Watched<'m, const N: usize> {
     pub(super) value: Value<'m, N>,
 }
 
+/// [`Events::look`], or nothing.
+type Look<'m, M, const N: usize> =
+    fn(&mut Events<'m, M, N>, &Passage<'_, N>) -> Result<Option<Cut<'m, M, N>>, RunErrorKind>;
+
 /// Looks for the events of a run.
 pub(super) struct Events<'m, M, const N: usize> {
     model: Share<'m, M>,
     remodel: Option<Remodel<'m, M>>,
+    look: Look<'m, M, N>,
     watched: Vec<Watched<'m, N>>,
     /// Sides on which the values were seen last; 0 where this is not known.
     sides: Vec<f64>,
@@ -155,8 +161,7 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
 
     pub(super) fn new(
         model: Share<'m, M>,
-        remodel: Option<Remodel<'m, M>>,
-        on: &[On<'m, N>],
+        watching: &Watching<'m, M, N>,
         (element, control): (Element, Control),
     ) -> Result<Self, RunErrorKind> {
         let known = || (0..model.columns()).map(|at| model.column_name(at).to_string());
@@ -176,11 +181,12 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
             let on = one.clone();
             Ok(Watched { on, value })
         };
-        let watched: Vec<_> = on.iter().map(watched).collect::<Result<_, _>>()?;
+        let watched: Vec<_> = watching.on.iter().map(watched).collect::<Result<_, _>>()?;
         let columns = model.columns();
         Ok(Self {
             model,
-            remodel,
+            remodel: watching.remodel,
+            look: watching.look,
             sides: vec![0.0; watched.len()],
             watched,
             element,
@@ -210,10 +216,14 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
     }
 
     /// Does what is to be done at the events inside an element, in their order, up to the first that ends it.
-    pub(super) fn look(
+    pub(super) fn pass(
         &mut self,
         arc: &Passage<'_, N>,
     ) -> Result<Option<Cut<'m, M, N>>, RunErrorKind> {
+        (self.look)(self, arc)
+    }
+
+    fn look(&mut self, arc: &Passage<'_, N>) -> Result<Option<Cut<'m, M, N>>, RunErrorKind> {
         let Passage { t, h, dense, .. } = *arc;
         self.recorded.clear();
         if self.stays_off(dense) {

@@ -1,6 +1,5 @@
 //! Runs of models with inputs.
 
-use super::events::remodel::{Remodel, remodel};
 use super::held::Held;
 use super::setup::Simulation;
 use crate::driven::{Cells, Driven, InputError, Interpolation};
@@ -159,7 +158,6 @@ impl<'m, M, const N: usize> Simulation<'m, M, N> {
     {
         Simulation {
             model,
-            remodel: self.remodel.map(|_| remodel as Remodel<'m, T>),
             element: self.element,
             step: self.step,
             nodes: self.nodes,
@@ -167,7 +165,7 @@ impl<'m, M, const N: usize> Simulation<'m, M, N> {
             record_every: self.record_every,
             impulses: self.impulses,
             breaks: self.breaks,
-            events: self.events,
+            events: self.events.of(),
             at_kinks: self.at_kinks,
             progress: self.progress,
             refusal: self.refusal,

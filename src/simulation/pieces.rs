@@ -214,7 +214,7 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
                 dense,
                 impulses,
             };
-            let cut = self.events.look(&arc)?;
+            let cut = self.events.pass(&arc)?;
             for severed in self.events.gone_by(&arc) {
                 observer.met(&severed).map_err(no_matrix)?;
             }

@@ -183,7 +183,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         stepper: &Stepper<'m, M, N>,
     ) -> Result<Pieces<'m, M, N>, RunErrorKind> {
         let chosen = (stepper.element(), stepper.control());
-        let events = Events::new(self.model.clone(), self.remodel, &self.events, chosen)?;
+        let events = Events::new(self.model.clone(), &self.events, chosen)?;
         Ok(Pieces::new(self.model.clone(), events))
     }
 

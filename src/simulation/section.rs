@@ -55,7 +55,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ) -> Section<'m, M, N> {
         let mut run = self.clone();
         let which = run.events.len();
-        run.events.push(On {
+        run.events.watch(On {
             name: name.into(),
             function: None,
             crossing,

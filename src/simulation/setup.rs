@@ -1,7 +1,6 @@
 //! A run to be: a model, an element, a step, and what else is asked for.
 
-use super::events::act::On;
-use super::events::remodel::Remodel;
+use super::events::on::Watching;
 use super::mesh::Mesh;
 use super::watch::resolution::Again;
 use crate::error::RunErrorKind;
@@ -40,9 +39,7 @@ pub struct Simulation<'m, M, const N: usize> {
     pub(super) record_every: usize,
     pub(super) impulses: Vec<Impulse<N>>,
     pub(super) breaks: Vec<f64>,
-    pub(super) events: Vec<On<'m, N>>,
-    /// Makes models with other parameters, where events may ask for them.
-    pub(super) remodel: Option<Remodel<'m, M>>,
+    pub(super) events: Watching<'m, M, N>,
     /// What was asked for.
     pub(super) at_kinks: Option<bool>,
     pub(super) progress: bool,
@@ -75,8 +72,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             record_every: 1,
             impulses: Vec::new(),
             breaks: Vec::new(),
-            events: Vec::new(),
-            remodel: None,
+            events: Watching::NOTHING,
             at_kinks: None,
             progress: false,
             refusal: None,
@@ -223,6 +219,12 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// How elements are solved.
     pub(crate) fn with_control(self, control: Control) -> Self {
         Self { control, ..self }
+    }
+
+    /// What it looks for.
+    pub(crate) fn watching(self, events: &Watching<'m, M, N>) -> Self {
+        let events = events.clone();
+        Self { events, ..self }
     }
 
     pub(crate) fn model(&self) -> &M {

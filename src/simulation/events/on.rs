@@ -2,6 +2,8 @@
 
 use super::act::{Act, Crossing, Occurrence, On};
 use super::remodel::{Remodel, remodel};
+use super::value::Function;
+use super::{Events, Look};
 use crate::simulation::setup::Simulation;
 use std::sync::Arc;
 use tfe_runtime::Model;
@@ -42,13 +44,7 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
         crossing: Crossing,
         act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
     ) -> Self {
-        self.events.push(On {
-            name: name.into(),
-            function: None,
-            crossing,
-            act: Arc::new(act),
-        });
-        self.remodel = Some(remodel);
+        self.events.push(name, crossing, None, act);
         self
     }
 
@@ -84,30 +80,28 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
         function: impl Fn(f64, &[f64; N], &[f64; N]) -> f64 + Send + Sync + 'm,
         act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
     ) -> Self {
-        self.events.push(On {
-            name: name.into(),
-            function: Some(Arc::new(function)),
-            crossing,
-            act: Arc::new(act),
-        });
-        self.remodel = Some(remodel);
+        let function: Function<'m, N> = Arc::new(function);
+        self.events.push(name, crossing, Some(function), act);
         self
     }
 }
 
-/// What all runs of an ensemble are asked to look for.
+/// What runs are asked to look for.
 #[derive(Debug)]
 pub(crate) struct Watching<'m, M, const N: usize> {
-    events: Vec<On<'m, N>>,
-    remodel: Option<Remodel<'m, M>>,
+    pub(super) on: Vec<On<'m, N>>,
+    /// Makes models with other parameters, where events may ask for them.
+    pub(super) remodel: Option<Remodel<'m, M>>,
+    /// Called where there is anything to look for, and so compiled for models with events only.
+    pub(super) look: Look<'m, M, N>,
 }
 
 // Not derived: models need not be `Clone`.
 impl<M, const N: usize> Clone for Watching<'_, M, N> {
     fn clone(&self) -> Self {
         Self {
-            events: self.events.clone(),
-            remodel: self.remodel,
+            on: self.on.clone(),
+            ..*self
         }
     }
 }
@@ -115,38 +109,56 @@ impl<M, const N: usize> Clone for Watching<'_, M, N> {
 impl<'m, M, const N: usize> Watching<'m, M, N> {
     /// No events.
     pub(crate) const NOTHING: Self = Self {
-        events: Vec::new(),
+        on: Vec::new(),
         remodel: None,
+        look: |_, _| Ok(None),
     };
 
     pub(crate) fn is_empty(&self) -> bool {
-        self.events.is_empty()
+        self.on.is_empty()
     }
 
-    /// One event more.
+    pub(in crate::simulation) fn len(&self) -> usize {
+        self.on.len()
+    }
+
+    /// The same of another model.
+    pub(in crate::simulation) fn of<T>(self) -> Watching<'m, T, N>
+    where
+        T: Model<N> + Send + Sync + 'm,
+    {
+        let mut watching = Watching::NOTHING;
+        for on in self.on {
+            watching.watch(on);
+        }
+        watching.remodel = self.remodel.map(|_| remodel as Remodel<'m, T>);
+        watching
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Watching<'m, M, N> {
+    /// One event more, that sets no parameters.
+    pub(in crate::simulation) fn watch(&mut self, on: On<'m, N>) {
+        self.on.push(on);
+        self.look = Events::look;
+    }
+
+    /// One event more: of an output, or of a function.
     pub(crate) fn push(
         &mut self,
-        name: String,
+        name: impl Into<String>,
         crossing: Crossing,
+        function: Option<Function<'m, N>>,
         act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
     ) where
-        M: Model<N> + Send + Sync + 'm,
+        M: Send + Sync + 'm,
     {
-        self.events.push(On {
-            name,
-            function: None,
+        self.watch(On {
+            name: name.into(),
+            function,
             crossing,
             act: Arc::new(act),
         });
         self.remodel = Some(remodel);
-    }
-
-    /// A run that looks for them.
-    pub(crate) fn watched_by(&self, run: Simulation<'m, M, N>) -> Simulation<'m, M, N> {
-        Simulation {
-            events: self.events.clone(),
-            remodel: self.remodel,
-            ..run
-        }
     }
 }
