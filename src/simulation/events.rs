@@ -6,10 +6,10 @@ pub(super) mod remodel;
 mod search;
 pub(super) mod settings;
 pub(super) mod value;
+pub(super) mod watching;
 
 use crate::error::RunErrorKind;
 use act::{Act, After, Event, On};
-use on::Watching;
 use remodel::Remodel;
 use search::Course;
 use std::cell::RefCell;
@@ -158,48 +158,6 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
 
     /// As is one that comes again so soon, relative to the step: a little later its way is lost in roundings.
     const SOON: f64 = 1e-6;
-
-    pub(super) fn new(
-        model: Share<'m, M>,
-        watching: &Watching<'m, M, N>,
-        (element, control): (Element, Control),
-    ) -> Result<Self, RunErrorKind> {
-        let known = || (0..model.columns()).map(|at| model.column_name(at).to_string());
-        let watched = |one: &On<'m, N>| {
-            let value = match &one.function {
-                Some(function) => Value::Function(function.clone()),
-                None => match known().position(|name| name == one.name) {
-                    Some(column) => Value::Column(column),
-                    None => {
-                        return Err(RunErrorKind::NoEvent {
-                            name: one.name.clone(),
-                            known: known().collect(),
-                        });
-                    }
-                },
-            };
-            let on = one.clone();
-            Ok(Watched { on, value })
-        };
-        let watched: Vec<_> = watching.on.iter().map(watched).collect::<Result<_, _>>()?;
-        let columns = model.columns();
-        Ok(Self {
-            model,
-            remodel: watching.remodel,
-            look: watching.look,
-            sides: vec![0.0; watched.len()],
-            watched,
-            element,
-            control,
-            rooms: Rooms::new(columns),
-            probe: None,
-            met: Vec::new(),
-            recorded: Vec::new(),
-            cuts: 0,
-            step: 0.0,
-            last: None,
-        })
-    }
 
     /// Goes on with another model.
     pub(super) fn set_model(&mut self, model: Share<'m, M>) {

@@ -1,6 +1,6 @@
 //! A run to be: a model, an element, a step, and what else is asked for.
 
-use super::events::on::Watching;
+use super::events::watching::Watching;
 use super::mesh::Mesh;
 use super::watch::resolution::Again;
 use crate::error::RunErrorKind;
