@@ -113,7 +113,9 @@ impl ByHand<3> for FreeBody {
         first.z[1] = by_theta;
         first.z[2] = spin;
         first.q[1] = v[0] * h;
-        first.q[2] = w * by_theta - v[1] * by_w;
+        // Euler: w L_θ̇ − θ̇ L_w, which has no digits of a small A − B.
+        let (rate_1, rate_2) = (w * sin_psi + v[1] * cos_psi, w * cos_psi - v[1] * sin_psi);
+        first.q[2] = (a - b) * (rate_1 * rate_2);
         second.zz[0][0] = inertia;
         second.zz[0][1] = sin_d;
         second.zz[1][0] = sin_d;
