@@ -34,7 +34,7 @@ fn five_links_save_a_third() {
 }
 
 /// What the macro emits for a pendulum with gravity, mass and length: characters without spaces. All kernels, and nothing for what the model has not: no forces, no
-/// constraints, no outputs. Six hundred of them number the three parameters, by each of which motions are differentiated.
+/// constraints, no outputs. Six hundred of them number the three parameters, by each of which motions are differentiated; fifty are quotation marks and commas of the page's lines.
 #[test]
 fn emitted_code_keeps_to_a_budget() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tfe-macros/golden/pendulum.rs");
@@ -47,7 +47,7 @@ fn emitted_code_keeps_to_a_budget() {
         .filter(|c| !c.is_whitespace())
         .count();
     println!("{characters} characters");
-    assert!(characters <= 4000, "{characters} characters");
+    assert!(characters <= 4050, "{characters} characters");
     for absent in ["first.force[", "fn constraint", "fn observables"] {
         assert!(
             !golden.contains(absent),
