@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::residue::{Residue, residues};
 use crate::expr::hash::Map;
+use crate::expr::input::Input;
 use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::Formula;
 
@@ -104,6 +105,7 @@ pub(super) struct Search<'a> {
     pub(super) reciprocals: Vec<Residue>,
     /// One bit for each operation that is not defined everywhere.
     partial: Vec<u64>,
+    leaves: Vec<Option<Leaves>>,
     pub(super) singles: Map<Residue, Vec<OpId>>,
     pub(super) products: Table,
     /// x + y and x − y
@@ -132,6 +134,7 @@ impl<'a> Search<'a> {
             checks: residues(plan, 2),
             reciprocals: values.iter().map(|value| value.reciprocal()).collect(),
             partial: partial(plan),
+            leaves: leaves(plan),
             values,
             singles,
             products: Table::of(products),
@@ -189,6 +192,31 @@ impl<'a> Search<'a> {
         usable
     }
 
+    /// Whether something that moves is added to something else before another that moves: (x − y) − c may cancel before a digit is rounded away, (x − c) − y may not,
+    /// and beside larger terms no sample shows it.
+    pub(super) fn parts_what_moves(&self, formula: &Formula) -> bool {
+        let Formula::Sum(terms) = formula else {
+            return false;
+        };
+        let [a, b] = &**terms;
+        let parted = match (self.leaves_of(a), self.leaves_of(b)) {
+            (Some(a), Some(b)) => a.moving && b.moving && (a.resting || b.resting),
+            _ => false,
+        };
+        parted || self.parts_what_moves(a) || self.parts_what_moves(b)
+    }
+
+    fn leaves_of(&self, formula: &Formula) -> Option<Leaves> {
+        match formula {
+            Formula::Is(value) => self.leaves[value.op.index()],
+            Formula::Sum(terms) => {
+                let [a, b] = &**terms;
+                Some(self.leaves_of(a)?.and(self.leaves_of(b)?))
+            }
+            Formula::Product(_) => None,
+        }
+    }
+
     pub(super) fn check(&self, formula: &Formula) -> Residue {
         match formula {
             Formula::Is(value) => {
@@ -199,6 +227,53 @@ impl<'a> Search<'a> {
             Formula::Product(parts) => self.check(&parts[0]).times(self.check(&parts[1])),
         }
     }
+}
+
+/// What stands in a sum of inputs and numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Leaves {
+    /// Coordinates and their rates.
+    moving: bool,
+    /// Parameters and numbers.
+    resting: bool,
+}
+
+impl Leaves {
+    fn and(self, other: Self) -> Self {
+        Self {
+            moving: self.moving || other.moving,
+            resting: self.resting || other.resting,
+        }
+    }
+}
+
+/// The operations that are inputs, numbers, or sums of these.
+fn leaves(plan: &Plan) -> Vec<Option<Leaves>> {
+    let mut all: Vec<Option<Leaves>> = Vec::with_capacity(plan.len());
+    for id in plan.ids() {
+        let of = |x: &OpId| all[x.index()];
+        let own = match plan.op(id) {
+            Op::Input(input) => {
+                let resting = matches!(
+                    input,
+                    Input::Parameter(_) | Input::ParameterElement(..) | Input::Integer(_)
+                );
+                Some(Leaves {
+                    moving: !resting,
+                    resting,
+                })
+            }
+            Op::Constant(_) => Some(Leaves {
+                resting: true,
+                ..Leaves::default()
+            }),
+            Op::Negate(a) => of(a),
+            Op::Add(a, b) | Op::Subtract(a, b) => of(a).zip(of(b)).map(|(a, b)| a.and(b)),
+            _ => None,
+        };
+        all.push(own);
+    }
+    all
 }
 
 /// Bits of what is not defined, or not smooth, everywhere; all past the sixty-third share one.
