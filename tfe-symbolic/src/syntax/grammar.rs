@@ -3,7 +3,7 @@
 
 // The generated `enum Rule` is public and undocumented, so it stays behind a private module.
 #![allow(missing_docs, unreachable_pub)]
-#![allow(dead_code, clippy::all, reason = "made by pest")]
+#![allow(dead_code, clippy::all, clippy::pedantic, reason = "made by pest")]
 
 pub struct TfeParser;
 
