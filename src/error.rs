@@ -115,6 +115,13 @@ pub enum RunErrorKind {
         /// When it was to act.
         time: f64,
     },
+    /// Something was asked for that models of this kind cannot do.
+    Unsupported {
+        /// The call.
+        call: &'static str,
+        /// The kind of models.
+        of: &'static str,
+    },
     /// The model declares no event or output of a name.
     NoEvent {
         /// The name asked for.
@@ -393,6 +400,7 @@ impl fmt::Display for RunErrorKind {
                     "; `consistent_state` finds the nearest start that does not"
                 )
             }
+            Self::Unsupported { call, of } => write!(f, "`{call}` is not to be had of {of}"),
             Self::Impulse { time } => {
                 write!(
                     f,

@@ -2,7 +2,7 @@
 
 use super::accurate::repeatable::{Broken, Passing};
 use super::course::{Course, Leg};
-use super::mesh::{Endless, Mesh};
+use super::mesh::{Endless, Mesh, is_same};
 use super::progress;
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;
@@ -56,6 +56,8 @@ pub struct FamilySimulation<'m, M> {
     pub(super) control: Control,
     record_every: usize,
     pub(super) breaks: Vec<f64>,
+    /// Times, which are breaks as well, and a number for each coordinate.
+    impulses: Vec<(f64, Vec<f64>)>,
     pub(super) progress: bool,
 }
 
@@ -65,6 +67,7 @@ impl<M> Clone for FamilySimulation<'_, M> {
         Self {
             nodes: self.nodes.clone(),
             breaks: self.breaks.clone(),
+            impulses: self.impulses.clone(),
             ..*self
         }
     }
@@ -81,6 +84,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             control: Control::default(),
             record_every: 1,
             breaks: Vec::new(),
+            impulses: Vec::new(),
             progress: false,
         }
     }
@@ -146,6 +150,40 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         self
     }
 
+    /// Adds an impulse: a generalized force of the given time integral, one number for each coordinate, that acts at one instant. An element ends there, and the node shows the momentum
+    /// before it. One at the start of the span acts at once, one at its end on what [`resume`](Self::resume) goes on with. Models with constraints, and runs with
+    /// an estimate of their error, refuse impulses: [`RunErrorKind::Unsupported`].
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(
+    ///     coordinates(q[n]),
+    ///     lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2),
+    /// )]
+    /// struct Chain { n: usize }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let chain = Chain { n: 50 };
+    /// let mut blow = vec![0.0; 50];
+    /// blow[0] = 1.5;
+    /// let motion = Simulation::new(&chain)
+    ///     .step(0.1)
+    ///     .impulse(1.0, blow)
+    ///     .run(chain.state([0.0; 50], [0.0; 50]), 0.0..5.0)?;
+    /// assert!(motion.states()[10].p.iter().all(|p| *p == 0.0)); // at t = 1, before it
+    /// let total: f64 = motion.last().p.iter().sum();
+    /// assert!((total - 1.5).abs() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn impulse(mut self, time: f64, impulse: impl Into<Vec<f64>>) -> Self {
+        self.breaks.push(time);
+        self.impulses.push((time, impulse.into()));
+        self
+    }
+
     /// Shows the progress of long runs on standard error, once a second.
     #[must_use]
     pub fn progress(mut self) -> Self {
@@ -206,6 +244,13 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     }
 
     pub(super) fn mesh(&self, span: &Range<f64>) -> Result<Mesh<0>, RunErrorKind> {
+        let (first, last) = (span.start.min(span.end), span.start.max(span.end));
+        for (time, impulse) in &self.impulses {
+            let is_finite = impulse.iter().all(|one| one.is_finite());
+            if !(is_finite && first <= *time && *time <= last) {
+                return Err(RunErrorKind::Impulse { time: *time });
+            }
+        }
         if let Some(nodes) = &self.nodes {
             return Mesh::through(span, nodes, &self.breaks, &[]);
         }
@@ -239,7 +284,9 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         let mut state = start.clone();
         let mut watch = Watch::new(self.chosen_element());
         watch.pass(recorded::<M>(&motion, false));
+        let conserves = self.impulses.is_empty();
         for (element, (t, next, h)) in mesh.elements().enumerate().skip(done) {
+            kick(&self.impulses, t, &mut state);
             if let Err(source) = stepper.advance(mesh.begin(t, h), h, &mut state) {
                 if motion.last().t != t {
                     motion.record(self.model, t, &state, stepper.velocity(t, &state));
@@ -259,7 +306,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
             let last = element + 1 == mesh.steps();
             if last || (element + 1) % self.record_every == 0 {
                 motion.record(self.model, next, &state, stepper.velocity(next, &state));
-                watch.pass(recorded::<M>(&motion, true));
+                watch.pass(recorded::<M>(&motion, conserves));
             }
             if goes_on.is_break() {
                 break;
@@ -287,6 +334,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         FamilySteps {
             course: Course::new(stepper),
             state: start,
+            impulses: self.impulses.clone(),
         }
     }
 
@@ -297,6 +345,7 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         start: &FamilyState,
     ) -> Result<(FamilyStepper<'m, M>, Vec<f64>), RunErrorKind> {
         self.check(start)?;
+        self.check_impulses()?;
         let stepper = FamilyStepper::new(self.model, self.chosen_element(), self.control);
         let mut stepper = stepper.map_err(RunErrorKind::Family)?;
         // A run records velocities: what has none is refused before it begins.
@@ -312,11 +361,42 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
         suspended: FamilySuspended,
     ) -> Result<FamilyStepper<'m, M>, RunErrorKind> {
         self.check(state)?;
+        self.check_impulses()?;
         let (element, control) = (self.chosen_element(), self.control);
         let stepper = FamilyStepper::resume(self.model, element, control, suspended);
         let mut stepper = stepper.map_err(RunErrorKind::Family)?;
         stepper.velocity(t, state).map_err(RunErrorKind::Family)?;
         Ok(stepper)
+    }
+
+    /// Whether a call may compare runs, which look for errors of momenta at nodes: at impulses they have two values there.
+    pub(super) fn without_impulses(&self, call: &'static str) -> Result<(), RunErrorKind> {
+        let of = "runs of models of run-time length with impulses";
+        match self.impulses.is_empty() {
+            true => Ok(()),
+            false => Err(RunErrorKind::Unsupported { call, of }),
+        }
+    }
+
+    /// Whether the impulses are some that the model can take.
+    fn check_impulses(&self) -> Result<(), RunErrorKind> {
+        if const { M::CONSTRAINED } && !self.impulses.is_empty() {
+            return Err(RunErrorKind::Unsupported {
+                call: "impulse",
+                of: "models of run-time length with constraints",
+            });
+        }
+        let expected = self.model.len();
+        for (_, impulse) in &self.impulses {
+            if impulse.len() != expected {
+                return Err(RunErrorKind::Family(FamilyError::StateLength {
+                    vector: "of an impulse",
+                    length: impulse.len(),
+                    expected,
+                }));
+            }
+        }
+        Ok(())
     }
 
     /// Whether model and start are good.
@@ -343,6 +423,15 @@ impl<'m, M: FamilyModel> FamilySimulation<'m, M> {
     }
 }
 
+/// What impulses at this time make of momenta.
+fn kick(impulses: &[(f64, Vec<f64>)], t: f64, state: &mut FamilyState) {
+    for (_, impulse) in impulses.iter().filter(|(time, _)| is_same(*time, t)) {
+        for (p, change) in state.p.iter_mut().zip(impulse) {
+            *p += change;
+        }
+    }
+}
+
 /// The last node of a motion, behind another one or not.
 fn recorded<M: FamilyModel>(motion: &FamilyMotion, is_behind: bool) -> Recorded {
     let facts = M::FACTS;
@@ -361,14 +450,17 @@ fn recorded<M: FamilyModel>(motion: &FamilyMotion, is_behind: bool) -> Recorded 
 pub struct FamilySteps<'m, M> {
     course: Course<FamilyStepper<'m, M>>,
     state: FamilyState,
+    impulses: Vec<(f64, Vec<f64>)>,
 }
 
 impl<M: FamilyModel> Iterator for FamilySteps<'_, M> {
     type Item = Result<FamilyNode, RunErrorKind>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let state = &mut self.state;
+        let (state, impulses) = (&mut self.state, &self.impulses);
         let advance = |stepper: &mut FamilyStepper<'_, M>, leg: &Leg| {
+            let (begin, _) = leg.nodes;
+            kick(impulses, begin, state);
             stepper
                 .advance(leg.begin, leg.h, state)
                 .map_err(|source| leg.failed(source))?;

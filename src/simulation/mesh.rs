@@ -291,7 +291,7 @@ pub(crate) fn up_to_break(start: f64, end: f64) -> f64 {
 }
 
 /// Whether two times are one but for rounding.
-fn is_same(a: f64, b: f64) -> bool {
+pub(super) fn is_same(a: f64, b: f64) -> bool {
     (a - b).abs() <= 8.0 * f64::EPSILON * a.abs().max(b.abs())
 }
 

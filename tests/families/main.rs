@@ -8,6 +8,7 @@ mod checkpoints;
 mod constrained;
 mod constraints;
 mod errors;
+mod impulses;
 mod kernels;
 mod lists;
 mod motions;

@@ -54,6 +54,7 @@ impl<M: FamilyModel> FamilySimulation<'_, M> {
         span: Range<f64>,
     ) -> Result<Estimated<FamilyMotion>, FamilyRunError> {
         let refused = |kind| self.refused(kind, span.start, &start);
+        self.without_impulses("run_estimated").map_err(refused)?;
         self.stepper(span.start, &start).map_err(refused)?;
         let mesh = self.mesh(&span).map_err(refused)?;
         estimated(self, (span.start, &start), &mesh)
@@ -79,6 +80,7 @@ impl<M: FamilyModel> Accurate<FamilySimulation<'_, M>> {
             let call = "accuracy";
             return Err(refused(RunErrorKind::KinksUnsupported { call }));
         }
+        run.without_impulses("accuracy").map_err(refused)?;
         run.stepper(span.start, &start).map_err(refused)?;
         run.mesh(&span).map_err(refused)?;
         if span.start == span.end {

@@ -1,0 +1,136 @@
+//! Impulses on models of run-time length.
+
+use tfe::error::RunErrorKind;
+use tfe::family::{FamilyError, FamilySimulation};
+use tfe::prelude::*;
+
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + a/4*(q[i+1]-q[i])^4),
+)]
+struct Chain {
+    n: usize,
+    a: f64,
+}
+
+#[dynamics(
+    coordinates(q[5]),
+    lagrangian = sum(i in 0..5, dot(q[i])^2/2) - sum(i in 0..4, (q[i+1]-q[i])^2/2 + a/4*(q[i+1]-q[i])^4),
+)]
+struct FiveMasses {
+    a: f64,
+}
+
+const CHAIN: Chain = Chain { n: 5, a: 0.7 };
+const Q: [f64; 5] = [0.3, -0.1, 0.4, 0.0, 0.2];
+const BLOW: [f64; 5] = [0.5, 0.0, -1.0, 0.0, 0.25];
+
+fn struck(times: &[f64]) -> FamilySimulation<'static, Chain> {
+    let simulation = Simulation::new(&CHAIN).element(Mixed::<5>).step(0.05);
+    (times.iter()).fold(simulation, |run, time| run.impulse(*time, BLOW))
+}
+
+/// In the steps of a model of fixed size, to whose nodes impulses are moved by a break.
+#[test]
+fn they_do_what_they_do_to_models_of_fixed_size() {
+    let times = [0.0, 0.51, 1.25];
+    let run = struck(&times).run(CHAIN.state(Q, [0.0; 5]), 0.0..2.0);
+    let fixed = FiveMasses { a: 0.7 };
+    let simulation = Simulation::new(&fixed).element(Mixed::<5>).step(0.05);
+    let simulation = (times.iter()).fold(simulation, |run, time| {
+        run.break_at(*time).impulse(*time, BLOW)
+    });
+    let other = simulation.run(fixed.state(Q, [0.0; 5]), 0.0..2.0);
+    let (run, other) = (run.expect("a good run"), other.expect("a good run"));
+    let (a, b) = (run.last(), other.last());
+    for k in 0..5 {
+        assert!((a.q[k] - b.q[k]).abs() < 1e-13, "{:?} {:?}", a.q, b.q);
+        assert!((a.p[k] - b.p[k]).abs() < 1e-13, "{:?} {:?}", a.p, b.p);
+    }
+    assert_eq!(run.warnings(), &[]);
+}
+
+#[test]
+fn nodes_show_the_momentum_before_them() {
+    let run = struck(&[0.5]).run(CHAIN.state(Q, [0.0; 5]), 0.0..1.0);
+    let run = run.expect("a good run");
+    let total = |node: usize| run.states()[node].p.iter().sum::<f64>();
+    let expected: f64 = BLOW.iter().sum();
+    assert_eq!(run.states()[10].t, 0.5);
+    assert!(total(10).abs() < 1e-15 && (total(11) - expected).abs() < 1e-15);
+}
+
+/// Runs, halves of runs and single steps are the same to the bit, also where the halves meet at an impulse.
+#[test]
+fn halves_and_steps_are_one_run() {
+    let times = [0.0, 0.25, 0.5];
+    let start = || CHAIN.state(Q, [0.1; 5]);
+    let whole = struck(&times).run(start(), 0.0..1.0).expect("a good run");
+    let first = struck(&times).run(start(), 0.0..0.5);
+    let first = first.expect("a good run");
+    let checkpoint = first.checkpoint().expect("a complete run");
+    let second = struck(&times).resume(checkpoint, 1.0).expect("a good run");
+    assert_eq!(second.states(), &whole.states()[10..]);
+    let steps = struck(&times).steps(start(), 0.0).take(20);
+    for (node, step) in whole.states()[1..].iter().zip(steps) {
+        assert_eq!(node, &step.expect("a good step"));
+    }
+}
+
+#[test]
+fn what_cannot_act_is_refused() {
+    let start = || CHAIN.state(Q, [0.0; 5]);
+    let kind = |run: FamilySimulation<'static, Chain>| {
+        let error = run.run(start(), 0.0..1.0).expect_err("no good impulse");
+        error.kind().clone()
+    };
+    let run = Simulation::new(&CHAIN).step(0.1);
+    let wrong = FamilyError::StateLength {
+        vector: "of an impulse",
+        length: 3,
+        expected: 5,
+    };
+    assert_eq!(
+        kind(run.clone().impulse(0.5, [1.0; 3])),
+        RunErrorKind::Family(wrong)
+    );
+    for (time, value) in [(1.5, 1.0), (f64::INFINITY, 1.0), (0.5, f64::INFINITY)] {
+        assert_eq!(
+            kind(run.clone().impulse(time, [value; 5])),
+            RunErrorKind::Impulse { time }
+        );
+    }
+}
+
+#[test]
+fn estimates_refuse_them() {
+    let start = || CHAIN.state(Q, [0.0; 5]);
+    let accurate = struck(&[0.5]).accuracy(1e-6).run(start(), 0.0..1.0);
+    let estimated = struck(&[0.5]).run_estimated(start(), 0.0..1.0);
+    for (run, call) in [(accurate, "accuracy"), (estimated, "run_estimated")] {
+        let of = "runs of models of run-time length with impulses";
+        let error = run.expect_err("two momenta at a node");
+        assert_eq!(error.kind(), &RunErrorKind::Unsupported { call, of });
+    }
+}
+
+#[cfg(feature = "sparse")]
+#[test]
+fn constraints_refuse_them() {
+    #[dynamics(
+        coordinates(x[n], y[n]),
+        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
+        constraint(rod[i in 0..n]) = x[i]^2 + y[i]^2 - 1,
+    )]
+    struct Rods {
+        n: usize,
+    }
+    let rods = Rods { n: 1 };
+    let run = Simulation::new(&rods).step(0.1).impulse(0.5, [1.0, 0.0]);
+    let error = run.run(rods.state([1.0, 0.0], [0.0, 0.0]), 0.0..1.0);
+    let error = error.expect_err("impulses are not consistent with constraints");
+    assert_eq!(
+        error.kind().to_string(),
+        "`impulse` is not to be had of models of run-time length with constraints"
+    );
+}
