@@ -172,8 +172,7 @@ impl Kernels<'_> {
             ..nothing
         };
         let formulas = Formulas::of(self.declared, self.derivation);
-        let doc = |formula: &str, program: &Program| page::kernel(formula, program);
-        let value_doc = doc(&formulas.value, &self.program(value));
+        let value_doc = page::kernel(&formulas.value, &self.program(value));
         let value = self.body(&self.program(value), Given::Nothing);
         let (value_statements, value) = (value.statements, value.value);
         let value = value.unwrap_or_else(|| quote!(t.like(0.0)));
@@ -189,10 +188,10 @@ impl Kernels<'_> {
             second: true,
             ..first
         };
-        let first_doc = doc(&formulas.first, &self.program(first));
-        let mass_doc = doc(&formulas.mass, &self.program(mass));
+        let first_doc = page::kernel(&formulas.first, &self.program(first));
+        let mass_doc = page::kernel(&formulas.mass, &self.program(mass));
         let seconds = format!("{}, {}", formulas.first, formulas.second);
-        let second_doc = doc(&seconds, &self.program(second));
+        let second_doc = page::kernel(&seconds, &self.program(second));
         let first = self.body(&self.program(first), Given::First).statements;
         let forces = self.derivation.forces();
         let assigns = self.strides(&forces).filter(|strides| strides.assigns);
@@ -202,7 +201,7 @@ impl Kernels<'_> {
             )
         });
         let in_strides = self.in_strides(&forces);
-        let forces_doc = doc(&formulas.forces, &forces);
+        let forces_doc = page::kernel(&formulas.forces, &forces);
         let forces = self.body(&forces, Given::Forces).statements;
         let mass = self.body(&self.program(mass), Given::Nothing).statements;
         let second = self.body(&self.program(second), Given::First).statements;

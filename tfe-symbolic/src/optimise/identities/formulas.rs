@@ -96,10 +96,10 @@ impl Found<'_> {
             return;
         };
         let saving = most.saturating_sub(self.kept(operands));
-        if self.search.parts_what_moves(&formula) {
-            return;
-        }
-        if saving > 0 && self.search.check(&formula) == self.search.checks[self.target.index()] {
+        if saving > 0
+            && !self.search.parts_what_moves(&formula)
+            && self.search.check(&formula) == self.search.checks[self.target.index()]
+        {
             self.candidates.push(Candidate {
                 saving,
                 target: self.target,
