@@ -525,3 +525,40 @@ fn families_tell_that_they_cross_kinks() {
     let estimated = estimated.run_estimated(start, 0.0..10.0).expect("a run");
     assert!(estimated.warnings().contains(&Warning::KinksCrossed));
 }
+
+/// An element that ends at an event is cut at the kinks before it, as the element that was to be: a cord that goes slack, and a wall.
+#[test]
+fn times_of_events_behind_a_kink_are_as_accurate() {
+    #[dynamics(
+        coordinates(x, y),
+        lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y - k/2*max(hypot(x, y) - l, 0)^2,
+        event(wall) = x - w,
+    )]
+    struct Cord {
+        m: f64,
+        g: f64,
+        k: f64,
+        l: f64,
+        w: f64,
+    }
+    let cord = Cord {
+        m: 1.0,
+        g: 9.81,
+        k: 50.0,
+        l: 1.0,
+        w: 0.8,
+    };
+    for step in [0.02, 0.01] {
+        let simulation = Simulation::new(&cord)
+            .element(Mixed::<6>)
+            .step(step)
+            .at_kinks(true)
+            .on("wall", Crossing::Rising, |event| {
+                Act::Restart(event.state_with_velocity([-event.v[0], event.v[1]]))
+            });
+        let run = simulation.run(cord.state([-0.9, 0.6], [0.0, 0.0]), 0.0..5.0);
+        let run = run.expect("a good run");
+        assert_eq!(run.events().len(), 3);
+        assert!(run.energy_error() < 1e-13, "{:e}", run.energy_error());
+    }
+}

@@ -40,6 +40,8 @@ pub(super) struct Events<'m, M, const N: usize> {
     sides: Vec<f64>,
     element: Element,
     control: Control,
+    /// Whether steps are cut at kinks, those that look for the times of events as well.
+    at_kinks: bool,
     rooms: Rooms,
     /// Finds the times of events, apart from the run.
     probe: Option<Stepper<'m, M, N>>,
@@ -430,7 +432,15 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
         let mut length = root.tau * h;
         let mut probe = match self.probe.take() {
             Some(probe) => probe,
-            None => Stepper::sharing(self.model.clone(), self.element, self.control).ok()?,
+            None => {
+                let probe =
+                    Stepper::sharing(self.model.clone(), self.element, self.control).ok()?;
+                if self.at_kinks {
+                    probe.at_kinks()
+                } else {
+                    probe
+                }
+            }
         };
         let mut last = f64::INFINITY;
         let mut met = None;

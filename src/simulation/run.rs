@@ -182,7 +182,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         &self,
         stepper: &Stepper<'m, M, N>,
     ) -> Result<Pieces<'m, M, N>, RunErrorKind> {
-        let chosen = (stepper.element(), stepper.control());
+        let at_kinks = self.at_kinks == Some(true);
+        let chosen = (stepper.element(), stepper.control(), at_kinks);
         let events = Events::new(self.model.clone(), &self.events, chosen)?;
         Ok(Pieces::new(self.model.clone(), events))
     }

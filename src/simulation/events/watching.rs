@@ -91,7 +91,7 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
     pub(in crate::simulation) fn new(
         model: Share<'m, M>,
         watching: &Watching<'m, M, N>,
-        (element, control): (Element, Control),
+        (element, control, at_kinks): (Element, Control, bool),
     ) -> Result<Self, RunErrorKind> {
         let known = || (0..model.columns()).map(|at| model.column_name(at).to_string());
         let watched = |one: &On<'m, N>| {
@@ -120,6 +120,7 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
             watched,
             element,
             control,
+            at_kinks,
             rooms: Rooms::new(columns),
             probe: None,
             met: Vec::new(),
