@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 use std::error::Error;
 use std::time::Instant;
 use tfe::charts::{Axis, Chart, Scale, Style};
-use tfe::family::{self, FamilyModel, FamilySimulation, FamilyState, FamilyStepper};
+use tfe::family::{self, FamilyModel, FamilyState, FamilyStepper};
 use tfe::prelude::*;
 use tfe::runtime::step::Control;
 
@@ -94,7 +94,7 @@ fn sweep<M: FamilyModel>(model: impl Fn(usize) -> M) -> Result<Vec<Row>, Box<dyn
         let q = (0..n).map(|i| (0.1 * i as f64).sin()).collect();
         let start = family::state(&model, 0.0, q, vec![0.0; n]);
         let runs = (300_000 / n).clamp(2, 500);
-        let simulation = FamilySimulation::new(&model).element(Mixed::<4>).step(STEP);
+        let simulation = Simulation::new(&model).element(Mixed::<4>).step(STEP);
         let simulation = simulation.record_every(usize::MAX);
         let mut row = Row {
             n,

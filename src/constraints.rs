@@ -96,7 +96,7 @@ pub struct ConstraintResidual {
     pub position: f64,
     /// max |A v + a|
     pub velocity: f64,
-    /// The smallest number of independent constraints.
+    /// The smallest number of independent constraints; of models of run-time length, which need all to be so, their number.
     pub rank: usize,
 }
 
@@ -104,21 +104,24 @@ pub struct ConstraintResidual {
 ///
 /// They are those of the instant, from the state alone (theory.md (T-77)), so that they have the accuracy of the state. Of dependent constraints any
 /// reactions with the same forces would do; these have the least Σ λ².
+///
+/// Constraints of models of run-time length are called by their sites, `rod[0]`, `rod[1]`, …
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Reactions {
-    pub(crate) names: Vec<&'static str>,
+pub struct Reactions<Name = &'static str> {
+    pub(crate) names: Vec<Name>,
     pub(crate) values: Vec<f64>,
 }
 
-impl Reactions {
-    /// The names of the constraints, in the order of declaration.
-    pub fn names(&self) -> &[&'static str] {
+impl<Name: fmt::Display> Reactions<Name> {
+    /// The names of the constraints, in the order of declaration and of sites.
+    pub fn names(&self) -> &[Name] {
         &self.names
     }
 
     /// The reactions of one constraint at the recorded nodes; `None` where the model declares no such name.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
-        let at = self.names.iter().position(|candidate| *candidate == name)?;
+        let is_it = |candidate: &Name| candidate.to_string() == name;
+        let at = self.names.iter().position(is_it)?;
         let rows = self.values.chunks_exact(self.names.len());
         Some(rows.map(|row| row[at]).collect())
     }

@@ -2,6 +2,7 @@
 
 use crate::constraints::write_residuals;
 use crate::driven::InputError;
+use crate::length::{FixedLength, Length};
 use crate::motion::Motion;
 use std::error::Error;
 use std::fmt;
@@ -234,13 +235,13 @@ impl RunErrorKind {
 
 /// A run that stopped before its end: why, and the motion up to the last good state.
 #[derive(Clone, Debug)]
-pub struct RunError<const N: usize> {
+pub struct RunError<const N: usize, L: Length<N> = FixedLength> {
     kind: RunErrorKind,
-    partial: Box<Motion<N>>,
+    partial: Box<Motion<N, L>>,
 }
 
-impl<const N: usize> RunError<N> {
-    pub(crate) fn new(kind: RunErrorKind, partial: Motion<N>) -> Self {
+impl<const N: usize, L: Length<N>> RunError<N, L> {
+    pub(crate) fn new(kind: RunErrorKind, partial: Motion<N, L>) -> Self {
         Self {
             kind,
             partial: Box::new(partial),
@@ -253,12 +254,12 @@ impl<const N: usize> RunError<N> {
     }
 
     /// The motion up to the last good state; the start alone where the run never began.
-    pub fn partial(&self) -> &Motion<N> {
+    pub fn partial(&self) -> &Motion<N, L> {
         &self.partial
     }
 
     /// The motion up to the last good state, by value.
-    pub fn into_partial(self) -> Motion<N> {
+    pub fn into_partial(self) -> Motion<N, L> {
         *self.partial
     }
 }
@@ -441,7 +442,7 @@ impl Error for RunErrorKind {
     }
 }
 
-impl<const N: usize> fmt::Display for RunError<N> {
+impl<const N: usize, L: Length<N>> fmt::Display for RunError<N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.kind.fmt(f)?;
         match self.partial.states().last() {
@@ -458,7 +459,7 @@ impl<const N: usize> fmt::Display for RunError<N> {
     }
 }
 
-impl<const N: usize> Error for RunError<N> {
+impl<const N: usize, L: Length<N>> Error for RunError<N, L> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         self.kind.source()
     }

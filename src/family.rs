@@ -1,7 +1,7 @@
 //! Models of run-time length: `coordinates(q[n])` with n a field of the struct.
 //!
-//! [`Simulation::new`](crate::Simulation::new) runs them as it runs models of fixed size; the types here are those that it gives. The example is
-//! at [`FamilySimulation`].
+//! [`Simulation::new`](crate::Simulation::new) runs them as it runs models of fixed size. Types of runs and motions are the same, with a last parameter [`RunTimeLength`], which the aliases here
+//! give.
 //!
 //! Who is joined to whom may be a list, and an output may be one number for each site:
 //!
@@ -34,12 +34,22 @@
 //! # }
 //! ```
 
-pub use crate::motion::family::{FamilyMotion, FamilyNode, FamilyOutputs, FamilyResidual};
-pub use crate::simulation::FamilyCheckpoint;
-pub use crate::simulation::family::{FamilyRunError, FamilySimulation, FamilySteps};
-pub use crate::simulation::kind::Runs;
+pub use crate::evaluate::Evaluate;
+pub use crate::length::{Declared, FixedLength, RunTimeLength};
 pub use tfe_runtime::family::{
     Block, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, FamilySuspended,
     Gradient, Pattern, STRIDE, Sweep, constraint_residual, energy, momenta, state, velocity,
 };
-pub use tfe_runtime::length::{Declared, FixedLength, RunTimeLength};
+
+/// [`Simulation`](crate::Simulation) of a model of run-time length.
+pub type Simulation<'m, M> = crate::Simulation<'m, M, 0, RunTimeLength>;
+/// [`Motion`](crate::Motion) of a model of run-time length.
+pub type Motion = crate::Motion<0, RunTimeLength>;
+/// [`Node`](crate::Node) of a model of run-time length.
+pub type Node = crate::Node<0, RunTimeLength>;
+/// [`RunError`](crate::RunError) of a model of run-time length.
+pub type RunError = crate::RunError<0, RunTimeLength>;
+/// [`Steps`](crate::Steps) of a model of run-time length.
+pub type Steps<'m, M> = crate::Steps<'m, M, 0, RunTimeLength>;
+/// [`Checkpoint`](crate::Checkpoint) of a model of run-time length.
+pub type Checkpoint = crate::Checkpoint<0, RunTimeLength>;

@@ -13,10 +13,12 @@ mod csv;
 mod driven;
 pub mod ensemble;
 pub mod error;
+mod evaluate;
 pub mod family;
 pub mod fidelity;
 #[cfg(feature = "fit")]
 pub mod fit;
+pub mod length;
 pub mod linearised;
 pub mod modal;
 pub mod motion;

@@ -4,11 +4,10 @@ mod arcs;
 mod at_error;
 mod checkpoint;
 mod event;
-pub(crate) mod family;
 mod warning;
 
 pub use at_error::AtError;
-pub use checkpoint::{Checkpoint, FamilyCheckpoint};
+pub use checkpoint::Checkpoint;
 pub use event::Event;
 pub use warning::Warning;
 
@@ -18,51 +17,60 @@ pub use arcs::{MotionArc, Setting};
 
 use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv;
+use crate::evaluate::Evaluate;
+use crate::length::{FixedLength, Length, Polynomial};
 use crate::numbers::larger;
-use crate::velocity::velocity_from;
 use arcs::Arcs;
 use std::fmt;
 use std::io;
 use std::ops::Range;
 use std::path::Path;
 use tfe_runtime::quadrature::Quadrature;
-use tfe_runtime::step::DenseElement;
-use tfe_runtime::{CoordinateName, Form, Model, State, Statistics, constrained, legendre};
+use tfe_runtime::{CoordinateName, Model, Statistics};
 
-/// A state with its time.
+/// A state with its time: of arrays, or of vectors where the length is known at run time only.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Node<const N: usize> {
+pub struct Node<const N: usize, L: Length<N> = FixedLength> {
     /// Time.
     pub t: f64,
     /// Generalized coordinates.
-    pub q: [f64; N],
+    pub q: L::Vector,
     /// Generalized momenta p = ∂L/∂v.
-    pub p: [f64; N],
+    pub p: L::Vector,
     /// Velocities dq/dt: those of the state at nodes, NaN where no velocity belongs to the momentum; between nodes the derivative of the polynomial.
-    pub v: [f64; N],
+    pub v: L::Vector,
 }
 
-impl<const N: usize> Node<N> {
+impl<const N: usize, L: Length<N>> Node<N, L> {
+    /// A state with its velocities.
+    pub(crate) fn of(t: f64, state: &L::State, v: L::Vector) -> Self {
+        let (q, p) = L::parts(state);
+        let (q, p) = (q.clone(), p.clone());
+        Self { t, q, p, v }
+    }
+
     /// A state of a model, whose velocities are looked for from `guess` on.
-    pub(crate) fn new<M: Model<N>>(model: &M, t: f64, state: &State<N>, guess: &[f64; N]) -> Self {
-        Self {
-            t,
-            q: state.q,
-            p: state.p,
-            v: velocity_from(model, t, state, guess),
-        }
+    pub(crate) fn new<M>(model: &M, t: f64, state: &L::State, guess: &L::Vector) -> Self
+    where
+        M: Evaluate<N, L>,
+    {
+        let velocity = model.velocity(t, state, guess);
+        Self::of(t, state, velocity.unwrap_or_else(|| L::unknown(guess)))
     }
 
     /// The point of phase space, without the time.
-    pub fn state(&self) -> State<N> {
-        State {
-            q: self.q,
-            p: self.p,
-        }
+    pub fn state(&self) -> L::State {
+        L::state(self.q.clone(), self.p.clone())
+    }
+
+    /// p·v
+    pub(crate) fn action(&self) -> f64 {
+        let products = self.v.as_ref().iter().zip(self.p.as_ref());
+        products.map(|(v, p)| v * p).sum()
     }
 }
 
-/// The observables that a model declares by `output(name) = …`, one column each, one row a recorded node.
+/// The observables that a model declares by `output(name) = …` or, with one column for each site, by `output(name[i in a..b]) = …`; one row a recorded node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outputs {
     names: Vec<CoordinateName>,
@@ -70,189 +78,181 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// The names, in the order of declaration.
+    /// The names of the columns, in the order of declaration and of sites: `strain[0]`, `strain[1]`, … where they have any.
     pub fn names(&self) -> &[CoordinateName] {
         &self.names
     }
 
-    /// The values of one observable at the recorded nodes; `None` where the model declares no such name.
+    /// The values of one column at the recorded nodes; `None` where the model declares no such name.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
         let is_it = |candidate: &CoordinateName| candidate.to_string() == name;
         let at = self.names.iter().position(is_it)?;
-        Some(
-            self.values
-                .iter()
-                .skip(at)
-                .step_by(self.names.len())
-                .copied()
-                .collect(),
-        )
+        let values = self.values.iter().skip(at);
+        Some(values.step_by(self.names.len()).copied().collect())
     }
 
-    /// All observables at one recorded node, in the order of [`names`](Self::names).
+    /// All columns at one recorded node, in the order of [`names`](Self::names).
     pub fn row(&self, node: usize) -> Option<&[f64]> {
-        self.values
-            .get(node * self.names.len()..(node + 1) * self.names.len())
+        let columns = self.names.len();
+        self.values.get(node * columns..(node + 1) * columns)
     }
 }
 
-/// A recorded motion of a model with `N` coordinates.
+/// A recorded motion of a model with `N` coordinates, or of one of run-time length.
 ///
 /// The nodes are the ends of the elements (every one, or every k-th after
 /// [`record_every`](crate::Simulation::record_every)); between nodes, [`at`](Self::at) evaluates the element's own polynomial.
+///
+/// A node of a model of run-time length keeps 4 n numbers for n coordinates, the polynomial of an element of s stages 2 s n more: for long chains and long runs, `record_every` leaves nodes and
+/// polynomials out.
 #[derive(Clone)]
-pub struct Motion<const N: usize> {
-    nodes: Vec<Node<N>>,
-    velocities: Vec<[f64; N]>,
+pub struct Motion<const N: usize, L: Length<N> = FixedLength> {
+    nodes: Vec<Node<N, L>>,
+    velocities: Vec<L::Vector>,
     energies: Vec<f64>,
     outputs: Outputs,
-    reactions: Reactions,
+    reactions: Reactions<L::ConstraintName>,
     residual: ConstraintResidual,
-    elements: Vec<DenseElement<N>>,
+    elements: Vec<L::Polynomial>,
     statistics: Statistics,
     warnings: Vec<Warning>,
     names: Vec<CoordinateName>,
-    checkpoint: Option<Box<Checkpoint<N>>>,
-    events: Vec<Event<N>>,
+    checkpoint: Option<Box<Checkpoint<N, L>>>,
+    events: Vec<Event<N, L>>,
     arcs: Arcs,
 }
 
-impl<const N: usize> Motion<N> {
+impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// The motion of a model that has only its start.
-    pub(crate) fn from_start<M: Model<N>>(model: &M, t: f64, start: &State<N>) -> Self {
+    pub(crate) fn from_start<M>(model: &M, t: f64, start: &L::State) -> Self
+    where
+        M: Evaluate<N, L>,
+    {
+        let (_, p) = L::parts(start);
+        let node = Node::new(model, t, start, &L::zero(p));
+        Self::starting(model, node)
+    }
+
+    /// The same of a start whose velocity is known.
+    pub(crate) fn starting<M: Evaluate<N, L>>(model: &M, node: Node<N, L>) -> Self {
         let mut motion = Self::empty(model);
-        motion.record(model, t, start);
+        motion.record_node(model, node);
         motion
     }
 
     /// The same of a model that cannot be evaluated there.
-    pub(crate) fn unknown<M: Model<N>>(model: &M, t: f64, start: &State<N>) -> Self {
+    pub(crate) fn unknown<M: Evaluate<N, L>>(model: &M, t: f64, start: &L::State) -> Self {
         let mut motion = Self::empty(model);
-        let v = [f64::NAN; N];
-        let State { q, p } = *start;
-        motion.nodes.push(Node { t, q, p, v });
+        let (_, p) = L::parts(start);
+        let v = L::unknown(p);
+        motion.nodes.push(Node::of(t, start, v.clone()));
         motion.velocities.push(v);
         motion.energies.push(f64::NAN);
-        motion.outputs.values = vec![f64::NAN; model.columns()];
-        motion.reactions.values = vec![f64::NAN; M::CONSTRAINTS.len()];
+        motion.outputs.values = vec![f64::NAN; motion.outputs.names.len()];
+        motion.reactions.values = vec![f64::NAN; motion.reactions.names.len()];
         motion
     }
 
-    fn empty<M: Model<N>>(model: &M) -> Self {
+    /// The start of a run that never began: nothing is asked of the model, whose lengths may not even fit together.
+    pub(crate) fn unasked(t: f64, start: &L::State) -> Self {
+        let (_, p) = L::parts(start);
+        let nodes = vec![Node::of(t, start, L::unknown(p))];
+        Self {
+            nodes,
+            ..Self::without_nodes(Vec::new(), Vec::new(), Vec::new())
+        }
+    }
+
+    fn empty<M: Evaluate<N, L>>(model: &M) -> Self {
+        Self::without_nodes(
+            model.coordinate_names(),
+            model.output_names(),
+            model.constraint_names(),
+        )
+    }
+
+    fn without_nodes(
+        names: Vec<CoordinateName>,
+        outputs: Vec<CoordinateName>,
+        constraints: Vec<L::ConstraintName>,
+    ) -> Self {
         Self {
             nodes: Vec::new(),
             velocities: Vec::new(),
             energies: Vec::new(),
             outputs: Outputs {
-                names: (0..model.columns())
-                    .map(|at| model.column_name(at))
-                    .collect(),
-                values: Vec::new(),
-            },
-            reactions: Reactions {
-                names: M::CONSTRAINTS.iter().map(|one| one.name).collect(),
+                names: outputs,
                 values: Vec::new(),
             },
             residual: ConstraintResidual {
                 position: 0.0,
                 velocity: 0.0,
-                rank: M::CONSTRAINTS.len(),
+                rank: constraints.len(),
+            },
+            reactions: Reactions {
+                names: constraints,
+                values: Vec::new(),
             },
             elements: Vec::new(),
             statistics: Statistics::default(),
             warnings: Vec::new(),
-            names: (0..N).map(M::coordinate_name).collect(),
+            names,
             checkpoint: None,
             events: Vec::new(),
             arcs: Arcs::default(),
         }
     }
 
-    /// The same of a run that goes on, whose velocity at the start is known.
-    pub(crate) fn from_checkpoint<M: Model<N>>(model: &M, checkpoint: &Checkpoint<N>) -> Self {
-        let (t, start) = (checkpoint.time(), &checkpoint.state);
-        let mut motion = Self::from_start(model, t, start);
-        motion.nodes.clear();
-        motion.velocities.clear();
-        motion.energies.clear();
-        motion.outputs.values.clear();
-        motion.reactions.values.clear();
-        motion.record_with(model, t, start, checkpoint.velocity);
-        motion
+    /// Appends a node, with its velocity, energy and observables. Where the Legendre transform has no solution at the node they are
+    /// recorded as NaN: the state itself is good, and its momentum may well belong to no velocity (a singular mass matrix).
+    pub(crate) fn record<M: Evaluate<N, L>>(&mut self, model: &M, t: f64, state: &L::State) {
+        let node = match self.velocities.last() {
+            Some(guess) => Node::new(model, t, state, guess),
+            None => {
+                let (_, p) = L::parts(state);
+                Node::new(model, t, state, &L::zero(p))
+            }
+        };
+        self.record_node(model, node);
     }
 
-    pub(crate) fn set_checkpoint(&mut self, checkpoint: Checkpoint<N>) {
+    /// The same where the velocity is known.
+    pub(crate) fn record_node<M: Evaluate<N, L>>(&mut self, model: &M, node: Node<N, L>) {
+        let (t, state) = (node.t, node.state());
+        self.energies.push(model.energy(t, &state, &node.v));
+        let columns = self.outputs.names.len();
+        if columns > 0 {
+            let start = self.outputs.values.len();
+            self.outputs.values.resize(start + columns, 0.0);
+            let values = &mut self.outputs.values[start..];
+            model.outputs(t, &state, &node.v, values);
+        }
+        if let Some((residual, reactions)) = model.constraints(t, &state, &node.v) {
+            let largest = &mut self.residual;
+            largest.position = larger(largest.position, residual.position);
+            largest.velocity = larger(largest.velocity, residual.velocity);
+            largest.rank = largest.rank.min(residual.rank);
+            self.reactions.values.extend(reactions);
+        }
+        self.velocities.push(node.v.clone());
+        self.nodes.push(node);
+    }
+
+    pub(crate) fn add_warning(&mut self, warning: Warning) {
+        self.warnings.push(warning);
+    }
+
+    pub(crate) fn set_checkpoint(&mut self, checkpoint: Checkpoint<N, L>) {
         self.checkpoint = Some(Box::new(checkpoint));
     }
 
     /// Where the run ended, with all that [`Simulation::resume`](crate::Simulation::resume) needs to go on as if it had never stopped; `None` where the run failed, or
     /// was made of several ([`accuracy`](crate::Simulation::accuracy)).
-    pub fn checkpoint(&self) -> Option<&Checkpoint<N>> {
+    pub fn checkpoint(&self) -> Option<&Checkpoint<N, L>> {
         self.checkpoint.as_deref()
     }
 
-    /// Appends a node, with its velocity, energy and observables. Where the Legendre transform has no solution at the node they are
-    /// recorded as NaN: the state itself is good, and its momentum may well belong to no velocity (a singular mass matrix).
-    pub(crate) fn record<M: Model<N>>(&mut self, model: &M, t: f64, state: &State<N>) {
-        let guess = self.velocities.last().copied().unwrap_or([0.0; N]);
-        let velocity = velocity_from(model, t, state, &guess);
-        self.record_with(model, t, state, velocity);
-    }
-
-    /// The same where the velocity is known.
-    fn record_with<M: Model<N>>(
-        &mut self,
-        model: &M,
-        t: f64,
-        state: &State<N>,
-        velocity: [f64; N],
-    ) {
-        let energy = legendre::energy_at(model, t, &state.q, &state.p, &velocity);
-        self.nodes.push(Node {
-            t,
-            q: state.q,
-            p: state.p,
-            v: velocity,
-        });
-        if const { !M::CONSTRAINTS.is_empty() } {
-            self.record_constraints(model, t, state, &velocity);
-        }
-        self.velocities.push(velocity);
-        self.energies.push(energy);
-        let columns = model.columns();
-        if columns > 0 {
-            let z = if matches!(M::FORM, Form::Lagrangian) {
-                &velocity
-            } else {
-                &state.p
-            };
-            let start = self.outputs.values.len();
-            self.outputs.values.resize(start + columns, 0.0);
-            model.observables(t, &state.q, z, &mut self.outputs.values[start..]);
-        }
-    }
-
-    fn record_constraints<M: Model<N>>(
-        &mut self,
-        model: &M,
-        t: f64,
-        state: &State<N>,
-        velocity: &[f64; N],
-    ) {
-        let reactions = constrained::reactions(model, t, state, velocity);
-        let reactions = reactions.unwrap_or_else(|_| vec![f64::NAN; M::CONSTRAINTS.len()]);
-        self.reactions.values.extend(reactions);
-        for one in constrained::residuals(model, t, &state.q, velocity, 1.0) {
-            let largest = &mut self.residual;
-            largest.position = larger(largest.position, one.position.abs());
-            largest.velocity = larger(largest.velocity, one.velocity.abs());
-        }
-        let independent = constrained::independent(model, t, &state.q);
-        let rank = independent.into_iter().filter(|one| *one).count();
-        self.residual.rank = self.residual.rank.min(rank);
-    }
-
-    pub(crate) fn keep_element(&mut self, element: DenseElement<N>) {
+    pub(crate) fn keep_element(&mut self, element: L::Polynomial) {
         self.elements.push(element);
     }
 
@@ -265,7 +265,7 @@ impl<const N: usize> Motion<N> {
     }
 
     /// The last recorded node: the end of the span after a complete run.
-    pub fn last(&self) -> &Node<N> {
+    pub fn last(&self) -> &Node<N, L> {
         self.nodes.last().expect("a motion is made with its start")
     }
 
@@ -291,27 +291,19 @@ impl<const N: usize> Motion<N> {
     }
 
     /// The recorded nodes, in the order of time.
-    pub fn states(&self) -> &[Node<N>] {
+    pub fn states(&self) -> &[Node<N, L>] {
         &self.nodes
     }
 
     /// The velocities dq/dt at the recorded nodes.
-    pub fn velocities(&self) -> &[[f64; N]] {
+    pub fn velocities(&self) -> &[L::Vector] {
         &self.velocities
     }
 
     /// Energy and p·v at the last recorded node.
     pub(crate) fn last_energy(&self) -> (f64, f64) {
-        let (node, velocity) = (self.last(), self.velocities.last());
-        let products = velocity
-            .into_iter()
-            .flatten()
-            .zip(&node.p)
-            .map(|(v, p)| v * p);
-        (
-            self.energies.last().copied().unwrap_or(f64::NAN),
-            products.sum(),
-        )
+        let energy = self.energies.last().copied();
+        (energy.unwrap_or(f64::NAN), self.last().action())
     }
 
     /// The energy H = p·v − L at the recorded nodes.
@@ -327,7 +319,7 @@ impl<const N: usize> Motion<N> {
     ///
     /// # Errors
     /// [`AtError::Outside`] beyond the span, [`AtError::NotRecorded`] where `record_every` left the element out.
-    pub fn at(&self, time: f64) -> Result<Node<N>, AtError> {
+    pub fn at(&self, time: f64) -> Result<Node<N, L>, AtError> {
         let (start, end) = (self.nodes[0].t, self.last().t);
         if !((start.min(end)..=start.max(end)).contains(&time)) {
             return Err(AtError::Outside { time, start, end });
@@ -337,7 +329,7 @@ impl<const N: usize> Motion<N> {
             .nodes
             .partition_point(|node| direction * node.t < direction * time);
         if let Some(node) = self.nodes.get(node).filter(|node| node.t == time) {
-            return Ok(*node);
+            return Ok(node.clone());
         }
         let after = self
             .elements
@@ -345,13 +337,8 @@ impl<const N: usize> Motion<N> {
         let element = after.checked_sub(1).and_then(|at| self.elements.get(at));
         match element {
             Some(element) if direction * element.end() >= direction * time => {
-                let state = element.at_time(time);
-                Ok(Node {
-                    t: time,
-                    q: state.q,
-                    p: state.p,
-                    v: element.velocity_at_time(time),
-                })
+                let velocity = element.velocity_at_time(time);
+                Ok(Node::of(time, &element.at_time(time), velocity))
             }
             _ => Err(AtError::NotRecorded { time }),
         }
@@ -392,9 +379,12 @@ impl<const N: usize> Motion<N> {
     /// # Errors
     /// [`AtError::NoOutput`] for a name that is none, [`AtError::NotRecorded`] where `record_every` left elements out, [`AtError::NoVelocity`] where a
     /// momentum belongs to no velocity.
-    pub fn integral<M: Model<N>>(&self, model: &M, output: &str) -> Result<Vec<f64>, AtError> {
-        let names: Vec<String> = (0..model.columns())
-            .map(|at| model.column_name(at).to_string())
+    pub fn integral<M>(&self, model: &M, output: &str) -> Result<Vec<f64>, AtError>
+    where
+        M: Evaluate<N, L>,
+    {
+        let names: Vec<String> = (model.output_names().iter())
+            .map(ToString::to_string)
             .collect();
         let mut values = vec![0.0; names.len()];
         let Some(column) = names.iter().position(|name| name == output) else {
@@ -403,7 +393,7 @@ impl<const N: usize> Motion<N> {
                 known: names,
             });
         };
-        let mut velocity = self.velocities[0];
+        let mut velocity = self.nodes[0].v.clone();
         let (mut sum, mut integrals) = (0.0, vec![0.0]);
         let mut rule = Quadrature::gauss(1);
         let mut elements = self.elements.iter();
@@ -432,16 +422,11 @@ impl<const N: usize> Motion<N> {
                 for point in 0..rule.len() {
                     let (node, weight) = (rule.node(point), rule.weight(point));
                     let (t, state) = (from + node * length, piece.at(node));
-                    let z = match M::FORM {
-                        Form::Hamiltonian => state.p,
-                        Form::Lagrangian => {
-                            let found =
-                                constrained::velocity_of(model, t, &state.q, &state.p, &velocity);
-                            velocity = found.map_err(|_| AtError::NoVelocity { time: t })?;
-                            velocity
-                        }
-                    };
-                    model.observables(t, &state.q, &z, &mut values);
+                    if const { M::NEEDS_VELOCITY } {
+                        let found = model.velocity(t, &state, &velocity);
+                        velocity = found.ok_or(AtError::NoVelocity { time: t })?;
+                    }
+                    model.outputs(t, &state, &velocity, &mut values);
                     sum += weight * length * values[column];
                 }
             }
@@ -467,8 +452,7 @@ impl<const N: usize> Motion<N> {
         let Some(&start) = self.energies.first() else {
             return 0.0;
         };
-        let nodes = self.nodes.iter().zip(&self.velocities);
-        let scale = energy_scale(start, nodes.map(|(node, v)| (&node.p[..], &v[..])));
+        let scale = energy_scale(start, self.nodes.iter().map(Node::action));
         let of_arc = |nodes: Range<usize>| {
             let energies = self.energies.get(nodes).unwrap_or_default();
             let start = energies.first().copied().unwrap_or_default();
@@ -490,12 +474,12 @@ impl<const N: usize> Motion<N> {
         &self.warnings
     }
 
-    pub(crate) fn set_events(&mut self, events: Vec<Event<N>>) {
+    pub(crate) fn set_events(&mut self, events: Vec<Event<N, L>>) {
         self.events = events;
     }
 
     /// The events that [`Simulation::on`](crate::Simulation::on) asked for, in the order in which they happened.
-    pub fn events(&self) -> &[Event<N>] {
+    pub fn events(&self) -> &[Event<N, L>] {
         &self.events
     }
 
@@ -514,27 +498,13 @@ impl<const N: usize> Motion<N> {
         self.arcs.begin(self.nodes.len() - 1, so_far);
     }
 
-    /// Parameters are set at the node that is to come, at the time of the last one.
-    pub(crate) fn set_parameters<M: Model<N>>(&mut self, model: &M, values: &[(usize, f64)]) {
-        let (t, node) = (self.last().t, self.nodes.len());
-        for (index, value) in values {
-            let parameter = model.parameter_name(*index).to_string();
-            self.arcs.set(Setting {
-                t,
-                node,
-                parameter,
-                value: *value,
-            });
-        }
-    }
-
     /// The observables at the recorded nodes.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
     }
 
     /// The reactions of the constraints at the recorded nodes; NaN where the kinetic energy is singular for motions that the constraints allow.
-    pub fn reactions(&self) -> &Reactions {
+    pub fn reactions(&self) -> &Reactions<L::ConstraintName> {
         &self.reactions
     }
 
@@ -565,8 +535,10 @@ impl<const N: usize> Motion<N> {
         );
         let rows = self.nodes.iter().enumerate().map(|(k, node)| {
             let mut row = vec![node.t];
-            row.extend(node.q.iter().chain(&self.velocities[k]).chain(&node.p));
-            row.push(self.energies[k]);
+            for values in [&node.q, &node.v, &node.p] {
+                row.extend(values.as_ref());
+            }
+            row.extend(self.energies.get(k));
             row.extend(self.outputs.row(k).unwrap_or_default());
             row.extend(self.reactions.row(k).unwrap_or_default());
             row
@@ -576,10 +548,9 @@ impl<const N: usize> Motion<N> {
 }
 
 /// With what changes of the energy are compared: its value at the start, or one where that is zero, or a rounding beside the largest product of momenta and velocities.
-fn energy_scale<'a>(start: f64, nodes: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> f64 {
+fn energy_scale(start: f64, actions: impl Iterator<Item = f64>) -> f64 {
     const ROUNDING: f64 = 1e-12;
-    let action = |(p, v): (&[f64], &[f64])| p.iter().zip(v).map(|(p, v)| p * v).sum::<f64>();
-    let largest = nodes.map(|node| action(node).abs()).fold(0.0, larger);
+    let largest = actions.map(f64::abs).fold(0.0, larger);
     if start == 0.0 || start.abs() <= ROUNDING * largest {
         1.0
     } else {
@@ -587,7 +558,29 @@ fn energy_scale<'a>(start: f64, nodes: impl Iterator<Item = (&'a [f64], &'a [f64
     }
 }
 
-impl<const N: usize> fmt::Debug for Motion<N> {
+impl<const N: usize> Motion<N> {
+    /// The motion of a run that goes on, whose velocity at the start is known.
+    pub(crate) fn from_checkpoint<M: Model<N>>(model: &M, checkpoint: &Checkpoint<N>) -> Self {
+        let node = Node::of(checkpoint.time(), &checkpoint.state, checkpoint.velocity);
+        Self::starting(model, node)
+    }
+
+    /// Parameters are set at the node that is to come, at the time of the last one.
+    pub(crate) fn set_parameters<M: Model<N>>(&mut self, model: &M, values: &[(usize, f64)]) {
+        let (t, node) = (self.last().t, self.nodes.len());
+        for (index, value) in values {
+            let parameter = model.parameter_name(*index).to_string();
+            self.arcs.set(Setting {
+                t,
+                node,
+                parameter,
+                value: *value,
+            });
+        }
+    }
+}
+
+impl<const N: usize, L: Length<N>> fmt::Debug for Motion<N, L> {
     /// The extent of the motion, not its thousands of numbers.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Motion")

@@ -101,7 +101,7 @@ pub use subject::{PhasePoint, Subject};
 /// # }
 /// ```
 ///
-/// What a family cannot run (an element or a solver, see [`FamilySimulation`](crate::family::FamilySimulation)) is a failed point that says
+/// What a family cannot run (an element or a solver, see [`Simulation`](crate::Simulation)) is a failed point that says
 /// why; the other curves are measured all the same.
 pub struct WorkPrecision<'m, M, S> {
     model: &'m M,

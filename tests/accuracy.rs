@@ -524,12 +524,12 @@ fn families_know_their_errors_too() {
         .record_every(100)
         .run(start.clone(), 0.0..20.0)
         .expect("runs");
-    let size = |part: fn(&tfe::family::FamilyNode) -> &Vec<f64>| {
+    let size = |part: fn(&tfe::family::Node) -> &Vec<f64>| {
         let numbers = fine.states().iter().flat_map(part);
         numbers.fold(0.0, |most: f64, x| most.max(x.abs()))
     };
     let (size_q, size_p) = (size(|node| &node.q), size(|node| &node.p));
-    let error = |node: &tfe::family::FamilyNode| {
+    let error = |node: &tfe::family::Node| {
         let largest = |a: &[f64], b: &[f64]| {
             let pairs = a.iter().zip(b);
             pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))

@@ -311,8 +311,7 @@ pub(crate) fn steps() -> Result<Section, Box<dyn Error>> {
         motion.map(|motion| (motion, clock.elapsed().as_secs_f64()))
     };
     let (reference, _) = run(Element::mixed(6), 200.0 * limit)?;
-    let tip =
-        |motion: &tfe::family::FamilyMotion| [motion.last().q[n - 1], motion.last().q[2 * n - 1]];
+    let tip = |motion: &tfe::family::Motion| [motion.last().q[n - 1], motion.last().q[2 * n - 1]];
     let exact = tip(&reference);
     println!(
         "falling cantilever: the explicit limit is h = {limit:.1e}; tip ends at ({:.4}, {:.4})",

@@ -6,7 +6,7 @@ use crate::system::System;
 use crate::table::{milliseconds, verdict};
 use std::error::Error;
 use std::time::Instant;
-use tfe::family::{FamilyNode, FamilyState};
+use tfe::family::{FamilyState, Node as FamilyNode};
 use tfe::prelude::*;
 
 const SITES: usize = 1024;

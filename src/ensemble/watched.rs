@@ -58,7 +58,7 @@ where
         span: &Range<f64>,
     ) -> (Result<Node<N>, RunErrorKind>, Statistics) {
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
-        let mut run = Simulation::with_defaults(model)
+        let mut run = Simulation::new(model)
             .element(self.element)
             .step(step)
             .record_every(usize::MAX)

@@ -217,7 +217,7 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
 
     /// The run of a model over the measurements.
     pub(super) fn simulation<'s>(&self, model: &'s M, times: &[f64]) -> Simulation<'s, M, N> {
-        let mut simulation = Simulation::with_defaults(model);
+        let mut simulation = Simulation::new(model);
         if let Some(element) = self.element {
             simulation = simulation.element(element);
         }

@@ -1,7 +1,9 @@
 //! The arcs of a motion, between events that changed its state or its parameters.
 
+use crate::evaluate::Evaluate;
+use crate::length::Length;
 use std::ops::Range;
-use tfe_runtime::{Model, Statistics};
+use tfe_runtime::Statistics;
 
 /// A part of a motion between two changes of the state or of parameters, from [`Motion::arcs`](crate::Motion::arcs).
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,11 +70,11 @@ impl Arcs {
     }
 
     /// The model with what was set at a node; none where nothing was.
-    pub(super) fn model_from<M: Model<N>, const N: usize>(
-        &self,
-        model: &M,
-        node: usize,
-    ) -> Option<M> {
+    pub(super) fn model_from<M, L, const N: usize>(&self, model: &M, node: usize) -> Option<M>
+    where
+        M: Evaluate<N, L>,
+        L: Length<N>,
+    {
         let first = self.settings.partition_point(|one| one.node < node);
         let here = self.settings[first..]
             .iter()
@@ -80,8 +82,7 @@ impl Arcs {
         let mut made: Option<M> = None;
         for one in here {
             let now = made.as_ref().unwrap_or(model);
-            let other = now.with_parameter(now.find_parameter(&one.parameter)?, one.value)?;
-            made = Some(other);
+            made = Some(now.with(&one.parameter, one.value)?);
         }
         made
     }

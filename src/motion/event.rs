@@ -1,30 +1,27 @@
 //! Events that a run has met.
 
-use tfe_runtime::State;
+use crate::length::{FixedLength, Length};
 
 /// An event that was met, with the state before anything is done.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Event<const N: usize> {
+pub struct Event<const N: usize, L: Length<N> = FixedLength> {
     /// The output that changed its sign.
     pub name: String,
     /// When.
     pub t: f64,
     /// Generalized coordinates.
-    pub q: [f64; N],
+    pub q: L::Vector,
     /// Velocities dq/dt.
-    pub v: [f64; N],
+    pub v: L::Vector,
     /// Generalized momenta.
-    pub p: [f64; N],
+    pub p: L::Vector,
     /// Whether it went from below zero to above.
     pub rises: bool,
 }
 
-impl<const N: usize> Event<N> {
+impl<const N: usize, L: Length<N>> Event<N, L> {
     /// The point of phase space, without the time.
-    pub fn state(&self) -> State<N> {
-        State {
-            q: self.q,
-            p: self.p,
-        }
+    pub fn state(&self) -> L::State {
+        L::state(self.q.clone(), self.p.clone())
     }
 }

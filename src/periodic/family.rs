@@ -9,7 +9,7 @@ use super::error::OrbitError;
 use super::phase::{Period, Phase};
 use super::problem::Global;
 use crate::assembly::{Control, Mesh};
-use crate::family::FamilySimulation;
+use crate::simulation::Simulation;
 use shooting::Shooting;
 use tfe_runtime::family::{self, FamilyModel, FamilyState};
 use tfe_runtime::{Element, Mixed};
@@ -237,7 +237,7 @@ impl<'m, M: FamilyModel> FamilyPeriodicOrbit<'m, M> {
                 .collect(),
             LongGuess::Curve(curve) => times.map(|t| state(t, curve(t))).collect(),
             LongGuess::Start(start) => {
-                let simulation = FamilySimulation::new(self.model)
+                let simulation = Simulation::new(self.model)
                     .element(self.element)
                     .step(period / self.elements as f64);
                 let motion = simulation

@@ -140,8 +140,7 @@ fn check_accuracy(accuracy: f64) -> Result<(), RunErrorKind> {
     }
 }
 
-/// A run to be that picks its element and its step; made by [`Simulation::accuracy`](crate::Simulation::accuracy) and
-/// [`FamilySimulation::accuracy`](crate::family::FamilySimulation::accuracy).
+/// A run to be that picks its element and its step; made by [`Simulation::accuracy`](crate::Simulation::accuracy).
 #[derive(Clone, Debug)]
 pub struct Accurate<S> {
     simulation: S,

@@ -8,8 +8,8 @@ use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Checkpoint, Motion, Reached};
 use std::ops::Range;
+use tfe_runtime::Model;
 use tfe_runtime::step::Stepper;
-use tfe_runtime::{Model, State};
 
 impl Reached {
     pub(crate) fn new<const N: usize>(
@@ -54,18 +54,6 @@ impl Reached {
             Some(mesh) => Ok((mesh, elements, origin)),
             None => Ok((mesh(&(time..end), None)?, 0, time)),
         }
-    }
-}
-
-impl<const N: usize> Checkpoint<N> {
-    /// The time that the run has reached.
-    pub fn time(&self) -> f64 {
-        self.reached.time
-    }
-
-    /// The state there.
-    pub fn state(&self) -> &State<N> {
-        &self.state
     }
 }
 

@@ -2,12 +2,19 @@
 
 use crate::error::RunErrorKind;
 use tfe_runtime::constrained::{self, Residual};
+use tfe_runtime::family::FamilyModel;
 use tfe_runtime::{Model, State};
 
 /// Whether the energy of a model is known to be conserved, and a jump tells of a step that is too long: linear models have steps of their own kind of error.
 pub(crate) const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
     let facts = M::FACTS;
     !(facts.time_dependent || facts.forced || facts.linear) && M::CONSTRAINTS.is_empty()
+}
+
+/// The same of a model of run-time length.
+pub(crate) const fn conserves_energies<M: FamilyModel>() -> bool {
+    let facts = M::FACTS;
+    !(facts.time_dependent || facts.forced || facts.linear || M::CONSTRAINED)
 }
 
 /// Refuses start values that are not finite.

@@ -1,55 +1,31 @@
-//! Which kind of run `Simulation::new` gives.
+//! What steps models of either kind of length.
 
-use super::family::FamilySimulation;
-use super::setup::Simulation;
-use tfe_runtime::Model;
-use tfe_runtime::family::FamilyModel;
-use tfe_runtime::length::{Declared, FixedLength, RunTimeLength};
+use crate::length::{FixedLength, Length, RunTimeLength};
+use tfe_runtime::family::{FamilyModel, FamilyStepper};
+use tfe_runtime::step::Stepper;
+use tfe_runtime::{Model, Statistics};
 
-/// The kind of run that models of one kind of length have; what [`Simulation::new`] returns.
-pub trait Runs<M, const N: usize> {
-    /// The run to be.
-    type Simulation<'m>
-    where
-        M: 'm;
+/// A [`Length`] whose models of type M can be stepped.
+pub trait Stepped<'m, M, const N: usize>: Length<N> {
+    /// What makes the steps.
+    type Stepper;
 
-    /// With the defaults.
-    fn with_defaults(model: &M) -> Self::Simulation<'_>;
+    /// What the steps so far have cost.
+    fn statistics(stepper: &Self::Stepper) -> &Statistics;
 }
 
-impl<M: Model<N>, const N: usize> Runs<M, N> for FixedLength {
-    type Simulation<'m>
-        = Simulation<'m, M, N>
-    where
-        M: 'm;
+impl<'m, M: Model<N> + 'm, const N: usize> Stepped<'m, M, N> for FixedLength {
+    type Stepper = Stepper<'m, M, N>;
 
-    fn with_defaults(model: &M) -> Simulation<'_, M, N> {
-        Simulation::with_defaults(model)
+    fn statistics(stepper: &Self::Stepper) -> &Statistics {
+        stepper.statistics()
     }
 }
 
-impl<M: FamilyModel> Runs<M, 0> for RunTimeLength {
-    type Simulation<'m>
-        = FamilySimulation<'m, M>
-    where
-        M: 'm;
+impl<'m, M: FamilyModel + 'm> Stepped<'m, M, 0> for RunTimeLength {
+    type Stepper = FamilyStepper<'m, M>;
 
-    fn with_defaults(model: &M) -> FamilySimulation<'_, M> {
-        FamilySimulation::new(model)
-    }
-}
-
-impl<'m, M, const N: usize> Simulation<'m, M, N> {
-    /// A run of `model` with the defaults: this type for a model of fixed size, [`FamilySimulation`](crate::family::FamilySimulation) for one of
-    /// run-time length, which has methods of the same names.
-    #[allow(
-        clippy::new_ret_no_self,
-        reason = "one name for models of both kinds of length"
-    )]
-    pub fn new(model: &'m M) -> <M::Length as Runs<M, N>>::Simulation<'m>
-    where
-        M: Declared<N, Length: Runs<M, N>>,
-    {
-        M::Length::with_defaults(model)
+    fn statistics(stepper: &Self::Stepper) -> &Statistics {
+        stepper.statistics()
     }
 }

@@ -42,7 +42,7 @@ where
         let (model, element) = (&simulation.model, simulation.chosen_element());
         let mut watch = Watch::new(element);
         let conserves = const { conserves_energy::<M, N>() };
-        watch.pass(recorded(&motion, false));
+        watch.pass(Recorded::last_of(&motion, false));
         if let Some(velocity) = motion.velocities().last() {
             watch.weigh(&**model, motion.last().t, (&start.q, velocity));
         }
@@ -86,7 +86,8 @@ where
             self.motion.record(model, t, state);
             self.follower.recorded(self.motion.last());
         }
-        self.watch.pass(recorded(&self.motion, self.is_conserved));
+        self.watch
+            .pass(Recorded::last_of(&self.motion, self.is_conserved));
         self.is_conserved = self.conserves;
     }
 
@@ -106,16 +107,6 @@ where
         self.motion.set_statistics(*stepper.statistics());
         self.motion.set_warnings(self.watch.into_warnings());
         self.motion
-    }
-}
-
-fn recorded<const N: usize>(motion: &Motion<N>, is_conserved: bool) -> Recorded {
-    let (energy, action) = motion.last_energy();
-    Recorded {
-        time: motion.last().t,
-        energy,
-        action,
-        is_conserved,
     }
 }
 

@@ -108,17 +108,18 @@ impl<const N: usize> Deref for SectionPoint<N> {
 }
 
 /// The points of a section, one after the other; made by [`Simulation::section`]. After an error, or where an event stops the motion, it is finished.
-pub struct Section<'m, M, const N: usize> {
+pub struct Section<'m, M: Model<N>, const N: usize> {
     chosen: (tfe_runtime::Element, tfe_runtime::step::Control),
     model: Share<'m, M>,
     way: Way<'m, M, N>,
     crossings: Crossings<'m, M, N>,
 }
 
-impl<M: fmt::Debug, const N: usize> fmt::Debug for Section<'_, M, N> {
+impl<M: Model<N>, const N: usize> fmt::Debug for Section<'_, M, N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Section")
-            .field("way", &self.way)
+            .field("time", &self.way.course.time())
+            .field("state", &self.way.state)
             .finish_non_exhaustive()
     }
 }

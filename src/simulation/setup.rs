@@ -1,12 +1,13 @@
-//! A run to be: a model, an element, a step, and what else is asked for.
+//! A run to be: a model, an element, a step, and what else is asked for; of models of either kind of length.
 
 use super::events::watching::Watching;
 use super::mesh::Mesh;
 use super::watch::resolution::Again;
 use crate::error::RunErrorKind;
+use crate::length::{Declared, FixedLength, Length};
 use std::ops::Range;
 use tfe_runtime::step::{Control, Impulse, Stepper};
-use tfe_runtime::{Element, Mixed, Model, Share, Solve};
+use tfe_runtime::{Element, Mixed, Model, Solve};
 
 /// A run to be: which model, with which element and step.
 ///
@@ -28,16 +29,48 @@ use tfe_runtime::{Element, Mixed, Model, Share, Solve};
 /// ```
 ///
 /// Defaults: `Mixed::<4>` (order 6), a thousandth of the span as step, every node recorded, iteration to round-off.
+///
+/// # Models of run-time length
+/// A model with `coordinates(q[n])` costs the same to compile at any length. A step takes time and memory linear in the number of coordinates and terms: one fixed-point iteration for the
+/// forces at all points of the element, four points to a register.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(
+///     coordinates(q[n]),
+///     lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3),
+/// )]
+/// struct Chain { n: usize, m: f64, k: f64, a: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let chain = Chain { n: 100, m: 1.0, k: 1.0, a: 0.25 };
+/// let q: Vec<f64> = (0..chain.n).map(|i| (0.03 * i as f64).cos()).collect();
+/// let start = chain.state(q, vec![0.0; chain.n]);
+/// let motion = Simulation::new(&chain)
+///     .element(Mixed::<4>)
+///     .step(0.1)
+///     .run(start, 0.0..10.0)?;
+/// assert!(motion.energy_error() < 1e-7); // order 6 at this step
+/// let total: f64 = motion.last().p.iter().sum();
+/// assert!(total.abs() < 1e-12); // no force from outside
+/// # Ok(())
+/// # }
+/// ```
+///
+/// Without the feature `sparse` their kinetic energy must be ½ Σ m v² with constant masses, one for each coordinate; the potential energy and the forces may be any. With it a
+/// Lagrangian may have any kinetic energy and holonomic constraints: `constraint(rod[i in 0..n-1]) = …`. What they cannot do is a typed error, [`RunErrorKind::Unsupported`]; the table of calls
+/// is in `docs/calls.md`.
 #[derive(Debug)]
-pub struct Simulation<'m, M, const N: usize> {
-    pub(super) model: Share<'m, M>,
+pub struct Simulation<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+    pub(super) model: L::Held<'m, M>,
     /// The default where it is not chosen.
     pub(super) element: Option<Element>,
     pub(super) step: Option<f64>,
     pub(super) nodes: Option<Vec<f64>>,
     pub(super) control: Control,
     pub(super) record_every: usize,
-    pub(super) impulses: Vec<Impulse<N>>,
+    pub(super) impulses: Vec<L::Impulse>,
     pub(super) breaks: Vec<f64>,
     pub(super) events: Watching<'m, M, N>,
     /// What was asked for.
@@ -47,7 +80,8 @@ pub struct Simulation<'m, M, const N: usize> {
     pub(super) refusal: Option<RunErrorKind>,
 }
 
-impl<M, const N: usize> Clone for Simulation<'_, M, N> {
+// Not derived: models need not be `Clone`.
+impl<M, const N: usize, L: Length<N>> Clone for Simulation<'_, M, N, L> {
     fn clone(&self) -> Self {
         Self {
             model: self.model.clone(),
@@ -61,10 +95,14 @@ impl<M, const N: usize> Clone for Simulation<'_, M, N> {
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
-    pub(crate) fn with_defaults(model: &'m M) -> Self {
+impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
+    /// A run of `model` with the defaults.
+    pub fn new(model: &'m M) -> Self
+    where
+        M: Declared<N, Length = L>,
+    {
         Self {
-            model: Share::Borrowed(model),
+            model: model.into(),
             element: None,
             step: None,
             nodes: None,
@@ -79,7 +117,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
     }
 
-    /// The element: `Mixed::<4>`, `Primal::<3>.reduced()`, `Element::mixed(n)`, …
+    /// The element: `Mixed::<4>`, `Primal::<3>.reduced()`, `Element::mixed(n)`, …; for models of run-time length without the feature `sparse` those that are Runge–Kutta methods, with
+    /// constraints those of them with Gauss points.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.element = Some(element.into());
@@ -138,6 +177,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 
     /// How the element's equations are solved; `Solve::Auto` by default, which cuts steps whose solution is not proven to continue the motion ([`Solve::Trusting`] does
     /// not; `docs/theory.md` §10.6).
+    ///
+    /// Models of run-time length begin with the fixed point; with the feature `sparse`, steps that contract badly go to Newton's method with a sparse factorisation, without it they
+    /// are errors, and so is `Solve::Newton`.
     #[must_use]
     pub fn solver(mut self, solve: Solve) -> Self {
         self.control.solve = solve;
@@ -149,17 +191,6 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     #[must_use]
     pub fn record_every(mut self, k: usize) -> Self {
         self.record_every = k.max(1);
-        self
-    }
-
-    /// Adds an impulse: a generalized force of the given time integral that acts at one instant. Inside an element it is weighted by the test
-    /// functions, at a node it changes the momentum there (`docs/theory.md`, impulses). The node at that instant shows the momentum before it.
-    #[must_use]
-    pub fn impulse(mut self, time: f64, impulse: [f64; N]) -> Self {
-        self.impulses.push(Impulse {
-            time,
-            value: impulse,
-        });
         self
     }
 
@@ -175,7 +206,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// [`Statistics::kinks`](crate::Statistics::kinks) counts the crossings. A motion that would slide along a jump is an error, [`StepError::Slides`](crate::runtime::StepError::Slides).
     ///
     /// [`run`](Self::run), [`steps`](Self::steps) and [`run_estimated`](Self::run_estimated) do so only if asked, runs with an [`accuracy`](Self::accuracy) unless forbidden;
-    /// [`run_linearised`](Self::run_linearised) refuses to, as [`RunErrorKind::KinksUnsupported`].
+    /// [`run_linearised`](Self::run_linearised) refuses to, as [`RunErrorKind::KinksUnsupported`], and so do runs of models of run-time length that have kinks.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -207,6 +238,32 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         self
     }
 
+    /// How elements are solved.
+    pub(crate) fn with_control(self, control: Control) -> Self {
+        Self { control, ..self }
+    }
+
+    pub(crate) fn model(&self) -> &M {
+        &self.model
+    }
+
+    pub(super) fn chosen_element(&self) -> Element {
+        self.element.unwrap_or_else(|| Element::from(Mixed::<4>))
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
+    /// Adds an impulse: a generalized force of the given time integral that acts at one instant. Inside an element it is weighted by the test
+    /// functions, at a node it changes the momentum there (`docs/theory.md`, impulses). The node at that instant shows the momentum before it.
+    #[must_use]
+    pub fn impulse(mut self, time: f64, impulse: [f64; N]) -> Self {
+        self.impulses.push(Impulse {
+            time,
+            value: impulse,
+        });
+        self
+    }
+
     /// A stepper that cuts steps at kinks, if that was asked for.
     pub(super) fn cutting(&self, stepper: Stepper<'m, M, N>) -> Stepper<'m, M, N> {
         if self.at_kinks == Some(true) {
@@ -216,19 +273,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
     }
 
-    /// How elements are solved.
-    pub(crate) fn with_control(self, control: Control) -> Self {
-        Self { control, ..self }
-    }
-
     /// What it looks for.
     pub(crate) fn watching(self, events: &Watching<'m, M, N>) -> Self {
         let events = events.clone();
         Self { events, ..self }
-    }
-
-    pub(crate) fn model(&self) -> &M {
-        &self.model
     }
 
     /// With what elements are looked at a second time.
@@ -239,10 +287,6 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             control: self.control,
             at_kinks: self.at_kinks == Some(true),
         }
-    }
-
-    pub(super) fn chosen_element(&self) -> Element {
-        self.element.unwrap_or_else(|| Element::from(Mixed::<4>))
     }
 
     pub(super) fn mesh(&self, span: &Range<f64>) -> Result<Mesh<N>, RunErrorKind> {

@@ -1,40 +1,53 @@
 //! The endless sequence of states.
 
+mod family;
+
 use super::checks::conserves_energy;
 use super::course::{Course, Leg};
 use super::follow::{Follow, Passed};
+use super::kind::Stepped;
 use super::mesh::{self, Endless};
 use super::pieces::{Left, Observe, Piece, Pieces, Planned, Side};
 use super::watch::resolution::{Again, Examined, Resolution};
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;
+use crate::length::FixedLength;
 use crate::motion::Warning;
 use crate::motion::{Event, Node};
 use std::collections::VecDeque;
+use std::fmt;
 use tfe_runtime::step::{Impulse, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Model, Share, State, Statistics};
 
 /// The endless sequence of states of [`Simulation::steps`](crate::Simulation::steps).
-#[derive(Debug)]
-pub struct Steps<'m, M, const N: usize> {
-    way: Way<'m, M, N>,
+pub struct Steps<'m, M, const N: usize, L: Stepped<'m, M, N> = FixedLength> {
+    pub(super) way: Way<'m, M, N, L>,
     /// Of the last node, from where the next is looked for.
-    velocity: [f64; N],
+    velocity: L::Vector,
     /// Nodes at events that are to be told yet.
-    nodes: VecDeque<Result<Node<N>, RunErrorKind>>,
-    watch: Watch,
-    resolution: Resolution<'m, M, N>,
+    nodes: VecDeque<Result<Node<N, L>, RunErrorKind>>,
+    pub(super) watch: Watch,
+    /// Of models of fixed size.
+    resolution: Option<Resolution<'m, M, N>>,
+}
+
+impl<'m, M, const N: usize, L: Stepped<'m, M, N>> fmt::Debug for Steps<'m, M, N, L> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Steps")
+            .field("time", &self.way.course.time())
+            .field("state", &self.way.state)
+            .finish_non_exhaustive()
+    }
 }
 
 /// A stepper with its state on an endless course.
-#[derive(Debug)]
-pub(super) struct Way<'m, M, const N: usize> {
+pub(super) struct Way<'m, M, const N: usize, L: Stepped<'m, M, N> = FixedLength> {
     /// As it was at first.
-    model: Share<'m, M>,
-    pub(super) course: Course<Stepper<'m, M, N>>,
-    pub(super) state: State<N>,
-    impulses: Vec<Impulse<N>>,
+    model: L::Held<'m, M>,
+    pub(super) course: Course<L::Stepper>,
+    pub(super) state: L::State,
+    pub(super) impulses: Vec<L::Impulse>,
     /// None where no events are looked for.
     pub(super) pieces: Option<Box<Pieces<'m, M, N>>>,
     /// Of a course that has ended.
@@ -57,12 +70,8 @@ impl<'m, M: Model<N>, const N: usize> Way<'m, M, N> {
             Err(kind) => (Err(kind), None),
         };
         Self {
-            model,
-            course: Course::new(way),
-            state: start,
-            impulses,
             pieces,
-            statistics: Statistics::default(),
+            ..Self::along(model, Course::new(way), start, impulses)
         }
     }
 
@@ -104,10 +113,29 @@ impl<'m, M: Model<N>, const N: usize> Way<'m, M, N> {
         }
         passed
     }
+}
+
+impl<'m, M, const N: usize, L: Stepped<'m, M, N>> Way<'m, M, N, L> {
+    /// Without a look for events.
+    pub(super) fn along(
+        model: L::Held<'m, M>,
+        course: Course<L::Stepper>,
+        state: L::State,
+        impulses: Vec<L::Impulse>,
+    ) -> Self {
+        Self {
+            model,
+            course,
+            state,
+            impulses,
+            pieces: None,
+            statistics: Statistics::default(),
+        }
+    }
 
     pub(super) fn statistics(&self) -> Statistics {
         match self.course.stepper() {
-            Some(stepper) => *stepper.statistics(),
+            Some(stepper) => *L::statistics(stepper),
             None => self.statistics,
         }
     }
@@ -118,6 +146,13 @@ fn acting<const N: usize>(impulses: &[Impulse<N>], leg: &Leg) -> Vec<Impulse<N>>
     let (t, next) = leg.nodes;
     let acts = |impulse: &&Impulse<N>| mesh::within(impulse.time, t, next);
     impulses.iter().filter(acts).copied().collect()
+}
+
+impl<'m, M, const N: usize, L: Stepped<'m, M, N>> Steps<'m, M, N, L> {
+    /// What the steps so far have cost.
+    pub fn statistics(&self) -> Statistics {
+        self.way.statistics()
+    }
 }
 
 impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
@@ -143,16 +178,8 @@ impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
             velocity,
             nodes: VecDeque::new(),
             watch,
-            resolution: Resolution::new(again),
+            resolution: Some(Resolution::new(again)),
         }
-    }
-
-    /// What is doubtful about the steps so far without being an error, as [`Motion::warnings`](crate::Motion::warnings) tells it of a run. Where events are looked for, neither jumps of
-    /// the energy nor unstable steps are.
-    pub fn warnings(&self) -> Vec<Warning> {
-        let mut warnings = self.watch.warnings().to_vec();
-        warnings.extend(self.resolution.warning(&self.way.state));
-        warnings
     }
 
     /// The model, unless the steps have ended.
@@ -171,9 +198,13 @@ impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
         })
     }
 
-    /// What the steps so far have cost.
-    pub fn statistics(&self) -> Statistics {
-        self.way.statistics()
+    /// What is doubtful about the steps so far without being an error, as [`Motion::warnings`](crate::Motion::warnings) tells it of a run. Where events are looked for, neither jumps of
+    /// the energy nor unstable steps are.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = self.watch.warnings().to_vec();
+        let resolution = self.resolution.as_ref();
+        warnings.extend(resolution.and_then(|one| one.warning(&self.way.state)));
+        warnings
     }
 
     /// The [events](crate::Simulation::on) met in the step that led to the node given last, in their order. Where a step has several nodes, because events changed the state, they come
@@ -189,7 +220,7 @@ impl<'m, M: Model<N>, const N: usize> Steps<'m, M, N> {
             velocity: &mut self.velocity,
             last: f64::NAN,
             watch: &mut self.watch,
-            resolution: &mut self.resolution,
+            resolution: self.resolution.as_mut(),
         };
         match self.way.pass(&mut observer) {
             None | Some(Ok((Left::Stopped, _))) => {}
@@ -224,7 +255,7 @@ impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
             statistics,
             ..
         } = &mut self.way;
-        let (watch, resolution) = (&mut self.watch, &mut self.resolution);
+        let (watch, resolution) = (&mut self.watch, self.resolution.as_mut());
         let velocity = &mut self.velocity;
         let advance = |stepper: &mut Stepper<'_, M, N>, leg: &Leg| {
             let impulses = acting(impulses, leg);
@@ -244,7 +275,9 @@ impl<M: Model<N>, const N: usize> Iterator for Steps<'_, M, N> {
                 Err(_) => return Err(RunErrorKind::panicked(t)),
             };
             *velocity = node.v;
-            if impulses.is_empty() {
+            if let Some(resolution) = resolution
+                && impulses.is_empty()
+            {
                 let examined = Examined {
                     t,
                     h: leg.h,
@@ -268,7 +301,7 @@ struct Nodes<'a, 'm, M, const N: usize> {
     /// The time of the last one.
     last: f64,
     watch: &'a mut Watch,
-    resolution: &'a mut Resolution<'m, M, N>,
+    resolution: Option<&'a mut Resolution<'m, M, N>>,
 }
 
 impl<M: Model<N>, const N: usize> Nodes<'_, '_, M, N> {
@@ -304,12 +337,16 @@ impl<'m, M: Model<N>, const N: usize> Observe<'m, M, N> for Nodes<'_, 'm, M, N> 
                 before: piece.before,
                 after: piece.after,
             };
-            self.resolution.look(stepper.statistics(), examined);
+            if let Some(resolution) = &mut self.resolution {
+                resolution.look(stepper.statistics(), examined);
+            }
         }
     }
 
     fn changed(&mut self, model: &Share<'m, M>, _: &[(usize, f64)]) {
-        self.resolution.set_model(model.clone());
+        if let Some(resolution) = &mut self.resolution {
+            resolution.set_model(model.clone());
+        }
     }
 
     fn at_event(&mut self, stepper: &Stepper<'m, M, N>, side: Side, t: f64, state: &State<N>) {

@@ -2,10 +2,11 @@
 
 pub(super) mod resolution;
 
-use crate::motion::{Node, Warning};
+use crate::evaluate::Evaluate;
+use crate::length::Length;
+use crate::motion::{Motion, Node, Warning};
 use crate::stability::linear_model::LinearModel;
 use nalgebra::DMatrix;
-use tfe_runtime::legendre::energy_at;
 use tfe_runtime::{Element, First, Form, Model, State};
 
 /// Looks at the elements of a run now and then.
@@ -218,16 +219,29 @@ pub(super) struct Recorded {
 
 impl Recorded {
     /// Of a node whose energy is not known yet.
-    pub(super) fn of<M: Model<N>, const N: usize>(
-        model: &M,
-        node: &Node<N>,
-        is_conserved: bool,
-    ) -> Self {
-        let products = node.p.iter().zip(&node.v).map(|(p, v)| p * v);
+    pub(super) fn of<M, L, const N: usize>(model: &M, node: &Node<N, L>, is_conserved: bool) -> Self
+    where
+        M: Evaluate<N, L>,
+        L: Length<N>,
+    {
         Self {
             time: node.t,
-            energy: energy_at(model, node.t, &node.q, &node.p, &node.v),
-            action: products.sum(),
+            energy: model.energy(node.t, &node.state(), &node.v),
+            action: node.action(),
+            is_conserved,
+        }
+    }
+
+    /// Of the last node of a motion.
+    pub(super) fn last_of<L: Length<N>, const N: usize>(
+        motion: &Motion<N, L>,
+        is_conserved: bool,
+    ) -> Self {
+        let (energy, action) = motion.last_energy();
+        Self {
+            time: motion.last().t,
+            energy,
+            action,
             is_conserved,
         }
     }

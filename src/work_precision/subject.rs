@@ -5,7 +5,6 @@
 use crate::error::{RunError, RunErrorKind};
 use crate::numbers::raise;
 use crate::simulation::Simulation;
-use crate::simulation::family::FamilySimulation;
 use std::ops::Range;
 use tfe_runtime::ConstraintError;
 use tfe_runtime::constrained;
@@ -315,7 +314,7 @@ impl<M: FamilyModel> Steppable<FamilyState> for M {
         over: Range<f64>,
         h: f64,
     ) -> Result<(), RunErrorKind> {
-        let run = FamilySimulation::new(self).step(h).run(start.clone(), over);
+        let run = Simulation::new(self).step(h).run(start.clone(), over);
         match run {
             Err(error) if refuses(error.kind()) => Err(error.kind().clone()),
             // As above.

@@ -1,7 +1,7 @@
 //! Runs of families that go on where others ended.
 
 use tfe::error::RunErrorKind;
-use tfe::family::{FamilyError, FamilyModel, FamilySimulation, FamilyState};
+use tfe::family::{self, FamilyError, FamilyModel, FamilyState};
 use tfe::prelude::*;
 
 #[dynamics(
@@ -17,7 +17,7 @@ struct Chain {
 
 /// One run, and two of it that are cut anywhere: all states, velocities and energies are the same numbers.
 fn check<M: FamilyModel>(
-    simulation: &FamilySimulation<'_, M>,
+    simulation: &family::Simulation<'_, M>,
     start: &FamilyState,
     (steps, h): (u32, f64),
     seed: &mut u64,

@@ -202,7 +202,7 @@ fn starts_off_the_constraints_are_refused() {
 #[test]
 fn what_cannot_hold_constraints_is_refused() {
     let (model, (q, v)) = (rods(), start());
-    let kind = |simulation: tfe::family::FamilySimulation<'_, Rods>| {
+    let kind = |simulation: tfe::family::Simulation<'_, Rods>| {
         let run = simulation.run(model.state(q, v), 0.0..1.0);
         run.expect_err("no constraints").kind().clone()
     };

@@ -1,7 +1,7 @@
 //! Lengths that do not belong together, and what families cannot do yet: typed errors that name the sum and the index.
 
 use tfe::RunErrorKind;
-use tfe::family::{FamilyError, FamilyModel, FamilyMotion, FamilyRunError, FamilyState, momenta};
+use tfe::family::{self, FamilyError, FamilyModel, FamilyState, momenta};
 use tfe::prelude::*;
 
 #[dynamics(
@@ -222,7 +222,7 @@ fn a_stiff_chain_says_that_the_fixed_point_failed() {
 }
 
 #[track_caller]
-fn kind(run: Result<FamilyMotion, FamilyRunError>) -> RunErrorKind {
+fn kind(run: Result<family::Motion, family::RunError>) -> RunErrorKind {
     run.expect_err("not yet").kind().clone()
 }
 

@@ -1,7 +1,7 @@
 //! Impulses on models of run-time length.
 
 use tfe::error::RunErrorKind;
-use tfe::family::{FamilyError, FamilySimulation};
+use tfe::family::{self, FamilyError};
 use tfe::prelude::*;
 
 #[dynamics(
@@ -25,7 +25,7 @@ const CHAIN: Chain = Chain { n: 5, a: 0.7 };
 const Q: [f64; 5] = [0.3, -0.1, 0.4, 0.0, 0.2];
 const BLOW: [f64; 5] = [0.5, 0.0, -1.0, 0.0, 0.25];
 
-fn struck(times: &[f64]) -> FamilySimulation<'static, Chain> {
+fn struck(times: &[f64]) -> family::Simulation<'static, Chain> {
     let simulation = Simulation::new(&CHAIN).element(Mixed::<5>).step(0.05);
     (times.iter()).fold(simulation, |run, time| run.impulse(*time, BLOW))
 }
@@ -80,7 +80,7 @@ fn halves_and_steps_are_one_run() {
 #[test]
 fn what_cannot_act_is_refused() {
     let start = || CHAIN.state(Q, [0.0; 5]);
-    let kind = |run: FamilySimulation<'static, Chain>| {
+    let kind = |run: family::Simulation<'static, Chain>| {
         let error = run.run(start(), 0.0..1.0).expect_err("no good impulse");
         error.kind().clone()
     };

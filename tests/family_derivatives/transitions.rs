@@ -1,7 +1,10 @@
 //! The derivative of a step of a family.
 
 use crate::largest::larger;
-use tfe::family::{Block, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, Gradient};
+use tfe::family::{
+    Block, Declared, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, Gradient,
+    RunTimeLength,
+};
 use tfe::prelude::*;
 use tfe::runtime::step::Control;
 use tfe::runtime::{CoordinateName, Facts, Form, Real};
@@ -293,6 +296,10 @@ fn stable_symplectic_steps_have_no_largest_eigenvalue() {
 
 /// A particle that says it is constrained.
 struct Bound;
+
+impl Declared<0> for Bound {
+    type Length = RunTimeLength;
+}
 
 impl FamilyModel for Bound {
     const FORM: Form = Form::Lagrangian;

@@ -273,8 +273,8 @@ fn ran<const N: usize>(run: Result<Motion<N>, tfe::RunError<N>>) -> Motion<N> {
 }
 
 /// The same of a family.
-fn ran_family(run: Result<tfe::family::FamilyMotion, tfe::family::FamilyRunError>) -> Outcome {
-    let motion = run.unwrap_or_else(tfe::family::FamilyRunError::into_partial);
+fn ran_family(run: Result<tfe::family::Motion, tfe::family::RunError>) -> Outcome {
+    let motion = run.unwrap_or_else(tfe::family::RunError::into_partial);
     let end = motion.last();
     let numbers = [end.t]
         .into_iter()

@@ -3,11 +3,11 @@
 use crate::model::Model;
 
 /// The number of coordinates is a constant: [`Model`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FixedLength;
 
 /// The number of coordinates is a field of the model: `family::FamilyModel`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RunTimeLength;
 
 /// A model declared by `#[dynamics]`, or by hand through [`Model`], of either kind of length.

@@ -25,6 +25,12 @@ impl<'m, M: Send + Sync + 'm> Share<'m, M> {
     }
 }
 
+impl<'m, M> From<&'m M> for Share<'m, M> {
+    fn from(model: &'m M) -> Self {
+        Self::Borrowed(model)
+    }
+}
+
 impl<M> Clone for Share<'_, M> {
     fn clone(&self) -> Self {
         match self {

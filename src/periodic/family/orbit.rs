@@ -3,12 +3,13 @@
 use super::super::error::OrbitError;
 use super::super::orbit::{Exponent, Verdict, sort, trivial_of};
 use super::shooting::Shooting;
-use crate::motion::family::{FamilyMotion, FamilyNode};
+use crate::length::RunTimeLength;
+use crate::motion::{Motion, Node};
 use crate::numbers::larger;
 use crate::periodic_schur::{self, Multiplier};
 use nalgebra::{Complex, DMatrix};
 use tfe_runtime::Statistics;
-use tfe_runtime::family::{self, FamilyModel, FamilyState, FamilyTransition};
+use tfe_runtime::family::{FamilyModel, FamilyState, FamilyTransition};
 
 /// A periodic orbit of a model of run-time length with its Floquet multipliers: what [`Orbit`](crate::Orbit) is for models of fixed size, by the
 /// same names.
@@ -42,15 +43,12 @@ impl<'m, M: FamilyModel> FamilyOrbit<'m, M> {
     }
 
     /// The ends of the elements, in order; the last one is the first one a period later.
-    pub fn nodes(&self) -> Vec<FamilyNode> {
+    pub fn nodes(&self) -> Vec<Node<0, RunTimeLength>> {
         let shooting = &self.shooting;
         let times = shooting.mesh.times(shooting.start, shooting.period);
         let nodes = times.zip(&shooting.nodes);
         nodes
-            .map(|(t, state)| {
-                let velocity = family::velocity(shooting.model, t, state);
-                FamilyNode::new(t, state.clone(), velocity)
-            })
+            .map(|(t, state)| Node::new(shooting.model, t, state, &state.p))
             .collect()
     }
 
@@ -123,12 +121,10 @@ impl<'m, M: FamilyModel> FamilyOrbit<'m, M> {
     }
 
     /// The motion over one period, with dense output: the polynomials of the elements.
-    pub fn motion(&self) -> FamilyMotion {
+    pub fn motion(&self) -> Motion<0, RunTimeLength> {
         let shooting = &self.shooting;
-        let velocity = |t, state| family::velocity(shooting.model, t, state);
         let (start, first) = (shooting.start, &shooting.nodes[0]);
-        let mut motion =
-            FamilyMotion::from_start(shooting.model, start, first, velocity(start, first));
+        let mut motion = Motion::from_start(shooting.model, start, first);
         motion.set_statistics(shooting.statistics);
         // Each element begins where the one before ends, to the last bit.
         let mut places = Vec::with_capacity(shooting.mesh.elements());
@@ -145,7 +141,7 @@ impl<'m, M: FamilyModel> FamilyOrbit<'m, M> {
             let dense = transition.into_dense();
             e += 1;
             let (end, node) = (dense.end(), &shooting.nodes[e]);
-            motion.record(shooting.model, end, node, velocity(end, node));
+            motion.record(shooting.model, end, node);
             motion.keep_element(dense);
         };
         // These steps have been done before: they cannot fail now, and a motion that ends early would show it.

@@ -1,20 +1,21 @@
 //! Runs of models of run-time length with an estimate of their error.
 
-use super::super::family::{FamilyRunError, FamilySimulation};
 use super::graded::Steps;
 use super::repeatable::{Broken, Passing, Repeatable, trusting};
 use super::{Accurate, accurate, check_accuracy, estimated};
 use crate::accuracy::{Asked, Estimated};
-use crate::error::RunErrorKind;
-use crate::motion::Warning;
-use crate::motion::family::FamilyMotion;
+use crate::error::{RunError, RunErrorKind};
+use crate::length::RunTimeLength;
+use crate::motion::{Motion, Node, Warning};
+use crate::simulation::Simulation;
+use crate::simulation::family::node;
 use crate::simulation::mesh::Mesh;
 use std::ops::Range;
 use tfe_runtime::family::{FamilyModel, FamilyState, FamilyStepper};
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Form, Solve, Statistics, StepError};
 
-impl<M: FamilyModel> FamilySimulation<'_, M> {
+impl<M: FamilyModel> Simulation<'_, M, 0, RunTimeLength> {
     /// Picks element and step so that the estimated error is at or below `accuracy`, as [`Simulation::accuracy`](crate::Simulation::accuracy) does: largest errors over
     /// all sites, each over the largest number of its kind.
     ///
@@ -47,32 +48,32 @@ impl<M: FamilyModel> FamilySimulation<'_, M> {
     /// [`Simulation::run_estimated`](crate::Simulation::run_estimated) does. Where forces have kinks or jumps steps go across them, and the motion says so, [`Warning::KinksCrossed`].
     ///
     /// # Errors
-    /// [`FamilyRunError`], as from [`run`](Self::run), of either run.
+    /// [`RunError`], as from [`run`](Self::run), of either run.
     pub fn run_estimated(
         &self,
         start: FamilyState,
         span: Range<f64>,
-    ) -> Result<Estimated<FamilyMotion>, FamilyRunError> {
+    ) -> Result<Estimated<Motion<0, RunTimeLength>>, RunError<0, RunTimeLength>> {
         let refused = |kind| self.refused(kind, span.start, &start);
         self.without_impulses("run_estimated").map_err(refused)?;
         self.stepper(span.start, &start).map_err(refused)?;
         let mesh = self.mesh(&span).map_err(refused)?;
         estimated(self, (span.start, &start), &mesh)
-            .map_err(|broken| FamilyRunError::new(broken.0, broken.1))
+            .map_err(|broken| RunError::new(broken.0, broken.1))
     }
 }
 
-impl<M: FamilyModel> Accurate<FamilySimulation<'_, M>> {
+impl<M: FamilyModel> Accurate<Simulation<'_, M, 0, RunTimeLength>> {
     /// Runs over the span with the element and the step that meet the accuracy.
     ///
     /// # Errors
-    /// [`FamilyRunError`], as from [`FamilySimulation::run`]; [`RunErrorKind::AccuracyMissed`] where no step was found that meets the accuracy, with the best motion
-    /// in [`partial`](FamilyRunError::partial).
+    /// [`RunError`], as from [`Simulation::run`]; [`RunErrorKind::AccuracyMissed`] where no step was found that meets the accuracy, with the best motion
+    /// in [`partial`](RunError::partial).
     pub fn run(
         &self,
         start: FamilyState,
         span: Range<f64>,
-    ) -> Result<Estimated<FamilyMotion>, FamilyRunError> {
+    ) -> Result<Estimated<Motion<0, RunTimeLength>>, RunError<0, RunTimeLength>> {
         let run = &self.simulation;
         let refused = |kind| run.refused(kind, span.start, &start);
         check_accuracy(self.accuracy).map_err(refused)?;
@@ -108,15 +109,14 @@ impl<M: FamilyModel> Accurate<FamilySimulation<'_, M>> {
             in_pairs: M::CONSTRAINED,
         };
         let steps = Steps::of(&M::FACTS, self.equal_steps, M::CONSTRAINED);
-        accurate(run, &start, &asked, steps)
-            .map_err(|broken| FamilyRunError::new(broken.0, broken.1))
+        accurate(run, &start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
     }
 }
 
-impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
+impl<'m, M: FamilyModel> Repeatable<0> for Simulation<'m, M, 0, RunTimeLength> {
     type State = FamilyState;
     type Stepper = FamilyStepper<'m, M>;
-    type Motion = FamilyMotion;
+    type Motion = Motion<0, RunTimeLength>;
 
     fn element(&self) -> Element {
         self.chosen_element()
@@ -207,7 +207,7 @@ impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
         mesh: &Mesh<0>,
         start: (f64, &FamilyState),
         passed: &mut Passing<'_, FamilyStepper<'m, M>, FamilyState>,
-    ) -> Result<FamilyMotion, Broken<FamilyMotion>> {
+    ) -> Result<Motion<0, RunTimeLength>, Broken<Motion<0, RunTimeLength>>> {
         let mut motion = self.drive_over(start, mesh, stepper, passed)?;
         if self.crosses_kinks() {
             motion.add_warning(Warning::KinksCrossed);
@@ -223,13 +223,13 @@ impl<'m, M: FamilyModel> Repeatable<0> for FamilySimulation<'m, M> {
         &self,
         (t0, start): (f64, &FamilyState),
         (t, end): (f64, &FamilyState),
-    ) -> FamilyMotion {
+    ) -> Motion<0, RunTimeLength> {
         let Ok((mut stepper, velocity)) = self.stepper(t0, start) else {
-            return FamilyMotion::empty(self.model, t0, start);
+            return Motion::unasked(t0, start);
         };
-        let mut motion = FamilyMotion::from_start(self.model, t0, start, Ok(velocity));
+        let mut motion = Motion::starting(self.model, Node::of(t0, start, velocity));
         if t != t0 {
-            motion.record(self.model, t, end, stepper.velocity(t, end));
+            motion.record_node(self.model, node(&mut stepper, t, end));
         }
         motion
     }

@@ -1,11 +1,12 @@
 //! The same for families.
 
-use super::super::family::{FamilyRunError, FamilySimulation};
-use crate::motion::FamilyCheckpoint;
-use crate::motion::family::FamilyMotion;
+use crate::error::RunError;
+use crate::length::RunTimeLength;
+use crate::motion::{Checkpoint, Motion};
+use crate::simulation::Simulation;
 use tfe_runtime::family::FamilyModel;
 
-impl<M: FamilyModel> FamilySimulation<'_, M> {
+impl<M: FamilyModel> Simulation<'_, M, 0, RunTimeLength> {
     /// Goes on where a run ended, up to the time `end`: to the last bit as one run would have from there on, as [`Simulation::resume`](crate::Simulation::resume) does.
     ///
     /// ```
@@ -32,12 +33,12 @@ impl<M: FamilyModel> FamilySimulation<'_, M> {
     /// ```
     ///
     /// # Errors
-    /// [`FamilyRunError`], as from [`run`](Self::run).
+    /// [`RunError`], as from [`run`](Self::run).
     pub fn resume(
         &self,
-        checkpoint: &FamilyCheckpoint,
+        checkpoint: &Checkpoint<0, RunTimeLength>,
         end: f64,
-    ) -> Result<FamilyMotion, FamilyRunError> {
+    ) -> Result<Motion<0, RunTimeLength>, RunError<0, RunTimeLength>> {
         let (time, state) = (checkpoint.time(), &checkpoint.state);
         let refused = |kind| self.refused(kind, time, state);
         let mut run = self.clone();

@@ -115,6 +115,23 @@ impl FamilyDense {
         }
     }
 
+    /// Its pieces: the element itself, unless the step was [cut](crate::Statistics::cuts).
+    #[must_use]
+    pub fn pieces(&self) -> &[Self] {
+        if self.pieces.is_empty() {
+            core::slice::from_ref(self)
+        } else {
+            &self.pieces
+        }
+    }
+
+    /// The degree of the coordinates: the number of points at which an element of collocation meets the equations of motion.
+    #[must_use]
+    pub fn degree(&self) -> usize {
+        let piece = &self.pieces()[0];
+        piece.rates.len() / piece.start.q.len().max(1)
+    }
+
     /// Time at the start.
     #[must_use]
     pub fn start(&self) -> f64 {
@@ -136,7 +153,18 @@ impl FamilyDense {
         if let Some(piece) = self.piece_at(time) {
             return piece.at_time(time);
         }
-        let tau = (time - self.times.0) / (self.times.1 - self.times.0);
+        self.at((time - self.times.0) / (self.times.1 - self.times.0))
+    }
+
+    /// The state at τ ∈ [0, 1]: exactly that of the nodes at both ends.
+    #[must_use]
+    pub fn at(&self, tau: f64) -> FamilyState {
+        if tau == 1.0 {
+            return self.end.clone();
+        }
+        if !self.pieces.is_empty() {
+            return self.at_time(self.times.0 + tau * (self.times.1 - self.times.0));
+        }
         let mut integrals = [0.0; MAX_NODES];
         legendre_integrals(tau, &mut integrals);
         let mut state = self.start.clone();

@@ -1,6 +1,7 @@
 //! What a generated family gives the runtime.
 
 use super::error::FamilyError;
+use crate::length::{Declared, RunTimeLength};
 use crate::model::{CoordinateName, Facts, Form};
 use crate::real::Real;
 use alloc::vec;
@@ -67,7 +68,7 @@ pub trait Entries<R> {
 ///
 /// Implemented by `#[dynamics]` for models with `coordinates(q[n])`, n a field of type `usize`. All slices are as long as the model. Kernels may be
 /// called after [`check`](Self::check) has succeeded; before, they may panic or leave results out.
-pub trait FamilyModel {
+pub trait FamilyModel: Declared<0, Length = RunTimeLength> {
     /// By which function it was declared.
     const FORM: Form;
     /// What is known about its structure.

@@ -3,6 +3,7 @@
 use super::error::FamilyError;
 use super::inertia::Inertia;
 use super::model::{Block, Entries, FamilyModel, Gradient};
+use crate::length::{Declared, RunTimeLength};
 use crate::model::{CoordinateName, Facts, Form};
 use crate::real::Real;
 use alloc::vec::Vec;
@@ -93,6 +94,10 @@ impl<R: Real, E: Entries<R>> Entries<R> for Turned<'_, E> {
             _ => self.entries.add(block, row, column, value),
         }
     }
+}
+
+impl<M> Declared<0> for View<'_, M> {
+    type Length = RunTimeLength;
 }
 
 impl<M: FamilyModel> FamilyModel for View<'_, M> {

@@ -1,0 +1,159 @@
+//! What a motion records of a model, of either kind of length.
+
+use crate::constraints::ConstraintResidual;
+use crate::length::{FixedLength, Length, RunTimeLength};
+use crate::numbers::larger;
+use tfe_runtime::family::{self, FamilyModel, FamilyState};
+use tfe_runtime::{CoordinateName, Form, Model, State, constrained, legendre};
+
+/// Evaluates a model at points of phase space: every [`Model`] and every [`FamilyModel`], and nothing else.
+pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
+    /// The names of the coordinates.
+    fn coordinate_names(&self) -> Vec<CoordinateName>;
+
+    /// The names of the outputs, in the order of declaration and of sites.
+    fn output_names(&self) -> Vec<CoordinateName>;
+
+    /// The names of the constraints, in the order of declaration and of sites.
+    fn constraint_names(&self) -> Vec<L::ConstraintName>;
+
+    /// dq/dt, looked for from `guess` on; `None` where no velocity belongs to the momentum.
+    fn velocity(&self, t: f64, state: &L::State, guess: &L::Vector) -> Option<L::Vector>;
+
+    /// H = p·v − L.
+    fn energy(&self, t: f64, state: &L::State, velocity: &L::Vector) -> f64;
+
+    /// The outputs of a model that has any.
+    fn outputs(&self, t: f64, state: &L::State, velocity: &L::Vector, values: &mut [f64]);
+
+    /// What the state leaves of the constraints, and their reactions, if there are any. Reactions are NaN where they cannot be had.
+    fn constraints(
+        &self,
+        t: f64,
+        state: &L::State,
+        velocity: &L::Vector,
+    ) -> Option<(ConstraintResidual, Vec<f64>)>;
+
+    /// The same model with another value of a parameter, if one can be made.
+    fn with(&self, parameter: &str, value: f64) -> Option<Self>;
+
+    /// Whether outputs need a velocity: of a Hamiltonian they are functions of momenta.
+    const NEEDS_VELOCITY: bool;
+}
+
+impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
+    const NEEDS_VELOCITY: bool = matches!(M::FORM, Form::Lagrangian);
+
+    fn coordinate_names(&self) -> Vec<CoordinateName> {
+        (0..N).map(M::coordinate_name).collect()
+    }
+
+    fn output_names(&self) -> Vec<CoordinateName> {
+        (0..self.columns()).map(|at| self.column_name(at)).collect()
+    }
+
+    fn constraint_names(&self) -> Vec<&'static str> {
+        M::CONSTRAINTS.iter().map(|one| one.name).collect()
+    }
+
+    fn velocity(&self, t: f64, state: &State<N>, guess: &[f64; N]) -> Option<[f64; N]> {
+        constrained::velocity_of(self, t, &state.q, &state.p, guess).ok()
+    }
+
+    fn energy(&self, t: f64, state: &State<N>, velocity: &[f64; N]) -> f64 {
+        legendre::energy_at(self, t, &state.q, &state.p, velocity)
+    }
+
+    fn outputs(&self, t: f64, state: &State<N>, velocity: &[f64; N], values: &mut [f64]) {
+        let z = match M::FORM {
+            Form::Lagrangian => velocity,
+            Form::Hamiltonian => &state.p,
+        };
+        self.observables(t, &state.q, z, values);
+    }
+
+    fn constraints(
+        &self,
+        t: f64,
+        state: &State<N>,
+        velocity: &[f64; N],
+    ) -> Option<(ConstraintResidual, Vec<f64>)> {
+        if const { M::CONSTRAINTS.is_empty() } {
+            return None;
+        }
+        let reactions = constrained::reactions(self, t, state, velocity);
+        let reactions = reactions.unwrap_or_else(|_| vec![f64::NAN; M::CONSTRAINTS.len()]);
+        let (mut position, mut rate) = (0.0, 0.0);
+        for one in constrained::residuals(self, t, &state.q, velocity, 1.0) {
+            position = larger(position, one.position.abs());
+            rate = larger(rate, one.velocity.abs());
+        }
+        let independent = constrained::independent(self, t, &state.q);
+        let residual = ConstraintResidual {
+            position,
+            velocity: rate,
+            rank: independent.into_iter().filter(|one| *one).count(),
+        };
+        Some((residual, reactions))
+    }
+
+    fn with(&self, parameter: &str, value: f64) -> Option<Self> {
+        self.with_parameter(self.find_parameter(parameter)?, value)
+    }
+}
+
+impl<M: FamilyModel> Evaluate<0, RunTimeLength> for M {
+    const NEEDS_VELOCITY: bool = matches!(M::FORM, Form::Lagrangian);
+
+    fn coordinate_names(&self) -> Vec<CoordinateName> {
+        (0..self.len()).map(|a| self.coordinate_name(a)).collect()
+    }
+
+    fn output_names(&self) -> Vec<CoordinateName> {
+        (0..self.columns()).map(|at| self.column_name(at)).collect()
+    }
+
+    fn constraint_names(&self) -> Vec<CoordinateName> {
+        let rows = 0..self.constraints();
+        rows.map(|row| self.constraint_name(row)).collect()
+    }
+
+    fn velocity(&self, t: f64, state: &FamilyState, _: &Vec<f64>) -> Option<Vec<f64>> {
+        family::velocity(self, t, state).ok()
+    }
+
+    fn energy(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>) -> f64 {
+        family::energy(self, t, state, velocity)
+    }
+
+    fn outputs(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>, values: &mut [f64]) {
+        let z = match M::FORM {
+            Form::Lagrangian => velocity,
+            Form::Hamiltonian => &state.p,
+        };
+        self.observables(t, &state.q, z, values);
+    }
+
+    fn constraints(
+        &self,
+        t: f64,
+        state: &FamilyState,
+        velocity: &Vec<f64>,
+    ) -> Option<(ConstraintResidual, Vec<f64>)> {
+        if const { !M::CONSTRAINED } {
+            return None;
+        }
+        let rank = FamilyModel::constraints(self);
+        let (position, rate) = family::constraint_residual(self, t, &state.q, velocity);
+        let residual = ConstraintResidual {
+            position,
+            velocity: rate,
+            rank,
+        };
+        Some((residual, vec![f64::NAN; rank]))
+    }
+
+    fn with(&self, _: &str, _: f64) -> Option<Self> {
+        None
+    }
+}

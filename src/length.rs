@@ -1,0 +1,165 @@
+//! Models of both kinds of length: what their states, polynomials and checkpoints are.
+
+pub use tfe_runtime::length::{Declared, FixedLength, RunTimeLength};
+
+use std::fmt::{Debug, Display};
+use std::ops::Deref;
+use tfe_runtime::family::{FamilyDense, FamilyState, FamilySuspended};
+use tfe_runtime::step::{DenseElement, Impulse, Suspended};
+use tfe_runtime::{CoordinateName, Share, State};
+
+/// What runs and motions consist of: [`FixedLength`] keeps numbers in arrays, [`RunTimeLength`] in vectors. There is no third.
+///
+/// A [`Motion<N>`](crate::Motion) is one of `FixedLength`; of a model of run-time length it is a `Motion<0, RunTimeLength>`, or
+/// [`family::Motion`](crate::family::Motion).
+pub trait Length<const N: usize>: Copy + Debug + PartialEq + 'static {
+    /// How a run holds its model: borrowed, or also one of its own.
+    type Held<'m, M: 'm>: Clone + Deref<Target = M> + From<&'m M>;
+    /// Coordinates, momenta or velocities.
+    type Vector: Clone + Debug + PartialEq + AsRef<[f64]>;
+    /// A point of phase space.
+    type State: Clone + Debug + PartialEq;
+    /// The solution inside an element.
+    type Polynomial: Polynomial<State = Self::State, Vector = Self::Vector>;
+    /// A stepper without its model.
+    type Suspended: Clone + Debug;
+    /// A force that acts at one instant.
+    type Impulse: Clone + Debug;
+    /// The name of a constraint.
+    type ConstraintName: Clone + Debug + Display + PartialEq;
+
+    /// The state of coordinates and momenta.
+    fn state(q: Self::Vector, p: Self::Vector) -> Self::State;
+
+    /// Coordinates and momenta.
+    fn parts(state: &Self::State) -> (&Self::Vector, &Self::Vector);
+
+    /// As many numbers as another vector has, all of them NaN.
+    fn unknown(like: &Self::Vector) -> Self::Vector;
+
+    /// As many zeros as another vector has numbers.
+    fn zero(like: &Self::Vector) -> Self::Vector;
+}
+
+impl<const N: usize> Length<N> for FixedLength {
+    type Held<'m, M: 'm> = Share<'m, M>;
+    type Vector = [f64; N];
+    type State = State<N>;
+    type Polynomial = DenseElement<N>;
+    type Suspended = Suspended<N>;
+    type Impulse = Impulse<N>;
+    type ConstraintName = &'static str;
+
+    fn state(q: [f64; N], p: [f64; N]) -> State<N> {
+        State { q, p }
+    }
+
+    fn parts(state: &State<N>) -> (&[f64; N], &[f64; N]) {
+        (&state.q, &state.p)
+    }
+
+    fn unknown(_: &[f64; N]) -> [f64; N] {
+        [f64::NAN; N]
+    }
+
+    fn zero(_: &[f64; N]) -> [f64; N] {
+        [0.0; N]
+    }
+}
+
+impl Length<0> for RunTimeLength {
+    type Held<'m, M: 'm> = &'m M;
+    type Vector = Vec<f64>;
+    type State = FamilyState;
+    type Polynomial = FamilyDense;
+    type Suspended = FamilySuspended;
+    type Impulse = (f64, Vec<f64>);
+    type ConstraintName = CoordinateName;
+
+    fn state(q: Vec<f64>, p: Vec<f64>) -> FamilyState {
+        FamilyState { q, p }
+    }
+
+    fn parts(state: &FamilyState) -> (&Vec<f64>, &Vec<f64>) {
+        (&state.q, &state.p)
+    }
+
+    fn unknown(like: &Vec<f64>) -> Vec<f64> {
+        vec![f64::NAN; like.len()]
+    }
+
+    fn zero(like: &Vec<f64>) -> Vec<f64> {
+        vec![0.0; like.len()]
+    }
+}
+
+/// The solution inside an element, or inside its pieces if it was cut.
+pub trait Polynomial: Clone + Debug {
+    /// A point of phase space.
+    type State;
+    /// Velocities.
+    type Vector;
+
+    /// Time at the start.
+    fn start(&self) -> f64;
+
+    /// Time at the end.
+    fn end(&self) -> f64;
+
+    /// The degree of the coordinates.
+    fn degree(&self) -> usize;
+
+    /// The pieces of an element that was cut; the element itself if it was not.
+    fn pieces(&self) -> &[Self]
+    where
+        Self: Sized;
+
+    /// The state at a fraction of its length, between 0 and 1; of an element that is not cut.
+    fn at(&self, fraction: f64) -> Self::State;
+
+    /// The state at a time between start and end.
+    fn at_time(&self, time: f64) -> Self::State;
+
+    /// dq/dt there: the derivative of the polynomial.
+    fn velocity_at_time(&self, time: f64) -> Self::Vector;
+}
+
+macro_rules! polynomial {
+    ($polynomial:ty, $state:ty, $vector:ty, $($length:tt)*) => {
+        impl<$($length)*> Polynomial for $polynomial {
+            type State = $state;
+            type Vector = $vector;
+
+            fn start(&self) -> f64 {
+                self.start()
+            }
+
+            fn end(&self) -> f64 {
+                self.end()
+            }
+
+            fn degree(&self) -> usize {
+                self.degree()
+            }
+
+            fn pieces(&self) -> &[Self] {
+                self.pieces()
+            }
+
+            fn at(&self, fraction: f64) -> $state {
+                self.at(fraction)
+            }
+
+            fn at_time(&self, time: f64) -> $state {
+                self.at_time(time)
+            }
+
+            fn velocity_at_time(&self, time: f64) -> $vector {
+                self.velocity_at_time(time)
+            }
+        }
+    };
+}
+
+polynomial!(DenseElement<N>, State<N>, [f64; N], const N: usize);
+polynomial!(FamilyDense, FamilyState, Vec<f64>,);
