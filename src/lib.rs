@@ -62,7 +62,7 @@ pub use tfe_runtime::element::markers::*;
 pub use tfe_runtime::{
     Element, Family, Model, Rule, Solve, State, Statistics, StepError, Structure,
 };
-pub use velocity::{FamilyVelocity, Velocity};
+pub use velocity::Velocity;
 pub use work_precision::WorkPrecision;
 
 /// What a program that simulates needs: `use tfe::prelude::*;`.
@@ -71,10 +71,9 @@ pub mod prelude {
     pub use crate::Fit;
     pub use crate::stability::Blocks;
     pub use crate::{
-        Act, BoundaryValue, ConsistentState, Continuation, Crossing, Element, Ensemble,
-        FamilyVelocity, Fidelity, Interpolation, Modal, Model, Motion, Node, OptimalControl,
-        PeriodicOrbit, Settings, Simulation, Solve, State, Velocity, WorkPrecision, dynamics,
-        stability,
+        Act, BoundaryValue, ConsistentState, Continuation, Crossing, Element, Ensemble, Fidelity,
+        Interpolation, Modal, Model, Motion, Node, OptimalControl, PeriodicOrbit, Settings,
+        Simulation, Solve, State, Velocity, WorkPrecision, dynamics, stability,
     };
     pub use tfe_runtime::element::markers::*;
 }

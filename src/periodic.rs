@@ -20,10 +20,8 @@ pub(crate) mod problem;
 mod setup;
 
 pub use error::OrbitError;
-#[cfg(feature = "sparse")]
-pub use family::{FamilyOrbit, FamilyPeriodicOrbit};
 pub use hybrid::{HybridOrbit, HybridOrbits};
-pub use kind::Orbits;
+pub use kind::{Chained, Closed};
 pub use orbit::{Exponent, Orbit, Verdict};
 pub use phase::Phase;
 pub use setup::PeriodicOrbit;

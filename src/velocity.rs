@@ -1,12 +1,14 @@
 //! Velocities of states.
 
-use tfe_runtime::family::{self, FamilyModel, FamilyState};
-use tfe_runtime::{Model, State, constrained};
+use crate::evaluate::Evaluate;
+use crate::length::{FixedLength, Length, RunTimeLength};
+use tfe_runtime::family::{FamilyModel, FamilyState};
+use tfe_runtime::{Model, State};
 
-/// The velocities that belong to states of a model of fixed size.
-pub trait Velocity<const N: usize>: Model<N> + Sized {
-    /// dq/dt of a state at the time t: v with ∂L/∂v = p and on the constraints, or ∂H/∂p. NaN where the mass matrix is singular, or where the iteration for v of a kinetic
-    /// energy that is not quadratic fails.
+/// The velocities that belong to states of a model.
+pub trait Velocity<const N: usize, L: Length<N> = FixedLength>: Evaluate<N, L> {
+    /// dq/dt of a state at the time t: v with ∂L/∂v = p and on the constraints, or ∂H/∂p. NaN where the mass matrix is singular, where the iteration for v of a kinetic
+    /// energy that is not quadratic fails, or where the state is not as long as the model.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -18,31 +20,6 @@ pub trait Velocity<const N: usize>: Model<N> + Sized {
     /// let state = planet.state([3.0, 0.0], [0.25, 0.5]);
     /// assert_eq!(state.p, [0.5, 9.0]);
     /// assert_eq!(planet.velocity(0.0, &state), [0.25, 0.5]);
-    /// ```
-    fn velocity(&self, t: f64, state: &State<N>) -> [f64; N] {
-        velocity_from(self, t, state, &[0.0; N])
-    }
-}
-
-/// The same, looked for from `guess` on.
-pub(crate) fn velocity_from<M: Model<N>, const N: usize>(
-    model: &M,
-    t: f64,
-    state: &State<N>,
-    guess: &[f64; N],
-) -> [f64; N] {
-    let found = constrained::velocity_of(model, t, &state.q, &state.p, guess);
-    found.unwrap_or([f64::NAN; N])
-}
-
-impl<M: Model<N>, const N: usize> Velocity<N> for M {}
-
-/// The same for models of run-time length.
-pub trait FamilyVelocity: FamilyModel + Sized {
-    /// dq/dt of a state at the time t; NaN where there is none, or where the state is not as long as the model.
-    ///
-    /// ```
-    /// use tfe::prelude::*;
     ///
     /// #[dynamics(
     ///     coordinates(q[n]),
@@ -54,12 +31,21 @@ pub trait FamilyVelocity: FamilyModel + Sized {
     /// let state = chain.state([0.0, 0.1, 0.3], [0.5, 0.0, -1.0]);
     /// assert_eq!(chain.velocity(0.0, &state), [0.5, 0.0, -1.0]);
     /// ```
-    fn velocity(&self, t: f64, state: &FamilyState) -> Vec<f64> {
-        let n = self.len();
-        let fits = self.check().is_ok() && (state.q.len(), state.p.len()) == (n, n);
-        let found = fits.then(|| family::velocity(self, t, state).ok());
-        found.flatten().unwrap_or_else(|| vec![f64::NAN; n])
+    fn velocity(&self, t: f64, state: &L::State) -> L::Vector;
+}
+
+impl<M: Model<N>, const N: usize> Velocity<N> for M {
+    fn velocity(&self, t: f64, state: &State<N>) -> [f64; N] {
+        let found = Evaluate::velocity(self, t, state, &[0.0; N]);
+        found.unwrap_or([f64::NAN; N])
     }
 }
 
-impl<M: FamilyModel> FamilyVelocity for M {}
+impl<M: FamilyModel> Velocity<0, RunTimeLength> for M {
+    fn velocity(&self, t: f64, state: &FamilyState) -> Vec<f64> {
+        let n = self.len();
+        let fits = self.check().is_ok() && (state.q.len(), state.p.len()) == (n, n);
+        let found = fits.then(|| Evaluate::velocity(self, t, state, &state.p));
+        found.flatten().unwrap_or_else(|| vec![f64::NAN; n])
+    }
+}

@@ -72,6 +72,53 @@ impl Mesh {
             ..Direction::default()
         }
     }
+
+    /// The lengths of so many elements, each with the same arc length in scaled time and phase space, between nodes of which momenta and coordinates are given.
+    pub(crate) fn equidistributed(&self, nodes: &[[&[f64]; 2]], elements: usize) -> Vec<f64> {
+        let components = nodes.first().map_or(0, |[p, q]| p.len() + q.len());
+        let component = |[p, q]: &[&[f64]; 2], k: usize| match k.checked_sub(p.len()) {
+            None => p[k],
+            Some(k) => q[k],
+        };
+        let mut inverse_ranges = vec![0.0; components];
+        for (k, inverse) in inverse_ranges.iter_mut().enumerate() {
+            let values = nodes.iter().map(|node| component(node, k));
+            let (low, high) = values
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                    (low.min(value), high.max(value))
+                });
+            if high > low {
+                *inverse = 1.0 / (high - low);
+            }
+        }
+        // Arc length at the nodes.
+        let mut lengths = vec![0.0];
+        let mut total = 0.0;
+        for (element, pair) in nodes.windows(2).enumerate() {
+            let mut square = self.share(element).powi(2);
+            for (k, inverse) in inverse_ranges.iter().enumerate() {
+                let change = component(&pair[1], k) - component(&pair[0], k);
+                square += (inverse * change).powi(2);
+            }
+            total += square.sqrt();
+            lengths.push(total);
+        }
+        // Its inverse at equal parts.
+        let times: Vec<f64> = self.times(0.0, 1.0).collect();
+        let mut weights = Vec::with_capacity(elements);
+        let (mut at, mut last) = (0, 0.0);
+        for k in 1..=elements {
+            let length = total * k as f64 / elements as f64;
+            while at + 2 < lengths.len() && lengths[at + 1] < length {
+                at += 1;
+            }
+            let part = (length - lengths[at]) / (lengths[at + 1] - lengths[at]);
+            let time = times[at] + part.min(1.0) * (times[at + 1] - times[at]);
+            weights.push(time - last);
+            last = time;
+        }
+        weights
+    }
 }
 
 /// Why a mesh is none.

@@ -9,7 +9,7 @@ use tfe_runtime::{Element, Model, State, Statistics};
 
 /// The motion through solved elements, and their transition matrices.
 #[derive(Clone, Debug)]
-pub(crate) struct Solution<'m, M, const N: usize> {
+pub struct Solution<'m, M, const N: usize> {
     pub(crate) model: &'m M,
     pub(crate) element: Element,
     pub(crate) mesh: Mesh,
@@ -44,51 +44,6 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
 
     pub(crate) fn matrices(&self) -> Vec<DMatrix<f64>> {
         matrices::<N>(&self.transitions)
-    }
-
-    /// The lengths of so many elements, each with the same arc length in scaled time and phase space.
-    pub(crate) fn equidistributed(&self, elements: usize) -> Vec<f64> {
-        let nodes = &self.iterate.nodes;
-        let component =
-            |state: &State<N>, k: usize| if k < N { state.p[k] } else { state.q[k - N] };
-        let mut inverse_ranges = vec![0.0; 2 * N];
-        for (k, inverse) in inverse_ranges.iter_mut().enumerate() {
-            let values = nodes.iter().map(|node| component(node, k));
-            let (low, high) = values
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                    (low.min(value), high.max(value))
-                });
-            if high > low {
-                *inverse = 1.0 / (high - low);
-            }
-        }
-        // Arc length at the nodes.
-        let mut lengths = vec![0.0];
-        let mut total = 0.0;
-        for (element, pair) in nodes.windows(2).enumerate() {
-            let mut square = self.mesh.share(element).powi(2);
-            for (k, inverse) in inverse_ranges.iter().enumerate() {
-                let change = component(&pair[1], k) - component(&pair[0], k);
-                square += (inverse * change).powi(2);
-            }
-            total += square.sqrt();
-            lengths.push(total);
-        }
-        // Its inverse at equal parts.
-        let times: Vec<f64> = self.mesh.times(0.0, 1.0).collect();
-        let mut weights = Vec::with_capacity(elements);
-        let (mut at, mut last) = (0, 0.0);
-        for k in 1..=elements {
-            let length = total * k as f64 / elements as f64;
-            while at + 2 < lengths.len() && lengths[at + 1] < length {
-                at += 1;
-            }
-            let part = (length - lengths[at]) / (lengths[at + 1] - lengths[at]);
-            let time = times[at] + part.min(1.0) * (times[at + 1] - times[at]);
-            weights.push(time - last);
-            last = time;
-        }
-        weights
     }
 
     /// The motion with the polynomials of the elements.

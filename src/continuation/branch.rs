@@ -131,7 +131,7 @@ impl<const N: usize> Frame<N> {
             },
         };
         let unfolding = self.unfolded.then_some(member.unfolding);
-        Orbit::of_solution(solution, self.advance, floquet, self.trivial, unfolding)
+        Orbit::of_solution(solution, floquet, self.trivial, unfolding)
     }
 }
 
@@ -270,7 +270,10 @@ impl<M, const N: usize> fmt::Debug for Branch<M, N> {
 }
 
 /// Half the range of each coordinate over the period of an orbit, less its steady growth.
-pub(super) fn amplitudes<M: Model<N>, const N: usize>(orbit: &Orbit<'_, M, N>) -> [f64; N] {
+pub(super) fn amplitudes<M: Model<N>, const N: usize>(
+    orbit: &Orbit<'_, M, N>,
+    advance: &[f64; N],
+) -> [f64; N] {
     let motion = orbit.motion();
     let (start, period) = (orbit.solution.start, orbit.period());
     let mut samples: Vec<(f64, [f64; N])> = Vec::new();
@@ -279,7 +282,7 @@ pub(super) fn amplitudes<M: Model<N>, const N: usize>(orbit: &Orbit<'_, M, N>) -
             let t = pair[0].t + (pair[1].t - pair[0].t) * f64::from(part) / f64::from(SAMPLES);
             let mut q = motion.at(t).unwrap_or(pair[0]).q;
             for a in 0..N {
-                q[a] -= orbit.advance[a] * (t - start) / period;
+                q[a] -= advance[a] * (t - start) / period;
             }
             samples.push((t, q));
         }

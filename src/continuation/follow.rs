@@ -206,7 +206,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             parameter: solved.parameter(),
             period: orbit.period(),
             start: orbit.start(),
-            amplitudes: amplitudes(&orbit),
+            amplitudes: amplitudes(&orbit, &self.frame.advance),
             multipliers: orbit.multipliers().to_vec(),
             floquet: solved.floquet.clone(),
             trivial: orbit.trivial(),

@@ -44,6 +44,13 @@ pub enum OrbitError {
     },
     /// Orbits with events are not found for models with constraints: minimal coordinates are needed.
     HybridConstraints,
+    /// Something was asked for that models of this kind cannot do.
+    Unsupported {
+        /// The call.
+        call: &'static str,
+        /// The kind of models.
+        of: &'static str,
+    },
     /// The assembled equations were not solved.
     Assembly(AssemblyError),
     /// An autonomous model has no orbit of this period: the equations can only be met with an additional force γ v.
@@ -89,6 +96,7 @@ impl fmt::Display for OrbitError {
                 "the model depends on time, so its orbits have the period of the forcing: give it with `.period(T)`",
             ),
             Self::Mesh(error) => error.fmt(f),
+            Self::Unsupported { call, of } => write!(f, "`{call}` is not to be had of {of}"),
             Self::Phase { index } => {
                 write!(f, "the condition of phase names coordinate {index}, which does not exist")
             }

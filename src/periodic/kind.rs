@@ -1,62 +1,84 @@
-//! Which kind of orbit `PeriodicOrbit::of` gives.
+//! What closes orbits of models of either kind of length.
 
-#[cfg(feature = "sparse")]
-use super::family::FamilyPeriodicOrbit;
-use super::setup::PeriodicOrbit;
-use tfe_runtime::Model;
-#[cfg(feature = "sparse")]
-use tfe_runtime::family::FamilyModel;
-#[cfg(feature = "sparse")]
-use tfe_runtime::length::RunTimeLength;
-use tfe_runtime::length::{Declared, FixedLength};
+use crate::assembly::Solution;
+use crate::length::{FixedLength, Length};
+use crate::motion::{Motion, Node};
+use nalgebra::DMatrix;
+use tfe_runtime::{Model, State, Statistics};
 
-/// The kind of orbit that models of one kind of length have; what [`PeriodicOrbit::of`] returns.
+/// A [`Length`] whose models have periodic orbits.
 #[cfg_attr(
     not(feature = "sparse"),
     diagnostic::on_unimplemented(
         message = "periodic orbits of models of run-time length need the feature `sparse`"
     )
 )]
-pub trait Orbits<M, const N: usize> {
-    /// The orbit to be found.
-    type Orbit<'m>
+pub trait Closed<M, const N: usize>: Length<N> {
+    /// A chain of elements that is solved.
+    type Solution<'m>: Chained<N, Self>
     where
         M: 'm;
-
-    /// With the defaults.
-    fn with_defaults(model: &M) -> Self::Orbit<'_>;
 }
 
-impl<M: Model<N>, const N: usize> Orbits<M, N> for FixedLength {
-    type Orbit<'m>
-        = PeriodicOrbit<'m, M, N>
+/// A chain of elements over one period.
+pub trait Chained<const N: usize, L: Length<N>> {
+    /// The length of all of it.
+    fn period(&self) -> f64;
+
+    /// The state at its start.
+    fn start(&self) -> L::State;
+
+    /// The ends of the elements, in order.
+    fn nodes(&self) -> Vec<Node<N, L>>;
+
+    /// The transition matrices of the elements.
+    fn transitions(&self) -> Vec<DMatrix<f64>>;
+
+    /// Lengths of so many elements, each with the same piece of the orbit.
+    fn equidistributed(&self, elements: usize) -> Vec<f64>;
+
+    /// What the solution cost.
+    fn statistics(&self) -> &Statistics;
+
+    /// Through the polynomials of the elements.
+    fn motion(&self) -> Motion<N, L>;
+}
+
+impl<M: Model<N>, const N: usize> Closed<M, N> for FixedLength {
+    type Solution<'m>
+        = Solution<'m, M, N>
     where
         M: 'm;
+}
 
-    fn with_defaults(model: &M) -> PeriodicOrbit<'_, M, N> {
-        PeriodicOrbit::with_defaults(model)
+impl<M: Model<N>, const N: usize> Chained<N, FixedLength> for Solution<'_, M, N> {
+    fn period(&self) -> f64 {
+        self.length
     }
-}
 
-#[cfg(feature = "sparse")]
-impl<M: FamilyModel> Orbits<M, 0> for RunTimeLength {
-    type Orbit<'m>
-        = FamilyPeriodicOrbit<'m, M>
-    where
-        M: 'm;
-
-    fn with_defaults(model: &M) -> FamilyPeriodicOrbit<'_, M> {
-        FamilyPeriodicOrbit::new(model)
+    fn start(&self) -> State<N> {
+        self.start()
     }
-}
 
-impl<'m, M, const N: usize> PeriodicOrbit<'m, M, N> {
-    /// An orbit of `model`, with the defaults: this type for a model of fixed size, `FamilyPeriodicOrbit` (with the feature `sparse`) for one of
-    /// run-time length, which has methods of the same names.
-    pub fn of(model: &'m M) -> <M::Length as Orbits<M, N>>::Orbit<'m>
-    where
-        M: Declared<N, Length: Orbits<M, N>>,
-    {
-        M::Length::with_defaults(model)
+    fn nodes(&self) -> Vec<Node<N>> {
+        self.nodes()
+    }
+
+    fn transitions(&self) -> Vec<DMatrix<f64>> {
+        self.matrices()
+    }
+
+    fn equidistributed(&self, elements: usize) -> Vec<f64> {
+        let nodes = self.iterate.nodes.iter();
+        let nodes: Vec<_> = nodes.map(|state| [&state.p[..], &state.q]).collect();
+        self.mesh.equidistributed(&nodes, elements)
+    }
+
+    fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    fn motion(&self) -> Motion<N> {
+        self.motion()
     }
 }

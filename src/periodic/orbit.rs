@@ -1,9 +1,11 @@
 //! A periodic orbit, solved.
 
 use super::error::OrbitError;
+use super::kind::{Chained, Closed};
 use super::problem::Periodic;
 use crate::assembly::{Assembly, Iterate, Solution};
 use crate::constraints::reduced;
+use crate::length::FixedLength;
 use crate::motion::{Motion, Node};
 use crate::numbers::larger;
 use crate::periodic_schur::{self, Multiplier};
@@ -14,9 +16,8 @@ use tfe_runtime::{Element, Model, State, Statistics};
 
 /// A periodic orbit with its Floquet multipliers; made by [`PeriodicOrbit`](super::PeriodicOrbit).
 #[derive(Clone, Debug)]
-pub struct Orbit<'m, M, const N: usize> {
-    pub(crate) solution: Solution<'m, M, N>,
-    pub(crate) advance: [f64; N],
+pub struct Orbit<'m, M: 'm, const N: usize, L: Closed<M, N> = FixedLength> {
+    pub(crate) solution: L::Solution<'m>,
     floquet: Vec<Multiplier>,
     multipliers: Vec<Complex<f64>>,
     trivial: usize,
@@ -107,26 +108,20 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
             statistics: assembly.statistics(),
         };
         let trivial = problem.trivial();
-        Ok(Self::of_solution(
-            solution,
-            problem.advance,
-            floquet,
-            trivial,
-            unfolding,
-        ))
+        Ok(Self::of_solution(solution, floquet, trivial, unfolding))
     }
+}
 
+impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
     /// From a solved chain and its multipliers.
     pub(crate) fn of_solution(
-        solution: Solution<'m, M, N>,
-        advance: [f64; N],
+        solution: L::Solution<'m>,
         floquet: Vec<Multiplier>,
         trivial: usize,
         unfolding: Option<f64>,
     ) -> Self {
         Self {
             solution,
-            advance,
             multipliers: floquet.iter().map(Multiplier::to_complex).collect(),
             floquet,
             trivial,
@@ -136,33 +131,35 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
 
     /// The period T, as given or as found.
     pub fn period(&self) -> f64 {
-        self.solution.length
+        self.solution.period()
     }
 
     /// The state at the start of the period.
-    pub fn start(&self) -> State<N> {
+    pub fn start(&self) -> L::State {
         self.solution.start()
     }
 
     /// The ends of the elements, in order; the last one is the first one a period later.
-    pub fn nodes(&self) -> Vec<Node<N>> {
+    pub fn nodes(&self) -> Vec<Node<N, L>> {
         self.solution.nodes()
     }
 
     /// The transition matrices A_e of the elements in order, 2N × 2N, ordered (p, q).
     pub fn transitions(&self) -> Vec<DMatrix<f64>> {
-        self.solution.matrices()
+        self.solution.transitions()
     }
 
     /// The monodromy matrix A_E ⋯ A_1, 2N × 2N, ordered (p, q): the derivative of the state after a period by that before.
     ///
     /// Small multipliers of this matrix drown in the round-off of the large ones; [`multipliers`](Self::multipliers) do not come from it.
     pub fn monodromy(&self) -> DMatrix<f64> {
-        self.transitions()
-            .iter()
-            .fold(DMatrix::identity(2 * N, 2 * N), |product, matrix| {
-                matrix * product
-            })
+        let start = self.start();
+        let (_, p) = L::parts(&start);
+        let size = 2 * p.as_ref().len();
+        let transitions = self.transitions();
+        (transitions.iter()).fold(DMatrix::identity(size, size), |product, matrix| {
+            matrix * product
+        })
     }
 
     /// The Floquet multipliers μ, the largest modulus first, each to a relative accuracy of its own.
@@ -181,8 +178,8 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
     /// The exponents ln μ / T, in the same order.
     pub fn exponents(&self) -> Vec<Exponent> {
         let exponent = |multiplier: &Multiplier| Exponent {
-            growth: multiplier.log_modulus / self.solution.length,
-            frequency: multiplier.argument / self.solution.length,
+            growth: multiplier.log_modulus / self.period(),
+            frequency: multiplier.argument / self.period(),
         };
         self.floquet.iter().map(exponent).collect()
     }
@@ -245,11 +242,11 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
 
     /// What the solution cost.
     pub fn statistics(&self) -> &Statistics {
-        &self.solution.statistics
+        self.solution.statistics()
     }
 
     /// The motion over one period, with dense output: the polynomials of the elements.
-    pub fn motion(&self) -> Motion<N> {
+    pub fn motion(&self) -> Motion<N, L> {
         self.solution.motion()
     }
 }
@@ -262,13 +259,13 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
 ///   μ = 6.6539330e-2 − 6.3491730e-1 i, |μ| = 6.3839451e-1
 ///   stable, margin 3.6e-1
 /// ```
-impl<M: Model<N>, const N: usize> fmt::Display for Orbit<'_, M, N> {
+impl<'m, M, const N: usize, L: Closed<M, N>> fmt::Display for Orbit<'m, M, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
             "periodic orbit: T = {:.10}, {} elements, {} iterations",
             self.period(),
-            self.solution.mesh.elements(),
+            self.solution.transitions().len(),
             self.statistics().newton_iterations
         )?;
         let trivial = self.trivial();

@@ -1,19 +1,24 @@
 //! A periodic orbit to be found, and how it is found.
 
 use super::error::OrbitError;
+use super::kind::Closed;
 use super::orbit::Orbit;
 use super::phase::{Period, Phase};
 use super::problem::{Global, Periodic};
 use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh};
+use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Motion;
 use crate::simulation::Simulation;
-use tfe_runtime::{Element, Mixed, Model, State, constrained, legendre};
+use tfe_runtime::{Element, Mixed, Model, constrained, legendre};
+
+/// A curve t ↦ (q, dq/dt).
+type Around<'m, V> = Box<dyn Fn(f64) -> (V, V) + 'm>;
 
 /// Where Newton's method starts.
-enum Guess<'m, const N: usize> {
+pub(super) enum Guess<'m, const N: usize, L: Length<N>> {
     Rest,
-    Curve(Curve<'m, N>),
-    Start(State<N>),
+    Curve(Around<'m, L::Vector>),
+    Start(L::State),
 }
 
 /// A periodic orbit to be found.
@@ -47,22 +52,42 @@ enum Guess<'m, const N: usize> {
 /// # Ok(())
 /// # }
 /// ```
-pub struct PeriodicOrbit<'m, M, const N: usize> {
-    model: &'m M,
-    element: Element,
-    elements: usize,
-    weights: Vec<f64>,
-    start: f64,
-    period: Period,
-    guess: Guess<'m, N>,
-    phase: Phase,
-    energy: Option<f64>,
-    advance: [f64; N],
-    control: Control,
+///
+/// # Models of run-time length
+/// With the feature `sparse` elements are stepped from all nodes, with their derivatives by implicit differentiation of the step
+/// ([`FamilyTransition`](crate::stability::FamilyTransition)): multiple shooting.
+///
+/// ```text
+/// δy_{e+1} − A_e δy_e − C_e δγ = Y_e(y_e, γ) − y_{e+1} ,   e = 0 … E − 1 ;      y_E = y_0                    (theory.md, (T-81), (T-82))
+/// ```
+///
+/// The matrices A_e are dense, 2n × 2n, and so are the equations that close the chain and the multipliers: E (2n)² numbers of memory and of the order of
+/// 10 E (2n)³ operations an iteration. Tens of coordinates are quick, two hundred take minutes.
+///
+/// The kinetic energy may be any of a Lagrangian; that of a Hamiltonian has to be ½ Σ p²/m. Constraints and [`advance`](Self::advance) are refused.
+#[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
+pub struct PeriodicOrbit<'m, M, const N: usize, L: Length<N> = FixedLength> {
+    pub(super) model: &'m M,
+    pub(super) element: Element,
+    pub(super) elements: usize,
+    pub(super) weights: Vec<f64>,
+    pub(super) start: f64,
+    pub(super) period: Period,
+    pub(super) guess: Guess<'m, N, L>,
+    pub(super) phase: Phase,
+    pub(super) energy: Option<f64>,
+    /// Zeros where it is not chosen.
+    pub(super) advance: Option<L::Vector>,
+    pub(super) control: Control,
 }
 
-impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
-    pub(super) fn with_defaults(model: &'m M) -> Self {
+impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
+    /// An orbit of `model`, with the defaults. For a model of run-time length the feature `sparse` is needed.
+    pub fn of(model: &'m M) -> Self
+    where
+        M: Declared<N, Length = L>,
+        L: Closed<M, N>,
+    {
         Self {
             model,
             element: Mixed::<4>.into(),
@@ -73,7 +98,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             guess: Guess::Rest,
             phase: Phase::default(),
             energy: None,
-            advance: [0.0; N],
+            advance: None,
             control: Control::default(),
         }
     }
@@ -123,14 +148,14 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
 
     /// Where to begin: a curve t ↦ (q, dq/dt), roughly the orbit.
     #[must_use]
-    pub fn guess(mut self, curve: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
+    pub fn guess(mut self, curve: impl Fn(f64) -> (L::Vector, L::Vector) + 'm) -> Self {
         self.guess = Guess::Curve(Box::new(curve));
         self
     }
 
     /// Where to begin: the motion that starts here, over one (guessed) period.
     #[must_use]
-    pub fn guess_from(mut self, state: State<N>) -> Self {
+    pub fn guess_from(mut self, state: L::State) -> Self {
         self.guess = Guess::Start(state);
         self
     }
@@ -151,8 +176,8 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
 
     /// How much the coordinates grow over a period: a full turn for an angle that rotates. Zero by default.
     #[must_use]
-    pub fn advance(mut self, advance: [f64; N]) -> Self {
-        self.advance = advance;
+    pub fn advance(mut self, advance: L::Vector) -> Self {
+        self.advance = Some(advance);
         self
     }
 
@@ -170,6 +195,19 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         self
     }
 
+    pub(super) fn checked_phase(&self, coordinates: usize) -> Result<Phase, OrbitError> {
+        match self.phase {
+            Phase::Coordinate { index, .. } | Phase::Momentum { index, .. }
+                if index >= coordinates =>
+            {
+                Err(OrbitError::Phase { index })
+            }
+            phase => Ok(phase),
+        }
+    }
+}
+
+impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// Finds the orbit and its multipliers.
     ///
     /// # Errors
@@ -193,7 +231,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             period,
             unfolding: 0.0,
             globals: Vec::new(),
-            advance: self.advance,
+            advance: self.advances(),
             phase: None,
             energy: None,
         };
@@ -208,7 +246,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             problem.globals.push(Global::Period);
         }
         if autonomous && !at_rest {
-            problem.phase = Some(self.checked_phase()?);
+            problem.phase = Some(self.checked_phase(N)?);
             if conservative || problem.globals.is_empty() {
                 problem.globals.push(Global::Unfolding);
             }
@@ -240,20 +278,15 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         (self.element, self.control)
     }
 
-    fn checked_phase(&self) -> Result<Phase, OrbitError> {
-        match self.phase {
-            Phase::Coordinate { index, .. } | Phase::Momentum { index, .. } if index >= N => {
-                Err(OrbitError::Phase { index })
-            }
-            phase => Ok(phase),
-        }
+    fn advances(&self) -> [f64; N] {
+        self.advance.unwrap_or([0.0; N])
     }
 
     /// The guess as a curve.
     fn curve(&self, period: f64) -> Result<Curve<'_, N>, OrbitError> {
         Ok(match &self.guess {
             Guess::Rest => {
-                let (advance, start) = (self.advance, self.start);
+                let (advance, start) = (self.advances(), self.start);
                 Box::new(move |t| {
                     let turn = (t - start) / period;
                     (advance.map(|a| a * turn), advance.map(|a| a / period))
@@ -278,7 +311,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         (0..=16).all(|k| {
             let (q, v) = curve(self.start + period * f64::from(k) / 16.0);
             q == first && v == [0.0; N]
-        }) && self.advance == [0.0; N]
+        }) && self.advances() == [0.0; N]
     }
 
     fn energy_of(&self, curve: &Curve<'_, N>) -> Result<f64, OrbitError> {

@@ -6,26 +6,34 @@ use tfe_runtime::step::Stepper;
 use tfe_runtime::{Model, Statistics};
 
 /// A [`Length`] whose models of type M can be stepped.
-pub trait Stepped<'m, M, const N: usize>: Length<N> {
+pub trait Stepped<M, const N: usize>: Length<N> {
     /// What makes the steps.
-    type Stepper;
+    type Stepper<'m>
+    where
+        M: 'm;
 
     /// What the steps so far have cost.
-    fn statistics(stepper: &Self::Stepper) -> &Statistics;
+    fn statistics<'s>(stepper: &'s Self::Stepper<'_>) -> &'s Statistics;
 }
 
-impl<'m, M: Model<N> + 'm, const N: usize> Stepped<'m, M, N> for FixedLength {
-    type Stepper = Stepper<'m, M, N>;
+impl<M: Model<N>, const N: usize> Stepped<M, N> for FixedLength {
+    type Stepper<'m>
+        = Stepper<'m, M, N>
+    where
+        M: 'm;
 
-    fn statistics(stepper: &Self::Stepper) -> &Statistics {
+    fn statistics<'s>(stepper: &'s Self::Stepper<'_>) -> &'s Statistics {
         stepper.statistics()
     }
 }
 
-impl<'m, M: FamilyModel + 'm> Stepped<'m, M, 0> for RunTimeLength {
-    type Stepper = FamilyStepper<'m, M>;
+impl<M: FamilyModel> Stepped<M, 0> for RunTimeLength {
+    type Stepper<'m>
+        = FamilyStepper<'m, M>
+    where
+        M: 'm;
 
-    fn statistics(stepper: &Self::Stepper) -> &Statistics {
+    fn statistics<'s>(stepper: &'s Self::Stepper<'_>) -> &'s Statistics {
         stepper.statistics()
     }
 }

@@ -21,7 +21,7 @@ use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Model, Share, State, Statistics};
 
 /// The endless sequence of states of [`Simulation::steps`](crate::Simulation::steps).
-pub struct Steps<'m, M, const N: usize, L: Stepped<'m, M, N> = FixedLength> {
+pub struct Steps<'m, M: 'm, const N: usize, L: Stepped<M, N> = FixedLength> {
     pub(super) way: Way<'m, M, N, L>,
     /// Of the last node, from where the next is looked for.
     velocity: L::Vector,
@@ -32,7 +32,7 @@ pub struct Steps<'m, M, const N: usize, L: Stepped<'m, M, N> = FixedLength> {
     resolution: Option<Resolution<'m, M, N>>,
 }
 
-impl<'m, M, const N: usize, L: Stepped<'m, M, N>> fmt::Debug for Steps<'m, M, N, L> {
+impl<'m, M, const N: usize, L: Stepped<M, N>> fmt::Debug for Steps<'m, M, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Steps")
             .field("time", &self.way.course.time())
@@ -42,10 +42,10 @@ impl<'m, M, const N: usize, L: Stepped<'m, M, N>> fmt::Debug for Steps<'m, M, N,
 }
 
 /// A stepper with its state on an endless course.
-pub(super) struct Way<'m, M, const N: usize, L: Stepped<'m, M, N> = FixedLength> {
+pub(super) struct Way<'m, M: 'm, const N: usize, L: Stepped<M, N> = FixedLength> {
     /// As it was at first.
     model: L::Held<'m, M>,
-    pub(super) course: Course<L::Stepper>,
+    pub(super) course: Course<L::Stepper<'m>>,
     pub(super) state: L::State,
     pub(super) impulses: Vec<L::Impulse>,
     /// None where no events are looked for.
@@ -115,11 +115,11 @@ impl<'m, M: Model<N>, const N: usize> Way<'m, M, N> {
     }
 }
 
-impl<'m, M, const N: usize, L: Stepped<'m, M, N>> Way<'m, M, N, L> {
+impl<'m, M, const N: usize, L: Stepped<M, N>> Way<'m, M, N, L> {
     /// Without a look for events.
     pub(super) fn along(
         model: L::Held<'m, M>,
-        course: Course<L::Stepper>,
+        course: Course<L::Stepper<'m>>,
         state: L::State,
         impulses: Vec<L::Impulse>,
     ) -> Self {
@@ -148,7 +148,7 @@ fn acting<const N: usize>(impulses: &[Impulse<N>], leg: &Leg) -> Vec<Impulse<N>>
     impulses.iter().filter(acts).copied().collect()
 }
 
-impl<'m, M, const N: usize, L: Stepped<'m, M, N>> Steps<'m, M, N, L> {
+impl<'m, M, const N: usize, L: Stepped<M, N>> Steps<'m, M, N, L> {
     /// What the steps so far have cost.
     pub fn statistics(&self) -> Statistics {
         self.way.statistics()

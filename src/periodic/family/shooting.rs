@@ -12,7 +12,7 @@ use tfe_runtime::{Element, Form, Statistics};
 
 /// The chain of elements over one period, closed by periodicity, and its iterate.
 #[derive(Clone, Debug)]
-pub(super) struct Shooting<'m, M> {
+pub struct Shooting<'m, M> {
     pub(super) model: &'m M,
     pub(super) element: Element,
     pub(super) mesh: Mesh,

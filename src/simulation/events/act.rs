@@ -4,9 +4,9 @@ use super::remodel::{Changed, Remodel};
 use super::settings::{Settings, momenta_of};
 use super::value::{Function, Value};
 use crate::error::RunErrorKind;
+use crate::evaluate::Evaluate;
 pub use crate::motion::Event;
 use crate::sensitivity::slopes::momentum_by;
-use crate::velocity::velocity_from;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -247,7 +247,8 @@ pub(in crate::simulation) fn state_after<M: Model<N>, const N: usize>(
         Some(other) => (other, None),
         None => (model, near.parameter),
     };
-    let mut velocity = velocity_from(model, t, state, &event.v);
+    let found = model.velocity(t, state, &event.v);
+    let mut velocity = found.unwrap_or([f64::NAN; N]);
     if larger.is_some() {
         for (v, more) in velocity.iter_mut().zip(near.velocity) {
             *v += more;
