@@ -3,6 +3,7 @@
 mod doubts;
 mod ends;
 mod error;
+mod family;
 mod members;
 mod plan;
 mod progress;
@@ -14,6 +15,6 @@ mod watched;
 pub use doubts::WarningCounts;
 pub use ends::{Ends, Failure};
 pub use error::EnsembleError;
-pub use members::{ManyModels, Members, OneModel};
+pub use members::{ManyModels, Members, Models, OneModel};
 pub use setup::Ensemble;
 pub use under_way::EnsembleRun;

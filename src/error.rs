@@ -200,6 +200,12 @@ pub enum RunErrorKind {
 }
 
 impl RunErrorKind {
+    /// Of a call that models of run-time length do not have.
+    pub(crate) fn run_time_length(call: &'static str) -> Self {
+        let of = "models of run-time length";
+        Self::Unsupported { call, of }
+    }
+
     /// Of an element of a model that could not be solved: for a function of an input that is not finite within it, if there is one.
     pub(crate) fn of_element<M: Model<N>, const N: usize>(
         model: &M,

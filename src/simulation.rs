@@ -27,7 +27,7 @@ pub use crate::motion::Checkpoint;
 pub(crate) use crate::motion::Reached;
 pub use crate::motion::Warning;
 pub use accurate::Accurate;
-pub(crate) use checks::{check_constraints, check_start, conserves_energy};
+pub(crate) use checks::{check_constraints, check_start, conserves_energies, conserves_energy};
 pub use events::act::{Act, Crossing, Event, Occurrence};
 pub use events::settings::Settings;
 pub(crate) use events::watching::Watching;

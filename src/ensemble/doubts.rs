@@ -1,8 +1,10 @@
 //! What is doubtful about runs that came to their ends.
 
-use crate::simulation::{conserves_energy, is_jump};
+use crate::evaluate::Evaluate;
+use crate::length::Length;
+use crate::motion::Node;
+use crate::simulation::is_jump;
 use std::fmt;
-use tfe_runtime::{Model, State, constrained, legendre};
 
 /// How many runs of an ensemble are doubtful although they came to their ends, by the kinds of [`Warning`](crate::Warning) that a single run would give; [`Ends::warnings`](super::Ends::warnings).
 ///
@@ -18,10 +20,10 @@ pub struct WarningCounts {
 
 impl WarningCounts {
     /// Of one run, by the energies at its start and its end.
-    pub(super) fn of<M: Model<N>, const N: usize>(before: Energy, after: Energy) -> Self {
+    pub(super) fn of(is_conserved: bool, before: Energy, after: Energy) -> Self {
         let kinetic = before.kinetic.max(after.kinetic);
         let is_lost = !after.energy.is_finite();
-        let jumps = const { conserves_energy::<M, N>() }
+        let jumps = is_conserved
             && before.energy.is_finite()
             && !is_lost
             && is_jump([before.energy, after.energy], kinetic);
@@ -62,14 +64,24 @@ pub(super) struct Energy {
 
 impl Energy {
     /// Not a number where no velocity belongs to the momentum.
-    pub(super) fn of<M: Model<N>, const N: usize>(model: &M, t: f64, state: &State<N>) -> Self {
-        let State { q, p } = state;
-        let velocity = constrained::velocity_of(model, t, q, p, &[0.0; N]);
-        let velocity = velocity.unwrap_or([f64::NAN; N]);
-        let action: f64 = velocity.iter().zip(p).map(|(v, p)| v * p).sum();
+    pub(super) fn of<M, L, const N: usize>(model: &M, t: f64, state: &L::State) -> Self
+    where
+        M: Evaluate<N, L>,
+        L: Length<N>,
+    {
+        let (_, p) = L::parts(state);
+        Self::at(model, &Node::new(model, t, state, &L::zero(p)))
+    }
+
+    /// The same where the velocity is known.
+    pub(super) fn at<M, L, const N: usize>(model: &M, node: &Node<N, L>) -> Self
+    where
+        M: Evaluate<N, L>,
+        L: Length<N>,
+    {
         Self {
-            energy: legendre::energy_at(model, t, q, p, &velocity),
-            kinetic: 0.5 * action.abs(),
+            energy: model.energy(node.t, &node.state(), &node.v),
+            kinetic: 0.5 * node.action().abs(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::doubts::WarningCounts;
 use crate::error::RunErrorKind;
+use crate::length::{FixedLength, Length};
 use crate::motion::Node;
 use std::ops::Index;
 use tfe_runtime::Statistics;
@@ -10,8 +11,8 @@ use tfe_runtime::Statistics;
 ///
 /// `ends[k]` is the result of run k: the node at the end of the span, or why the run stopped before.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ends<const N: usize> {
-    results: Vec<Result<Node<N>, RunErrorKind>>,
+pub struct Ends<const N: usize, L: Length<N> = FixedLength> {
+    results: Vec<Result<Node<N, L>, RunErrorKind>>,
     statistics: Statistics,
     warnings: WarningCounts,
 }
@@ -25,9 +26,9 @@ pub struct Failure<'a> {
     pub kind: &'a RunErrorKind,
 }
 
-impl<const N: usize> Ends<N> {
+impl<const N: usize, L: Length<N>> Ends<N, L> {
     pub(super) fn new(
-        results: Vec<Result<Node<N>, RunErrorKind>>,
+        results: Vec<Result<Node<N, L>, RunErrorKind>>,
         statistics: Statistics,
         warnings: WarningCounts,
     ) -> Self {
@@ -49,17 +50,17 @@ impl<const N: usize> Ends<N> {
     }
 
     /// The result of run `index`; `None` beyond the last.
-    pub fn get(&self, index: usize) -> Option<&Result<Node<N>, RunErrorKind>> {
+    pub fn get(&self, index: usize) -> Option<&Result<Node<N, L>, RunErrorKind>> {
         self.results.get(index)
     }
 
     /// All results, in order.
-    pub fn iter(&self) -> std::slice::Iter<'_, Result<Node<N>, RunErrorKind>> {
+    pub fn iter(&self) -> std::slice::Iter<'_, Result<Node<N, L>, RunErrorKind>> {
         self.results.iter()
     }
 
     /// The ends of all runs that came to theirs, in order.
-    pub fn nodes(&self) -> impl Iterator<Item = &Node<N>> {
+    pub fn nodes(&self) -> impl Iterator<Item = &Node<N, L>> {
         self.results
             .iter()
             .filter_map(|result| result.as_ref().ok())
@@ -87,13 +88,13 @@ impl<const N: usize> Ends<N> {
     }
 
     /// All results by value, in order.
-    pub fn into_results(self) -> Vec<Result<Node<N>, RunErrorKind>> {
+    pub fn into_results(self) -> Vec<Result<Node<N, L>, RunErrorKind>> {
         self.results
     }
 }
 
-impl<const N: usize> Index<usize> for Ends<N> {
-    type Output = Result<Node<N>, RunErrorKind>;
+impl<const N: usize, L: Length<N>> Index<usize> for Ends<N, L> {
+    type Output = Result<Node<N, L>, RunErrorKind>;
 
     /// # Panics
     /// Beyond the last run; [`Ends::get`] does not.
@@ -102,18 +103,18 @@ impl<const N: usize> Index<usize> for Ends<N> {
     }
 }
 
-impl<'a, const N: usize> IntoIterator for &'a Ends<N> {
-    type Item = &'a Result<Node<N>, RunErrorKind>;
-    type IntoIter = std::slice::Iter<'a, Result<Node<N>, RunErrorKind>>;
+impl<'a, const N: usize, L: Length<N>> IntoIterator for &'a Ends<N, L> {
+    type Item = &'a Result<Node<N, L>, RunErrorKind>;
+    type IntoIter = std::slice::Iter<'a, Result<Node<N, L>, RunErrorKind>>;
 
     fn into_iter(self) -> Self::IntoIter {
         self.iter()
     }
 }
 
-impl<const N: usize> IntoIterator for Ends<N> {
-    type Item = Result<Node<N>, RunErrorKind>;
-    type IntoIter = std::vec::IntoIter<Result<Node<N>, RunErrorKind>>;
+impl<const N: usize, L: Length<N>> IntoIterator for Ends<N, L> {
+    type Item = Result<Node<N, L>, RunErrorKind>;
+    type IntoIter = std::vec::IntoIter<Result<Node<N, L>, RunErrorKind>>;
 
     fn into_iter(self) -> Self::IntoIter {
         self.results.into_iter()

@@ -6,19 +6,22 @@ use tfe_runtime::bundle::{Bundle, One, Trajectories, Varied};
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, ElementError, Model, State};
 
-/// The models of an ensemble.
-pub trait Members<'m, M: Model<N>, const N: usize>: Copy + Sync {
-    /// What eight trajectories side by side compute with.
-    type Lanes: Trajectories<'m, M, N> + Send + Sync;
-
+/// The models of an ensemble, of either kind of length.
+pub trait Models<'m, M>: Copy + Sync {
     /// The model of one run.
     fn model(&self, index: usize) -> &'m M;
 
-    /// How many runs there are.
+    /// How many runs there are of so many starts.
     ///
     /// # Errors
     /// [`EnsembleError::Starts`] where starts and models do not belong together.
-    fn count(&self, starts: &[State<N>]) -> Result<usize, EnsembleError>;
+    fn count(&self, starts: usize) -> Result<usize, EnsembleError>;
+}
+
+/// Models of fixed size, whose runs may go side by side.
+pub trait Members<'m, M: Model<N>, const N: usize>: Models<'m, M> {
+    /// What eight trajectories side by side compute with.
+    type Lanes: Trajectories<'m, M, N> + Send + Sync;
 
     /// Whether runs may go side by side, as far as the models are concerned.
     fn share_kernels(&self) -> bool;
@@ -67,16 +70,32 @@ impl<M> Clone for ManyModels<'_, M> {
 
 impl<M> Copy for ManyModels<'_, M> {}
 
-impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for OneModel<'m, M> {
-    type Lanes = One<'m, M>;
-
+impl<'m, M: Sync> Models<'m, M> for OneModel<'m, M> {
     fn model(&self, _index: usize) -> &'m M {
         self.0
     }
 
-    fn count(&self, starts: &[State<N>]) -> Result<usize, EnsembleError> {
-        Ok(starts.len())
+    fn count(&self, starts: usize) -> Result<usize, EnsembleError> {
+        Ok(starts)
     }
+}
+
+impl<'m, M: Sync> Models<'m, M> for ManyModels<'m, M> {
+    fn model(&self, index: usize) -> &'m M {
+        &self.0[index]
+    }
+
+    fn count(&self, starts: usize) -> Result<usize, EnsembleError> {
+        let models = self.0.len();
+        if starts != 1 && starts != models {
+            return Err(EnsembleError::Starts { models, starts });
+        }
+        Ok(models)
+    }
+}
+
+impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for OneModel<'m, M> {
+    type Lanes = One<'m, M>;
 
     fn share_kernels(&self) -> bool {
         true
@@ -102,19 +121,6 @@ impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for OneModel<'m, 
 
 impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for ManyModels<'m, M> {
     type Lanes = Varied<'m, M>;
-
-    fn model(&self, index: usize) -> &'m M {
-        &self.0[index]
-    }
-
-    fn count(&self, starts: &[State<N>]) -> Result<usize, EnsembleError> {
-        let models = self.0.len();
-        if starts.len() != 1 && starts.len() != models {
-            let starts = starts.len();
-            return Err(EnsembleError::Starts { models, starts });
-        }
-        Ok(models)
-    }
 
     /// Kernels written by hand that do not number their parameters read them from one model, which no two lanes share.
     fn share_kernels(&self) -> bool {

@@ -12,7 +12,7 @@ use tfe_runtime::{Element, Model, State, Statistics};
 pub(super) const WIDTH: usize = 8;
 
 /// The start of one run; one alone serves all.
-pub(super) fn start_of<const N: usize>(starts: &[State<N>], index: usize) -> &State<N> {
+pub(super) fn start_of<S>(starts: &[S], index: usize) -> &S {
     &starts[if starts.len() == 1 { 0 } else { index }]
 }
 

@@ -3,20 +3,21 @@
 use super::doubts::WarningCounts;
 use super::ends::Ends;
 use crate::error::RunErrorKind;
+use crate::length::Length;
 use crate::motion::Node;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tfe_runtime::Statistics;
 
 /// Results as they come, in no particular order.
-pub(super) struct Results<const N: usize> {
-    results: Vec<Option<Result<Node<N>, RunErrorKind>>>,
+pub(super) struct Results<const N: usize, L: Length<N>> {
+    results: Vec<Option<Result<Node<N, L>, RunErrorKind>>>,
     warnings: WarningCounts,
 }
 
-impl<const N: usize> Results<N> {
+impl<const N: usize, L: Length<N>> Results<N, L> {
     pub(super) fn new(count: usize) -> Self {
         Self {
-            results: vec![None; count],
+            results: (0..count).map(|_| None).collect(),
             warnings: WarningCounts::default(),
         }
     }
@@ -24,7 +25,7 @@ impl<const N: usize> Results<N> {
     pub(super) fn put(
         &mut self,
         index: usize,
-        result: Result<Node<N>, RunErrorKind>,
+        result: Result<Node<N, L>, RunErrorKind>,
         warnings: WarningCounts,
     ) {
         if let Some(place) = self.results.get_mut(index) {
@@ -34,7 +35,7 @@ impl<const N: usize> Results<N> {
     }
 
     /// When all are there, which are moved within the same memory.
-    pub(super) fn into_ends(self, statistics: Statistics) -> Ends<N> {
+    pub(super) fn into_ends(self, statistics: Statistics) -> Ends<N, L> {
         let results = self.results.into_iter().map_while(|result| result);
         Ends::new(results.collect(), statistics, self.warnings)
     }

@@ -8,9 +8,10 @@ use super::plan::{Plan, WIDTH, bad_starts, start_of};
 use super::progress::Progress;
 use super::results::{Results, lock, summed, unlock};
 use crate::error::RunErrorKind;
+use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Node;
-use crate::simulation::Watching;
 use crate::simulation::mesh::Mesh;
+use crate::simulation::{Watching, conserves_energy};
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Mutex;
@@ -45,12 +46,14 @@ use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 /// constraints; all others run one after the other. Parameter sets ([`of_models`](Self::of_models)) go side by side, too: each lane computes with the parameters of its own model.
 /// Those of hand-written models that do not number their [parameters](Model::parameters) run one after the other.
 ///
+/// Runs of models of run-time length go one by one, on all processors.
+///
 /// Results depend neither on the number of processors nor on the order or number of the other starts, not by one bit. From a
 /// [`Simulation`](crate::Simulation) of one start they differ by rounding, if at all.
 ///
 /// Defaults are those of `Simulation`: `Mixed::<4>` (order 6), a thousandth of the span as step, iteration to round-off.
 #[derive(Debug)]
-pub struct Ensemble<'m, M, const N: usize, K = OneModel<'m, M>> {
+pub struct Ensemble<'m, M, const N: usize, K = OneModel<'m, M>, L: Length<N> = FixedLength> {
     pub(super) models: K,
     pub(super) element: Element,
     pub(super) step: Option<f64>,
@@ -59,10 +62,10 @@ pub struct Ensemble<'m, M, const N: usize, K = OneModel<'m, M>> {
     pub(super) at_kinks: bool,
     pub(super) progress: bool,
     pub(super) events: Watching<'m, M, N>,
-    pub(super) of: PhantomData<&'m M>,
+    pub(super) of: PhantomData<(&'m M, L)>,
 }
 
-impl<M, const N: usize, K: Copy> Clone for Ensemble<'_, M, N, K> {
+impl<M, const N: usize, K: Copy, L: Length<N>> Clone for Ensemble<'_, M, N, K, L> {
     fn clone(&self) -> Self {
         Self {
             breaks: self.breaks.clone(),
@@ -72,9 +75,9 @@ impl<M, const N: usize, K: Copy> Clone for Ensemble<'_, M, N, K> {
     }
 }
 
-impl<'m, M, const N: usize> Ensemble<'m, M, N>
+impl<'m, M, const N: usize, L: Length<N>> Ensemble<'m, M, N, OneModel<'m, M>, L>
 where
-    M: Model<N> + Sync,
+    M: Declared<N, Length = L> + Sync,
 {
     /// Runs of one model from many starts.
     pub fn new(model: &'m M) -> Self {
@@ -82,9 +85,9 @@ where
     }
 }
 
-impl<'m, M, const N: usize> Ensemble<'m, M, N, ManyModels<'m, M>>
+impl<'m, M, const N: usize, L: Length<N>> Ensemble<'m, M, N, ManyModels<'m, M>, L>
 where
-    M: Model<N> + Sync,
+    M: Declared<N, Length = L> + Sync,
 {
     /// Runs of many models of one kind: parameter sets, with one start for each or one for all.
     ///
@@ -110,11 +113,7 @@ where
     }
 }
 
-impl<'m, M, const N: usize, K> Ensemble<'m, M, N, K>
-where
-    M: Model<N> + Sync,
-    K: Members<'m, M, N>,
-{
+impl<M, const N: usize, K, L: Length<N>> Ensemble<'_, M, N, K, L> {
     fn with(models: K) -> Self {
         Self {
             events: Watching::NOTHING,
@@ -200,16 +199,22 @@ where
         self
     }
 
-    /// Whether runs are made one by one, since events or kinks cut their elements.
-    pub(super) fn is_watched(&self) -> bool {
-        !self.events.is_empty() || (self.at_kinks && const { !M::FACTS.smooth })
-    }
-
     /// Shows the progress on standard error, once a second.
     #[must_use]
     pub fn progress(mut self) -> Self {
         self.progress = true;
         self
+    }
+}
+
+impl<'m, M, const N: usize, K> Ensemble<'m, M, N, K>
+where
+    M: Model<N> + Sync,
+    K: Members<'m, M, N>,
+{
+    /// Whether runs are made one by one, since events or kinks cut their elements.
+    pub(super) fn is_watched(&self) -> bool {
+        !self.events.is_empty() || (self.at_kinks && const { !M::FACTS.smooth })
     }
 
     /// Runs all trajectories over the span, backwards where it ends before it starts. Each result is the node at the end, or why its run
@@ -219,7 +224,7 @@ where
     /// [`EnsembleError`] where nothing can run: the element does not exist, step or span are not finite, the number of starts is not that of
     /// models. A bad start is a failure of its own run only.
     pub fn run(&self, starts: &[State<N>], span: Range<f64>) -> Result<Ends<N>, EnsembleError> {
-        let count = self.models.count(starts)?;
+        let count = self.models.count(starts.len())?;
         let results = Mutex::new(Results::new(count));
         let (from, to) = (span.start, span.end);
         let statistics = self.for_each(starts, span, |index, result| {
@@ -228,7 +233,11 @@ where
                 // Events may change the energy.
                 Ok(node) if self.events.is_empty() => {
                     let before = Energy::of(model, from, start_of(starts, index));
-                    WarningCounts::of::<M, N>(before, Energy::of(model, to, &node.state()))
+                    WarningCounts::of(
+                        const { conserves_energy::<M, N>() },
+                        before,
+                        Energy::of(model, to, &node.state()),
+                    )
                 }
                 _ => WarningCounts::default(),
             };
@@ -274,7 +283,7 @@ where
     where
         F: Fn(usize, Result<Node<N>, RunErrorKind>) + Send + Sync,
     {
-        let count = self.models.count(starts)?;
+        let count = self.models.count(starts.len())?;
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
         let mesh = Mesh::new(&span, step, &self.breaks, &[])?;
         self.element.validate().map_err(RunErrorKind::Element)?;

@@ -10,8 +10,8 @@ use super::results::{Results, lock, summed, unlock};
 use super::setup::Ensemble;
 use crate::error::RunErrorKind;
 use crate::motion::Node;
-use crate::simulation::Reached;
 use crate::simulation::mesh::Mesh;
+use crate::simulation::{Reached, conserves_energy};
 use std::sync::Mutex;
 use tfe_runtime::bundle::{Bundle, Trajectories};
 use tfe_runtime::step::Stepper;
@@ -114,7 +114,7 @@ where
         starts: &[State<N>],
         t0: f64,
     ) -> Result<EnsembleRun<'m, M, N, K>, EnsembleError> {
-        let count = self.models.count(starts)?;
+        let count = self.models.count(starts.len())?;
         if !self.events.is_empty() {
             let call = "Ensemble::begin";
             return Err(RunErrorKind::EventsUnsupported { call }.into());
@@ -209,7 +209,8 @@ where
                     let (results, energies) = &mut *results;
                     let mut warnings = WarningCounts::default();
                     if let (Some(before), Some(after)) = (energies.get_mut(index), after) {
-                        warnings = WarningCounts::of::<M, N>(*before, after);
+                        warnings =
+                            WarningCounts::of(const { conserves_energy::<M, N>() }, *before, after);
                         *before = after;
                     }
                     results.put(index, result, warnings);

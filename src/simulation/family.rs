@@ -238,6 +238,9 @@ impl<'m, M: FamilyModel> Simulation<'m, M, 0, RunTimeLength> {
 
     /// Whether model and start are good.
     fn check(&self, start: &FamilyState) -> Result<(), RunErrorKind> {
+        if self.at_kinks == Some(true) && const { !M::FACTS.smooth } {
+            return Err(RunErrorKind::KinksUnsupported { call: "at_kinks" });
+        }
         self.model.check().map_err(RunErrorKind::Family)?;
         // Before memory is asked for: a wrong length may be any number.
         let expected = self.model.len();

@@ -1,0 +1,128 @@
+//! Ensembles of models of run-time length.
+
+use super::doubts::{Energy, WarningCounts};
+use super::ends::Ends;
+use super::error::EnsembleError;
+use super::members::Models;
+use super::plan::start_of;
+use super::progress::Progress;
+use super::results::{Results, lock, summed, unlock};
+use super::setup::Ensemble;
+use crate::error::RunErrorKind;
+use crate::length::RunTimeLength;
+use crate::motion::Node;
+use crate::simulation::mesh::Mesh;
+use crate::simulation::{Simulation, conserves_energies};
+use std::convert::Infallible;
+use std::ops::Range;
+use std::sync::Mutex;
+use tfe_runtime::Statistics;
+use tfe_runtime::family::{FamilyModel, FamilyState};
+
+impl<'m, M, K> Ensemble<'m, M, 0, K, RunTimeLength>
+where
+    M: FamilyModel + Sync,
+    K: Models<'m, M>,
+{
+    /// Runs all trajectories over the span, backwards where it ends before it starts. Each result is the node at the end, or why its run stopped; a failure stops no other run.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(
+    ///     coordinates(q[n]),
+    ///     lagrangian = sum(i in 0..n, dot(q[i])^2/2 - q[i]^2/2) - sum(i in 0..n-1, c/4*(q[i+1] - q[i])^4),
+    /// )]
+    /// struct Chain { n: usize, c: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // Chains of other lengths and stiffnesses, each from a start of its own.
+    /// let chains: Vec<_> = (1..=10).map(|n| Chain { n, c: 0.1 * n as f64 }).collect();
+    /// let starts: Vec<_> = chains.iter().map(|chain| chain.state(vec![1.0; chain.n], vec![0.0; chain.n])).collect();
+    /// let ends = Ensemble::of_models(&chains).step(0.1).run(&starts, 0.0..10.0)?;
+    /// for end in ends.nodes() {
+    ///     assert!(end.q.iter().all(|q| (q - 10.0_f64.cos()).abs() < 1e-8)); // all sites move alike
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`EnsembleError`] where nothing can run: the element does not exist, step or span are not finite, the number of starts is not that of models. A bad start, and a model whose lengths do
+    /// not fit together, are failures of their own run only.
+    pub fn run(
+        &self,
+        starts: &[FamilyState],
+        span: Range<f64>,
+    ) -> Result<Ends<0, RunTimeLength>, EnsembleError> {
+        let count = self.models.count(starts.len())?;
+        let results = Mutex::new(Results::new(count));
+        let from = span.start;
+        let statistics = self.for_each(starts, span, |index, result| {
+            let model = self.models.model(index);
+            let warnings = match &result {
+                Ok(node) => WarningCounts::of(
+                    const { conserves_energies::<M>() },
+                    Energy::of(model, from, start_of(starts, index)),
+                    Energy::at(model, node),
+                ),
+                Err(_) => WarningCounts::default(),
+            };
+            lock(&results).put(index, result, warnings);
+        })?;
+        Ok(unlock(results).into_ends(statistics))
+    }
+
+    /// Runs all trajectories and hands over each result, with the index of its run, as soon as it is known: in no particular order, and with the feature `parallel` from several threads.
+    ///
+    /// Returns what all runs together have cost.
+    ///
+    /// # Errors
+    /// As from [`run`](Self::run).
+    pub fn for_each<F>(
+        &self,
+        starts: &[FamilyState],
+        span: Range<f64>,
+        finished: F,
+    ) -> Result<Statistics, EnsembleError>
+    where
+        F: Fn(usize, Result<Node<0, RunTimeLength>, RunErrorKind>) + Send + Sync,
+    {
+        let count = self.models.count(starts.len())?;
+        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        Mesh::<0>::new(&span, step, &self.breaks, &[])?;
+        self.element.validate().map_err(RunErrorKind::Element)?;
+        let progress = Progress::new(self.progress, count);
+        Ok(summed(
+            count,
+            || (),
+            |_: &mut (), index| {
+                let mut run = Simulation::new(self.models.model(index))
+                    .element(self.element)
+                    .step(step)
+                    .record_every(usize::MAX)
+                    .at_kinks(self.at_kinks)
+                    .with_control(self.control);
+                for time in &self.breaks {
+                    run = run.break_at(*time);
+                }
+                let start = start_of(starts, index);
+                let (result, statistics) = match run.run(start.clone(), span.clone()) {
+                    Ok(motion) => (Ok(motion.last().clone()), *motion.statistics()),
+                    Err(error) => (Err(error.kind().clone()), *error.partial().statistics()),
+                };
+                finished(index, result);
+                progress.advance(1);
+                statistics
+            },
+        ))
+    }
+
+    /// Refused: ensembles that go on where they have got to are those of models of fixed size.
+    ///
+    /// # Errors
+    /// [`RunErrorKind::Unsupported`], in any case. [`Simulation::resume`] goes on with single runs.
+    pub fn begin(&self, _: &[FamilyState], _: f64) -> Result<Infallible, EnsembleError> {
+        Err(RunErrorKind::run_time_length("Ensemble::begin").into())
+    }
+}

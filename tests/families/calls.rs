@@ -1,0 +1,138 @@
+//! The calls of the surface on models of run-time length: what works gives what a model of fixed size gives, what does not is one typed error.
+
+use crate::common::distance;
+use tfe::prelude::*;
+use tfe::{RunErrorKind, family};
+
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1] - q[i])^2/2 + a/4*(q[i+1] - q[i])^4) - q[0]^2/2,
+    output(first) = q[0],
+    output(power) = q[0]*dot(q[0]),
+)]
+struct Chain {
+    n: usize,
+    a: f64,
+}
+
+/// The same three masses, of fixed size.
+#[dynamics(
+    coordinates(x, y, z),
+    lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - (y - x)^2/2 - a/4*(y - x)^4 - (z - y)^2/2 - a/4*(z - y)^4 - x^2/2,
+    output(first) = x,
+    output(power) = x*dot(x),
+)]
+struct Three {
+    a: f64,
+}
+
+const CHAIN: Chain = Chain { n: 3, a: 0.5 };
+const THREE: Three = Three { a: 0.5 };
+
+fn start() -> family::FamilyState {
+    CHAIN.state([1.0, -0.5, 0.25], [0.0, 0.5, 0.0])
+}
+
+fn start_of_three() -> State<3> {
+    THREE.state([1.0, -0.5, 0.25], [0.0, 0.5, 0.0])
+}
+
+#[test]
+fn integrals_of_outputs() {
+    let motion = Simulation::new(&CHAIN).step(0.1).run(start(), 0.0..5.0);
+    let motion = motion.expect("a run");
+    let fixed = Simulation::new(&THREE)
+        .step(0.1)
+        .run(start_of_three(), 0.0..5.0);
+    let fixed = fixed.expect("a run");
+    for name in ["first", "power"] {
+        let here = motion.integral(&CHAIN, name).expect("an integral");
+        let there = fixed.integral(&THREE, name).expect("an integral");
+        assert!(distance(&here, &there) < 1e-13, "{name}");
+    }
+    // ∫ q q̇ dt = q²/2.
+    let power = motion.integral(&CHAIN, "power").expect("an integral");
+    let q = motion.last().q[0];
+    assert!((power[50] - (q * q - 1.0) / 2.0).abs() < 1e-7); // order 6 at this step
+    let error = motion
+        .integral(&CHAIN, "second")
+        .expect_err("no such output");
+    assert!(matches!(error, tfe::error::AtError::NoOutput { .. }));
+}
+
+#[test]
+fn steps_tell_costs_and_doubts() {
+    let simulation = Simulation::new(&CHAIN).step(0.1);
+    let mut steps = simulation.steps(start(), 0.0);
+    let node = steps
+        .by_ref()
+        .take(50)
+        .last()
+        .expect("steps")
+        .expect("good ones");
+    let motion = simulation.run(start(), 0.0..5.0).expect("a run");
+    assert_eq!(node, *motion.last());
+    assert_eq!(steps.statistics(), *motion.statistics());
+    assert_eq!(steps.warnings(), []);
+}
+
+#[test]
+fn ensembles() {
+    let starts: Vec<_> = (0..20)
+        .map(|k| CHAIN.state([0.1 * f64::from(k), 0.0, 0.5], [0.0; 3]))
+        .collect();
+    let ensemble = Ensemble::new(&CHAIN).element(Mixed::<5>).step(0.1);
+    let ends = ensemble.run(&starts, 0.0..10.0).expect("an ensemble");
+    assert_eq!(
+        (ends.nodes().count(), ends.warnings().is_empty()),
+        (20, true)
+    );
+    let one = Simulation::new(&CHAIN).element(Mixed::<5>).step(0.1);
+    let one = one.run(starts[7].clone(), 0.0..10.0).expect("a run");
+    assert_eq!(ends[7].as_ref(), Ok(one.last()));
+
+    // Parameter sets; a bad start fails alone.
+    let chains: Vec<_> = (0..4)
+        .map(|k| Chain {
+            n: 3,
+            a: f64::from(k),
+        })
+        .collect();
+    let ends = Ensemble::of_models(&chains)
+        .step(0.1)
+        .run(&starts[..4], 0.0..2.0);
+    assert_eq!(ends.expect("an ensemble").nodes().count(), 4);
+    let mut bad = starts[..4].to_vec();
+    bad[2].q.pop();
+    let ends = Ensemble::of_models(&chains).step(0.1).run(&bad, 0.0..2.0);
+    let ends = ends.expect("an ensemble");
+    let failures: Vec<_> = ends.failures().map(|failure| failure.index).collect();
+    assert_eq!(failures, [2]);
+    let error = ensemble.begin(&starts, 0.0).expect_err("refused");
+    assert_eq!(
+        error.to_string(),
+        "`Ensemble::begin` is not to be had of models of run-time length"
+    );
+}
+
+/// A chain with an end stop.
+#[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2 - abs(q[i])))]
+struct Bent {
+    n: usize,
+}
+
+#[test]
+fn kinks_are_not_cut() {
+    let bent = Bent { n: 2 };
+    let run = Simulation::new(&bent).step(0.1).at_kinks(true);
+    let error = run
+        .run(bent.state([1.0; 2], [0.0; 2]), 0.0..1.0)
+        .expect_err("refused");
+    assert!(matches!(
+        error.kind(),
+        RunErrorKind::KinksUnsupported { .. }
+    ));
+    // Where there are none nothing is asked for.
+    let run = Simulation::new(&CHAIN).step(0.1).at_kinks(true);
+    assert!(run.run(start(), 0.0..1.0).is_ok());
+}
