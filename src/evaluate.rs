@@ -26,13 +26,14 @@ pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
     /// The outputs of a model that has any.
     fn outputs(&self, t: f64, state: &L::State, velocity: &L::Vector, values: &mut [f64]);
 
-    /// What the state leaves of the constraints, and their reactions, if there are any. Reactions are NaN where they cannot be had.
-    fn constraints(
-        &self,
-        t: f64,
-        state: &L::State,
-        velocity: &L::Vector,
-    ) -> Option<(ConstraintResidual, Vec<f64>)>;
+    /// Whether there are constraints.
+    const IS_CONSTRAINED: bool;
+
+    /// What the state leaves of the constraints.
+    fn residual(&self, t: f64, state: &L::State, velocity: &L::Vector) -> ConstraintResidual;
+
+    /// The reactions of the constraints; NaN where they cannot be had.
+    fn reactions(&self, t: f64, state: &L::State, velocity: &L::Vector) -> Vec<f64>;
 
     /// The same model with another value of a parameter, if one can be made.
     fn with(&self, parameter: &str, value: f64) -> Option<Self>;
@@ -42,6 +43,7 @@ pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
 }
 
 impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
+    const IS_CONSTRAINED: bool = !M::CONSTRAINTS.is_empty();
     const NEEDS_VELOCITY: bool = matches!(M::FORM, Form::Lagrangian);
 
     fn coordinate_names(&self) -> Vec<CoordinateName> {
@@ -72,29 +74,23 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
         self.observables(t, &state.q, z, values);
     }
 
-    fn constraints(
-        &self,
-        t: f64,
-        state: &State<N>,
-        velocity: &[f64; N],
-    ) -> Option<(ConstraintResidual, Vec<f64>)> {
-        if const { M::CONSTRAINTS.is_empty() } {
-            return None;
-        }
-        let reactions = constrained::reactions(self, t, state, velocity);
-        let reactions = reactions.unwrap_or_else(|_| vec![f64::NAN; M::CONSTRAINTS.len()]);
+    fn residual(&self, t: f64, state: &State<N>, velocity: &[f64; N]) -> ConstraintResidual {
         let (mut position, mut rate) = (0.0, 0.0);
         for one in constrained::residuals(self, t, &state.q, velocity, 1.0) {
             position = larger(position, one.position.abs());
             rate = larger(rate, one.velocity.abs());
         }
         let independent = constrained::independent(self, t, &state.q);
-        let residual = ConstraintResidual {
+        ConstraintResidual {
             position,
             velocity: rate,
             rank: independent.into_iter().filter(|one| *one).count(),
-        };
-        Some((residual, reactions))
+        }
+    }
+
+    fn reactions(&self, t: f64, state: &State<N>, velocity: &[f64; N]) -> Vec<f64> {
+        let reactions = constrained::reactions(self, t, state, velocity);
+        reactions.unwrap_or_else(|_| vec![f64::NAN; M::CONSTRAINTS.len()])
     }
 
     fn with(&self, parameter: &str, value: f64) -> Option<Self> {
@@ -103,6 +99,7 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
 }
 
 impl<M: FamilyModel> Evaluate<0, RunTimeLength> for M {
+    const IS_CONSTRAINED: bool = M::CONSTRAINED;
     const NEEDS_VELOCITY: bool = matches!(M::FORM, Form::Lagrangian);
 
     fn coordinate_names(&self) -> Vec<CoordinateName> {
@@ -134,23 +131,18 @@ impl<M: FamilyModel> Evaluate<0, RunTimeLength> for M {
         self.observables(t, &state.q, z, values);
     }
 
-    fn constraints(
-        &self,
-        t: f64,
-        state: &FamilyState,
-        velocity: &Vec<f64>,
-    ) -> Option<(ConstraintResidual, Vec<f64>)> {
-        if const { !M::CONSTRAINED } {
-            return None;
-        }
-        let rank = FamilyModel::constraints(self);
+    fn residual(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>) -> ConstraintResidual {
         let (position, rate) = family::constraint_residual(self, t, &state.q, velocity);
-        let residual = ConstraintResidual {
+        ConstraintResidual {
             position,
             velocity: rate,
-            rank,
-        };
-        Some((residual, vec![f64::NAN; rank]))
+            rank: self.constraints(),
+        }
+    }
+
+    fn reactions(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>) -> Vec<f64> {
+        let reactions = family::reactions(self, t, &state.q, velocity);
+        reactions.unwrap_or_else(|| vec![f64::NAN; self.constraints()])
     }
 
     fn with(&self, _: &str, _: f64) -> Option<Self> {

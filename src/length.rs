@@ -4,8 +4,8 @@ pub use tfe_runtime::length::{Declared, FixedLength, RunTimeLength};
 
 use std::fmt::{Debug, Display};
 use std::ops::Deref;
-use tfe_runtime::family::{FamilyDense, FamilyState, FamilySuspended};
-use tfe_runtime::step::{DenseElement, Impulse, Suspended};
+use tfe_runtime::family::{FamilyDense, FamilyState, FamilyStepper, FamilySuspended};
+use tfe_runtime::step::{DenseElement, Impulse, Stepper, Suspended};
 use tfe_runtime::{CoordinateName, Share, State};
 
 /// What runs and motions consist of: [`FixedLength`] keeps numbers in arrays, [`RunTimeLength`] in vectors. There is no third.
@@ -21,6 +21,8 @@ pub trait Length<const N: usize>: Copy + Debug + PartialEq + 'static {
     type State: Clone + Debug + PartialEq;
     /// The solution inside an element.
     type Polynomial: Polynomial<State = Self::State, Vector = Self::Vector>;
+    /// What makes the steps.
+    type Stepper<'m, M: 'm>;
     /// A stepper without its model.
     type Suspended: Clone + Debug;
     /// A force that acts at one instant.
@@ -34,11 +36,18 @@ pub trait Length<const N: usize>: Copy + Debug + PartialEq + 'static {
     /// Coordinates and momenta.
     fn parts(state: &Self::State) -> (&Self::Vector, &Self::Vector);
 
-    /// As many numbers as another vector has, all of them NaN.
-    fn unknown(like: &Self::Vector) -> Self::Vector;
+    /// As many numbers as another vector has: what a function gives for 0, 1, …
+    fn from_fn(like: &Self::Vector, number: impl FnMut(usize) -> f64) -> Self::Vector;
+
+    /// As many NaN as another vector has numbers.
+    fn unknown(like: &Self::Vector) -> Self::Vector {
+        Self::from_fn(like, |_| f64::NAN)
+    }
 
     /// As many zeros as another vector has numbers.
-    fn zero(like: &Self::Vector) -> Self::Vector;
+    fn zero(like: &Self::Vector) -> Self::Vector {
+        Self::from_fn(like, |_| 0.0)
+    }
 }
 
 impl<const N: usize> Length<N> for FixedLength {
@@ -46,6 +55,7 @@ impl<const N: usize> Length<N> for FixedLength {
     type Vector = [f64; N];
     type State = State<N>;
     type Polynomial = DenseElement<N>;
+    type Stepper<'m, M: 'm> = Stepper<'m, M, N>;
     type Suspended = Suspended<N>;
     type Impulse = Impulse<N>;
     type ConstraintName = &'static str;
@@ -58,12 +68,8 @@ impl<const N: usize> Length<N> for FixedLength {
         (&state.q, &state.p)
     }
 
-    fn unknown(_: &[f64; N]) -> [f64; N] {
-        [f64::NAN; N]
-    }
-
-    fn zero(_: &[f64; N]) -> [f64; N] {
-        [0.0; N]
+    fn from_fn(_: &[f64; N], number: impl FnMut(usize) -> f64) -> [f64; N] {
+        std::array::from_fn(number)
     }
 }
 
@@ -72,6 +78,7 @@ impl Length<0> for RunTimeLength {
     type Vector = Vec<f64>;
     type State = FamilyState;
     type Polynomial = FamilyDense;
+    type Stepper<'m, M: 'm> = FamilyStepper<'m, M>;
     type Suspended = FamilySuspended;
     type Impulse = (f64, Vec<f64>);
     type ConstraintName = CoordinateName;
@@ -84,12 +91,8 @@ impl Length<0> for RunTimeLength {
         (&state.q, &state.p)
     }
 
-    fn unknown(like: &Vec<f64>) -> Vec<f64> {
-        vec![f64::NAN; like.len()]
-    }
-
-    fn zero(like: &Vec<f64>) -> Vec<f64> {
-        vec![0.0; like.len()]
+    fn from_fn(like: &Vec<f64>, number: impl FnMut(usize) -> f64) -> Vec<f64> {
+        (0..like.len()).map(number).collect()
     }
 }
 

@@ -1,6 +1,7 @@
 //! A motion with its linearisation: the transition matrix of every element.
 
 use crate::constraints::reduced;
+use crate::length::{FixedLength, Length};
 use crate::motion::Motion;
 use crate::periodic_schur::{self, Multiplier, PeriodicSchurError};
 use nalgebra::DMatrix;
@@ -40,8 +41,8 @@ use tfe_runtime::{Model, State, StepError};
 /// # }
 /// ```
 #[derive(Clone, Debug)]
-pub struct Linearised<const N: usize> {
-    motion: Motion<N>,
+pub struct Linearised<const N: usize, L: Length<N> = FixedLength> {
+    motion: Motion<N, L>,
     transitions: Vec<DMatrix<f64>>,
     /// The same on the motions that constraints allow, for models that have any.
     reduced: Option<Result<Vec<DMatrix<f64>>, StepError>>,
@@ -72,9 +73,25 @@ impl<const N: usize> Linearised<N> {
             reduced,
         }
     }
+}
+
+impl<const N: usize, L: Length<N>> Linearised<N, L> {
+    /// Of a model without constraints.
+    pub(crate) fn free(motion: Motion<N, L>, transitions: Vec<DMatrix<f64>>) -> Self {
+        Self {
+            motion,
+            transitions,
+            reduced: None,
+        }
+    }
+
+    /// The number of coordinates and momenta.
+    fn size(&self) -> usize {
+        2 * self.motion.last().p.as_ref().len()
+    }
 
     /// The motion.
-    pub fn motion(&self) -> &Motion<N> {
+    pub fn motion(&self) -> &Motion<N, L> {
         &self.motion
     }
 
@@ -94,7 +111,7 @@ impl<const N: usize> Linearised<N> {
     }
 
     /// The motion and the transition matrices, by value.
-    pub fn into_parts(self) -> (Motion<N>, Vec<DMatrix<f64>>) {
+    pub fn into_parts(self) -> (Motion<N, L>, Vec<DMatrix<f64>>) {
         (self.motion, self.transitions)
     }
 
@@ -106,9 +123,8 @@ impl<const N: usize> Linearised<N> {
     /// Where some directions grow and others decay by more than ten orders of magnitude the product holds the growing ones only, and
     /// beyond 10³⁰⁸ its entries are infinite or NaN: use [`multipliers`](Self::multipliers), which does not form it.
     pub fn product(&self) -> DMatrix<f64> {
-        self.transitions
-            .iter()
-            .fold(DMatrix::identity(2 * N, 2 * N), |product, a| a * product)
+        let identity = DMatrix::identity(self.size(), self.size());
+        (self.transitions.iter()).fold(identity, |product, a| a * product)
     }
 
     /// The eigenvalues of the [`product`](Self::product), largest modulus first, without forming it: tiny ones beside huge ones keep
@@ -143,7 +159,8 @@ impl<const N: usize> Linearised<N> {
             None => {}
         }
         if self.transitions.is_empty() {
-            return periodic_schur::multipliers(&[DMatrix::identity(2 * N, 2 * N)]);
+            let identity = DMatrix::identity(self.size(), self.size());
+            return periodic_schur::multipliers(&[identity]);
         }
         periodic_schur::multipliers(&self.transitions)
     }

@@ -26,7 +26,7 @@ use std::io;
 use std::ops::Range;
 use std::path::Path;
 use tfe_runtime::quadrature::Quadrature;
-use tfe_runtime::{CoordinateName, Model, Statistics};
+use tfe_runtime::{CoordinateName, Statistics};
 
 /// A state with its time: of arrays, or of vectors where the length is known at run time only.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -140,6 +140,16 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         motion
     }
 
+    /// The same of a start whose reactions are known as well.
+    pub(crate) fn starting_with<M>(model: &M, node: Node<N, L>, reactions: Vec<f64>) -> Self
+    where
+        M: Evaluate<N, L>,
+    {
+        let mut motion = Self::empty(model);
+        motion.record_all(model, node, reactions);
+        motion
+    }
+
     /// The same of a model that cannot be evaluated there.
     pub(crate) fn unknown<M: Evaluate<N, L>>(model: &M, t: f64, start: &L::State) -> Self {
         let mut motion = Self::empty(model);
@@ -218,6 +228,18 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
 
     /// The same where the velocity is known.
     pub(crate) fn record_node<M: Evaluate<N, L>>(&mut self, model: &M, node: Node<N, L>) {
+        let reactions = match M::IS_CONSTRAINED {
+            true => model.reactions(node.t, &node.state(), &node.v),
+            false => Vec::new(),
+        };
+        self.record_all(model, node, reactions);
+    }
+
+    /// The same where the reactions are known as well.
+    pub(crate) fn record_all<M>(&mut self, model: &M, node: Node<N, L>, reactions: Vec<f64>)
+    where
+        M: Evaluate<N, L>,
+    {
         let (t, state) = (node.t, node.state());
         self.energies.push(model.energy(t, &state, &node.v));
         let columns = self.outputs.names.len();
@@ -227,7 +249,8 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
             let values = &mut self.outputs.values[start..];
             model.outputs(t, &state, &node.v, values);
         }
-        if let Some((residual, reactions)) = model.constraints(t, &state, &node.v) {
+        if M::IS_CONSTRAINED {
+            let residual = model.residual(t, &state, &node.v);
             let largest = &mut self.residual;
             largest.position = larger(largest.position, residual.position);
             largest.velocity = larger(largest.velocity, residual.velocity);
@@ -498,6 +521,20 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.arcs.begin(self.nodes.len() - 1, so_far);
     }
 
+    /// Parameters, by their numbers, are set at the node that is to come, at the time of the last one.
+    pub(crate) fn set_parameters(&mut self, names: &[CoordinateName], values: &[(usize, f64)]) {
+        let (t, node) = (self.last().t, self.nodes.len());
+        for (number, value) in values {
+            let parameter = names.get(*number).map(ToString::to_string);
+            self.arcs.set(Setting {
+                t,
+                node,
+                parameter: parameter.unwrap_or_default(),
+                value: *value,
+            });
+        }
+    }
+
     /// The observables at the recorded nodes.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
@@ -555,28 +592,6 @@ fn energy_scale(start: f64, actions: impl Iterator<Item = f64>) -> f64 {
         1.0
     } else {
         start.abs()
-    }
-}
-
-impl<const N: usize> Motion<N> {
-    /// The motion of a run that goes on, whose velocity at the start is known.
-    pub(crate) fn from_checkpoint<M: Model<N>>(model: &M, checkpoint: &Checkpoint<N>) -> Self {
-        let node = Node::of(checkpoint.time(), &checkpoint.state, checkpoint.velocity);
-        Self::starting(model, node)
-    }
-
-    /// Parameters are set at the node that is to come, at the time of the last one.
-    pub(crate) fn set_parameters<M: Model<N>>(&mut self, model: &M, values: &[(usize, f64)]) {
-        let (t, node) = (self.last().t, self.nodes.len());
-        for (index, value) in values {
-            let parameter = model.parameter_name(*index).to_string();
-            self.arcs.set(Setting {
-                t,
-                node,
-                parameter,
-                value: *value,
-            });
-        }
     }
 }
 

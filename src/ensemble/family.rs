@@ -61,12 +61,13 @@ where
         let statistics = self.for_each(starts, span, |index, result| {
             let model = self.models.model(index);
             let warnings = match &result {
-                Ok(node) => WarningCounts::of(
+                // Events may change the energy.
+                Ok(node) if self.events.is_empty() => WarningCounts::of(
                     const { conserves_energies::<M>() },
                     Energy::of(model, from, start_of(starts, index)),
                     Energy::at(model, node),
                 ),
-                Err(_) => WarningCounts::default(),
+                _ => WarningCounts::default(),
             };
             lock(&results).put(index, result, warnings);
         })?;
@@ -106,6 +107,7 @@ where
                 for time in &self.breaks {
                     run = run.break_at(*time);
                 }
+                let run = run.watching(&self.events);
                 let start = start_of(starts, index);
                 let (result, statistics) = match run.run(start.clone(), span.clone()) {
                     Ok(motion) => (Ok(motion.last().clone()), *motion.statistics()),

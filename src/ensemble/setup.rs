@@ -53,7 +53,7 @@ use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 ///
 /// Defaults are those of `Simulation`: `Mixed::<4>` (order 6), a thousandth of the span as step, iteration to round-off.
 #[derive(Debug)]
-pub struct Ensemble<'m, M, const N: usize, K = OneModel<'m, M>, L: Length<N> = FixedLength> {
+pub struct Ensemble<'m, M: 'm, const N: usize, K = OneModel<'m, M>, L: Length<N> = FixedLength> {
     pub(super) models: K,
     pub(super) element: Element,
     pub(super) step: Option<f64>,
@@ -61,7 +61,7 @@ pub struct Ensemble<'m, M, const N: usize, K = OneModel<'m, M>, L: Length<N> = F
     pub(super) breaks: Vec<f64>,
     pub(super) at_kinks: bool,
     pub(super) progress: bool,
-    pub(super) events: Watching<'m, M, N>,
+    pub(super) events: Watching<'m, M, N, L>,
     pub(super) of: PhantomData<(&'m M, L)>,
 }
 

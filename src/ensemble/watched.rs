@@ -3,14 +3,16 @@
 use super::members::Members;
 use super::setup::Ensemble;
 use crate::error::RunErrorKind;
+use crate::length::Length;
 use crate::motion::Node;
-use crate::simulation::{Act, Crossing, Occurrence, Simulation};
+use crate::simulation::{Act, Crossing, Occurrence, Settable, Simulation};
 use std::ops::Range;
 use tfe_runtime::{Model, State, Statistics};
 
-impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize, K> Ensemble<'m, M, N, K>
+impl<'m, M, const N: usize, K, L> Ensemble<'m, M, N, K, L>
 where
-    K: Members<'m, M, N>,
+    M: Settable<'m, N, L>,
+    L: Length<N>,
 {
     /// Does `act` at events of every run, as [`Simulation::on`]. Runs are made one by one then, on all processors; a run that an event stops ends there, with the node at the event.
     ///
@@ -39,7 +41,7 @@ where
         mut self,
         name: impl Into<String>,
         crossing: Crossing,
-        act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
+        act: impl Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm,
     ) -> Self {
         self.events.push(name, crossing, None, act);
         self

@@ -1,7 +1,6 @@
 //! Runs with an estimate of their error: what models of both kinds of length have in common.
 
-mod family;
-mod fixed;
+mod asked;
 mod graded;
 mod pilots;
 mod place;

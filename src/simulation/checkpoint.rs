@@ -1,15 +1,13 @@
 //! Runs that go on where others ended.
 
-mod family;
-
 use super::follow::Nobody;
+use super::kind::Simulated;
 use super::mesh::Mesh;
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
-use crate::motion::{Checkpoint, Motion, Reached};
+use crate::length::Length;
+use crate::motion::{Checkpoint, Motion, Node, Reached};
 use std::ops::Range;
-use tfe_runtime::Model;
-use tfe_runtime::step::Stepper;
 
 impl Reached {
     pub(crate) fn new<const N: usize>(
@@ -57,7 +55,11 @@ impl Reached {
     }
 }
 
-impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
+impl<M, const N: usize, L> Simulation<'_, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     /// Goes on where a run ended, up to the time `end`.
     ///
     /// Where that run ended on the grid of this one (its start, and the same steps and breaks), the motion is to the last bit what one run would have been from there on; else the grid
@@ -83,22 +85,19 @@ impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run).
-    pub fn resume(&self, checkpoint: &Checkpoint<N>, end: f64) -> Result<Motion<N>, RunError<N>> {
-        let motion = Motion::from_checkpoint(&*self.model, checkpoint);
-        let prepared = self.check_start(&checkpoint.state).and_then(|()| {
+    pub fn resume(
+        &self,
+        checkpoint: &Checkpoint<N, L>,
+        end: f64,
+    ) -> Result<Motion<N, L>, RunError<N, L>> {
+        let (time, state) = (checkpoint.time(), &checkpoint.state);
+        let prepared = self.check_start(state).and_then(|()| {
             let mut run = self.clone();
             run.step = run.step.or(checkpoint.reached.step);
-            // The last element of a run takes those at its end.
-            run.impulses
-                .retain(|impulse| impulse.time != checkpoint.time());
-            let element = self.chosen_element();
+            M::leave_behind(&mut run.impulses, time);
             let suspended = checkpoint.stepper.clone();
-            let stepper = if suspended.element() == element {
-                Stepper::resume(self.model.clone(), self.control, suspended)
-            } else {
-                Stepper::sharing(self.model.clone(), element, self.control)
-            };
-            let stepper = self.cutting(stepper.map_err(RunErrorKind::Element)?);
+            let mut stepper = M::resumed(self.model.clone(), self.chosen(), suspended)?;
+            M::check_velocity(&mut stepper, (time, state))?;
             let place = checkpoint
                 .reached
                 .place(end, self.nodes.as_deref(), |span, nodes| {
@@ -108,14 +107,15 @@ impl<M: Model<N>, const N: usize> Simulation<'_, M, N> {
             Ok((place, stepper))
         });
         match prepared {
-            Ok(((mesh, done, origin), stepper)) => self.drive_on(
-                motion,
-                &checkpoint.state,
-                (&mesh, done, origin),
-                stepper,
-                Nobody,
-            ),
-            Err(kind) => Err(RunError::new(kind, motion)),
+            Ok(((mesh, done, origin), stepper)) => {
+                let node = Node::of(time, state, checkpoint.velocity.clone());
+                let motion = Motion::starting(&*self.model, node);
+                self.drive_on(motion, state, (&mesh, done, origin), stepper, Nobody)
+            }
+            Err(kind) => {
+                let motion = self.model.first_node((time, state), None);
+                Err(RunError::new(kind, motion))
+            }
         }
     }
 }

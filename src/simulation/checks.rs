@@ -27,17 +27,6 @@ pub(crate) fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErr
     Ok(())
 }
 
-/// Refuses a state from which a run cannot go on.
-pub(super) fn check_restart<M: Model<N>, const N: usize>(
-    model: &M,
-    time: f64,
-    h: f64,
-    state: &State<N>,
-) -> Result<(), RunErrorKind> {
-    check_start(state)?;
-    check_constraints(model, time, h, state)
-}
-
 /// Refuses a start that is not on the constraints.
 pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
     model: &M,

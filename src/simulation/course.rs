@@ -2,7 +2,6 @@
 
 use super::mesh::Endless;
 use crate::error::RunErrorKind;
-use tfe_runtime::StepError;
 
 /// A stepper on its way, or the error that it ended with, until that is told.
 #[derive(Debug)]
@@ -22,18 +21,6 @@ pub(super) struct Leg {
     pub(super) nodes: (f64, f64),
 }
 
-impl Leg {
-    /// What a failure of its solution is told as.
-    pub(super) fn failed(&self, source: StepError) -> RunErrorKind {
-        RunErrorKind::Solve {
-            element: self.number,
-            time: self.nodes.0,
-            step: self.h,
-            source,
-        }
-    }
-}
-
 impl<S> Course<S> {
     pub(super) fn new(way: Result<(S, Endless), RunErrorKind>) -> Self {
         Self {
@@ -45,6 +32,11 @@ impl<S> Course<S> {
     /// The stepper, unless the course has ended.
     pub(super) fn stepper(&self) -> Option<&S> {
         self.way.as_ref().ok().map(|(stepper, _)| stepper)
+    }
+
+    /// The same, to be worked with.
+    pub(super) fn stepper_mut(&mut self) -> Option<&mut S> {
+        self.way.as_mut().ok().map(|(stepper, _)| stepper)
     }
 
     /// When the next element begins, unless the course has ended.

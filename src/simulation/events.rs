@@ -8,7 +8,9 @@ pub(super) mod settings;
 pub(super) mod value;
 pub(super) mod watching;
 
+use super::kind::{Chosen, Simulated};
 use crate::error::RunErrorKind;
+use crate::length::{FixedLength, Length, Polynomial};
 use act::{Act, After, Event, On};
 use remodel::Remodel;
 use search::Course;
@@ -16,36 +18,35 @@ use std::cell::RefCell;
 use std::fmt;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
-use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper};
-use tfe_runtime::{Arguments, Element, Form, Model, Real, Share, State, constrained};
+use tfe_runtime::step::Impulse;
 use value::Value;
 
 /// An event that is looked for.
-pub(super) struct Watched<'m, const N: usize> {
-    pub(super) on: On<'m, N>,
-    pub(super) value: Value<'m, N>,
+pub(super) struct Watched<'m, const N: usize, L: Length<N> = FixedLength> {
+    pub(super) on: On<'m, N, L>,
+    pub(super) value: Value<'m, L::Vector>,
 }
 
 /// [`Events::look`], or nothing.
-type Look<'m, M, const N: usize> =
-    fn(&mut Events<'m, M, N>, &Passage<'_, N>) -> Result<Option<Cut<'m, M, N>>, RunErrorKind>;
+type Look<'m, M, const N: usize, L> = fn(
+    &mut Events<'m, M, N, L>,
+    &Passage<'_, N, L>,
+) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind>;
 
 /// Looks for the events of a run.
-pub(super) struct Events<'m, M, const N: usize> {
-    model: Share<'m, M>,
-    remodel: Option<Remodel<'m, M>>,
-    look: Look<'m, M, N>,
-    watched: Vec<Watched<'m, N>>,
+pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+    model: L::Held<'m, M>,
+    remodel: Option<Remodel<'m, M, N, L>>,
+    look: Look<'m, M, N, L>,
+    watched: Vec<Watched<'m, N, L>>,
     /// Sides on which the values were seen last; 0 where this is not known.
     sides: Vec<f64>,
-    element: Element,
-    control: Control,
-    /// Whether steps are cut at kinks, those that look for the times of events as well.
-    at_kinks: bool,
+    /// Of the steps that look for the times of events, as of those of the run.
+    chosen: Chosen,
     rooms: Rooms,
     /// Finds the times of events, apart from the run.
-    probe: Option<Stepper<'m, M, N>>,
-    pub(super) met: Vec<Event<N>>,
+    probe: Option<L::Stepper<'m, M>>,
+    pub(super) met: Vec<Event<N, L>>,
     /// Events of the element looked into last that did not end it.
     recorded: Vec<Place>,
     /// Cuts in this step.
@@ -56,7 +57,7 @@ pub(super) struct Events<'m, M, const N: usize> {
     last: Option<(f64, usize)>,
 }
 
-impl<M: fmt::Debug, const N: usize> fmt::Debug for Events<'_, M, N> {
+impl<M, const N: usize, L: Length<N>> fmt::Debug for Events<'_, M, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let names = self.watched.iter().map(|watched| &watched.on);
         f.debug_list().entries(names).finish()
@@ -82,12 +83,12 @@ impl Rooms {
 }
 
 /// An element that is to be looked into.
-pub(super) struct Passage<'a, const N: usize> {
+pub(super) struct Passage<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) t: f64,
     pub(super) h: f64,
-    pub(super) before: &'a State<N>,
-    pub(super) after: &'a State<N>,
-    pub(super) dense: &'a DenseElement<N>,
+    pub(super) before: &'a L::State,
+    pub(super) after: &'a L::State,
+    pub(super) dense: &'a L::Polynomial,
     pub(super) impulses: &'a [Impulse<N>],
 }
 
@@ -105,46 +106,46 @@ struct Place {
 }
 
 /// An element that ends at an event.
-pub(super) struct Cut<'m, M, const N: usize> {
+pub(super) struct Cut<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     pub(super) t: f64,
-    pub(super) at: State<N>,
-    pub(super) inside: Option<DenseElement<N>>,
+    pub(super) at: L::State,
+    pub(super) inside: Option<L::Polynomial>,
     /// None where the run ends there.
-    pub(super) after: Option<After<'m, M, N>>,
+    pub(super) after: Option<After<'m, M, N, L>>,
     place: Place,
 }
 
 /// The same beside the element that was to be.
-pub(super) struct Severed<'a, 'm, const N: usize> {
+pub(super) struct Severed<'a, 'm, const N: usize, L: Length<N> = FixedLength> {
     /// Where the element begins.
     pub(super) start: f64,
     pub(super) length: f64,
     /// What its length was to be.
     pub(super) step: f64,
-    pub(super) before: &'a State<N>,
+    pub(super) before: &'a L::State,
     pub(super) impulses: &'a [Impulse<N>],
     /// False where the event is at the start.
     pub(super) inside: bool,
-    pub(super) watched: &'a Watched<'m, N>,
+    pub(super) watched: &'a Watched<'m, N, L>,
     /// The place of what is watched among all.
     pub(super) which: usize,
-    pub(super) event: &'a Event<N>,
+    pub(super) event: &'a Event<N, L>,
     /// The place of the event among all.
     pub(super) number: usize,
     pub(super) goes_on: bool,
 }
 
 /// What has come of a search for the time of an event.
-struct Met<const N: usize> {
+struct Met<const N: usize, L: Length<N>> {
     length: f64,
-    state: State<N>,
-    velocity: [f64; N],
-    inside: Option<DenseElement<N>>,
+    state: L::State,
+    velocity: L::Vector,
+    inside: Option<L::Polynomial>,
 }
 
-impl<const N: usize> Met<N> {
+impl<const N: usize, L: Length<N>> Met<N, L> {
     /// Of the polynomial alone, where no element can end there.
-    fn between(dense: &DenseElement<N>, t: f64, length: f64) -> Self {
+    fn between(dense: &L::Polynomial, t: f64, length: f64) -> Self {
         Self {
             length,
             state: dense.at_time(t + length),
@@ -154,7 +155,11 @@ impl<const N: usize> Met<N> {
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
+impl<'m, M, const N: usize, L> Events<'m, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     /// So many events within one step are a motion that comes to rest by ever more of them.
     const MAX_CUTS: u32 = 1000;
 
@@ -162,7 +167,7 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
     const SOON: f64 = 1e-6;
 
     /// Goes on with another model.
-    pub(super) fn set_model(&mut self, model: Share<'m, M>) {
+    pub(super) fn set_model(&mut self, model: L::Held<'m, M>) {
         (self.model, self.probe) = (model, None);
     }
 
@@ -178,12 +183,12 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
     /// Does what is to be done at the events inside an element, in their order, up to the first that ends it.
     pub(super) fn pass(
         &mut self,
-        arc: &Passage<'_, N>,
-    ) -> Result<Option<Cut<'m, M, N>>, RunErrorKind> {
+        arc: &Passage<'_, N, L>,
+    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
         (self.look)(self, arc)
     }
 
-    fn look(&mut self, arc: &Passage<'_, N>) -> Result<Option<Cut<'m, M, N>>, RunErrorKind> {
+    fn look(&mut self, arc: &Passage<'_, N, L>) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
         let Passage { t, h, dense, .. } = *arc;
         self.recorded.clear();
         if self.stays_off(dense) {
@@ -193,22 +198,23 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
         let samples = (2 * dense.degree()).clamp(8, 24);
         let value = |tau: f64, row: &mut Vec<f64>| {
             let time = t + tau * h;
-            let inside = 0.0 < tau && tau < 1.0;
-            let (state, v) = if inside {
-                (dense.at_time(time), self.velocity_inside(dense, time))
-            } else if !self.needs_velocity() {
-                (*if tau == 0.0 { arc.before } else { arc.after }, [0.0; N])
-            } else {
-                // Two elements agree at a node.
-                let (time, state) = if tau == 0.0 {
-                    (t, arc.before)
-                } else {
-                    (dense.end(), arc.after)
-                };
-                let v = constrained::velocity_of(&*self.model, time, &state.q, &state.p, &[0.0; N]);
-                (*state, v.unwrap_or([f64::NAN; N]))
-            };
-            self.outputs(time, &state, &v, row);
+            if 0.0 < tau && tau < 1.0 {
+                let state = dense.at_time(time);
+                let v = self.velocity_inside(dense, time, &state);
+                self.outputs(time, &state, &v, row);
+                return;
+            }
+            let state = if tau == 0.0 { arc.before } else { arc.after };
+            let (q, _) = L::parts(state);
+            if !self.needs_velocity() {
+                self.outputs(time, state, &L::zero(q), row);
+                return;
+            }
+            // Two elements agree at a node.
+            let time = if tau == 0.0 { t } else { dense.end() };
+            let v = self.model.velocity(time, state, &L::zero(q));
+            let v = v.unwrap_or_else(|| L::unknown(q));
+            self.outputs(time, state, &v, row);
         };
         let course = |function, part| self.course(dense, function, part);
         let resolution_of_tau = resolution / h.abs();
@@ -227,12 +233,13 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
             } else {
                 t + met.length
             };
+            let (q, p) = L::parts(&met.state);
             let event = Event {
                 name: name.clone(),
                 t: time,
-                q: met.state.q,
+                q: q.clone(),
                 v: met.velocity,
-                p: met.state.p,
+                p: p.clone(),
                 rises: root.rises,
             };
             let watched = &self.watched[root.function];
@@ -276,26 +283,26 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
     /// A cut, with all that derivatives need.
     pub(super) fn severed<'c>(
         &'c self,
-        arc: &Passage<'c, N>,
-        cut: &Cut<'m, M, N>,
-    ) -> Severed<'c, 'm, N> {
+        arc: &Passage<'c, N, L>,
+        cut: &Cut<'m, M, N, L>,
+    ) -> Severed<'c, 'm, N, L> {
         self.place(arc, &cut.place, cut.after.is_some())
     }
 
     /// The events that did not end the element looked into last.
     pub(super) fn gone_by<'c>(
         &'c self,
-        arc: &Passage<'c, N>,
-    ) -> impl Iterator<Item = Severed<'c, 'm, N>> {
+        arc: &Passage<'c, N, L>,
+    ) -> impl Iterator<Item = Severed<'c, 'm, N, L>> {
         (self.recorded.iter()).map(|place| self.place(arc, place, true))
     }
 
     fn place<'c>(
         &'c self,
-        arc: &Passage<'c, N>,
+        arc: &Passage<'c, N, L>,
         place: &Place,
         goes_on: bool,
-    ) -> Severed<'c, 'm, N> {
+    ) -> Severed<'c, 'm, N, L> {
         let before = |impulse: &&Impulse<N>| (impulse.time - arc.t).abs() < place.length.abs();
         let count = arc.impulses.iter().take_while(before).count();
         Severed {
@@ -326,54 +333,43 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
 
     /// Whether anything that is watched is a function of velocities; those of a Hamiltonian are of momenta.
     fn needs_velocity(&self) -> bool {
-        matches!(M::FORM, Form::Lagrangian) || self.has_functions()
+        M::OF_VELOCITIES || self.has_functions()
     }
 
     fn has_functions(&self) -> bool {
-        let is_function = |one: &Watched<'m, N>| matches!(one.value, Value::Function(_));
+        let is_function = |one: &Watched<'m, N, L>| matches!(one.value, Value::Function(_));
         self.watched.iter().any(is_function)
     }
 
     /// The velocity in an element, where it is needed.
-    fn velocity_inside(&self, dense: &DenseElement<N>, time: f64) -> [f64; N] {
+    fn velocity_inside(&self, dense: &L::Polynomial, time: f64, state: &L::State) -> L::Vector {
         if self.needs_velocity() {
             dense.velocity_at_time(time)
         } else {
-            [0.0; N]
+            let (q, _) = L::parts(state);
+            L::zero(q)
         }
     }
 
     /// The values of what is watched.
-    fn outputs(&self, t: f64, state: &State<N>, v: &[f64; N], row: &mut Vec<f64>) {
-        let z = match M::FORM {
-            Form::Lagrangian => v,
-            Form::Hamiltonian => &state.p,
-        };
+    fn outputs(&self, t: f64, state: &L::State, v: &L::Vector, row: &mut Vec<f64>) {
         let mut values = self.rooms.values.borrow_mut();
-        self.model.observables(t, &state.q, z, &mut values);
+        self.model.outputs(t, state, v, &mut values);
+        let (q, _) = L::parts(state);
         row.extend(self.watched.iter().map(|watched| match &watched.value {
             Value::Column(column) => values[*column],
-            Value::Function(function) => function(t, &state.q, v),
+            Value::Function(function) => function(t, q, v),
         }));
     }
 
-    /// All outputs of bounds of what they are functions of.
-    fn bounded<R: Real>(&self, over: &Arguments<R, N>, values: &mut [R]) {
-        let z = match M::FORM {
-            Form::Lagrangian => &over.v,
-            Form::Hamiltonian => &over.p,
-        };
-        self.model.observables(over.t, &over.q, z, values);
-    }
-
     /// Whether it is proved that nothing that is watched comes to zero in an element. Sides that were not known are known then.
-    fn stays_off(&mut self, dense: &DenseElement<N>) -> bool {
+    fn stays_off(&mut self, dense: &L::Polynomial) -> bool {
         if self.has_functions() {
             return false;
         }
         for piece in dense.pieces() {
             let mut values = self.rooms.bounds.borrow_mut();
-            self.bounded(&piece.bounds(M::FORM), &mut values);
+            self.model.outputs_along(piece, &mut values);
             for (watched, known) in self.watched.iter().zip(&mut self.sides) {
                 let Value::Column(column) = watched.value else {
                     return false;
@@ -389,13 +385,13 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
     }
 
     /// What is known of an output that is watched in a part of an element.
-    fn course(&self, dense: &DenseElement<N>, function: usize, part: (f64, f64)) -> Course {
+    fn course(&self, dense: &L::Polynomial, function: usize, part: (f64, f64)) -> Course {
         let Value::Column(column) = self.watched[function].value else {
             return Course::Unknown;
         };
         let length = dense.end() - dense.start();
         // The piece that holds the part, if one holds all of it.
-        let place = |piece: &DenseElement<N>| {
+        let place = |piece: &L::Polynomial| {
             let from = (piece.start() - dense.start()) / length;
             let to = (piece.end() - dense.start()) / length;
             ((part.0 - from) / (to - from), (part.1 - from) / (to - from))
@@ -406,7 +402,7 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
             return Course::Bent;
         };
         let mut values = self.rooms.slopes.borrow_mut();
-        self.bounded(&piece.bounds_over(within), &mut values);
+        self.model.outputs_over(piece, within, &mut values);
         let Dual { value, slope, .. } = values[column];
         if value.side() != 0.0 || slope.side() != 0.0 {
             Course::Plain
@@ -421,10 +417,10 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
     /// cannot be solved.
     fn locate(
         &mut self,
-        arc: &Passage<'_, N>,
+        arc: &Passage<'_, N, L>,
         root: &search::Root,
         resolution: f64,
-    ) -> Option<Met<N>> {
+    ) -> Option<Met<N, L>> {
         /// Corrections of the length; each leaves the square of what was off.
         const MAX_TRIALS: u32 = 8;
 
@@ -432,31 +428,21 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
         let mut length = root.tau * h;
         let mut probe = match self.probe.take() {
             Some(probe) => probe,
-            None => {
-                let probe =
-                    Stepper::sharing(self.model.clone(), self.element, self.control).ok()?;
-                if self.at_kinks {
-                    probe.at_kinks()
-                } else {
-                    probe
-                }
-            }
+            None => M::stepper(self.model.clone(), self.chosen).ok()?,
         };
         let mut last = f64::INFINITY;
         let mut met = None;
         for _ in 0..MAX_TRIALS {
-            let mut state = *arc.before;
+            let mut state = arc.before.clone();
             let mut inside = None;
             if length.abs() > resolution {
                 let before = |impulse: &&Impulse<N>| (impulse.time - t).abs() < length.abs();
                 let impulses: Vec<_> = arc.impulses.iter().filter(before).copied().collect();
-                probe.advance(t, length, &mut state, &impulses).ok()?;
-                inside = Some(probe.dense(t, t + length));
+                M::advance(&mut probe, (t, length), &mut state, &impulses).ok()?;
+                inside = Some(M::inside(&probe, None, (t, t + length)));
             }
             let guess = dense.velocity_at_time(t + length);
-            let velocity =
-                constrained::velocity_of(&*self.model, t + length, &state.q, &state.p, &guess)
-                    .ok()?;
+            let velocity = self.model.velocity(t + length, &state, &guess)?;
             let mut row = Vec::new();
             self.outputs(t + length, &state, &velocity, &mut row);
             let value = row[root.function];
@@ -481,7 +467,7 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
     }
 
     /// dg/dt on the polynomial.
-    fn slope(&self, arc: &Passage<'_, N>, function: usize, length: f64) -> f64 {
+    fn slope(&self, arc: &Passage<'_, N, L>, function: usize, length: f64) -> f64 {
         const NEAR: f64 = 1e-4;
         let Passage { t, h, dense, .. } = *arc;
         let value = |length: f64| {

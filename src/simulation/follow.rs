@@ -2,34 +2,34 @@
 
 use super::events::Severed;
 use crate::error::RunErrorKind;
+use crate::length::{FixedLength, Length};
 use crate::motion::Node;
 use std::ops::ControlFlow;
-use tfe_runtime::step::Stepper;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Model, Share, State};
 
 /// Where an element begins that a run has passed.
-pub(super) struct Passed<'a, const N: usize> {
+pub(super) struct Passed<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) start: f64,
-    pub(super) before: &'a State<N>,
+    pub(super) h: f64,
+    pub(super) before: &'a L::State,
 }
 
 /// Is shown what a run does.
-pub(super) trait Follow<'m, M: Model<N>, const N: usize> {
+pub(super) trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// An element, to its end.
     fn passed(
         &mut self,
-        stepper: &mut Stepper<'m, M, N>,
-        passed: &Passed<'_, N>,
+        stepper: &mut L::Stepper<'m, M>,
+        passed: &Passed<'_, N, L>,
     ) -> Result<(), TransitionError>;
 
     /// An event inside an element that goes on as if nothing had happened; before the element is passed or cut.
-    fn met(&mut self, _severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+    fn met(&mut self, _severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         Ok(())
     }
 
     /// An element that an event has cut, up to there.
-    fn cut(&mut self, _severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+    fn cut(&mut self, _severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         Ok(())
     }
 
@@ -37,55 +37,56 @@ pub(super) trait Follow<'m, M: Model<N>, const N: usize> {
     fn acted(&mut self) {}
 
     /// Parameters that were set at that event: the model with them.
-    fn set(&mut self, _model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+    fn set(&mut self, _model: &L::Held<'m, M>) -> Result<(), RunErrorKind> {
         Ok(())
     }
 
     /// The end of an element of the grid, in whatever pieces; whether the run goes on.
     fn reached(
         &mut self,
-        _stepper: &mut Stepper<'m, M, N>,
+        _stepper: &mut L::Stepper<'m, M>,
         _t: f64,
-        _state: &State<N>,
+        _state: &L::State,
     ) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
     /// A node that is recorded.
-    fn recorded(&mut self, _node: &Node<N>) {}
+    fn recorded(&mut self, _node: &Node<N, L>) {}
 }
 
 /// Nobody goes along.
 pub(super) struct Nobody;
 
-impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Nobody {
+impl<'m, M: 'm, const N: usize, L: Length<N>> Follow<'m, M, N, L> for Nobody {
     fn passed(
         &mut self,
-        _: &mut Stepper<'m, M, N>,
-        _: &Passed<'_, N>,
+        _: &mut L::Stepper<'m, M>,
+        _: &Passed<'_, N, L>,
     ) -> Result<(), TransitionError> {
         Ok(())
     }
 }
 
-impl<'m, M, F, const N: usize> Follow<'m, M, N> for &mut F
+impl<'m, M, F, const N: usize, L> Follow<'m, M, N, L> for &mut F
 where
-    M: Model<N>,
-    F: Follow<'m, M, N>,
+    M: 'm,
+    F: Follow<'m, M, N, L>,
+    L: Length<N>,
 {
     fn passed(
         &mut self,
-        stepper: &mut Stepper<'m, M, N>,
-        passed: &Passed<'_, N>,
+        stepper: &mut L::Stepper<'m, M>,
+        passed: &Passed<'_, N, L>,
     ) -> Result<(), TransitionError> {
         (**self).passed(stepper, passed)
     }
 
-    fn met(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+    fn met(&mut self, severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         (**self).met(severed)
     }
 
-    fn cut(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+    fn cut(&mut self, severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         (**self).cut(severed)
     }
 
@@ -93,20 +94,20 @@ where
         (**self).acted();
     }
 
-    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+    fn set(&mut self, model: &L::Held<'m, M>) -> Result<(), RunErrorKind> {
         (**self).set(model)
     }
 
     fn reached(
         &mut self,
-        stepper: &mut Stepper<'m, M, N>,
+        stepper: &mut L::Stepper<'m, M>,
         t: f64,
-        state: &State<N>,
+        state: &L::State,
     ) -> ControlFlow<()> {
         (**self).reached(stepper, t, state)
     }
 
-    fn recorded(&mut self, node: &Node<N>) {
+    fn recorded(&mut self, node: &Node<N, L>) {
         (**self).recorded(node);
     }
 }

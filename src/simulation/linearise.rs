@@ -1,5 +1,7 @@
 //! Runs with the transition matrix of every element.
 
+mod family;
+
 use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::sensitive::Tangents;

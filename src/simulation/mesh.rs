@@ -18,9 +18,32 @@ struct Segment {
     at_break: (bool, bool),
 }
 
+/// What was asked of the elements of a run.
+pub struct Grid<'a, I> {
+    pub(crate) step: Option<f64>,
+    pub(crate) nodes: Option<&'a [f64]>,
+    pub(crate) breaks: &'a [f64],
+    pub(crate) impulses: &'a [I],
+}
+
+impl<I> Grid<'_, I> {
+    /// The elements of a span, with impulses that act inside them.
+    pub(crate) fn mesh<const N: usize>(
+        &self,
+        span: &Range<f64>,
+        impulses: &[Impulse<N>],
+    ) -> Result<Mesh<N>, RunErrorKind> {
+        if let Some(nodes) = self.nodes {
+            return Mesh::through(span, nodes, self.breaks, impulses);
+        }
+        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        Mesh::new(span, step, self.breaks, impulses)
+    }
+}
+
 /// All elements of a span.
 #[derive(Clone, Debug)]
-pub(crate) struct Mesh<const N: usize> {
+pub struct Mesh<const N: usize> {
     segments: Vec<Segment>,
     /// In the order in which the run meets them.
     impulses: Vec<Impulse<N>>,

@@ -1,14 +1,14 @@
 //! One element of the grid of a run, in the pieces into which events cut it.
 
-use super::checks::check_restart;
 use super::events::act::After;
 use super::events::remodel::Changed;
 use super::events::{Cut, Events, Passage};
 use super::follow::{Follow, Passed};
+use super::kind::Simulated;
 use crate::error::RunErrorKind;
+use crate::length::{FixedLength, Length};
 use std::ops::ControlFlow;
-use tfe_runtime::step::{DenseElement, Impulse, Stepper};
-use tfe_runtime::{Model, Share, State};
+use tfe_runtime::step::Impulse;
 
 /// An element of the grid.
 #[derive(Clone, Copy)]
@@ -24,11 +24,11 @@ pub(super) struct Planned<'a, const N: usize> {
 }
 
 /// A piece that has been passed without an event that cuts it.
-pub(super) struct Piece<'a, const N: usize> {
+pub(super) struct Piece<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) start: f64,
     pub(super) h: f64,
-    pub(super) before: &'a State<N>,
-    pub(super) after: &'a State<N>,
+    pub(super) before: &'a L::State,
+    pub(super) after: &'a L::State,
     pub(super) has_impulses: bool,
 }
 
@@ -40,21 +40,29 @@ pub(super) enum Side {
 }
 
 /// Is shown what becomes of an element.
-pub(super) trait Observe<'m, M: Model<N>, const N: usize>: Follow<'m, M, N> {
+pub(super) trait Observe<'m, M: 'm, const N: usize, L: Length<N> = FixedLength>:
+    Follow<'m, M, N, L>
+{
     /// Whether the polynomial of every piece is wanted.
     fn keeps(&self) -> bool;
 
     /// A piece that was not cut.
-    fn whole(&mut self, _stepper: &Stepper<'m, M, N>, _piece: &Piece<'_, N>) {}
+    fn whole(&mut self, _stepper: &L::Stepper<'m, M>, _piece: &Piece<'_, N, L>) {}
 
     /// A polynomial that is wanted.
-    fn inside(&mut self, _dense: DenseElement<N>) {}
+    fn inside(&mut self, _dense: L::Polynomial) {}
 
     /// A node at an event.
-    fn at_event(&mut self, stepper: &Stepper<'m, M, N>, side: Side, t: f64, state: &State<N>);
+    fn at_event(
+        &mut self,
+        stepper: &mut L::Stepper<'m, M>,
+        model: &M,
+        side: Side,
+        at: (f64, &L::State),
+    );
 
     /// Parameters, by their numbers, that were set at the time of the node that is to come.
-    fn changed(&mut self, _model: &Share<'m, M>, _values: &[(usize, f64)]) {}
+    fn changed(&mut self, _model: &L::Held<'m, M>, _values: &[(usize, f64)]) {}
 }
 
 /// How an element was left.
@@ -75,26 +83,29 @@ fn left(goes_on: ControlFlow<()>) -> Left {
 
 /// Why an element was not passed.
 #[derive(Debug)]
-pub(super) struct Broken<const N: usize> {
+pub(super) struct Broken<const N: usize, L: Length<N> = FixedLength> {
     pub(super) kind: RunErrorKind,
     /// Where the piece begins that could not be passed, with its length; none where a state after an event cannot be used.
-    pub(super) piece: Option<(f64, f64, State<N>)>,
+    pub(super) piece: Option<(f64, f64, L::State)>,
 }
 
 /// Passes elements, with a look at events.
-#[derive(Debug)]
-pub(super) struct Pieces<'m, M, const N: usize> {
+pub(super) struct Pieces<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// As events have left it.
-    pub(super) model: Share<'m, M>,
-    pub(super) events: Events<'m, M, N>,
+    pub(super) model: L::Held<'m, M>,
+    pub(super) events: Events<'m, M, N, L>,
     /// Of an element that was looked into and is not kept.
-    spare: Option<DenseElement<N>>,
+    spare: Option<L::Polynomial>,
     /// Whether parameters were set.
     is_changed: bool,
 }
 
-impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
-    pub(super) fn new(model: Share<'m, M>, events: Events<'m, M, N>) -> Self {
+impl<'m, M, const N: usize, L> Pieces<'m, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    pub(super) fn new(model: L::Held<'m, M>, events: Events<'m, M, N, L>) -> Self {
         Self {
             model,
             events,
@@ -111,11 +122,11 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
     /// Moves a state from the start to the end of an element, or to the event that ends the run.
     pub(super) fn pass(
         &mut self,
-        stepper: &mut Stepper<'m, M, N>,
+        stepper: &mut L::Stepper<'m, M>,
         planned: Planned<'_, N>,
-        state: &mut State<N>,
-        observer: &mut impl Observe<'m, M, N>,
-    ) -> Result<Left, Box<Broken<N>>> {
+        state: &mut L::State,
+        observer: &mut impl Observe<'m, M, N, L>,
+    ) -> Result<Left, Box<Broken<N, L>>> {
         let Planned { t, next, h, .. } = planned;
         self.events.begin(h);
         // What is left of the element behind its last event.
@@ -133,7 +144,7 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
                 impulses: &planned.impulses[behind..],
                 ..planned
             };
-            let before = *state;
+            let before = state.clone();
             let cut = self.pass_piece(stepper, piece, state, observer);
             let cut = cut.map_err(|kind| Broken {
                 kind,
@@ -152,7 +163,7 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
             if let Some(dense) = inside.filter(|_| observer.keeps()) {
                 observer.inside(dense);
             }
-            observer.at_event(stepper, Side::Before, time, &at);
+            observer.at_event(stepper, &self.model, Side::Before, (time, &at));
             observer.acted();
             let Some(After {
                 state: after,
@@ -163,9 +174,9 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
                 return Ok(Left::Stopped);
             };
             let changed = model.map_or(Ok(()), |changed| self.change(stepper, observer, changed));
-            let good = changed.and_then(|()| check_restart(&*self.model, time, length, &after));
+            let good = changed.and_then(|()| self.model.check_restart(time, length, &after));
             good.map_err(|kind| Broken { kind, piece: None })?;
-            observer.at_event(stepper, Side::After, time, &after);
+            observer.at_event(stepper, &self.model, Side::After, (time, &after));
             *state = after;
             if time == next {
                 return Ok(left(observer.reached(stepper, next, state)));
@@ -178,11 +189,11 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
     /// Moves a state to the end of a piece, unless an event cuts it.
     fn pass_piece(
         &mut self,
-        stepper: &mut Stepper<'m, M, N>,
+        stepper: &mut L::Stepper<'m, M>,
         piece: Planned<'_, N>,
-        state: &mut State<N>,
-        observer: &mut impl Observe<'m, M, N>,
-    ) -> Result<Option<Cut<'m, M, N>>, RunErrorKind> {
+        state: &mut L::State,
+        observer: &mut impl Observe<'m, M, N, L>,
+    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
         let Planned {
             number,
             t,
@@ -191,14 +202,13 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
             begin,
             impulses,
         } = piece;
-        let before = *state;
-        stepper
-            .advance(begin, h, state, impulses)
-            .map_err(|source| RunErrorKind::of_element(&*self.model, number, (t, h), source))?;
+        let before = state.clone();
+        M::advance(stepper, (begin, h), state, impulses)
+            .map_err(|source| self.model.failed(number, (t, h), source))?;
         let keeps = observer.keeps();
         // Before a matrix, which needs the same memory.
         let dense = (keeps || !self.events.is_empty())
-            .then(|| stepper.dense_in(self.spare.take(), t, next));
+            .then(|| M::inside(stepper, self.spare.take(), (t, next)));
         let no_matrix = |source| RunErrorKind::Transition {
             element: number,
             time: t,
@@ -226,6 +236,7 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
         }
         let passed = Passed {
             start: t,
+            h,
             before: &before,
         };
         observer.passed(stepper, &passed).map_err(no_matrix)?;
@@ -249,14 +260,12 @@ impl<'m, M: Model<N>, const N: usize> Pieces<'m, M, N> {
     /// Goes on with other parameters.
     fn change(
         &mut self,
-        stepper: &mut Stepper<'m, M, N>,
-        observer: &mut impl Observe<'m, M, N>,
-        (model, values): Changed<'m, M>,
+        stepper: &mut L::Stepper<'m, M>,
+        observer: &mut impl Observe<'m, M, N, L>,
+        (model, values): Changed<'m, M, N, L>,
     ) -> Result<(), RunErrorKind> {
         observer.set(&model)?;
-        stepper
-            .set_model(model.clone())
-            .map_err(RunErrorKind::Element)?;
+        M::exchange(stepper, model.clone())?;
         self.events.set_model(model.clone());
         observer.changed(&model, &values);
         (self.model, self.is_changed) = (model, true);

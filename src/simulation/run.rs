@@ -1,8 +1,8 @@
 //! Runs: from a start over a span, or without an end.
 
-use super::checks::{check_constraints, check_start};
 use super::events::Events;
 use super::follow::{Follow, Nobody};
+use super::kind::{Chosen, Simulated};
 use super::mesh::{Endless, Mesh};
 use super::pieces::{Broken, Left, Pieces, Planned};
 use super::progress;
@@ -10,12 +10,15 @@ use super::recorder::Recorder;
 use super::setup::Simulation;
 use super::steps::{Beginning, Steps};
 use crate::error::{RunError, RunErrorKind};
+use crate::length::Length;
 use crate::motion::{Checkpoint, Motion, Reached};
 use std::ops::Range;
-use tfe_runtime::step::Stepper;
-use tfe_runtime::{Model, State};
 
-impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
+impl<'m, M, const N: usize, L> Simulation<'m, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     /// Runs over the span, backwards where it ends before it starts. The last node is exactly at the end of the span.
     ///
     /// What is doubtful about the result without being an error is in [`Motion::warnings`].
@@ -39,15 +42,11 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn run(&self, start: State<N>, span: Range<f64>) -> Result<Motion<N>, RunError<N>> {
+    pub fn run(&self, start: L::State, span: Range<f64>) -> Result<Motion<N, L>, RunError<N, L>> {
         let ends_only = self.record_every != 1 && self.events.is_empty();
-        let ready = |stepper: Stepper<'m, M, N>| {
-            let stepper = self.cutting(stepper);
-            if ends_only {
-                stepper.ends_only()
-            } else {
-                stepper
-            }
+        let ready = |stepper| match ends_only {
+            true => M::ends_only(stepper),
+            false => stepper,
         };
         self.drive(start, &span, ready, Nobody)
     }
@@ -55,16 +54,18 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span, followed by `follower`.
     pub(super) fn drive(
         &self,
-        start: State<N>,
+        start: L::State,
         span: &Range<f64>,
-        ready: impl FnOnce(Stepper<'m, M, N>) -> Stepper<'m, M, N>,
-        follower: impl Follow<'m, M, N>,
-    ) -> Result<Motion<N>, RunError<N>> {
+        ready: impl FnOnce(L::Stepper<'m, M>) -> L::Stepper<'m, M>,
+        follower: impl Follow<'m, M, N, L>,
+    ) -> Result<Motion<N, L>, RunError<N, L>> {
         let prepared = self.model.guarded(|| {
-            let motion = Motion::from_start(&*self.model, span.start, &start);
-            (self.prepare(&start, span), motion)
+            let mut prepared = self.prepare(&start, span);
+            let stepper = prepared.as_mut().ok().map(|(_, stepper)| stepper);
+            let motion = self.model.first_node((span.start, &start), stepper);
+            (prepared, motion)
         });
-        let Ok((prepared, motion)) = prepared else {
+        let Some((prepared, motion)) = prepared else {
             let motion = Motion::unknown(&*self.model, span.start, &start);
             return Err(RunError::new(RunErrorKind::panicked(span.start), motion));
         };
@@ -79,55 +80,55 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Goes on from the only node of `motion` over a mesh of which some elements are done, and leaves a checkpoint.
     pub(super) fn drive_on(
         &self,
-        motion: Motion<N>,
-        start: &State<N>,
+        motion: Motion<N, L>,
+        start: &L::State,
         (mesh, done, origin): (&Mesh<N>, usize, f64),
-        mut stepper: Stepper<'m, M, N>,
-        follower: impl Follow<'m, M, N>,
-    ) -> Result<Motion<N>, RunError<N>> {
+        mut stepper: L::Stepper<'m, M>,
+        follower: impl Follow<'m, M, N, L>,
+    ) -> Result<Motion<N, L>, RunError<N, L>> {
         let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, follower)?;
-        let last = *motion.last();
+        let last = motion.last();
         // A run that was stopped has no grid to go on with, and one whose parameters were set no model.
         if mesh.end().is_some_and(|end| end != last.t) || !motion.settings().is_empty() {
             return Ok(motion);
         }
-        motion.set_checkpoint(Checkpoint {
+        let checkpoint = Checkpoint {
             reached: Reached::new(origin, self.step, mesh, last.t),
             state: last.state(),
-            velocity: motion.velocities().last().copied().unwrap_or([0.0; N]),
-            stepper: stepper.suspend(),
-        });
+            velocity: last.v.clone(),
+            stepper: M::suspended(stepper),
+        };
+        motion.set_checkpoint(checkpoint);
         Ok(motion)
     }
 
     /// Runs over a mesh with a stepper at rest.
     pub(super) fn drive_over(
         &self,
-        start: State<N>,
-        t0: f64,
+        (t0, start): (f64, &L::State),
         mesh: &Mesh<N>,
-        stepper: &mut Stepper<'m, M, N>,
-        follower: impl Follow<'m, M, N>,
-    ) -> Result<Motion<N>, RunError<N>> {
-        let motion = Motion::from_start(&*self.model, t0, &start);
-        self.drive_from(motion, &start, (mesh, 0), stepper, follower)
+        stepper: &mut L::Stepper<'m, M>,
+        follower: impl Follow<'m, M, N, L>,
+    ) -> Result<Motion<N, L>, RunError<N, L>> {
+        let motion = self.model.first_node((t0, start), Some(stepper));
+        self.drive_from(motion, start, (mesh, 0), stepper, follower)
     }
 
     /// The same from the only node of `motion`, after the elements that are done.
     fn drive_from(
         &self,
-        motion: Motion<N>,
-        start: &State<N>,
+        motion: Motion<N, L>,
+        start: &L::State,
         (mesh, done): (&Mesh<N>, usize),
-        stepper: &mut Stepper<'m, M, N>,
-        follower: impl Follow<'m, M, N>,
-    ) -> Result<Motion<N>, RunError<N>> {
+        stepper: &mut L::Stepper<'m, M>,
+        follower: impl Follow<'m, M, N, L>,
+    ) -> Result<Motion<N, L>, RunError<N, L>> {
         let mut pieces = match self.pieces(stepper) {
             Ok(pieces) => pieces,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
-        let mut recorder = Recorder::new(self, motion, start, follower);
-        let mut state = *start;
+        let mut recorder = Recorder::new(self, motion, follower);
+        let mut state = start.clone();
         let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
         let mut failure = None;
         for (number, (t, next, h)) in mesh.elements().enumerate().skip(done) {
@@ -140,16 +141,18 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 begin: mesh.begin(t, h),
                 impulses: mesh.impulses_in(t, next, is_last),
             };
-            let has_impulses = !planned.impulses.is_empty();
-            recorder.begin(stepper.model(), number, (t, h), &state, has_impulses);
+            let is_kicked = pieces.model.kick(&self.impulses, t, &mut state);
+            let has_impulses = is_kicked || !planned.impulses.is_empty();
+            recorder.begin(&*pieces.model, number, (t, h), &state, has_impulses);
             let passed = self.model.guarded(|| {
                 let left = pieces.pass(stepper, planned, &mut state, &mut recorder)?;
                 if left == Left::Done {
-                    recorder.end(stepper.model(), number, is_last, next, &state);
+                    let model = &*pieces.model;
+                    recorder.end(stepper, model, (number, is_last), (next, &state));
                 }
                 Ok(left)
             });
-            let passed = passed.unwrap_or_else(|_| {
+            let passed = passed.unwrap_or_else(|| {
                 let (kind, piece) = (RunErrorKind::panicked(t), None);
                 Err(Box::new(Broken { kind, piece }))
             });
@@ -157,7 +160,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 Ok(Left::Done) => {}
                 Ok(Left::Stopped) => break,
                 Err(broken) => {
-                    recorder.fail(stepper.model(), number, &broken);
+                    recorder.fail(stepper, &*pieces.model, number, &broken);
                     failure = Some(broken.kind);
                     break;
                 }
@@ -166,9 +169,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
         let mut motion = recorder.into_motion(stepper, &state);
         if pieces.is_changed()
-            && let Err(error) = stepper.set_model(self.model.clone())
+            && let Err(kind) = M::exchange(stepper, self.model.clone())
         {
-            failure.get_or_insert(RunErrorKind::Element(error));
+            failure.get_or_insert(kind);
         }
         motion.set_events(pieces.events.met);
         match failure {
@@ -180,35 +183,47 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// What passes elements, with a look at events.
     pub(super) fn pieces(
         &self,
-        stepper: &Stepper<'m, M, N>,
-    ) -> Result<Pieces<'m, M, N>, RunErrorKind> {
-        let at_kinks = self.at_kinks == Some(true);
-        let chosen = (stepper.element(), stepper.control(), at_kinks);
+        stepper: &L::Stepper<'m, M>,
+    ) -> Result<Pieces<'m, M, N, L>, RunErrorKind> {
+        let (element, control) = M::chosen(stepper);
+        let chosen = Chosen {
+            element,
+            control,
+            ..self.chosen()
+        };
         let events = Events::new(self.model.clone(), &self.events, chosen)?;
         Ok(Pieces::new(self.model.clone(), events))
     }
 
     /// Whether the run can begin at `start`.
-    pub(super) fn check_start(&self, start: &State<N>) -> Result<(), RunErrorKind> {
+    pub(super) fn check_start(&self, start: &L::State) -> Result<(), RunErrorKind> {
         match &self.refusal {
             Some(refusal) => Err(refusal.clone()),
-            None => check_start(start),
+            None => {
+                let at_kinks = self.at_kinks == Some(true);
+                self.model.check_start(start, &self.impulses, at_kinks)
+            }
         }
     }
 
     /// The elements of a run and its stepper, if all arguments are good.
     pub(super) fn prepare(
         &self,
-        start: &State<N>,
+        start: &L::State,
         span: &Range<f64>,
-    ) -> Result<(Mesh<N>, Stepper<'m, M, N>), RunErrorKind> {
+    ) -> Result<(Mesh<N>, L::Stepper<'m, M>), RunErrorKind> {
         self.check_start(start)?;
         let mesh = self.mesh(span)?;
         if let Some((_, _, h)) = mesh.elements().next() {
-            check_constraints(&*self.model, span.start, h, start)?;
+            self.model.check_first((span.start, h), start)?;
         }
-        let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control);
-        Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
+        let mut stepper = M::stepper(self.model.clone(), self.chosen())?;
+        M::check_velocity(&mut stepper, (span.start, start))?;
+        Ok((mesh, stepper))
+    }
+
+    pub(super) fn mesh(&self, span: &Range<f64>) -> Result<Mesh<N>, RunErrorKind> {
+        M::mesh(span, &self.grid())
     }
 
     /// The states that follow `start`, one a step, without end and in constant memory; elements end at [breaks](Self::break_at), as in [`run`](Self::run). After an error the iterator
@@ -234,20 +249,21 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn steps(&self, start: State<N>, t0: f64) -> Steps<'m, M, N> {
+    pub fn steps(&self, start: L::State, t0: f64) -> Steps<'m, M, N, L> {
         let new = |beginning| {
             let (model, impulses) = (self.model.clone(), self.impulses.clone());
-            Steps::new(model, beginning, start, t0, impulses, self.again())
+            let begin = (t0, start.clone());
+            Steps::new(model, beginning, begin, impulses, self.again())
         };
         let begun = self.model.guarded(|| new(self.endless(&start, t0)));
-        begun.unwrap_or_else(|_| new(Err(RunErrorKind::panicked(t0))))
+        begun.unwrap_or_else(|| new(Err(RunErrorKind::panicked(t0))))
     }
 
     /// The beginning of a course without an end.
-    pub(super) fn endless(&self, start: &State<N>, t0: f64) -> Beginning<'m, M, N> {
+    pub(super) fn endless(&self, start: &L::State, t0: f64) -> Beginning<'m, M, N, L> {
         let step = self.step.unwrap_or(f64::NAN);
         self.check_start(start)?;
-        check_constraints(&*self.model, t0, step, start)?;
+        self.model.check_first((t0, step), start)?;
         if !t0.is_finite() {
             return Err(RunErrorKind::Span {
                 start: t0,
@@ -255,10 +271,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             });
         }
         let elements = Endless::new(t0, step, &self.breaks)?;
-        let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control);
-        let stepper = self.cutting(stepper.map_err(RunErrorKind::Element)?);
+        let mut stepper = M::stepper(self.model.clone(), self.chosen())?;
+        M::check_velocity(&mut stepper, (t0, start))?;
         if self.events.is_empty() {
-            return Ok((stepper.ends_only(), elements, None));
+            return Ok((M::ends_only(stepper), elements, None));
         }
         let pieces = self.pieces(&stepper)?;
         Ok((stepper, elements, Some(pieces)))

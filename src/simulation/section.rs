@@ -210,5 +210,5 @@ impl<'m, M: Model<N>, const N: usize> Observe<'m, M, N> for Crossings<'m, M, N> 
         false
     }
 
-    fn at_event(&mut self, _: &Stepper<'m, M, N>, _: Side, _: f64, _: &State<N>) {}
+    fn at_event(&mut self, _: &mut Stepper<'m, M, N>, _: &M, _: Side, _: (f64, &State<N>)) {}
 }

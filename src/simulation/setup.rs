@@ -1,12 +1,12 @@
 //! A run to be: a model, an element, a step, and what else is asked for; of models of either kind of length.
 
 use super::events::watching::Watching;
-use super::mesh::Mesh;
+use super::kind::Chosen;
+use super::mesh::Grid;
 use super::watch::resolution::Again;
 use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
-use std::ops::Range;
-use tfe_runtime::step::{Control, Impulse, Stepper};
+use tfe_runtime::step::{Control, Impulse};
 use tfe_runtime::{Element, Mixed, Model, Solve};
 
 /// A run to be: which model, with which element and step.
@@ -72,7 +72,7 @@ pub struct Simulation<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     pub(super) record_every: usize,
     pub(super) impulses: Vec<L::Impulse>,
     pub(super) breaks: Vec<f64>,
-    pub(super) events: Watching<'m, M, N>,
+    pub(super) events: Watching<'m, M, N, L>,
     /// What was asked for.
     pub(super) at_kinks: Option<bool>,
     pub(super) progress: bool,
@@ -247,6 +247,46 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         &self.model
     }
 
+    /// What it looks for.
+    pub(crate) fn watching(self, events: &Watching<'m, M, N, L>) -> Self {
+        let events = events.clone();
+        Self { events, ..self }
+    }
+
+    /// With what elements are looked at a second time.
+    pub(super) fn again(&self) -> Again<'m, M, N, L> {
+        let Chosen {
+            element,
+            control,
+            at_kinks,
+        } = self.chosen();
+        Again {
+            model: self.model.clone(),
+            element,
+            control,
+            at_kinks,
+        }
+    }
+
+    /// What was asked of the elements.
+    pub(super) fn grid(&self) -> Grid<'_, L::Impulse> {
+        Grid {
+            step: self.step,
+            nodes: self.nodes.as_deref(),
+            breaks: &self.breaks,
+            impulses: &self.impulses,
+        }
+    }
+
+    /// How elements are solved.
+    pub(super) fn chosen(&self) -> Chosen {
+        Chosen {
+            element: self.chosen_element(),
+            control: self.control,
+            at_kinks: self.at_kinks == Some(true),
+        }
+    }
+
     pub(super) fn chosen_element(&self) -> Element {
         self.element.unwrap_or_else(|| Element::from(Mixed::<4>))
     }
@@ -262,38 +302,5 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             value: impulse,
         });
         self
-    }
-
-    /// A stepper that cuts steps at kinks, if that was asked for.
-    pub(super) fn cutting(&self, stepper: Stepper<'m, M, N>) -> Stepper<'m, M, N> {
-        if self.at_kinks == Some(true) {
-            stepper.at_kinks()
-        } else {
-            stepper
-        }
-    }
-
-    /// What it looks for.
-    pub(crate) fn watching(self, events: &Watching<'m, M, N>) -> Self {
-        let events = events.clone();
-        Self { events, ..self }
-    }
-
-    /// With what elements are looked at a second time.
-    pub(super) fn again(&self) -> Again<'m, M> {
-        Again {
-            model: self.model.clone(),
-            element: self.chosen_element(),
-            control: self.control,
-            at_kinks: self.at_kinks == Some(true),
-        }
-    }
-
-    pub(super) fn mesh(&self, span: &Range<f64>) -> Result<Mesh<N>, RunErrorKind> {
-        if let Some(nodes) = &self.nodes {
-            return Mesh::through(span, nodes, &self.breaks, &self.impulses);
-        }
-        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
-        Mesh::new(span, step, &self.breaks, &self.impulses)
     }
 }

@@ -11,7 +11,7 @@ use tfe_runtime::{Element, First, Form, Model, State};
 
 /// Looks at the elements of a run now and then.
 #[derive(Clone, Debug)]
-pub(super) struct Watch {
+pub struct Watch {
     /// None if it needs no watching.
     element: Option<Element>,
     /// The number of the element that is examined next.
@@ -92,28 +92,6 @@ impl Watch {
         });
     }
 
-    /// Looks at the mass matrix at the start of a run.
-    pub(super) fn weigh<M: Model<N>, const N: usize>(
-        &mut self,
-        model: &M,
-        time: f64,
-        (q, v): (&[f64; N], &[f64; N]),
-    ) {
-        let has_mass = const { matches!(M::FORM, Form::Lagrangian) && M::CONSTRAINTS.is_empty() };
-        if !has_mass {
-            return;
-        }
-        let (mut first, mut mass) = (First::ZERO, [[0.0; N]; N]);
-        model.first_and_mass(time, q, v, &mut first, &mut mass);
-        if let Some((least, largest)) = signs(mass.as_flattened()) {
-            self.warnings.push(Warning::MassIndefinite {
-                time,
-                least,
-                largest,
-            });
-        }
-    }
-
     /// Looks at the energy of a recorded node, whose momentum has the product p·v with its velocity.
     pub(super) fn pass(&mut self, node: Recorded) {
         let Recorded {
@@ -181,6 +159,25 @@ impl Watch {
 pub(crate) fn is_jump([before, after]: [f64; 2], kinetic: f64) -> bool {
     let rounding = 1e-9 * after.abs().max(before.abs());
     (after - before).abs() > (0.1 * kinetic).max(rounding)
+}
+
+/// What is wrong with the mass matrix at the start of a run.
+pub(super) fn mass_signs<M: Model<N>, const N: usize>(
+    model: &M,
+    start: &Node<N>,
+) -> Option<Warning> {
+    let has_mass = const { matches!(M::FORM, Form::Lagrangian) && M::CONSTRAINTS.is_empty() };
+    if !has_mass {
+        return None;
+    }
+    let (mut first, mut mass) = (First::ZERO, [[0.0; N]; N]);
+    model.first_and_mass(start.t, &start.q, &start.v, &mut first, &mut mass);
+    let (least, largest) = signs(mass.as_flattened())?;
+    Some(Warning::MassIndefinite {
+        time: start.t,
+        least,
+        largest,
+    })
 }
 
 /// The least and the largest eigenvalue of a symmetric matrix, if they are of different signs beyond roundings.

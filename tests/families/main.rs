@@ -9,6 +9,7 @@ mod checkpoints;
 mod constrained;
 mod constraints;
 mod errors;
+mod events;
 mod impulses;
 mod kernels;
 mod lists;

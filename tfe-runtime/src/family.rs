@@ -11,6 +11,8 @@ mod dense;
 mod error;
 mod forces;
 mod inertia;
+#[cfg(feature = "sparse")]
+mod instant;
 mod kernel;
 mod lanes;
 mod model;
@@ -99,6 +101,42 @@ pub fn velocity<M: FamilyModel>(
     state: &FamilyState,
 ) -> Result<Vec<f64>, FamilyError> {
     Legendre::default().velocity(model, t, state)
+}
+
+/// The velocities that constraints leave of a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, [`velocity`].
+///
+/// # Errors
+/// [`FamilyError::NoVelocity`] where there are none, [`FamilyError::ConstraintsNotSupported`] without the feature `sparse`.
+pub fn allowed_velocity<M: FamilyModel>(
+    model: &M,
+    t: f64,
+    state: &FamilyState,
+) -> Result<Vec<f64>, FamilyError> {
+    if !M::CONSTRAINED {
+        return velocity(model, t, state);
+    }
+    #[cfg(feature = "sparse")]
+    return match instant::Instant::new(model) {
+        Some(mut instant) => instant.velocity(model, t, state),
+        None => Err(FamilyError::TooLarge),
+    };
+    #[cfg(not(feature = "sparse"))]
+    Err(FamilyError::ConstraintsNotSupported)
+}
+
+/// The reactions λ of the constraints at a state with its velocities, one for each row; the forces on the coordinates are Aᵀλ (T-77). None where there are none to be had: rows that depend on
+/// each other, a kinetic energy that is singular for motions that the constraints allow, and always without the feature `sparse`.
+#[must_use]
+pub fn reactions<M: FamilyModel>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Option<Vec<f64>> {
+    #[cfg(feature = "sparse")]
+    return instant::Instant::new(model)?
+        .reactions(model, (t, q), v)
+        .ok();
+    #[cfg(not(feature = "sparse"))]
+    {
+        let _ = (model, t, q, v);
+        None
+    }
 }
 
 /// The energy H = p·v − L, or H itself, at a state with its velocities.

@@ -80,7 +80,7 @@ pub mod workspace;
 pub use condense::{Direction, Parameter};
 pub use controlled::{Controlled, MAX_INPUTS};
 #[cfg(feature = "std")]
-pub use dense::bounds::Arguments;
+pub use dense::bounds::{Arguments, LongArguments};
 pub use element::markers::*;
 pub use element::{Element, ElementError, Family, Rule};
 pub use error::{ConstraintError, LegendreError, StepError};

@@ -1,16 +1,17 @@
 //! What is done at events, and what a caller is told of them.
 
 use super::remodel::{Changed, Remodel};
-use super::settings::{Settings, momenta_of};
+use super::settings::Settings;
 use super::value::{Function, Value};
 use crate::error::RunErrorKind;
 use crate::evaluate::Evaluate;
+use crate::length::{FixedLength, Length};
 pub use crate::motion::Event;
-use crate::sensitivity::slopes::momentum_by;
+use crate::simulation::kind::Simulated;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
-use tfe_runtime::{Model, State, constrained};
+use tfe_runtime::{Model, State};
 
 /// Which changes of sign count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,40 +36,37 @@ impl Crossing {
 
 /// What is done at an event.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Act<const N: usize> {
+pub enum Act<const N: usize, L: Length<N> = FixedLength> {
     /// The event is recorded, as all are, and the run goes on as if nothing had happened, with the same bits.
     Record,
     /// The run ends at the event.
     Stop,
     /// The element ends at the event, and the run goes on from this state.
-    Restart(State<N>),
+    Restart(L::State),
     /// The same with momenta that are larger by an impulse. What of it is against constraints, these take up at once: the run goes on with the velocity that is left,
     /// L_v(q, v) + Aᵀν = p + J, A v + a = 0 (T-74).
-    Impulse([f64; N]),
+    Impulse(L::Vector),
     /// The same with other values of parameters, and from another state if one is given with them: [`Settings`].
-    Set(Settings<N>),
+    Set(Settings<N, L>),
 }
 
 /// An event while it happens: an [`Event`] that knows its model.
-pub struct Occurrence<'a, const N: usize> {
-    event: &'a Event<N>,
-    model: &'a dyn Knows<N>,
+pub struct Occurrence<'a, const N: usize, L: Length<N> = FixedLength> {
+    event: &'a Event<N, L>,
+    model: &'a dyn Knows<N, L>,
 }
 
 /// What an event can be asked about its model.
-trait Knows<const N: usize> {
-    fn momenta(&self, v: [f64; N]) -> [f64; N];
-    fn after_impact(&self, restitution: f64) -> State<N>;
+trait Knows<const N: usize, L: Length<N>> {
+    fn momenta(&self, v: &L::Vector) -> L::Vector;
+    fn after_impact(&self, restitution: f64) -> L::State;
     fn parameter(&self, name: &str) -> Option<f64>;
 }
 
-impl<const N: usize> Occurrence<'_, N> {
+impl<const N: usize, L: Length<N>> Occurrence<'_, N, L> {
     /// The state at the same coordinates with other velocities; its momenta are NaN where none belong to them, and the run then ends with an error.
-    pub fn state_with_velocity(&self, v: [f64; N]) -> State<N> {
-        State {
-            q: self.event.q,
-            p: self.model.momenta(v),
-        }
+    pub fn state_with_velocity(&self, v: L::Vector) -> L::State {
+        L::state(self.event.q.clone(), self.model.momenta(&v))
     }
 
     /// The state after an impact without friction on the surface g(t, q) = 0 of the event, with a coefficient of restitution e,
@@ -103,7 +101,7 @@ impl<const N: usize> Occurrence<'_, N> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn after_impact(&self, restitution: f64) -> State<N> {
+    pub fn after_impact(&self, restitution: f64) -> L::State {
         self.model.after_impact(restitution)
     }
 
@@ -113,87 +111,95 @@ impl<const N: usize> Occurrence<'_, N> {
     }
 }
 
-impl<const N: usize> Deref for Occurrence<'_, N> {
-    type Target = Event<N>;
+impl<const N: usize, L: Length<N>> Deref for Occurrence<'_, N, L> {
+    type Target = Event<N, L>;
 
-    fn deref(&self) -> &Event<N> {
+    fn deref(&self) -> &Event<N, L> {
         self.event
     }
 }
 
-impl<const N: usize> fmt::Debug for Occurrence<'_, N> {
+impl<const N: usize, L: Length<N>> fmt::Debug for Occurrence<'_, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.event.fmt(f)
     }
 }
 
-type Action<'m, const N: usize> = Arc<dyn Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm>;
+type Action<'m, const N: usize, L> =
+    Arc<dyn Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm>;
 
 /// What a run is to look for.
 #[derive(Clone)]
-pub(in crate::simulation) struct On<'m, const N: usize> {
+pub(in crate::simulation) struct On<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(in crate::simulation) name: String,
     /// None for an output of this name.
-    pub(in crate::simulation) function: Option<Function<'m, N>>,
+    pub(in crate::simulation) function: Option<Function<'m, L::Vector>>,
     pub(in crate::simulation) crossing: Crossing,
-    pub(in crate::simulation) act: Action<'m, N>,
+    pub(in crate::simulation) act: Action<'m, N, L>,
 }
 
-impl<const N: usize> fmt::Debug for On<'_, N> {
+impl<const N: usize, L: Length<N>> fmt::Debug for On<'_, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {:?}", self.name, self.crossing)
     }
 }
 
 /// An event with its model.
-struct Knowing<'a, 'm, M, const N: usize> {
+struct Knowing<'a, 'm, M, const N: usize, L: Length<N>> {
     model: &'a M,
-    event: &'a Event<N>,
-    value: &'a Value<'m, N>,
+    event: &'a Event<N, L>,
+    value: &'a Value<'m, L::Vector>,
     /// A parameter that the model cannot have another value of, and by how much it is larger.
     larger: Option<(usize, f64)>,
 }
 
-impl<M: Model<N>, const N: usize> Knows<N> for Knowing<'_, '_, M, N> {
-    fn momenta(&self, v: [f64; N]) -> [f64; N] {
-        let mut p = momenta_of(self.model, self.event, v);
-        if let Some((parameter, larger)) = self.larger {
-            let Event { t, q, .. } = self.event;
-            let slopes = momentum_by(self.model, *t, (q, &v, &p), parameter);
-            for (p, slope) in p.iter_mut().zip(slopes) {
-                *p += larger * slope;
-            }
-        }
-        p
+impl<M, L, const N: usize> Knows<N, L> for Knowing<'_, '_, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    fn momenta(&self, v: &L::Vector) -> L::Vector {
+        let Event { t, q, .. } = self.event;
+        let p = self.model.momenta(*t, q, v);
+        let Some((parameter, larger)) = self.larger else {
+            return p;
+        };
+        let slopes = self.model.momenta_by(*t, q, (v, &p), parameter);
+        let (p, slopes) = (p.as_ref(), slopes.as_ref());
+        L::from_fn(q, |a| p[a] + larger * slopes[a])
     }
 
-    fn after_impact(&self, restitution: f64) -> State<N> {
+    fn after_impact(&self, restitution: f64) -> L::State {
         let Event { t, q, p, v, .. } = self.event;
-        let unknown = State {
-            q: *q,
-            p: [f64::NAN; N],
-        };
+        let unknown = || L::state(q.clone(), L::unknown(q));
         if self.larger.is_some() {
-            return unknown;
+            return unknown();
         }
         let Some((normal, drift)) = self.value.normal(self.model, self.event) else {
-            return unknown;
+            return unknown();
         };
-        let rate = |v: &[f64; N]| drift + normal.iter().zip(v).map(|(n, v)| n * v).sum::<f64>();
+        let rate = |v: &L::Vector| {
+            let products = normal.as_ref().iter().zip(v.as_ref());
+            drift + products.map(|(n, v)| n * v).sum::<f64>()
+        };
         let velocity = |lambda: f64| {
-            let p = std::array::from_fn(|a| p[a] + lambda * normal[a]);
-            constrained::velocity(self.model, *t, q, &p, v).ok()
+            let p = L::from_fn(q, |a| p.as_ref()[a] + lambda * normal.as_ref()[a]);
+            let state = L::state(q.clone(), p);
+            self.model.allowed_velocity(*t, &state, v)
         };
         let aim = -restitution * rate(v);
         // Linear in λ where the kinetic energy is quadratic: the second secant is then the last one that changes anything.
         const MAX_SECANTS: u32 = 20;
         let (mut before, mut lambda) = ((0.0, rate(v) - aim), f64::NAN);
         // Of the size that an energy ½ v·p has.
-        let size = |values: &[f64; N]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let size = |values: &L::Vector| {
+            let values = values.as_ref().iter();
+            values.fold(0.0_f64, |m, x| m.max(x.abs()))
+        };
         let mut next = size(p).max(f64::MIN_POSITIVE.sqrt()) / size(&normal);
         for _ in 0..MAX_SECANTS {
             let Some(found) = velocity(next) else {
-                return unknown;
+                return unknown();
             };
             let here = (next, rate(&found) - aim);
             lambda = next;
@@ -203,22 +209,20 @@ impl<M: Model<N>, const N: usize> Knows<N> for Knowing<'_, '_, M, N> {
             }
             (before, next) = (here, next + change);
         }
-        let Some(v) = velocity(lambda) else {
-            return unknown;
+        let Some(after) = velocity(lambda) else {
+            return unknown();
         };
-        if !((rate(&v) - aim).abs() <= 1e-9 * rate(&self.event.v).abs()) {
-            return unknown;
+        if !((rate(&after) - aim).abs() <= 1e-9 * rate(v).abs()) {
+            return unknown();
         }
-        State {
-            q: *q,
-            p: momenta_of(self.model, self.event, v),
-        }
+        L::state(q.clone(), self.model.momenta(*t, q, &after))
     }
 
     fn parameter(&self, name: &str) -> Option<f64> {
-        let index = self.model.find_parameter(name)?;
+        let names = self.model.parameter_names();
+        let index = names.iter().position(|own| own.is(name))?;
         let larger = self.larger.filter(|(own, _)| *own == index);
-        Some(self.model.parameter(index) + larger.map_or(0.0, |(_, larger)| larger))
+        Some(self.model.parameter_value(index) + larger.map_or(0.0, |(_, larger)| larger))
     }
 }
 
@@ -235,7 +239,7 @@ pub(in crate::simulation) struct Near<const N: usize> {
 /// What an act makes of a state near that of its event; none where it lets the run end or go on as it was.
 pub(in crate::simulation) fn state_after<M: Model<N>, const N: usize>(
     model: &M,
-    (on, value): (&On<'_, N>, &Value<'_, N>),
+    (on, value): (&On<'_, N>, &Value<'_, [f64; N]>),
     event: &Event<N>,
     near: &Near<N>,
 ) -> Option<State<N>> {
@@ -280,11 +284,15 @@ pub(in crate::simulation) fn state_after<M: Model<N>, const N: usize>(
 }
 
 /// What is to be done at an event.
-pub(super) fn act<M: Model<N>, const N: usize>(
+pub(super) fn act<M, L, const N: usize>(
     model: &M,
-    (on, value): (&On<'_, N>, &Value<'_, N>),
-    event: &Event<N>,
-) -> Act<N> {
+    (on, value): (&On<'_, N, L>, &Value<'_, L::Vector>),
+    event: &Event<N, L>,
+) -> Act<N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     (on.act)(&Occurrence {
         event,
         model: &Knowing {
@@ -297,19 +305,23 @@ pub(super) fn act<M: Model<N>, const N: usize>(
 }
 
 /// With what a run goes on after an event.
-pub(in crate::simulation) struct After<'m, M, const N: usize> {
-    pub(in crate::simulation) state: State<N>,
+pub(in crate::simulation) struct After<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+    pub(in crate::simulation) state: L::State,
     /// The model with other parameters, if any were set, and these by their numbers.
-    pub(in crate::simulation) model: Option<Changed<'m, M>>,
+    pub(in crate::simulation) model: Option<Changed<'m, M, N, L>>,
 }
 
 /// What an act lets a run go on with; none where it ends.
-pub(super) fn after<'m, M: Model<N>, const N: usize>(
+pub(super) fn after<'m, M, L, const N: usize>(
     model: &M,
-    remodel: Option<Remodel<'m, M>>,
-    event: &Event<N>,
-    act: Act<N>,
-) -> Result<Option<After<'m, M, N>>, RunErrorKind> {
+    remodel: Option<Remodel<'m, M, N, L>>,
+    event: &Event<N, L>,
+    act: Act<N, L>,
+) -> Result<Option<After<'m, M, N, L>>, RunErrorKind>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     let state = match act {
         Act::Record | Act::Stop => return Ok(None),
         Act::Restart(state) => state,
@@ -327,20 +339,28 @@ pub(super) fn after<'m, M: Model<N>, const N: usize>(
 }
 
 /// The state with momenta that are larger by an impulse, as far as constraints let it act.
-fn kicked<M: Model<N>, const N: usize>(
+fn kicked<M, L, const N: usize>(
     model: &M,
     t: f64,
-    state: &State<N>,
-    impulse: &[f64; N],
-) -> State<N> {
-    let mut kicked = *state;
-    for (p, more) in kicked.p.iter_mut().zip(impulse) {
-        *p += more;
+    state: &L::State,
+    impulse: &L::Vector,
+) -> L::State
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    let (q, p) = L::parts(state);
+    let more = impulse.as_ref();
+    if more.len() != p.as_ref().len() {
+        // Told as a state that is not finite.
+        return L::state(q.clone(), L::unknown(p));
     }
-    if const { !M::CONSTRAINTS.is_empty() }
-        && let Ok(v) = constrained::velocity(model, t, &kicked.q, &kicked.p, &[0.0; N])
+    let p = L::from_fn(p, |a| p.as_ref()[a] + more[a]);
+    let kicked = L::state(q.clone(), p);
+    if M::IS_CONSTRAINED
+        && let Some(v) = model.allowed_velocity(t, &kicked, &L::zero(q))
     {
-        kicked = tfe_runtime::__private::state(model, t, kicked.q, v);
+        return L::state(q.clone(), model.momenta(t, q, &v));
     }
     kicked
 }

@@ -2,11 +2,16 @@
 
 use super::act::{Act, Crossing, Occurrence};
 use super::value::Function;
+use super::watching::Settable;
+use crate::length::Length;
 use crate::simulation::setup::Simulation;
 use std::sync::Arc;
-use tfe_runtime::Model;
 
-impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
+impl<'m, M, const N: usize, L> Simulation<'m, M, N, L>
+where
+    M: Settable<'m, N, L>,
+    L: Length<N>,
+{
     /// Does `act` whenever the event or output `name` of the model changes its sign in the direction of `crossing`; [`Motion::events`](crate::Motion::events) lists what was met. Of several
     /// events the run does what is to be done in the order of time.
     ///
@@ -40,7 +45,7 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
         mut self,
         name: impl Into<String>,
         crossing: Crossing,
-        act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
+        act: impl Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm,
     ) -> Self {
         self.events.push(name, crossing, None, act);
         self
@@ -75,10 +80,10 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
         mut self,
         name: impl Into<String>,
         crossing: Crossing,
-        function: impl Fn(f64, &[f64; N], &[f64; N]) -> f64 + Send + Sync + 'm,
-        act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
+        function: impl Fn(f64, &L::Vector, &L::Vector) -> f64 + Send + Sync + 'm,
+        act: impl Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm,
     ) -> Self {
-        let function: Function<'m, N> = Arc::new(function);
+        let function: Function<'m, L::Vector> = Arc::new(function);
         self.events.push(name, crossing, Some(function), act);
         self
     }

@@ -1,12 +1,15 @@
 //! Models with other parameters.
 
+use crate::length::Length;
 use tfe_runtime::{Model, Share};
 
 /// A model with other parameters, and these by their numbers.
-pub(in crate::simulation) type Changed<'m, M> = (tfe_runtime::Share<'m, M>, Vec<(usize, f64)>);
+pub(in crate::simulation) type Changed<'m, M, const N: usize, L> =
+    (<L as Length<N>>::Held<'m, M>, Vec<(usize, f64)>);
 
 /// Makes a model with other values of some parameters, if that can be.
-pub(in crate::simulation) type Remodel<'m, M> = fn(&M, &[(usize, f64)]) -> Option<Share<'m, M>>;
+pub(in crate::simulation) type Remodel<'m, M, const N: usize, L> =
+    fn(&M, &[(usize, f64)]) -> Option<<L as Length<N>>::Held<'m, M>>;
 
 /// The [`Remodel`] of a model that may go to other threads.
 pub(in crate::simulation) fn remodel<'m, M, const N: usize>(

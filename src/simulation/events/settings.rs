@@ -2,8 +2,9 @@
 
 use super::remodel::{Changed, Remodel};
 use crate::error::RunErrorKind;
+use crate::length::{FixedLength, Length};
 use crate::motion::Event;
-use tfe_runtime::{Model, State};
+use crate::simulation::kind::Simulated;
 
 /// New values of parameters, for [`Act::Set`](crate::Act::Set). They hold until they are set again, or the run ends; the model of the caller stays as it is.
 ///
@@ -36,20 +37,20 @@ use tfe_runtime::{Model, State};
 /// # }
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings<const N: usize> {
+pub struct Settings<const N: usize, L: Length<N> = FixedLength> {
     values: Vec<(String, f64)>,
-    from: From<N>,
+    from: From<N, L>,
 }
 
 /// From where a run goes on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum From<const N: usize> {
+#[derive(Clone, Debug, PartialEq)]
+enum From<const N: usize, L: Length<N>> {
     Here,
-    State(State<N>),
-    Velocity([f64; N]),
+    State(L::State),
+    Velocity(L::Vector),
 }
 
-impl<const N: usize> Settings<N> {
+impl<const N: usize, L: Length<N>> Settings<N, L> {
     /// Sets one parameter: `k`, or `m[2]` for an element of an array.
     pub fn new(parameter: impl Into<String>, value: f64) -> Self {
         Self {
@@ -67,33 +68,34 @@ impl<const N: usize> Settings<N> {
 
     /// Goes on from this state.
     #[must_use]
-    pub fn and_state(mut self, state: State<N>) -> Self {
+    pub fn and_state(mut self, state: L::State) -> Self {
         self.from = From::State(state);
         self
     }
 
     /// Goes on with these velocities, whose momenta are those of the new parameters.
     #[must_use]
-    pub fn and_velocity(mut self, v: [f64; N]) -> Self {
+    pub fn and_velocity(mut self, v: L::Vector) -> Self {
         self.from = From::Velocity(v);
         self
     }
 
     /// The model with these values, and the numbers of the parameters.
-    pub(super) fn applied<'m, M: Model<N>>(
+    pub(super) fn applied<'m, M: Simulated<N, L>>(
         &self,
         model: &M,
-        remodel: Option<Remodel<'m, M>>,
-    ) -> Result<Changed<'m, M>, RunErrorKind> {
+        remodel: Option<Remodel<'m, M, N, L>>,
+    ) -> Result<Changed<'m, M, N, L>, RunErrorKind> {
+        if const { !M::HAS_PARAMETERS } {
+            return Err(RunErrorKind::ParametersFixed);
+        }
+        let names = model.parameter_names();
         let number = |(name, value): &(String, f64)| {
-            let index = model
-                .find_parameter(name)
-                .ok_or_else(|| RunErrorKind::NoParameter {
-                    name: name.clone(),
-                    known: (0..model.parameters())
-                        .map(|index| model.parameter_name(index).to_string())
-                        .collect(),
-                })?;
+            let index = names.iter().position(|own| own.is(name));
+            let index = index.ok_or_else(|| RunErrorKind::NoParameter {
+                name: name.clone(),
+                known: names.iter().map(ToString::to_string).collect(),
+            })?;
             if value.is_finite() {
                 Ok((index, *value))
             } else {
@@ -112,41 +114,29 @@ impl<const N: usize> Settings<N> {
     }
 
     /// The state from where the run goes on, of the model with the new values.
-    pub(super) fn state<M: Model<N>>(&self, model: &M, event: &Event<N>) -> State<N> {
-        match self.from {
+    pub(super) fn state<M: Simulated<N, L>>(&self, model: &M, event: &Event<N, L>) -> L::State {
+        match &self.from {
             From::Here => event.state(),
-            From::State(state) => state,
-            From::Velocity(v) => State {
-                q: event.q,
-                p: momenta_of(model, event, v),
-            },
+            From::State(state) => state.clone(),
+            From::Velocity(v) => L::state(event.q.clone(), model.momenta(event.t, &event.q, v)),
         }
     }
 
     /// The same where the model has the old values still.
-    pub(super) fn state_nearby<M: Model<N>>(
+    pub(super) fn state_nearby<M: Simulated<N, L>>(
         &self,
         model: &M,
-        event: &Event<N>,
-    ) -> Option<State<N>> {
+        event: &Event<N, L>,
+    ) -> Option<L::State> {
         if let From::Velocity(_) = self.from {
             let mut values = self.values.iter();
             let (name, value) = values.next()?;
-            let mut made = model.with_parameter(model.find_parameter(name)?, *value)?;
+            let mut made = model.with(name, *value)?;
             for (name, value) in values {
-                made = made.with_parameter(made.find_parameter(name)?, *value)?;
+                made = made.with(name, *value)?;
             }
             return Some(self.state(&made, event));
         }
         Some(self.state(model, event))
     }
-}
-
-/// The momenta of velocities at an event; NaN where there are none.
-pub(super) fn momenta_of<M: Model<N>, const N: usize>(
-    model: &M,
-    event: &Event<N>,
-    v: [f64; N],
-) -> [f64; N] {
-    tfe_runtime::__private::state(model, event.t, event.q, v).p
 }

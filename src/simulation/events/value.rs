@@ -1,21 +1,22 @@
 //! What changes its sign at an event.
 
+use crate::length::Length;
 use crate::motion::Event;
 use crate::sensitivity::slopes::{Along, Change};
+use crate::simulation::kind::Simulated;
 use std::sync::Arc;
-use tfe_runtime::dual::{Dual, duals};
-use tfe_runtime::{Form, Model};
+use tfe_runtime::Model;
+use tfe_runtime::dual::Dual;
 
 /// A function of time, coordinates and velocities.
-pub(super) type Function<'m, const N: usize> =
-    Arc<dyn Fn(f64, &[f64; N], &[f64; N]) -> f64 + Send + Sync + 'm>;
+pub(super) type Function<'m, V> = Arc<dyn Fn(f64, &V, &V) -> f64 + Send + Sync + 'm>;
 
 /// An output of the model, or a function.
 #[derive(Clone)]
-pub(in crate::simulation) enum Value<'m, const N: usize> {
+pub(in crate::simulation) enum Value<'m, V> {
     /// The output's place among all.
     Column(usize),
-    Function(Function<'m, N>),
+    Function(Function<'m, V>),
 }
 
 /// Weights of the differences over 1, 2 and 3 distances on both sides: a derivative of sixth order.
@@ -30,57 +31,62 @@ fn derivative(distance: f64, f: impl Fn(f64) -> f64) -> f64 {
     differences.sum::<f64>() / distance
 }
 
-fn largest<const N: usize>(values: &[f64; N]) -> f64 {
+fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
 }
 
 /// A distance for differences, relative to what is changed: their error is below roundings, and these are some 1e-13.
 const DISTANCE: f64 = 2e-3;
 
-impl<const N: usize> Value<'_, N> {
+impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
     /// The gradient g_q, and g_t; none where g depends on velocities.
-    pub(super) fn normal<M: Model<N>>(
+    pub(super) fn normal<M, L, const N: usize>(
         &self,
         model: &M,
-        event: &Event<N>,
-    ) -> Option<([f64; N], f64)> {
-        let unit = |a: usize| std::array::from_fn(|b| if a == b { 1.0 } else { 0.0 });
-        let still = [0.0; N];
+        event: &Event<N, L>,
+    ) -> Option<(V, f64)>
+    where
+        M: Simulated<N, L>,
+        L: Length<N, Vector = V>,
+    {
+        let Event { t, q, v, .. } = event;
+        let unit = |a: usize| L::from_fn(q, |b| if a == b { 1.0 } else { 0.0 });
+        let still = L::zero(q);
+        let coordinates = q.as_ref().len();
         match self {
             Self::Column(column) => {
-                let z = match M::FORM {
-                    Form::Lagrangian => &event.v,
-                    Form::Hamiltonian => &event.p,
-                };
-                let mut values = vec![Dual::ZERO; model.columns()];
-                let mut slope = |dt: f64, dq: &[f64; N], dz: &[f64; N]| {
-                    let time = Dual::new(event.t, dt);
-                    model.observables(time, &duals(&event.q, dq), &duals(z, dz), &mut values);
+                let z = if M::OF_VELOCITIES { v } else { &event.p };
+                let mut values = vec![Dual::ZERO; model.output_names().len()];
+                let mut slope = |dt: f64, dq: &V, dz: &V| {
+                    model.outputs_towards(Dual::new(*t, dt), (q, dq), (z, dz), &mut values);
                     values[*column].slope
                 };
-                let of_velocity = (0..N).any(|a| slope(0.0, &still, &unit(a)) != 0.0);
-                let normal = std::array::from_fn(|a| slope(0.0, &unit(a), &still));
+                let of_velocity = (0..coordinates).any(|a| slope(0.0, &still, &unit(a)) != 0.0);
+                let normal = L::from_fn(q, |a| slope(0.0, &unit(a), &still));
                 (!of_velocity).then(|| (normal, slope(1.0, &still, &still)))
             }
             Self::Function(function) => {
                 let size = |one: f64| if one > 0.0 { one } else { 1.0 };
-                let moved = |from: &[f64; N], a: usize, s: f64| {
-                    let mut to = *from;
-                    to[a] += s;
-                    to
+                let moved = |from: &V, a: usize, s: f64| {
+                    let part = |b: usize| from.as_ref()[b] + if a == b { s } else { 0.0 };
+                    L::from_fn(from, part)
                 };
-                let Event { t, q, v, .. } = event;
-                let (at_q, at_v) = (DISTANCE * size(largest(q)), DISTANCE * size(largest(v)));
+                let at_q = DISTANCE * size(largest(q.as_ref()));
+                let at_v = DISTANCE * size(largest(v.as_ref()));
                 let here = function(*t, q, v);
-                let of_velocity = (0..N).any(|a| function(*t, q, &moved(v, a, at_v)) != here);
-                let normal =
-                    std::array::from_fn(|a| derivative(at_q, |s| function(*t, &moved(q, a, s), v)));
+                let of_velocity =
+                    (0..coordinates).any(|a| function(*t, q, &moved(v, a, at_v)) != here);
+                let normal = L::from_fn(q, |a| {
+                    derivative(at_q, |s| function(*t, &moved(q, a, s), v))
+                });
                 let drift = derivative(DISTANCE, |s| function(t + s, q, v));
                 (!of_velocity).then_some((normal, drift))
             }
         }
     }
+}
 
+impl<const N: usize> Value<'_, [f64; N]> {
     /// The change of it, where the velocity changes by `velocity`.
     pub(in crate::simulation) fn slope<M: Model<N>>(
         &self,

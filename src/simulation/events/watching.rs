@@ -5,22 +5,30 @@ use super::remodel::{Remodel, remodel};
 use super::value::{Function, Value};
 use super::{Events, Look, Rooms, Watched};
 use crate::error::RunErrorKind;
+use crate::length::{FixedLength, Length, RunTimeLength};
+use crate::simulation::kind::{Chosen, Simulated};
+use std::fmt;
 use std::sync::Arc;
-use tfe_runtime::step::Control;
-use tfe_runtime::{Element, Model, Share};
+use tfe_runtime::Model;
+use tfe_runtime::family::FamilyModel;
 
 /// What runs are asked to look for.
-#[derive(Debug)]
-pub(crate) struct Watching<'m, M, const N: usize> {
-    on: Vec<On<'m, N>>,
+pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+    on: Vec<On<'m, N, L>>,
     /// Makes models with other parameters, where events may ask for them.
-    remodel: Option<Remodel<'m, M>>,
+    remodel: Option<Remodel<'m, M, N, L>>,
     /// Called where there is anything to look for, and so compiled for models with events only.
-    look: Look<'m, M, N>,
+    look: Look<'m, M, N, L>,
+}
+
+impl<M, const N: usize, L: Length<N>> fmt::Debug for Watching<'_, M, N, L> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(&self.on).finish()
+    }
 }
 
 // Not derived: models need not be `Clone`.
-impl<M, const N: usize> Clone for Watching<'_, M, N> {
+impl<M, const N: usize, L: Length<N>> Clone for Watching<'_, M, N, L> {
     fn clone(&self) -> Self {
         Self {
             on: self.on.clone(),
@@ -29,7 +37,7 @@ impl<M, const N: usize> Clone for Watching<'_, M, N> {
     }
 }
 
-impl<'m, M, const N: usize> Watching<'m, M, N> {
+impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
     /// No events.
     pub(crate) const NOTHING: Self = Self {
         on: Vec::new(),
@@ -45,23 +53,11 @@ impl<'m, M, const N: usize> Watching<'m, M, N> {
         self.on.len()
     }
 
-    /// The same of another model.
-    pub(in crate::simulation) fn of<T>(self) -> Watching<'m, T, N>
-    where
-        T: Model<N> + Send + Sync + 'm,
-    {
-        let mut watching = Watching::NOTHING;
-        for on in self.on {
-            watching.watch(on);
-        }
-        watching.remodel = self.remodel.map(|_| remodel as Remodel<'m, T>);
-        watching
-    }
-}
-
-impl<'m, M: Model<N>, const N: usize> Watching<'m, M, N> {
     /// One event more, that sets no parameters.
-    pub(in crate::simulation) fn watch(&mut self, on: On<'m, N>) {
+    pub(in crate::simulation) fn watch(&mut self, on: On<'m, N, L>)
+    where
+        M: Simulated<N, L>,
+    {
         self.on.push(on);
         self.look = Events::look;
     }
@@ -71,10 +67,10 @@ impl<'m, M: Model<N>, const N: usize> Watching<'m, M, N> {
         &mut self,
         name: impl Into<String>,
         crossing: Crossing,
-        function: Option<Function<'m, N>>,
-        act: impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'm,
+        function: Option<Function<'m, L::Vector>>,
+        act: impl Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm,
     ) where
-        M: Send + Sync + 'm,
+        M: Settable<'m, N, L>,
     {
         self.watch(On {
             name: name.into(),
@@ -82,19 +78,61 @@ impl<'m, M: Model<N>, const N: usize> Watching<'m, M, N> {
             crossing,
             act: Arc::new(act),
         });
-        self.remodel = Some(remodel);
+        self.remodel = M::REMODEL;
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
+impl<'m, M, const N: usize> Watching<'m, M, N> {
+    /// The same of another model.
+    pub(in crate::simulation) fn of<T>(self) -> Watching<'m, T, N>
+    where
+        T: Model<N> + Send + Sync + 'm,
+    {
+        let mut watching = Watching::NOTHING;
+        for on in self.on {
+            watching.watch(on);
+        }
+        watching.remodel = self
+            .remodel
+            .map(|_| remodel as Remodel<'m, T, N, FixedLength>);
+        watching
+    }
+}
+
+/// A model whose events may set parameters, if they can be set at all: it may go to other threads then.
+pub trait Settable<'m, const N: usize, L: Length<N>>: Simulated<N, L> + 'm {
+    /// How another model is made.
+    const REMODEL: Option<Remodel<'m, Self, N, L>>;
+}
+
+impl<'m, M, const N: usize> Settable<'m, N, FixedLength> for M
+where
+    M: Model<N> + Send + Sync + 'm,
+{
+    const REMODEL: Option<Remodel<'m, M, N, FixedLength>> = Some(remodel);
+}
+
+impl<'m, M: FamilyModel + 'm> Settable<'m, 0, RunTimeLength> for M {
+    const REMODEL: Option<Remodel<'m, M, 0, RunTimeLength>> = None;
+}
+
+impl<'m, M, const N: usize, L> Events<'m, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     /// Those of a run.
     pub(in crate::simulation) fn new(
-        model: Share<'m, M>,
-        watching: &Watching<'m, M, N>,
-        (element, control, at_kinks): (Element, Control, bool),
+        model: L::Held<'m, M>,
+        watching: &Watching<'m, M, N, L>,
+        chosen: Chosen,
     ) -> Result<Self, RunErrorKind> {
-        let known = || (0..model.columns()).map(|at| model.column_name(at).to_string());
-        let watched = |one: &On<'m, N>| {
+        let names = match watching.is_empty() {
+            true => Vec::new(),
+            false => model.output_names(),
+        };
+        let known = || names.iter().map(ToString::to_string);
+        let watched = |one: &On<'m, N, L>| {
             let value = match &one.function {
                 Some(function) => Value::Function(function.clone()),
                 None => match known().position(|name| name == one.name) {
@@ -111,16 +149,14 @@ impl<'m, M: Model<N>, const N: usize> Events<'m, M, N> {
             Ok(Watched { on, value })
         };
         let watched: Vec<_> = watching.on.iter().map(watched).collect::<Result<_, _>>()?;
-        let columns = model.columns();
+        let columns = names.len();
         Ok(Self {
             model,
             remodel: watching.remodel,
             look: watching.look,
             sides: vec![0.0; watched.len()],
             watched,
-            element,
-            control,
-            at_kinks,
+            chosen,
             rooms: Rooms::new(columns),
             probe: None,
             met: Vec::new(),

@@ -1,13 +1,14 @@
 //! Whether elements resolve the motion: a second look at some of those whose iteration did not contract quickly (T-121).
 
+use crate::length::{FixedLength, Length};
 use crate::motion::Warning;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::{Element, Model, Share, Solve, State, Statistics};
 
 /// Compares elements with three of a third of the length, those that were cut with nine of a ninth: halves might be cut into the same pieces as the element.
 #[derive(Debug)]
-pub(in crate::simulation) struct Resolution<'m, M, const N: usize> {
-    again: Again<'m, M>,
+pub struct Resolution<'m, M, const N: usize> {
+    again: Again<'m, M, N>,
     /// The largest ratio of increments that is not doubtful.
     quick: f64,
     /// Made when it is first needed.
@@ -27,8 +28,8 @@ pub(in crate::simulation) struct Resolution<'m, M, const N: usize> {
 
 /// With what elements are stepped over again: as in the run.
 #[derive(Debug)]
-pub(in crate::simulation) struct Again<'m, M> {
-    pub(in crate::simulation) model: Share<'m, M>,
+pub struct Again<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+    pub(in crate::simulation) model: L::Held<'m, M>,
     pub(in crate::simulation) element: Element,
     pub(in crate::simulation) control: Control,
     pub(in crate::simulation) at_kinks: bool,
@@ -36,11 +37,11 @@ pub(in crate::simulation) struct Again<'m, M> {
 
 /// An element that has been passed without an error.
 #[derive(Clone, Copy)]
-pub(in crate::simulation) struct Examined<'a, const N: usize> {
+pub struct Examined<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(in crate::simulation) t: f64,
     pub(in crate::simulation) h: f64,
-    pub(in crate::simulation) before: &'a State<N>,
-    pub(in crate::simulation) after: &'a State<N>,
+    pub(in crate::simulation) before: &'a L::State,
+    pub(in crate::simulation) after: &'a L::State,
 }
 
 /// A motion in parts of elements beside that of the run.
@@ -66,7 +67,7 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
     /// The part of what the motion extends over that its parts may end elsewhere.
     const MOST: f64 = 0.03;
 
-    pub(in crate::simulation) fn new(again: Again<'m, M>) -> Self {
+    pub(in crate::simulation) fn new(again: Again<'m, M, N>) -> Self {
         Self {
             quick: Self::DOUBTFUL.powf(2.0 / again.element.order() as f64),
             again,
@@ -218,11 +219,8 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
     }
 }
 
-impl<'m, M> Again<'m, M> {
-    fn stepper<const N: usize>(&self) -> Option<Stepper<'m, M, N>>
-    where
-        M: Model<N>,
-    {
+impl<'m, M: Model<N>, const N: usize> Again<'m, M, N> {
+    fn stepper(&self) -> Option<Stepper<'m, M, N>> {
         let stepper = Stepper::sharing(self.model.clone(), self.element, self.control).ok()?;
         let stepper = stepper.ends_only();
         Some(if self.at_kinks {

@@ -6,6 +6,7 @@ use crate::dual::Dual;
 use crate::enclosure::Enclosure;
 use crate::model::Form;
 use crate::real::Real;
+use alloc::vec::Vec;
 
 /// What outputs are functions of, along an element or a part of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,67 +82,130 @@ impl Expansion {
     }
 }
 
-/// Σ c_j yʲ for each coordinate.
-struct Powers<const N: usize> {
-    coefficients: [[Enclosure; N]; MAX_NODES],
+/// The expansions of all Legendre polynomials below a degree.
+struct Expansions {
+    middle: f64,
+    radius: f64,
+    coefficients: [[[f64; MAX_NODES]; 2]; MAX_NODES],
     count: usize,
 }
 
-impl<const N: usize> Powers<N> {
-    /// The polynomial with given Legendre coefficients, over a part of the element.
-    fn of(rates: &[[f64; N]], part: (f64, f64)) -> Self {
-        let count = rates.len();
-        let (mut values, mut sizes) = ([[0.0; N]; MAX_NODES], [[0.0; N]; MAX_NODES]);
+impl Expansions {
+    fn over(part: (f64, f64), count: usize) -> Self {
         let (middle, mut expansion) = Expansion::over(part);
-        for (k, rate) in rates.iter().enumerate() {
+        let mut coefficients = [[[0.0; MAX_NODES]; 2]; MAX_NODES];
+        for (k, row) in coefficients[..count].iter_mut().enumerate() {
             if k > 0 {
                 expansion.raise(middle);
             }
-            for j in 0..=k {
-                for a in 0..N {
-                    values[j][a] += expansion.here[0][j] * rate[a];
-                    sizes[j][a] += expansion.here[1][j] * rate[a].abs();
-                }
-            }
-        }
-        // Each of the sums and of the recurrences has some four roundings a degree.
-        let rounding = 8.0 * f64::EPSILON * (count + 1) as f64;
-        let mut coefficients = [[Enclosure::ZERO; N]; MAX_NODES];
-        for j in 0..count {
-            for a in 0..N {
-                let off = rounding * sizes[j][a];
-                coefficients[j][a] = Enclosure::between(values[j][a] - off, values[j][a] + off);
-            }
+            *row = expansion.here;
         }
         Self {
+            middle,
+            radius: expansion.radius,
             coefficients,
             count,
         }
     }
 
+    /// The polynomial of one coordinate with given Legendre coefficients, as powers of y.
+    fn powers(&self, rate: impl Fn(usize) -> f64) -> Powers {
+        let (mut values, mut sizes) = ([0.0; MAX_NODES], [0.0; MAX_NODES]);
+        for (k, [here, size]) in self.coefficients[..self.count].iter().enumerate() {
+            let rate = rate(k);
+            for j in 0..=k {
+                values[j] += here[j] * rate;
+                sizes[j] += size[j] * rate.abs();
+            }
+        }
+        // Each of the sums and of the recurrences has some four roundings a degree.
+        let rounding = 8.0 * f64::EPSILON * (self.count + 1) as f64;
+        let mut coefficients = [Enclosure::ZERO; MAX_NODES];
+        for (j, coefficient) in coefficients[..self.count].iter_mut().enumerate() {
+            let off = rounding * sizes[j];
+            *coefficient = Enclosure::between(values[j] - off, values[j] + off);
+        }
+        Powers {
+            coefficients,
+            count: self.count,
+            radius: self.radius,
+        }
+    }
+}
+
+/// Σ c_j yʲ
+struct Powers {
+    coefficients: [Enclosure; MAX_NODES],
+    count: usize,
+    radius: f64,
+}
+
+impl Powers {
     /// Σ w_j c_j y^{j + shift}, without the terms whose power would be negative.
-    fn sum(&self, a: usize, shift: isize, weight: impl Fn(usize) -> f64) -> Enclosure {
+    fn sum(&self, shift: isize, weight: impl Fn(usize) -> f64) -> Enclosure {
         let mut sum = Enclosure::ZERO;
-        for (j, row) in self.coefficients[..self.count].iter().enumerate() {
+        for (j, coefficient) in self.coefficients[..self.count].iter().enumerate() {
             if let Some(exponent) = j.checked_add_signed(shift) {
                 let factor = Enclosure::from_f64(weight(j)) * power(exponent);
-                sum += row[a] * factor;
+                sum += *coefficient * factor;
             }
         }
         sum
     }
 
     /// Polynomial and derivative by τ.
-    fn rate(&self, a: usize, radius: f64) -> Dual<Enclosure> {
-        let value = self.sum(a, 0, |_| 1.0);
-        Dual::new(value, self.sum(a, -1, |j| j as f64 / radius))
+    fn rate(&self) -> Dual<Enclosure> {
+        let value = self.sum(0, |_| 1.0);
+        Dual::new(value, self.sum(-1, |j| j as f64 / self.radius))
     }
 
     /// The integral from the middle on, and the polynomial.
-    fn integral(&self, a: usize, radius: f64) -> Dual<Enclosure> {
-        let value = self.sum(a, 1, |j| radius / (j + 1) as f64);
-        Dual::new(value, self.sum(a, 0, |_| 1.0))
+    fn integral(&self) -> Dual<Enclosure> {
+        let value = self.sum(1, |j| self.radius / (j + 1) as f64);
+        Dual::new(value, self.sum(0, |_| 1.0))
     }
+}
+
+/// For what is rounded in sums and polynomials.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// Bounds of a coordinate, or a momentum, all along an element: by the coefficients of its rate, of which the first does not count, and its ends.
+fn along(others: impl Iterator<Item = f64>, ends: (f64, f64)) -> Enclosure {
+    let mut radius = ROUNDING * (ends.0.abs() + ends.1.abs());
+    for (rate, most) in others.zip(&MOST_OF_INTEGRALS[1..]) {
+        radius += rate.abs() * most;
+    }
+    let (low, high) = (ends.0.min(ends.1), ends.0.max(ends.1));
+    Enclosure::between(low - radius, high + radius)
+}
+
+/// Bounds of a velocity all along an element, by the coefficients of the rate and one over the length.
+fn velocity_along(mean: f64, others: impl Iterator<Item = f64>, by_time: f64) -> Enclosure {
+    let sum = others.fold(0.0, |sum, rate| sum + rate.abs());
+    let radius = sum + ROUNDING * (sum + mean.abs());
+    Enclosure::between((mean - radius) * by_time, (mean + radius) * by_time)
+}
+
+/// The time over a part of an element, with its derivative.
+fn time_over(times: (f64, f64), (from, to): (f64, f64)) -> Dual<Enclosure> {
+    let length = Enclosure::from_f64(times.1 - times.0);
+    let time = |tau: f64| Enclosure::from_f64(times.0) + Enclosure::from_f64(tau) * length;
+    Dual::new(time(from).hull(time(to)), length)
+}
+
+/// A coordinate, or a momentum, over a part of an element whose middle it passes at a value.
+fn over(powers: &Powers, centre: f64, start: f64) -> Dual<Enclosure> {
+    let rounding = ROUNDING * (centre.abs() + start.abs());
+    let centre = Enclosure::between(centre - rounding, centre + rounding);
+    let Dual { value, slope, .. } = powers.integral();
+    Dual::new(centre + value, slope)
+}
+
+/// The velocity there.
+fn velocity_over(powers: &Powers, length: f64) -> Dual<Enclosure> {
+    let by_time = Enclosure::from_f64(1.0) / Enclosure::from_f64(length);
+    let Dual { value, slope, .. } = powers.rate();
+    Dual::new(value * by_time, slope * by_time)
 }
 
 impl<const N: usize> DenseElement<N> {
@@ -150,21 +214,8 @@ impl<const N: usize> DenseElement<N> {
     #[must_use]
     #[inline]
     pub fn bounds(&self, form: Form) -> Arguments<Enclosure, N> {
-        /// For what is rounded in sums and polynomials.
-        const ROUNDING: f64 = 16.0 * f64::EPSILON;
-
         let (from, to) = self.times;
         let (rates, forces) = self.rates.split_at(self.rates.len() / 2);
-        let along = |rates: &[[f64; N]], a: usize, ends: (f64, f64)| {
-            let mut radius = ROUNDING * (ends.0.abs() + ends.1.abs());
-            if let Some((_, rates)) = rates.split_first() {
-                for (rate, most) in rates.iter().zip(&MOST_OF_INTEGRALS[1..]) {
-                    radius += rate[a].abs() * most;
-                }
-            }
-            let (low, high) = (ends.0.min(ends.1), ends.0.max(ends.1));
-            Enclosure::between(low - radius, high + radius)
-        };
         let mut bounds = Arguments {
             t: Enclosure::between(from, to),
             q: [Enclosure::ZERO; N],
@@ -173,18 +224,17 @@ impl<const N: usize> DenseElement<N> {
         };
         let by_time = 1.0 / (to - from);
         for a in 0..N {
-            bounds.q[a] = along(rates, a, (self.start.q[a], self.end.q[a]));
+            let others = rates.iter().skip(1).map(|rate| rate[a]);
+            bounds.q[a] = along(others.clone(), (self.start.q[a], self.end.q[a]));
             match form {
                 Form::Lagrangian => {
-                    if let Some((mean, others)) = rates.split_first() {
-                        let sum = others.iter().fold(0.0, |sum, rate| sum + rate[a].abs());
-                        let radius = sum + ROUNDING * (sum + mean[a].abs());
-                        let ends = ((mean[a] - radius) * by_time, (mean[a] + radius) * by_time);
-                        bounds.v[a] = Enclosure::between(ends.0, ends.1);
+                    if let Some(mean) = rates.first() {
+                        bounds.v[a] = velocity_along(mean[a], others, by_time);
                     }
                 }
                 Form::Hamiltonian => {
-                    bounds.p[a] = along(forces, a, (self.start.p[a], self.end.p[a]));
+                    let others = forces.iter().skip(1).map(|force| force[a]);
+                    bounds.p[a] = along(others, (self.start.p[a], self.end.p[a]));
                 }
             }
         }
@@ -195,36 +245,111 @@ impl<const N: usize> DenseElement<N> {
     /// falls with that of the part.
     #[must_use]
     pub fn bounds_over(&self, part: (f64, f64)) -> Arguments<Dual<Enclosure>, N> {
-        let (from, to) = part;
-        let (middle, radius) = (0.5 * (from + to), 0.5 * (to - from));
         let length = self.times.1 - self.times.0;
-        let time = |tau: f64| {
-            Enclosure::from_f64(self.times.0)
-                + Enclosure::from_f64(tau) * Enclosure::from_f64(length)
-        };
         let (rates, forces) = self.rates.split_at(self.rates.len() / 2);
-        let (rates, forces) = (Powers::of(rates, part), Powers::of(forces, part));
-        let centre = self.at(middle);
+        let expansions = Expansions::over(part, rates.len());
+        let centre = self.at(expansions.middle);
         let zero = Dual::new(Enclosure::ZERO, Enclosure::ZERO);
         let mut bounds = Arguments {
-            t: Dual::new(time(from).hull(time(to)), Enclosure::from_f64(length)),
+            t: time_over(self.times, part),
             q: [zero; N],
             v: [zero; N],
             p: [zero; N],
         };
-        let about = |value: f64, start: f64| {
-            let rounding = 16.0 * f64::EPSILON * (value.abs() + start.abs());
-            Enclosure::between(value - rounding, value + rounding)
-        };
-        let by_time = Enclosure::from_f64(1.0) / Enclosure::from_f64(length);
         for a in 0..N {
-            let (q, p) = (rates.integral(a, radius), forces.integral(a, radius));
-            let q_centre = about(centre.q[a], self.start.q[a]);
-            let p_centre = about(centre.p[a], self.start.p[a]);
-            bounds.q[a] = Dual::new(q_centre + q.value, q.slope);
-            bounds.p[a] = Dual::new(p_centre + p.value, p.slope);
-            let rate = rates.rate(a, radius);
-            bounds.v[a] = Dual::new(rate.value * by_time, rate.slope * by_time);
+            let rate = expansions.powers(|k| rates[k][a]);
+            let force = expansions.powers(|k| forces[k][a]);
+            bounds.q[a] = over(&rate, centre.q[a], self.start.q[a]);
+            bounds.p[a] = over(&force, centre.p[a], self.start.p[a]);
+            bounds.v[a] = velocity_over(&rate, length);
+        }
+        bounds
+    }
+}
+
+/// What outputs of a model of run-time length are functions of, along an element or a part of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LongArguments<R> {
+    /// The time.
+    pub t: R,
+    /// Coordinates.
+    pub q: Vec<R>,
+    /// Velocities of a Lagrangian: the derivative of the coordinates' polynomial.
+    pub v: Vec<R>,
+    /// Momenta of a Hamiltonian.
+    pub p: Vec<R>,
+}
+
+/// The polynomials of an element of many coordinates: Legendre coefficients of the rates of coordinates and momenta, a row of n each, and its ends.
+pub(crate) struct Rows<'a> {
+    pub(crate) times: (f64, f64),
+    pub(crate) rates: &'a [f64],
+    pub(crate) forces: &'a [f64],
+    pub(crate) start: [&'a [f64]; 2],
+    pub(crate) end: [&'a [f64]; 2],
+}
+
+/// The coefficients of one of n coordinates but for the first.
+fn others(rates: &[f64], n: usize, a: usize) -> impl Iterator<Item = f64> {
+    let rows = rates.chunks_exact(n.max(1)).skip(1);
+    rows.map(move |row| row[a])
+}
+
+impl Rows<'_> {
+    /// The same as of elements of fixed size.
+    pub(crate) fn bounds(&self, form: Form) -> LongArguments<Enclosure> {
+        let [q, p] = self.start;
+        let n = q.len();
+        let by_time = 1.0 / (self.times.1 - self.times.0);
+        let velocity = |a: usize| match self.rates.get(a) {
+            Some(mean) => velocity_along(*mean, others(self.rates, n, a), by_time),
+            None => Enclosure::ZERO,
+        };
+        let momentum = |a: usize| along(others(self.forces, n, a), (p[a], self.end[1][a]));
+        LongArguments {
+            t: Enclosure::between(self.times.0, self.times.1),
+            q: (0..n)
+                .map(|a| along(others(self.rates, n, a), (q[a], self.end[0][a])))
+                .collect(),
+            v: match form {
+                Form::Lagrangian => (0..n).map(velocity).collect(),
+                Form::Hamiltonian => Vec::new(),
+            },
+            p: match form {
+                Form::Lagrangian => Vec::new(),
+                Form::Hamiltonian => (0..n).map(momentum).collect(),
+            },
+        }
+    }
+
+    /// The same as of elements of fixed size; `centre` is the state at the middle of the part.
+    pub(crate) fn bounds_over(
+        &self,
+        form: Form,
+        part: (f64, f64),
+        centre: [&[f64]; 2],
+    ) -> LongArguments<Dual<Enclosure>> {
+        let [q, p] = self.start;
+        let n = q.len();
+        let length = self.times.1 - self.times.0;
+        let expansions = Expansions::over(part, self.rates.len() / n.max(1));
+        let powers = |rates: &[f64], a: usize| expansions.powers(|k| rates[k * n + a]);
+        let mut bounds = LongArguments {
+            t: time_over(self.times, part),
+            q: Vec::with_capacity(n),
+            v: Vec::new(),
+            p: Vec::new(),
+        };
+        for a in 0..n {
+            let rate = powers(self.rates, a);
+            bounds.q.push(over(&rate, centre[0][a], q[a]));
+            match form {
+                Form::Lagrangian => bounds.v.push(velocity_over(&rate, length)),
+                Form::Hamiltonian => {
+                    let force = powers(self.forces, a);
+                    bounds.p.push(over(&force, centre[1][a], p[a]));
+                }
+            }
         }
         bounds
     }

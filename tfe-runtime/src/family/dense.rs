@@ -2,7 +2,11 @@
 
 use super::model::FamilyState;
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
+use crate::dense::bounds::{LongArguments, Rows};
 use crate::dense::piece_at;
+use crate::dual::Dual;
+use crate::enclosure::Enclosure;
+use crate::model::Form;
 use crate::scheme::SchemeRef;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -130,6 +134,36 @@ impl FamilyDense {
     pub fn degree(&self) -> usize {
         let piece = &self.pieces()[0];
         piece.rates.len() / piece.start.q.len().max(1)
+    }
+
+    /// Bounds of what outputs of a `form` are functions of, all along an element of one [piece](Self::pieces), as
+    /// [`DenseElement::bounds`](crate::step::DenseElement::bounds).
+    #[must_use]
+    pub fn bounds(&self, form: Form) -> LongArguments<Enclosure> {
+        self.rows().bounds(form)
+    }
+
+    /// Bounds over a part of an element of one [piece](Self::pieces), from τ to τ, and of the derivatives by τ.
+    #[must_use]
+    pub fn bounds_over(&self, form: Form, part: (f64, f64)) -> LongArguments<Dual<Enclosure>> {
+        let centre = self.at(0.5 * (part.0 + part.1));
+        self.rows().bounds_over(form, part, [&centre.q, &centre.p])
+    }
+
+    fn rows(&self) -> Rows<'_> {
+        let forces = match &self.momenta {
+            Momenta::Rates(rates) => &rates[..],
+            // Of Lagrangians alone, whose outputs are no functions of momenta.
+            #[cfg(feature = "sparse")]
+            Momenta::Values(_) => &[],
+        };
+        Rows {
+            times: self.times,
+            rates: &self.rates,
+            forces,
+            start: [&self.start.q, &self.start.p],
+            end: [&self.end.q, &self.end.p],
+        }
     }
 
     /// Time at the start.

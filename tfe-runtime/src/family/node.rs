@@ -78,21 +78,7 @@ impl Node {
         let mut last = f64::INFINITY;
         for _ in 0..MOST {
             self.slope(model, t, q, z);
-            let mut entries = self.pattern.scatter(&mut self.derivatives);
-            model.mass(t, q, z, &mut entries);
-            self.matrix.values.fill(0.0);
-            for (place, value) in self.masses.iter().zip(&self.derivatives) {
-                self.matrix.values[place.first] = *value;
-            }
-            for ((place, transposed), value) in self.rows.iter().zip(&rows.values) {
-                self.matrix.values[place.first] = *value;
-                self.matrix.values[transposed.first] = *value;
-            }
-            self.matrix.factor().map_err(|error| match error {
-                StepError::NonFinite => error,
-                _ if rows.phi.is_empty() => LegendreError::Singular { coordinate: 0 }.into(),
-                _ => ConstraintError::SingularMass.into(),
-            })?;
+            self.factor(model, (t, q, z), rows)?;
             for a in 0..n {
                 self.vector[a] = wanted[a] - self.slope[a];
             }
@@ -121,6 +107,52 @@ impl Node {
             residual: last,
         }
         .into())
+    }
+
+    /// Factors the matrix at one instant.
+    fn factor<M: FamilyModel>(
+        &mut self,
+        model: &M,
+        (t, q, z): (f64, &[f64], &[f64]),
+        rows: &Rows,
+    ) -> Result<(), StepError> {
+        let mut entries = self.pattern.scatter(&mut self.derivatives);
+        model.mass(t, q, z, &mut entries);
+        self.matrix.values.fill(0.0);
+        for (place, value) in self.masses.iter().zip(&self.derivatives) {
+            self.matrix.values[place.first] = *value;
+        }
+        for ((place, transposed), value) in self.rows.iter().zip(&rows.values) {
+            self.matrix.values[place.first] = *value;
+            self.matrix.values[transposed.first] = *value;
+        }
+        self.matrix.factor().map_err(|error| match error {
+            StepError::NonFinite => error,
+            _ if rows.phi.is_empty() => LegendreError::Singular { coordinate: 0 }.into(),
+            _ => ConstraintError::SingularMass.into(),
+        })
+    }
+
+    /// The solution of the linear equations at one instant, with Aᵀ at the multipliers.
+    ///
+    /// # Errors
+    /// [`StepError`] where the matrix is singular or a number is not finite.
+    pub(super) fn solve_linear<M: FamilyModel>(
+        &mut self,
+        model: &M,
+        at: (f64, &[f64], &[f64]),
+        rows: &Rows,
+        sides: impl Iterator<Item = f64>,
+    ) -> Result<&[f64], StepError> {
+        self.factor(model, at, rows)?;
+        for (entry, side) in self.vector.iter_mut().zip(sides) {
+            *entry = side;
+        }
+        self.matrix.solve(&mut self.vector);
+        match self.vector.iter().all(|value| value.is_finite()) {
+            true => Ok(&self.vector),
+            false => Err(StepError::NonFinite),
+        }
     }
 
     /// Adds the step, or as much of it as brings ∂E/∂z nearer to what is wanted: functions like −m√(1 − v²) end where Newton's step may land.

@@ -4,6 +4,8 @@ use super::dense::FamilyDense;
 use super::error::FamilyError;
 use super::forces::Forces;
 use super::inertia::Legendre;
+#[cfg(feature = "sparse")]
+use super::instant::Instant;
 use super::model::{FamilyModel, FamilyState};
 #[cfg(feature = "sparse")]
 use super::rates::Rates;
@@ -35,6 +37,9 @@ pub struct FamilyStepper<'m, M> {
     length: usize,
     way: Way<&'m M>,
     legendre: Legendre,
+    /// For reactions, made when it is needed.
+    #[cfg(feature = "sparse")]
+    instant: Option<Instant>,
     control: Control,
     /// Of a last step that was cut.
     pieces: Vec<FamilyDense>,
@@ -101,6 +106,8 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
             length: model.len(),
             way,
             legendre: Legendre::default(),
+            #[cfg(feature = "sparse")]
+            instant: None,
             control,
             pieces: Vec::new(),
         }
@@ -246,6 +253,35 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
     /// As [`velocity`](super::velocity).
     pub fn velocity(&mut self, t: f64, state: &FamilyState) -> Result<Vec<f64>, FamilyError> {
         self.legendre.velocity(self.model, t, state)
+    }
+
+    /// What [`reactions`](super::reactions) says, with the ordering of equations kept from one call to the next.
+    pub fn reactions(&mut self, t: f64, q: &[f64], v: &[f64]) -> Option<Vec<f64>> {
+        #[cfg(feature = "sparse")]
+        {
+            let instant = match &mut self.instant {
+                Some(instant) => instant,
+                empty => empty.insert(Instant::new(self.model)?),
+            };
+            instant.reactions(self.model, (t, q), v).ok()
+        }
+        #[cfg(not(feature = "sparse"))]
+        {
+            let _ = (t, q, v);
+            None
+        }
+    }
+
+    /// The element it steps with.
+    #[must_use]
+    pub fn element(&self) -> Element {
+        self.element
+    }
+
+    /// What iterations are allowed, as asked for.
+    #[must_use]
+    pub fn control(&self) -> Control {
+        self.control
     }
 
     /// Changes what iterations may leave from the next step on: [`Control::tolerance`].

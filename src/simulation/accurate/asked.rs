@@ -1,25 +1,28 @@
-//! Runs of models of fixed size with an estimate of their error.
+//! What is asked for: runs with an estimate of their error, or with an accuracy.
 
-use super::super::checks::check_constraints;
 use super::super::events::Severed;
 use super::super::follow::{Follow, Passed};
-use super::super::mesh::Mesh;
+use super::super::kind::{Chosen, Simulated};
+use super::super::mesh::{Grid, Mesh};
 use super::super::setup::Simulation;
 use super::graded::Steps;
 use super::repeatable::{Broken, Passing, Repeatable, trusting};
 use super::{Accurate, accurate, check_accuracy, estimated};
 use crate::accuracy::{Asked, Estimated};
 use crate::error::{RunError, RunErrorKind};
-use crate::motion::Motion;
+use crate::length::Length;
+use crate::motion::{Motion, Warning};
 use std::ops::{ControlFlow, Range};
 use tfe_runtime::constrained::Trail;
-use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::step::Control;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{
-    Element, First, Form, Model, Second, Solve, State, Statistics, StepError, constrained,
-};
+use tfe_runtime::{Element, Solve, Statistics, StepError};
 
-impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
+impl<M, const N: usize, L> Simulation<'_, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     /// Picks element and step so that the estimated error is at or below `accuracy` wherever it is estimated: of coordinates over the largest coordinate, of
     /// momenta over the largest momentum, of each declared output over its largest value.
     ///
@@ -86,18 +89,25 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// [`RunError`], as from [`run`](Self::run), of either run.
     pub fn run_estimated(
         &self,
-        start: State<N>,
+        start: L::State,
         span: Range<f64>,
-    ) -> Result<Estimated<Motion<N>>, RunError<N>> {
-        let beginning = || Motion::from_start(&*self.model, span.start, &start);
+    ) -> Result<Estimated<Motion<N, L>>, RunError<N, L>> {
         let mesh = self.prepare(&start, &span).map(|(mesh, _)| mesh);
-        let mesh = mesh.map_err(|kind| RunError::new(kind, beginning()))?;
+        let mesh = mesh.map_err(|kind| self.refused(kind, (span.start, &start)))?;
         estimated(self, (span.start, &start), &mesh)
             .map_err(|broken| RunError::new(broken.0, broken.1))
     }
+
+    fn refused(&self, kind: RunErrorKind, start: (f64, &L::State)) -> RunError<N, L> {
+        RunError::new(kind, self.model.first_node(start, None))
+    }
 }
 
-impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
+impl<M, const N: usize, L> Accurate<Simulation<'_, M, N, L>>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     /// Runs over the span with the element and the step that meet the accuracy.
     ///
     /// # Errors
@@ -105,11 +115,14 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
     /// [`partial`](RunError::partial): a chaotic motion over a span too long, or less than roundings make.
     pub fn run(
         &self,
-        start: State<N>,
+        start: L::State,
         span: Range<f64>,
-    ) -> Result<Estimated<Motion<N>>, RunError<N>> {
-        let run = &self.simulation;
-        let run = &run.clone().at_kinks(run.at_kinks.unwrap_or(true));
+    ) -> Result<Estimated<Motion<N, L>>, RunError<N, L>> {
+        let mut run = self.simulation.clone();
+        if const { M::CUTS_AT_KINKS } {
+            run.at_kinks.get_or_insert(true);
+        }
+        let run = &run;
         if span.start == span.end {
             let motion = run.run(start, span)?;
             let outputs = run.outputs();
@@ -121,12 +134,9 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
                 None,
             ));
         }
-        let refused = |kind| {
-            let motion = Motion::from_start(&*run.model, span.start, &start);
-            RunError::new(kind, motion)
-        };
-        self.check(&start, &span).map_err(refused)?;
-        let impulses = run.impulses.iter().map(|one| one.time);
+        let checked = self.check(run, &start, &span);
+        checked.map_err(|kind| run.refused(kind, (span.start, &start)))?;
+        let impulses = run.impulses.iter().map(|one| M::time_of(one));
         let asked = Asked {
             accuracy: self.accuracy,
             span: span.clone(),
@@ -134,50 +144,56 @@ impl<M: Model<N>, const N: usize> Accurate<Simulation<'_, M, N>> {
             breaks: run.breaks.iter().copied().chain(impulses).collect(),
             element: run.element,
             longest: run.step,
-            may_iterate: run.control.solve == Solve::Auto
-                && const { !M::FACTS.linear && M::CONSTRAINTS.is_empty() },
+            may_iterate: run.control.solve == Solve::Auto && M::MAY_ITERATE,
             solve: run.control.solve,
             graded: None,
-            in_pairs: const { !M::CONSTRAINTS.is_empty() }
-                && !run.has_events()
-                && !run.crosses_kinks(),
+            in_pairs: M::IS_CONSTRAINED && !run.has_events() && !run.crosses_kinks(),
         };
         let mut facts = M::FACTS;
         // Equations of first order, written as p·f(q), conserve nothing that short and long steps could spoil.
-        facts.forced |= !M::FACTS.linear && is_of_first_order(&*run.model, span.start, &start);
+        facts.forced |= !facts.linear && run.model.is_of_first_order(span.start, &start);
         let are_equal = self.equal_steps || run.has_events();
-        let steps = Steps::of(&facts, are_equal, !M::CONSTRAINTS.is_empty());
+        let steps = Steps::of(&facts, are_equal, M::IS_CONSTRAINED);
         accurate(run, &start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
     }
 
-    fn check(&self, start: &State<N>, span: &Range<f64>) -> Result<(), RunErrorKind> {
-        let run = &self.simulation;
+    fn check(
+        &self,
+        run: &Simulation<'_, M, N, L>,
+        start: &L::State,
+        span: &Range<f64>,
+    ) -> Result<(), RunErrorKind> {
         check_accuracy(self.accuracy)?;
+        if const { !M::CUTS_AT_KINKS } && run.crosses_kinks() {
+            let call = "accuracy";
+            return Err(RunErrorKind::KinksUnsupported { call });
+        }
         run.check_start(start)?;
-        // Of span, breaks and impulses.
-        let h = (span.end - span.start) / 1000.0;
         if run.nodes.is_some() {
             run.mesh(span)?;
         }
-        Mesh::new(span, h, &run.breaks, &run.impulses)?;
-        check_constraints(&*run.model, span.start, h, start)
+        // Of span, breaks and impulses.
+        let h = (span.end - span.start) / 1000.0;
+        let grid = Grid {
+            step: Some(h),
+            nodes: None,
+            ..run.grid()
+        };
+        M::mesh(span, &grid)?;
+        run.model.check_first((span.start, h), start)?;
+        let mut stepper = M::stepper(run.model.clone(), run.chosen())?;
+        M::check_velocity(&mut stepper, (span.start, start))
     }
 }
 
-/// Whether H is linear in the momenta: q̇ = f(q, t) does not hold them, and ṗ = −(∂f/∂q)ᵀ p is its adjoint.
-fn is_of_first_order<M: Model<N>, const N: usize>(model: &M, t: f64, start: &State<N>) -> bool {
-    let (mut first, mut second) = (First::ZERO, Second::ZERO);
-    let may_be = M::FORM == Form::Hamiltonian && M::FACTS.quadratic_in_z;
-    if may_be {
-        model.second(t, &start.q, &start.p, &mut first, &mut second);
-    }
-    may_be && second.zz.as_flattened().iter().all(|entry| *entry == 0.0)
-}
-
-impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
-    type State = State<N>;
-    type Stepper = Stepper<'m, M, N>;
-    type Motion = Motion<N>;
+impl<'m, M, const N: usize, L> Repeatable<N> for Simulation<'m, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    type State = L::State;
+    type Stepper = L::Stepper<'m, M>;
+    type Motion = Motion<N, L>;
 
     fn element(&self) -> Element {
         self.chosen_element()
@@ -192,17 +208,16 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
     }
 
     fn coordinates(&self) -> usize {
-        N
+        self.model.coordinates()
     }
 
     fn columns(&self) -> usize {
-        self.model.columns()
+        self.model.output_count()
     }
 
     fn outputs(&self) -> Vec<String> {
-        let columns = 0..self.model.columns();
-        let name = |at| self.model.column_name(at).to_string();
-        columns.map(name).collect()
+        let names = self.model.output_names();
+        names.iter().map(ToString::to_string).collect()
     }
 
     fn stepper(
@@ -210,90 +225,96 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
         element: Element,
         control: Control,
         is_recorded: bool,
-    ) -> Result<Stepper<'m, M, N>, RunErrorKind> {
-        let control = trusting(control);
-        let stepper = Stepper::sharing(self.model.clone(), element, control)
-            .map_err(RunErrorKind::Element)?;
-        let stepper = self.cutting(stepper);
+    ) -> Result<L::Stepper<'m, M>, RunErrorKind> {
+        let chosen = Chosen {
+            element,
+            control: trusting(control),
+            ..self.chosen()
+        };
+        let stepper = M::stepper(self.model.clone(), chosen)?;
         Ok(
             if self.has_events() || (is_recorded && self.record_every == 1) {
                 stepper
             } else {
-                stepper.ends_only()
+                M::ends_only(stepper)
             },
         )
     }
 
     fn advance(
         &self,
-        stepper: &mut Stepper<'m, M, N>,
+        stepper: &mut L::Stepper<'m, M>,
         (t, next, h): (f64, f64, f64),
         mesh: &Mesh<N>,
-        state: &mut State<N>,
+        state: &mut L::State,
     ) -> Result<(), StepError> {
+        self.model.kick(&self.impulses, t, state);
         let impulses = mesh.impulses_in(t, next, mesh.end() == Some(next));
+        let element = (mesh.begin(t, h), h);
         // Of a panic the motion that is recorded tells, which is the first.
-        let advanced =
-            (self.model).guarded(|| stepper.advance(mesh.begin(t, h), h, state, impulses));
+        let advanced = (self.model).guarded(|| M::advance(stepper, element, state, impulses));
         advanced.unwrap_or(Err(StepError::NonFinite))
     }
 
     fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
-        RunErrorKind::of_element(&*self.model, element, at, source)
+        self.model.failed(element, at, source)
     }
 
     fn leave(stepper: &Self::Stepper, trail: &mut Trail) {
-        stepper.leave(trail);
+        M::leave(stepper, trail);
     }
 
     fn foresee(stepper: &mut Self::Stepper, trail: &Trail, step: (f64, f64)) {
-        stepper.foresee(trail, step);
+        M::foresee(stepper, trail, step);
     }
 
-    fn set_tolerance(stepper: &mut Stepper<'m, M, N>, tolerance: f64) {
-        stepper.set_tolerance(tolerance);
+    fn set_tolerance(stepper: &mut Self::Stepper, tolerance: f64) {
+        M::set_tolerance(stepper, tolerance);
     }
 
-    fn statistics(stepper: &Stepper<'m, M, N>) -> Statistics {
-        *stepper.statistics()
+    fn statistics(stepper: &Self::Stepper) -> Statistics {
+        *M::statistics(stepper)
     }
 
-    fn take_statistics(stepper: &mut Stepper<'m, M, N>) -> Statistics {
-        stepper.take_statistics()
+    fn take_statistics(stepper: &mut Self::Stepper) -> Statistics {
+        M::take_statistics(stepper)
     }
 
-    fn row(&self, _: &mut Stepper<'m, M, N>, t: f64, state: &State<N>, row: &mut [f64]) {
-        row[..N].copy_from_slice(&state.q);
-        row[N..2 * N].copy_from_slice(&state.p);
-        if self.model.columns() == 0 {
+    fn row(&self, stepper: &mut Self::Stepper, t: f64, state: &L::State, row: &mut [f64]) {
+        let (q, p) = L::parts(state);
+        let n = q.as_ref().len();
+        row[..n].copy_from_slice(q.as_ref());
+        row[n..2 * n].copy_from_slice(p.as_ref());
+        if row.len() == 2 * n {
             return;
         }
-        let z = match M::FORM {
-            Form::Hamiltonian => state.p,
-            Form::Lagrangian => {
-                constrained::velocity_of(&*self.model, t, &state.q, &state.p, &[0.0; N])
-                    .unwrap_or([f64::NAN; N])
-            }
+        let still = L::zero(q);
+        let velocity = match M::OF_VELOCITIES {
+            true => M::node(stepper, &self.model, (t, state), &still).v,
+            false => still,
         };
-        self.model.observables(t, &state.q, &z, &mut row[2 * N..]);
+        self.model.outputs(t, state, &velocity, &mut row[2 * n..]);
     }
 
     fn record(
         &self,
-        stepper: &mut Stepper<'m, M, N>,
+        stepper: &mut Self::Stepper,
         mesh: &Mesh<N>,
-        (t, start): (f64, &State<N>),
-        passed: &mut Passing<'_, Stepper<'m, M, N>, State<N>>,
-    ) -> Result<Motion<N>, Broken<Motion<N>>> {
+        (t, start): (f64, &L::State),
+        passed: &mut Passing<'_, Self::Stepper, L::State>,
+    ) -> Result<Motion<N, L>, Broken<Motion<N, L>>> {
         let mut compared = Compared {
             passed,
             acts: 0,
             last: t,
             goes_on: ControlFlow::Continue(()),
         };
-        let motion = self
-            .drive_over(*start, t, mesh, stepper, &mut compared)
+        let mut motion = self
+            .drive_over((t, start), mesh, stepper, &mut compared)
             .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))?;
+        if const { !M::CUTS_AT_KINKS } && self.crosses_kinks() {
+            motion.add_warning(Warning::KinksCrossed);
+        }
         // A run that an event has stopped stays where it is.
         let (acts, last) = (compared.acts, compared.last);
         if compared.goes_on.is_break() {
@@ -308,27 +329,31 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
     }
 
     fn crosses_kinks(&self) -> bool {
-        self.at_kinks != Some(true) && const { !M::FACTS.smooth }
+        self.at_kinks != Some(true) && !M::FACTS.smooth
     }
 
     fn has_events(&self) -> bool {
         !self.events.is_empty()
     }
 
-    fn part(&self, (t0, start): (f64, &State<N>), (t, end): (f64, &State<N>)) -> Motion<N> {
-        let mut motion = Motion::from_start(&*self.model, t0, start);
+    fn part(&self, (t0, start): (f64, &L::State), (t, end): (f64, &L::State)) -> Motion<N, L> {
+        let stepper = M::stepper(self.model.clone(), self.chosen());
+        let Ok(mut stepper) = stepper else {
+            return self.model.first_node((t0, start), None);
+        };
+        let mut motion = self.model.first_node((t0, start), Some(&mut stepper));
         if t != t0 {
-            motion.record(&*self.model, t, end);
+            M::record(&mut motion, &mut stepper, &self.model, (t, end));
         }
         motion
     }
 
     fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind> {
-        Mesh::even(cuts, step, &self.breaks, &self.impulses)
+        Mesh::even(cuts, step, &self.breaks, M::inner(&self.impulses))
     }
 
     fn through(&self, nodes: &[f64]) -> Result<Mesh<N>, RunErrorKind> {
-        Mesh::of_nodes(nodes, &self.breaks, &self.impulses)
+        Mesh::of_nodes(nodes, &self.breaks, M::inner(&self.impulses))
     }
 
     fn nodes(&self) -> Option<&[f64]> {
@@ -337,33 +362,37 @@ impl<'m, M: Model<N>, const N: usize> Repeatable<N> for Simulation<'m, M, N> {
 }
 
 /// Shows what a run is compared by.
-struct Compared<'a, 'p, 'm, M, const N: usize> {
-    passed: &'a mut Passing<'p, Stepper<'m, M, N>, State<N>>,
+struct Compared<'a, 'p, T, S> {
+    passed: &'a mut Passing<'p, T, S>,
     /// Events that have cut elements.
     acts: usize,
     last: f64,
     goes_on: ControlFlow<()>,
 }
 
-impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Compared<'_, '_, 'm, M, N> {
+impl<'m, M, const N: usize, L> Follow<'m, M, N, L> for Compared<'_, '_, L::Stepper<'m, M>, L::State>
+where
+    M: 'm,
+    L: Length<N>,
+{
     fn passed(
         &mut self,
-        _: &mut Stepper<'m, M, N>,
-        _: &Passed<'_, N>,
+        _: &mut L::Stepper<'m, M>,
+        _: &Passed<'_, N, L>,
     ) -> Result<(), TransitionError> {
         Ok(())
     }
 
-    fn cut(&mut self, _: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+    fn cut(&mut self, _: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         self.acts += 1;
         Ok(())
     }
 
     fn reached(
         &mut self,
-        stepper: &mut Stepper<'m, M, N>,
+        stepper: &mut L::Stepper<'m, M>,
         t: f64,
-        state: &State<N>,
+        state: &L::State,
     ) -> ControlFlow<()> {
         self.last = t;
         self.goes_on = (self.passed)(stepper, t, state, self.acts);

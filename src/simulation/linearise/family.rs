@@ -1,0 +1,100 @@
+//! The same for models of run-time length.
+
+use super::super::follow::{Follow, Passed};
+use super::super::setup::Simulation;
+use crate::error::{RunError, RunErrorKind};
+use crate::length::RunTimeLength;
+use crate::linearised::Linearised;
+use std::convert::identity;
+use std::ops::Range;
+use tfe_runtime::family::{FamilyModel, FamilyState, FamilyStepper};
+use tfe_runtime::transition::TransitionError;
+
+impl<'m, M: FamilyModel> Simulation<'m, M, 0, RunTimeLength> {
+    /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion: 2n × 2n, ordered (p, q).
+    ///
+    /// Elements are solved once more for their matrices, which are dense: 4n² numbers an element, and 2n solutions with sparse factors.
+    ///
+    /// # Errors
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`] without the feature `sparse`, for models with constraints, and for events that change the state.
+    #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
+    pub fn run_linearised(
+        &self,
+        start: FamilyState,
+        span: Range<f64>,
+    ) -> Result<Linearised<0, RunTimeLength>, RunError<0, RunTimeLength>> {
+        let call = "run_linearised";
+        let refused = |of: &'static str| {
+            let motion = crate::Motion::unasked(span.start, &start);
+            RunError::new(RunErrorKind::Unsupported { call, of }, motion)
+        };
+        if !cfg!(feature = "sparse") {
+            return Err(refused(
+                "models of run-time length without the feature `sparse`",
+            ));
+        }
+        if const { M::CONSTRAINED } {
+            return Err(refused("models of run-time length with constraints"));
+        }
+        let mut elements = Elements::default();
+        let motion = self.drive(start.clone(), &span, identity, &mut elements)?;
+        if motion.arcs().count() > 1 {
+            let of = "models of run-time length whose events change the state";
+            return Err(RunError::new(
+                RunErrorKind::Unsupported { call, of },
+                motion,
+            ));
+        }
+        #[cfg(feature = "sparse")]
+        return self.linearised(motion, &elements.passed);
+        #[cfg(not(feature = "sparse"))]
+        Ok(Linearised::free(motion, Vec::new()))
+    }
+
+    #[cfg(feature = "sparse")]
+    fn linearised(
+        &self,
+        motion: crate::Motion<0, RunTimeLength>,
+        elements: &[(f64, f64, FamilyState)],
+    ) -> Result<Linearised<0, RunTimeLength>, RunError<0, RunTimeLength>> {
+        use tfe_runtime::family::{FamilyTransition, FamilyTransitionError};
+        let mut transitions = Vec::with_capacity(elements.len());
+        let steps = elements.iter().map(|(t, h, before)| (*t, *h, before));
+        let each = |transition: FamilyTransition| transitions.push(transition.matrix());
+        let element = self.chosen_element();
+        let found = FamilyTransition::of_steps(self.model, element, 0.0, steps, each);
+        let Err((number, error)) = found else {
+            return Ok(Linearised::free(motion, transitions));
+        };
+        let (time, step, _) = elements[number];
+        let kind = match error {
+            FamilyTransitionError::Family(error) => RunErrorKind::Family(error),
+            FamilyTransitionError::Step(source) => RunErrorKind::Solve {
+                element: number,
+                time,
+                step,
+                source,
+            },
+            _ => RunErrorKind::run_time_length("run_linearised"),
+        };
+        Err(RunError::new(kind, motion))
+    }
+}
+
+/// The elements passed so far: start, length, and the state before.
+#[derive(Default)]
+struct Elements {
+    passed: Vec<(f64, f64, FamilyState)>,
+}
+
+impl<'m, M: FamilyModel + 'm> Follow<'m, M, 0, RunTimeLength> for Elements {
+    fn passed(
+        &mut self,
+        _: &mut FamilyStepper<'m, M>,
+        passed: &Passed<'_, 0, RunTimeLength>,
+    ) -> Result<(), TransitionError> {
+        let element = (passed.start, passed.h, passed.before.clone());
+        self.passed.push(element);
+        Ok(())
+    }
+}

@@ -1,0 +1,79 @@
+//! Calls that models of run-time length do not have: one typed error, [`RunErrorKind::Unsupported`], that says which.
+
+use super::events::act::Crossing;
+use super::setup::Simulation;
+use crate::driven::Interpolation;
+use crate::error::{RunError, RunErrorKind};
+use crate::length::RunTimeLength;
+use crate::motion::Motion;
+use std::convert::Infallible;
+use std::ops::Range;
+use tfe_runtime::family::{FamilyModel, FamilyState};
+
+/// What a refused run gives.
+type Refused = Result<Infallible, RunError<0, RunTimeLength>>;
+
+impl<M: FamilyModel> Simulation<'_, M, 0, RunTimeLength> {
+    fn refuse(&self, call: &'static str, start: &FamilyState, span: &Range<f64>) -> Refused {
+        let motion = Motion::unasked(span.start, start);
+        Err(RunError::new(RunErrorKind::run_time_length(call), motion))
+    }
+
+    /// Refused: models of run-time length have no inputs. The run that is asked for then is an error.
+    #[must_use]
+    pub fn input(mut self, _: &str, _: impl Fn(f64) -> f64) -> Self {
+        self.refusal = Some(RunErrorKind::run_time_length("input"));
+        self
+    }
+
+    /// Refused, as [`input`](Self::input) is.
+    #[must_use]
+    pub fn table(
+        mut self,
+        _: &str,
+        _: impl AsRef<[f64]>,
+        _: impl AsRef<[f64]>,
+        _: Interpolation,
+    ) -> Self {
+        self.refusal = Some(RunErrorKind::run_time_length("table"));
+        self
+    }
+
+    /// Refused: models of run-time length have no inputs that could be held. [`steps`](Self::steps) makes one step after the other.
+    ///
+    /// # Errors
+    /// [`RunErrorKind::Unsupported`], in any case.
+    pub fn hold(self, _: FamilyState, _: f64) -> Result<Infallible, RunErrorKind> {
+        Err(RunErrorKind::run_time_length("hold"))
+    }
+
+    /// Refused; the points of a section are the [events](crate::Motion::events) of a run with [`on`](Self::on) and [`Act::Record`](crate::Act::Record).
+    ///
+    /// # Errors
+    /// [`RunErrorKind::Unsupported`], as the only item.
+    pub fn section(
+        &self,
+        _: impl Into<String>,
+        _: Crossing,
+        _: FamilyState,
+        _: f64,
+    ) -> impl Iterator<Item = Result<Infallible, RunErrorKind>> {
+        std::iter::once(Err(RunErrorKind::run_time_length("section")))
+    }
+
+    /// Refused: parameters of models of run-time length have no derivatives.
+    ///
+    /// # Errors
+    /// [`RunErrorKind::Unsupported`], in any case.
+    pub fn run_sensitive(&self, start: FamilyState, span: Range<f64>) -> Refused {
+        self.refuse("run_sensitive", &start, &span)
+    }
+
+    /// Refused, as [`run_sensitive`](Self::run_sensitive) is.
+    ///
+    /// # Errors
+    /// [`RunErrorKind::Unsupported`], in any case.
+    pub fn gradient<T>(&self, start: FamilyState, span: Range<f64>, _: &T) -> Refused {
+        self.refuse("gradient", &start, &span)
+    }
+}

@@ -1,0 +1,276 @@
+//! Events of models of run-time length, beside those of the same model of fixed size.
+
+use crate::common::distance;
+use std::error::Error;
+use tfe::error::RunErrorKind;
+use tfe::family;
+use tfe::prelude::*;
+
+/// Masses on a line between walls, each tied to its neighbours.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1] - q[i])^2/2 + a/4*(q[i+1] - q[i])^4) - q[0]^2/2,
+    event(first) = q[0],
+    event(wall[i in 0..n]) = 0.8 - q[i],
+    output(speed) = dot(q[0]),
+)]
+struct Chain {
+    n: usize,
+    a: f64,
+}
+
+/// The same three of fixed size.
+#[dynamics(
+    coordinates(x, y, z),
+    lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - (y - x)^2/2 - a/4*(y - x)^4 - (z - y)^2/2 - a/4*(z - y)^4 - x^2/2,
+    event(first) = x,
+    event(wall) = 0.8 - z,
+    output(speed) = dot(x),
+)]
+struct Three {
+    a: f64,
+}
+
+/// The same with momenta.
+#[dynamics(
+    coordinates(q[n]),
+    momenta(p[n]),
+    hamiltonian = sum(i in 0..n, p[i]^2/2) + sum(i in 0..n-1, (q[i+1] - q[i])^2/2 + a/4*(q[i+1] - q[i])^4) + q[0]^2/2,
+    event(still) = p[0],
+)]
+struct Momenta {
+    n: usize,
+    a: f64,
+}
+
+const CHAIN: Chain = Chain { n: 3, a: 0.5 };
+const THREE: Three = Three { a: 0.5 };
+const Q: [f64; 3] = [0.5, -0.5, 0.25];
+const V: [f64; 3] = [0.0, 0.5, 1.0];
+
+fn long() -> family::Simulation<'static, Chain> {
+    Simulation::new(&CHAIN).element(Mixed::<6>).step(0.2)
+}
+
+fn fixed() -> Simulation<'static, Three, 3> {
+    Simulation::new(&THREE).element(Mixed::<6>).step(0.2)
+}
+
+#[test]
+fn recorded_events_change_no_bit() -> Result<(), Box<dyn Error>> {
+    let start = || CHAIN.state(Q, V);
+    let plain = long().run(start(), 0.0..20.0)?;
+    let run = long()
+        .on("first", Crossing::Either, |_| Act::Record)
+        .on("speed", Crossing::Falling, |_| Act::Record)
+        .run(start(), 0.0..20.0)?;
+    assert_eq!(run.states(), plain.states());
+    let beside = fixed()
+        .on("first", Crossing::Either, |_| Act::Record)
+        .on("speed", Crossing::Falling, |_| Act::Record)
+        .run(THREE.state(Q, V), 0.0..20.0)?;
+    assert!(run.events().len() > 5);
+    assert_eq!(run.events().len(), beside.events().len());
+    for (a, b) in run.events().iter().zip(beside.events()) {
+        assert_eq!((&a.name, a.rises), (&b.name, b.rises));
+        assert!((a.t - b.t).abs() < 1e-12, "{} {}", a.t, b.t);
+        assert!(distance(&a.v, &b.v) < 1e-12 && distance(&a.p, &b.p) < 1e-12);
+    }
+    Ok(())
+}
+
+/// Bounces off a wall, by a state of one's own and by the impact along the normal; stops; blows.
+#[test]
+fn acts_are_those_of_fixed_size() -> Result<(), Box<dyn Error>> {
+    let run = long()
+        .on("wall[2]", Crossing::Falling, |event| {
+            Act::Restart(event.after_impact(0.9))
+        })
+        .run(CHAIN.state(Q, V), 0.0..15.0)?;
+    let beside = fixed()
+        .on("wall", Crossing::Falling, |event| {
+            Act::Restart(event.after_impact(0.9))
+        })
+        .run(THREE.state(Q, V), 0.0..15.0)?;
+    assert!(run.events().len() > 2, "{} {}", run.events().len(), beside.events().len());
+    assert_eq!(run.states().len(), beside.states().len());
+    for (a, b) in run.states().iter().zip(beside.states()) {
+        assert!((a.t - b.t).abs() < 1e-12);
+        assert!(distance(&a.q, &b.q) < 1e-11 && distance(&a.p, &b.p) < 1e-11);
+    }
+    assert_eq!(run.arcs().count(), run.events().len() + 1);
+    assert!(run.states().iter().all(|node| node.q[2] < 0.8 + 1e-12));
+    assert!(run.checkpoint().is_some());
+
+    let own = long()
+        .on("wall[2]", Crossing::Falling, |event| {
+            let mut v = event.v.clone();
+            v[2] *= -0.9;
+            Act::Restart(event.state_with_velocity(v))
+        })
+        .run(CHAIN.state(Q, V), 0.0..15.0)?;
+    assert!(distance(&own.last().q, &run.last().q) < 1e-12);
+
+    let stopped = long()
+        .on("wall[2]", Crossing::Falling, |_| Act::Stop)
+        .run(CHAIN.state(Q, V), 0.0..15.0)?;
+    assert_eq!(stopped.last().t, run.events()[0].t);
+    assert!((stopped.last().q[2] - 0.8).abs() < 1e-14);
+
+    let blow = |event: &tfe::Occurrence<'_, 0, family::RunTimeLength>| {
+        Act::Impulse(vec![0.0, 0.0, -1.9 * event.p[2]])
+    };
+    let struck = long().on("wall[2]", Crossing::Falling, blow);
+    let struck = struck.run(CHAIN.state(Q, V), 0.0..15.0)?;
+    assert!(distance(&struck.last().q, &run.last().q) < 1e-12);
+    Ok(())
+}
+
+#[test]
+fn momenta_and_functions() -> Result<(), Box<dyn Error>> {
+    let chain = Momenta { n: 3, a: 0.5 };
+    let start = family::FamilyState {
+        q: Q.to_vec(),
+        p: V.to_vec(),
+    };
+    let simulation = Simulation::new(&chain).element(Mixed::<6>).step(0.2);
+    let of_momenta = simulation
+        .clone()
+        .on("still", Crossing::Either, |_| Act::Record);
+    let of_momenta = of_momenta.run(start.clone(), 0.0..20.0)?;
+    let of_function =
+        simulation.on_function("still", Crossing::Either, |_, _, v| v[0], |_| Act::Record);
+    let of_function = of_function.run(start, 0.0..20.0)?;
+    assert!(of_momenta.events().len() > 5);
+    for (a, b) in of_momenta.events().iter().zip(of_function.events()) {
+        assert!((a.t - b.t).abs() < 1e-13 && a.p[0].abs() < 1e-14);
+    }
+    Ok(())
+}
+
+/// Steps, halves of runs, accuracies and ensembles go through events as runs do.
+#[test]
+fn every_kind_of_run() -> Result<(), Box<dyn Error>> {
+    let bounce = |event: &tfe::Occurrence<'_, 0, family::RunTimeLength>| {
+        Act::Restart(event.after_impact(0.9))
+    };
+    let start = || CHAIN.state(Q, V);
+    let simulation = long().on("wall[2]", Crossing::Falling, bounce);
+    let run = simulation.run(start(), 0.0..15.0)?;
+    let mut nodes = Vec::new();
+    for node in simulation.steps(start(), 0.0).take(run.states().len() - 1) {
+        nodes.push(node?);
+    }
+    assert_eq!(nodes, run.states()[1..]);
+
+    let first = simulation.run(start(), 0.0..4.0)?;
+    let checkpoint = first.checkpoint().ok_or("complete")?;
+    let second = simulation.resume(checkpoint, 15.0)?;
+    assert_eq!(second.last(), run.last());
+
+    let asked = Simulation::new(&CHAIN).on("wall[2]", Crossing::Falling, bounce);
+    let accurate = asked.accuracy(1e-9).run(start(), 0.0..15.0)?;
+    let fine = Simulation::new(&CHAIN).element(Mixed::<10>).step(0.05);
+    let fine = fine
+        .on("wall[2]", Crossing::Falling, bounce)
+        .run(start(), 0.0..15.0)?;
+    assert!(accurate.error_estimate() < 1e-9);
+    assert!(distance(&accurate.last().q, &fine.last().q) < 2e-9);
+
+    let ensemble = Ensemble::new(&CHAIN).element(Mixed::<6>).step(0.2);
+    let ends = ensemble.on("wall[2]", Crossing::Falling, bounce);
+    let ends = ends.run(&[start(), start()], 0.0..15.0)?;
+    assert_eq!(ends[1].as_ref(), Ok(run.last()));
+    Ok(())
+}
+
+#[test]
+fn what_cannot_be_is_a_typed_error() {
+    let kind = |run: family::Simulation<'static, Chain>| {
+        let error = run.run(CHAIN.state(Q, V), 0.0..15.0).expect_err("refused");
+        error.kind().clone()
+    };
+    let unknown = kind(long().on("wall[3]", Crossing::Either, |_| Act::Stop));
+    let known = ["first", "wall[0]", "wall[1]", "wall[2]", "speed"];
+    assert_eq!(
+        unknown,
+        RunErrorKind::NoEvent {
+            name: "wall[3]".to_owned(),
+            known: known.map(str::to_owned).to_vec(),
+        }
+    );
+    let set =
+        |_: &tfe::Occurrence<'_, 0, family::RunTimeLength>| Act::Set(tfe::Settings::new("a", 1.0));
+    let set = kind(long().on("first", Crossing::Either, set));
+    assert_eq!(set, RunErrorKind::ParametersFixed);
+    // A state that is too short, or not finite.
+    for bad in [vec![0.0; 2], vec![f64::NAN; 3]] {
+        let act = move |_: &tfe::Occurrence<'_, 0, family::RunTimeLength>| {
+            Act::Restart(family::FamilyState {
+                q: bad.clone(),
+                p: vec![0.0; 3],
+            })
+        };
+        let found = kind(long().on("first", Crossing::Either, act));
+        let is_told = matches!(found, RunErrorKind::Family(_) | RunErrorKind::Start { .. });
+        assert!(is_told, "{found:?}");
+    }
+    let short = |_: &tfe::Occurrence<'_, 0, family::RunTimeLength>| Act::Impulse(vec![1.0]);
+    let short = kind(long().on("first", Crossing::Either, short));
+    assert!(matches!(short, RunErrorKind::Start { .. }), "{short:?}");
+}
+
+/// A row of pendulums on rods, the last of which hits a wall: as in coordinates of angles.
+#[cfg(feature = "sparse")]
+#[test]
+fn impacts_along_constraints() -> Result<(), Box<dyn Error>> {
+    #[dynamics(
+        coordinates(x[n], y[n]),
+        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
+        constraint(top) = x[0]^2 + y[0]^2 - 1,
+        constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - 1,
+        event(wall) = 1 - x[n-1],
+    )]
+    struct Rods {
+        n: usize,
+    }
+    #[dynamics(
+        coordinates(a, b),
+        let x = sin(a) + sin(b),
+        let y = -cos(a) - cos(b),
+        lagrangian = (dot(sin(a))^2 + dot(cos(a))^2 + dot(x)^2 + dot(y)^2)/2 - (y - cos(a)),
+        event(wall) = 1 - x,
+    )]
+    struct Angles;
+    let rods = Rods { n: 2 };
+    let (a, b, u, w): (f64, f64, f64, f64) = (0.0, -0.5, 1.5, 2.5);
+    let (x, y) = ([a.sin(), a.sin() + b.sin()], [-a.cos(), -a.cos() - b.cos()]);
+    let (vx, vy) = (
+        [u * a.cos(), u * a.cos() + w * b.cos()],
+        [u * a.sin(), u * a.sin() + w * b.sin()],
+    );
+    let start = rods.state([x[0], x[1], y[0], y[1]], [vx[0], vx[1], vy[0], vy[1]]);
+    let run = Simulation::new(&rods)
+        .element(Mixed::<8>)
+        .step(0.01)
+        .on("wall", Crossing::Falling, |event| {
+            Act::Restart(event.after_impact(1.0))
+        })
+        .run(start, 0.0..8.0)?;
+    let beside = Simulation::new(&Angles)
+        .element(Mixed::<8>)
+        .step(0.01)
+        .on("wall", Crossing::Falling, |event| {
+            Act::Restart(event.after_impact(1.0))
+        })
+        .run(Angles.state([a, b], [u, w]), 0.0..8.0)?;
+    assert!(run.events().len() > 1, "{} {}", run.events().len(), beside.events().len());
+    assert_eq!(run.events().len(), beside.events().len());
+    for (one, other) in run.events().iter().zip(beside.events()) {
+        assert!((one.t - other.t).abs() < 1e-11, "{} {}", one.t, other.t);
+    }
+    let end = beside.last().q;
+    assert!((run.last().q[1] - end[0].sin() - end[1].sin()).abs() < 1e-10);
+    assert!(run.energy_error() < 1e-11 && run.constraint_residual().position < 1e-13);
+    Ok(())
+}
