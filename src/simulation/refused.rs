@@ -7,6 +7,7 @@ use crate::error::{RunError, RunErrorKind};
 use crate::length::RunTimeLength;
 use crate::motion::Motion;
 use std::convert::Infallible;
+use std::iter::{self, Once};
 use std::ops::Range;
 use tfe_runtime::family::{FamilyModel, FamilyState};
 
@@ -57,8 +58,8 @@ impl<M: FamilyModel> Simulation<'_, M, 0, RunTimeLength> {
         _: Crossing,
         _: FamilyState,
         _: f64,
-    ) -> impl Iterator<Item = Result<Infallible, RunErrorKind>> {
-        std::iter::once(Err(RunErrorKind::run_time_length("section")))
+    ) -> Once<Result<Infallible, RunErrorKind>> {
+        iter::once(Err(RunErrorKind::run_time_length("section")))
     }
 
     /// Refused: parameters of models of run-time length have no derivatives.

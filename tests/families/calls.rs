@@ -136,3 +136,111 @@ fn kinks_are_not_cut() {
     let run = Simulation::new(&CHAIN).step(0.1).at_kinks(true);
     assert!(run.run(start(), 0.0..1.0).is_ok());
 }
+
+#[cfg(feature = "sparse")]
+#[test]
+fn transition_matrices() {
+    let run = Simulation::new(&CHAIN).element(Mixed::<5>).step(0.1);
+    let run = run.run_linearised(start(), 0.0..5.0).expect("a run");
+    let fixed = Simulation::new(&THREE).element(Mixed::<5>).step(0.1);
+    let fixed = fixed
+        .run_linearised(start_of_three(), 0.0..5.0)
+        .expect("a run");
+    assert_eq!(run.transitions().len(), 50);
+    for (a, b) in run.transitions().iter().zip(fixed.transitions()) {
+        assert!(distance(a.as_slice(), b.as_slice()) < 1e-13);
+    }
+    let (product, beside) = (run.product(), fixed.product());
+    assert!(distance(product.as_slice(), beside.as_slice()) < 1e-12);
+    let multipliers = run.multipliers().expect("multipliers");
+    let beside = fixed.multipliers().expect("multipliers");
+    for (a, b) in multipliers.iter().zip(&beside) {
+        assert!((a.log_modulus - b.log_modulus).abs() < 1e-6); // of moduli near one, where they are multiple
+    }
+}
+
+#[cfg(not(feature = "sparse"))]
+#[test]
+fn transition_matrices_need_a_feature() {
+    let run = Simulation::new(&CHAIN).step(0.1);
+    let error = run.run_linearised(start(), 0.0..5.0).expect_err("refused");
+    let of = "models of run-time length without the feature `sparse`";
+    let call = "run_linearised";
+    assert_eq!(error.kind(), &RunErrorKind::Unsupported { call, of });
+}
+
+/// Two pendulums on rods, one hanging from the other, whose top one is pushed by a moving hand.
+#[cfg(feature = "sparse")]
+mod rods {
+    use super::*;
+
+    #[dynamics(
+        coordinates(x[n], y[n]),
+        lagrangian = sum(i in 0..n, m*(dot(x[i])^2 + dot(y[i])^2)/2 - m*g*y[i]),
+        constraint(top) = (x[0] - sin(t)/5)^2 + y[0]^2 - 1,
+        constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - 1,
+        dissipation = sum(i in 0..n, c/2*(dot(x[i])^2 + dot(y[i])^2)),
+    )]
+    pub struct Rods {
+        pub n: usize,
+        pub m: f64,
+        pub g: f64,
+        pub c: f64,
+    }
+
+    #[dynamics(
+        coordinates(x[2], y[2]),
+        lagrangian = sum(i in 0..2, m*(dot(x[i])^2 + dot(y[i])^2)/2 - m*g*y[i]),
+        constraint(top) = (x[0] - sin(t)/5)^2 + y[0]^2 - 1,
+        constraint(rod) = (x[1] - x[0])^2 + (y[1] - y[0])^2 - 1,
+        dissipation = sum(i in 0..2, c/2*(dot(x[i])^2 + dot(y[i])^2)),
+    )]
+    struct TwoRods {
+        m: f64,
+        g: f64,
+        c: f64,
+    }
+
+    #[test]
+    fn reactions_are_those_of_fixed_size() {
+        let (m, g, c) = (0.7, 9.81, 0.3);
+        let (rods, two) = (Rods { n: 2, m, g, c }, TwoRods { m, g, c });
+        // The upper rod moves with the hand, which begins at 1/5.
+        let (q, v) = ([0.0, 1.0, -1.0, -1.0], [0.2, 0.2, 0.0, 0.5]);
+        let run = Simulation::new(&rods).element(Mixed::<5>).step(0.01);
+        let run = run.run(rods.state(q, v), 0.0..2.0).expect("a run");
+        let beside = Simulation::new(&two).element(Mixed::<5>).step(0.01);
+        let beside = beside.run(two.state(q, v), 0.0..2.0).expect("a run");
+        let names: Vec<String> = run
+            .reactions()
+            .names()
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        assert_eq!(names, ["top", "rod[0]"]);
+        for (name, other) in [("top", "top"), ("rod[0]", "rod")] {
+            let here = run.reactions().column(name).expect("a constraint");
+            let there = beside.reactions().column(other).expect("a constraint");
+            assert_eq!(here.len(), 201);
+            assert!(distance(&here, &there) < 1e-9 * 20.0, "{name}");
+        }
+        // At rest in a line the rods carry what hangs below: of (x² + y² − 1) λ the force is 2 λ.
+        let (hanging, none) = ([0.0, 0.0, -1.0, -2.0], [0.2, 0.2, 0.0, 0.0]);
+        let still = Rods { c: 0.0, ..rods };
+        let run = Simulation::new(&still).step(0.01);
+        let run = run
+            .run(still.state(hanging, none), 0.0..0.01)
+            .expect("a run");
+        let rod = run.reactions().column("rod[0]").expect("a constraint");
+        assert!((rod[0] + m * g / 2.0).abs() < 1e-12, "{}", rod[0]);
+        let file = std::env::temp_dir().join(format!("tfe_rods_{}.csv", std::process::id()));
+        run.write_csv(&file).expect("a file");
+        let text = std::fs::read_to_string(&file).expect("a file");
+        std::fs::remove_file(&file).expect("a file");
+        let header = text.lines().next().expect("a header");
+        assert!(
+            header.ends_with("energy,lambda_top,lambda_rod[0]"),
+            "{header}"
+        );
+    }
+}

@@ -92,7 +92,12 @@ fn acts_are_those_of_fixed_size() -> Result<(), Box<dyn Error>> {
             Act::Restart(event.after_impact(0.9))
         })
         .run(THREE.state(Q, V), 0.0..15.0)?;
-    assert!(run.events().len() > 2, "{} {}", run.events().len(), beside.events().len());
+    assert!(
+        run.events().len() > 2,
+        "{} {}",
+        run.events().len(),
+        beside.events().len()
+    );
     assert_eq!(run.states().len(), beside.states().len());
     for (a, b) in run.states().iter().zip(beside.states()) {
         assert!((a.t - b.t).abs() < 1e-12);
@@ -264,7 +269,12 @@ fn impacts_along_constraints() -> Result<(), Box<dyn Error>> {
             Act::Restart(event.after_impact(1.0))
         })
         .run(Angles.state([a, b], [u, w]), 0.0..8.0)?;
-    assert!(run.events().len() > 1, "{} {}", run.events().len(), beside.events().len());
+    assert!(
+        run.events().len() > 1,
+        "{} {}",
+        run.events().len(),
+        beside.events().len()
+    );
     assert_eq!(run.events().len(), beside.events().len());
     for (one, other) in run.events().iter().zip(beside.events()) {
         assert!((one.t - other.t).abs() < 1e-11, "{} {}", one.t, other.t);

@@ -20,4 +20,6 @@ mod rates;
 #[cfg(feature = "sparse")]
 mod stiff;
 mod strides;
+#[cfg(feature = "sparse")]
+mod table;
 mod work_precision;

@@ -179,6 +179,11 @@ pub struct ConstraintSecond<'a, R, const N: usize> {
 /// `first_and_mass` and `second` write only entries that can be non-zero and never read what they
 /// are given, so pass [`First::ZERO`]-like values: entries that are structurally zero stay as they
 /// were.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a model of fixed size",
+    label = "not a model of fixed size",
+    note = "models are structs with `#[dynamics(...)]`; what those with `coordinates(q[n])` have is listed in `docs/calls.md`, all else needs a length known here, such as `q[10]`"
+)]
 pub trait Model<const N: usize> {
     /// By which function it was declared.
     const FORM: Form;

@@ -96,6 +96,6 @@ impl<'a> Rates<'a, Dual<f64>> {
 
 impl Entries<Dual<f64>> for Rates<'_, Dual<f64>> {
     fn add(&mut self, _: Block, row: usize, column: usize, value: Dual<f64>) {
-        self.values[row] = self.values[row] + value * self.v[column];
+        self.values[row] += value * self.v[column];
     }
 }
