@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 use std::time::Instant;
-use tfe::family::{FamilyModel, FamilyStepper, Gradient};
+use tfe::family::{self, Gradient, Model as _};
 use tfe::prelude::*;
 use tfe::runtime::step::Control;
 
@@ -115,7 +115,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let chain = Chain { n, ..chain };
         let q: Vec<f64> = (0..n).map(|i| (0.1 * i as f64).sin()).collect();
         let mut state = chain.state(q, vec![0.0; n]);
-        let mut stepper = FamilyStepper::new(&chain, Mixed::<4>.into(), Control::default())?;
+        let mut stepper = family::Stepper::new(&chain, Mixed::<4>.into(), Control::default())?;
         for step in 0..5 {
             stepper.advance(0.1 * f64::from(step), 0.1, &mut state)?;
         }

@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 use std::error::Error;
 use std::time::Instant;
 use tfe::charts::{Axis, Chart, Scale, Style};
-use tfe::family::{self, FamilyModel, FamilyState, FamilyStepper};
+use tfe::family::{self, FamilyState};
 use tfe::prelude::*;
 use tfe::runtime::step::Control;
 
@@ -87,7 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Runs a chain at all lengths over the same span; the least time of several runs.
-fn sweep<M: FamilyModel>(model: impl Fn(usize) -> M) -> Result<Vec<Row>, Box<dyn Error>> {
+fn sweep<M: family::Model>(model: impl Fn(usize) -> M) -> Result<Vec<Row>, Box<dyn Error>> {
     let mut rows = Vec::new();
     for n in LENGTHS {
         let model = model(n);
@@ -122,10 +122,10 @@ fn sweep<M: FamilyModel>(model: impl Fn(usize) -> M) -> Result<Vec<Row>, Box<dyn
 }
 
 /// What a stepper holds at most while it is made and does a few steps.
-fn bytes<M: FamilyModel>(model: &M, start: &FamilyState) -> Result<f64, Box<dyn Error>> {
+fn bytes<M: family::Model>(model: &M, start: &FamilyState) -> Result<f64, Box<dyn Error>> {
     let mut outcome = Ok(());
     let used = allocation_counter::measure(|| {
-        outcome = FamilyStepper::new(model, Mixed::<4>.into(), Control::default())
+        outcome = family::Stepper::new(model, Mixed::<4>.into(), Control::default())
             .map_err(Box::<dyn Error>::from)
             .and_then(|mut stepper| {
                 let mut state = start.clone();

@@ -7,7 +7,7 @@ use crate::motion::Motion;
 use std::error::Error;
 use std::fmt;
 use tfe_runtime::constrained::Residual;
-use tfe_runtime::family::FamilyError;
+use tfe_runtime::family;
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{ElementError, InputFailure, Model, StepError};
 
@@ -20,7 +20,7 @@ pub enum RunErrorKind {
     /// The element does not exist (number of nodes, quadrature).
     Element(ElementError),
     /// Of a model of run-time length: lengths that do not belong together, or something that such models cannot do yet.
-    Family(FamilyError),
+    Family(family::ModelError),
     /// The step is zero, infinite or not a number.
     Step {
         /// The step asked for.

@@ -3,10 +3,10 @@
 use crate::constraints::ConstraintResidual;
 use crate::length::{FixedLength, Length, RunTimeLength};
 use crate::numbers::larger;
-use tfe_runtime::family::{self, FamilyModel, FamilyState};
+use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::{CoordinateName, Form, Model, State, constrained, legendre};
 
-/// Evaluates a model at points of phase space: every [`Model`] and every [`FamilyModel`], and nothing else.
+/// Evaluates a model at points of phase space: every [`Model`] and every [`family::Model`], and nothing else.
 pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
     /// The names of the coordinates.
     fn coordinate_names(&self) -> Vec<CoordinateName>;
@@ -98,7 +98,7 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
     }
 }
 
-impl<M: FamilyModel> Evaluate<0, RunTimeLength> for M {
+impl<M: family::Model> Evaluate<0, RunTimeLength> for M {
     const IS_CONSTRAINED: bool = M::CONSTRAINED;
     const NEEDS_VELOCITY: bool = matches!(M::FORM, Form::Lagrangian);
 

@@ -37,8 +37,8 @@
 pub use crate::evaluate::Evaluate;
 pub use crate::length::{Declared, FixedLength, RunTimeLength};
 pub use tfe_runtime::family::{
-    Block, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, FamilySuspended,
-    Gradient, Pattern, STRIDE, Sweep, constraint_residual, energy, momenta, state, velocity,
+    Block, Entries, FamilyState, Gradient, Model, ModelError, Pattern, STRIDE, Stepper, Suspended,
+    Sweep, constraint_residual, energy, momenta, state, velocity,
 };
 
 /// [`Simulation`](crate::Simulation) of a model of run-time length.

@@ -4,7 +4,7 @@ pub use tfe_runtime::length::{Declared, FixedLength, RunTimeLength};
 
 use std::fmt::{Debug, Display};
 use std::ops::Deref;
-use tfe_runtime::family::{FamilyDense, FamilyState, FamilyStepper, FamilySuspended};
+use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::step::{DenseElement, Impulse, Stepper, Suspended};
 use tfe_runtime::{CoordinateName, Share, State};
 
@@ -77,9 +77,9 @@ impl Length<0> for RunTimeLength {
     type Held<'m, M: 'm> = &'m M;
     type Vector = Vec<f64>;
     type State = FamilyState;
-    type Polynomial = FamilyDense;
-    type Stepper<'m, M: 'm> = FamilyStepper<'m, M>;
-    type Suspended = FamilySuspended;
+    type Polynomial = family::DenseElement;
+    type Stepper<'m, M: 'm> = family::Stepper<'m, M>;
+    type Suspended = family::Suspended;
     type Impulse = (f64, Vec<f64>);
     type ConstraintName = CoordinateName;
 
@@ -165,4 +165,4 @@ macro_rules! polynomial {
 }
 
 polynomial!(DenseElement<N>, State<N>, [f64; N], const N: usize);
-polynomial!(FamilyDense, FamilyState, Vec<f64>,);
+polynomial!(family::DenseElement, FamilyState, Vec<f64>,);

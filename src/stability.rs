@@ -25,7 +25,7 @@ pub use step::Transitions;
 #[cfg(feature = "sparse")]
 pub use step::{dominant, transition};
 #[cfg(feature = "sparse")]
-pub use tfe_runtime::family::{FamilyTransition, FamilyTransitionError};
+pub use tfe_runtime::family::{OperatorError, TransitionOperator};
 pub use tfe_runtime::transition::TransitionError;
 pub use time_scales::TimeScales;
 
@@ -48,7 +48,7 @@ use tfe_runtime::{Element, Model, State};
 /// # Shapes
 /// 2N × 2N, ordered (p, q); [`Blocks`] names its four blocks.
 /// # Errors
-/// [`TransitionError`] (or `FamilyTransitionError`) where the element does not exist, cannot be solved, or has a singular tangent.
+/// [`TransitionError`] (or `family::OperatorError`) where the element does not exist, cannot be solved, or has a singular tangent.
 ///
 /// ```
 /// use tfe::prelude::*;

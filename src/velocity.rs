@@ -2,7 +2,7 @@
 
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length, RunTimeLength};
-use tfe_runtime::family::{FamilyModel, FamilyState};
+use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::{Model, State};
 
 /// The velocities that belong to states of a model.
@@ -41,7 +41,7 @@ impl<M: Model<N>, const N: usize> Velocity<N> for M {
     }
 }
 
-impl<M: FamilyModel> Velocity<0, RunTimeLength> for M {
+impl<M: family::Model> Velocity<0, RunTimeLength> for M {
     fn velocity(&self, t: f64, state: &FamilyState) -> Vec<f64> {
         let n = self.len();
         let fits = self.check().is_ok() && (state.q.len(), state.p.len()) == (n, n);

@@ -1,7 +1,7 @@
 //! No allocation per step, in every way a step can be done.
 
 use allocation_counter::measure;
-use tfe::family::FamilyStepper;
+use tfe::family;
 use tfe::prelude::*;
 use tfe::runtime::bundle::Bundle;
 use tfe::runtime::step::{Control, Stepper};
@@ -166,7 +166,7 @@ fn steps_of_families_do_not_allocate() {
         let mut state = chain.state(q, vec![0.0; n]);
         for element in [Element::mixed(4), Element::mixed(7)] {
             let mut stepper =
-                FamilyStepper::new(&chain, element, Control::default()).expect("an element");
+                family::Stepper::new(&chain, element, Control::default()).expect("an element");
             let mut walk = |from: u32, to: u32| {
                 for step in from..to {
                     let t = 0.01 * f64::from(step);

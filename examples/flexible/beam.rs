@@ -13,7 +13,7 @@ use std::error::Error;
 use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 use tfe::charts::{Axis, Chart, Scale, Section, Style};
-use tfe::family::{Block, FamilyModel, Gradient, Pattern};
+use tfe::family::{Block, Gradient, Model as _, Pattern};
 use tfe::prelude::*;
 
 #[dynamics(

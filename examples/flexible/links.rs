@@ -4,7 +4,7 @@
 use std::error::Error;
 use std::time::Instant;
 use tfe::charts::{Axis, Chart, Scale, Section, Style};
-use tfe::family::{FamilyModel, FamilyState};
+use tfe::family::{self, FamilyState};
 use tfe::prelude::*;
 
 /// Angles from the downward vertical; masses and lengths one.
@@ -64,7 +64,7 @@ fn cartesian(theta: &[f64]) -> Vec<f64> {
 }
 
 /// Milliseconds a step of Mixed::<3>: the least of a few runs.
-fn milliseconds<M: FamilyModel>(model: &M, start: &FamilyState) -> Result<f64, Box<dyn Error>> {
+fn milliseconds<M: family::Model>(model: &M, start: &FamilyState) -> Result<f64, Box<dyn Error>> {
     let simulation = Simulation::new(model).element(Mixed::<3>).step(STEP);
     let simulation = simulation.record_every(usize::MAX);
     // The ordering of the equations is done once a run: the difference of two lengths is what steps take.

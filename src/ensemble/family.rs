@@ -17,11 +17,11 @@ use std::convert::Infallible;
 use std::ops::Range;
 use std::sync::Mutex;
 use tfe_runtime::Statistics;
-use tfe_runtime::family::{FamilyModel, FamilyState};
+use tfe_runtime::family::{self, FamilyState};
 
 impl<'m, M, K> Ensemble<'m, M, 0, K, RunTimeLength>
 where
-    M: FamilyModel + Sync,
+    M: family::Model + Sync,
     K: Models<'m, M>,
 {
     /// Runs all trajectories over the span, backwards where it ends before it starts. Each result is the node at the end, or why its run stopped; a failure stops no other run.

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use std::fmt;
-use tfe_runtime::family::FamilyError;
+use tfe_runtime::family;
 
 /// Why a [`Modal`](super::Modal) could not be made of a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub enum ModalError {
     /// The iteration for eigenvalues did not end.
     NoEigenvalues,
     /// Lengths of a model of run-time length do not belong together.
-    Family(FamilyError),
+    Family(family::ModelError),
 }
 
 impl fmt::Display for ModalError {

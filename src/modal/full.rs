@@ -3,10 +3,10 @@
 use super::eigen::Quadratic;
 use super::error::ModalError;
 use nalgebra::{DMatrix, DVector};
-use tfe_runtime::family::{Block, Entries, FamilyModel, FamilyState, Gradient};
+use tfe_runtime::family::{self, Block, Entries, FamilyState, Gradient};
 use tfe_runtime::{CoordinateName, Facts, First, Form, Model, Real, Second, State};
 
-/// A model with states of type `S` that has modes: every [`Model`] with [`State`] and every [`FamilyModel`] with [`FamilyState`]. Not to be
+/// A model with states of type `S` that has modes: every [`Model`] with [`State`] and every [`family::Model`] with [`FamilyState`]. Not to be
 /// implemented elsewhere.
 pub trait Reducible<S> {
     /// By which function the model was declared.
@@ -107,12 +107,15 @@ impl<M: Model<N>, const N: usize> Reducible<State<N>> for M {
     }
 }
 
-impl<M: FamilyModel> Reducible<FamilyState> for M {
-    const DECLARED: Form = <M as FamilyModel>::FORM;
+impl<M: family::Model> Reducible<FamilyState> for M {
+    const DECLARED: Form = <M as family::Model>::FORM;
 
     fn quadratic(&self) -> Result<Quadratic, ModalError> {
         self.check().map_err(ModalError::Family)?;
-        admitted(<M as FamilyModel>::FACTS, <M as FamilyModel>::CONSTRAINED)?;
+        admitted(
+            <M as family::Model>::FACTS,
+            <M as family::Model>::CONSTRAINED,
+        )?;
         let n = self.len();
         let zero = vec![0.0; n];
         let (mut z, mut q, mut force) = (zero.clone(), zero.clone(), zero.clone());
@@ -122,18 +125,20 @@ impl<M: FamilyModel> Reducible<FamilyState> for M {
             q: &mut q,
             force: &mut force,
         };
-        FamilyModel::second(self, 0.0, &zero, &zero, first, &mut dense);
+        family::Model::second(self, 0.0, &zero, &zero, first, &mut dense);
         Quadratic::new(
-            <M as FamilyModel>::FORM,
+            <M as family::Model>::FORM,
             dense.0,
             [DVector::from_vec(z), DVector::from_vec(q)],
         )
     }
 
     fn energy_at(&self, q: &[f64], offset: &[f64]) -> f64 {
-        match <M as FamilyModel>::FORM {
-            Form::Lagrangian => -FamilyModel::energy_function(self, 0.0, q, &vec![0.0; self.len()]),
-            Form::Hamiltonian => FamilyModel::energy_function(self, 0.0, q, offset),
+        match <M as family::Model>::FORM {
+            Form::Lagrangian => {
+                -family::Model::energy_function(self, 0.0, q, &vec![0.0; self.len()])
+            }
+            Form::Hamiltonian => family::Model::energy_function(self, 0.0, q, offset),
         }
     }
 
@@ -142,15 +147,15 @@ impl<M: FamilyModel> Reducible<FamilyState> for M {
     }
 
     fn columns_of(&self) -> usize {
-        FamilyModel::columns(self)
+        family::Model::columns(self)
     }
 
     fn column_name_of(&self, column: usize) -> CoordinateName {
-        FamilyModel::column_name(self, column)
+        family::Model::column_name(self, column)
     }
 
     fn observables_of<T: Real>(&self, t: T, q: &[T], z: &[T], values: &mut [T]) {
-        FamilyModel::observables(self, t, q, z, values);
+        family::Model::observables(self, t, q, z, values);
     }
 }
 

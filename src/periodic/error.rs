@@ -64,7 +64,7 @@ pub enum OrbitError {
     Multipliers(PeriodicSchurError),
     /// A model of run-time length does not fit together, or its steps cannot be differentiated.
     #[cfg(feature = "sparse")]
-    Family(tfe_runtime::family::FamilyTransitionError),
+    Family(tfe_runtime::family::OperatorError),
 }
 
 impl From<AssemblyError> for OrbitError {

@@ -13,9 +13,9 @@ use crate::length::RunTimeLength;
 use crate::periodic_schur;
 use crate::simulation::Simulation;
 use shooting::Shooting;
-use tfe_runtime::family::{self, FamilyModel, FamilyState};
+use tfe_runtime::family::{self, FamilyState};
 
-impl<'m, M: FamilyModel> PeriodicOrbit<'m, M, 0, RunTimeLength> {
+impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
     /// Finds the orbit and its multipliers.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use crate::error::RunErrorKind;
 use tfe_runtime::constrained::{self, Residual};
-use tfe_runtime::family::FamilyModel;
+use tfe_runtime::family;
 use tfe_runtime::{Model, State};
 
 /// Whether the energy of a model is known to be conserved, and a jump tells of a step that is too long: linear models have steps of their own kind of error.
@@ -12,7 +12,7 @@ pub(crate) const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
 }
 
 /// The same of a model of run-time length.
-pub(crate) const fn conserves_energies<M: FamilyModel>() -> bool {
+pub(crate) const fn conserves_energies<M: family::Model>() -> bool {
     let facts = M::FACTS;
     !(facts.time_dependent || facts.forced || facts.linear || M::CONSTRAINED)
 }

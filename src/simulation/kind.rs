@@ -13,9 +13,7 @@ use std::ops::Range;
 use tfe_runtime::constrained::{self, Trail};
 use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::enclosure::Enclosure;
-use tfe_runtime::family::{
-    self, FamilyDense, FamilyError, FamilyModel, FamilyState, FamilyStepper, FamilySuspended,
-};
+use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper, Suspended};
 use tfe_runtime::{
     CoordinateName, Element, ElementError, Facts, First, Form, Model, Second, Share, State,
@@ -31,7 +29,7 @@ pub struct Chosen {
     pub(crate) at_kinks: bool,
 }
 
-/// A model that runs can be made of: every [`Model`] and every [`FamilyModel`], and nothing else. Not to be called outside.
+/// A model that runs can be made of: every [`Model`] and every [`family::Model`], and nothing else. Not to be called outside.
 pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// What is known of it.
     const FACTS: Facts;
@@ -594,7 +592,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     }
 }
 
-impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
+impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     const FACTS: Facts = M::FACTS;
     // Without sparse factorisations there is nothing else.
     const MAY_ITERATE: bool = M::FACTS.separable && !M::CONSTRAINED;
@@ -623,15 +621,15 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
         &[]
     }
 
-    fn leave(_: &FamilyStepper<'_, M>, _: &mut Trail) {}
+    fn leave(_: &family::Stepper<'_, M>, _: &mut Trail) {}
 
-    fn foresee(_: &mut FamilyStepper<'_, M>, _: &Trail, _: (f64, f64)) {}
+    fn foresee(_: &mut family::Stepper<'_, M>, _: &Trail, _: (f64, f64)) {}
 
-    fn set_tolerance(stepper: &mut FamilyStepper<'_, M>, tolerance: f64) {
+    fn set_tolerance(stepper: &mut family::Stepper<'_, M>, tolerance: f64) {
         stepper.set_tolerance(tolerance);
     }
 
-    fn take_statistics(stepper: &mut FamilyStepper<'_, M>) -> Statistics {
+    fn take_statistics(stepper: &mut family::Stepper<'_, M>) -> Statistics {
         stepper.take_statistics()
     }
 
@@ -673,7 +671,7 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
     fn first_node(
         &self,
         (t, start): (f64, &FamilyState),
-        stepper: Option<&mut FamilyStepper<'_, M>>,
+        stepper: Option<&mut family::Stepper<'_, M>>,
     ) -> Motion<0, RunTimeLength> {
         match stepper {
             Some(stepper) => {
@@ -685,34 +683,34 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
         }
     }
 
-    fn stepper<'m>(model: &'m M, chosen: Chosen) -> Result<FamilyStepper<'m, M>, RunErrorKind>
+    fn stepper<'m>(model: &'m M, chosen: Chosen) -> Result<family::Stepper<'m, M>, RunErrorKind>
     where
         M: 'm,
     {
-        let stepper = FamilyStepper::new(model, chosen.element, chosen.control);
+        let stepper = family::Stepper::new(model, chosen.element, chosen.control);
         stepper.map_err(RunErrorKind::Family)
     }
 
     fn resumed<'m>(
         model: &'m M,
         chosen: Chosen,
-        suspended: FamilySuspended,
-    ) -> Result<FamilyStepper<'m, M>, RunErrorKind>
+        suspended: family::Suspended,
+    ) -> Result<family::Stepper<'m, M>, RunErrorKind>
     where
         M: 'm,
     {
         let Chosen {
             element, control, ..
         } = chosen;
-        let stepper = FamilyStepper::resume(model, element, control, suspended);
+        let stepper = family::Stepper::resume(model, element, control, suspended);
         stepper.map_err(RunErrorKind::Family)
     }
 
-    fn suspended(stepper: FamilyStepper<'_, M>) -> FamilySuspended {
+    fn suspended(stepper: family::Stepper<'_, M>) -> family::Suspended {
         stepper.suspend()
     }
 
-    fn ends_only<'m>(stepper: FamilyStepper<'m, M>) -> FamilyStepper<'m, M>
+    fn ends_only<'m>(stepper: family::Stepper<'m, M>) -> family::Stepper<'m, M>
     where
         M: 'm,
     {
@@ -720,18 +718,18 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
     }
 
     fn check_velocity(
-        stepper: &mut FamilyStepper<'_, M>,
+        stepper: &mut family::Stepper<'_, M>,
         (t, start): (f64, &FamilyState),
     ) -> Result<(), RunErrorKind> {
         let velocity = stepper.velocity(t, start);
         velocity.map(|_| ()).map_err(RunErrorKind::Family)
     }
 
-    fn chosen(stepper: &FamilyStepper<'_, M>) -> (Element, Control) {
+    fn chosen(stepper: &family::Stepper<'_, M>) -> (Element, Control) {
         (stepper.element(), stepper.control())
     }
 
-    fn exchange<'m>(_: &mut FamilyStepper<'m, M>, _: &'m M) -> Result<(), RunErrorKind>
+    fn exchange<'m>(_: &mut family::Stepper<'m, M>, _: &'m M) -> Result<(), RunErrorKind>
     where
         M: 'm,
     {
@@ -739,7 +737,7 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
     }
 
     fn advance(
-        stepper: &mut FamilyStepper<'_, M>,
+        stepper: &mut family::Stepper<'_, M>,
         (t, h): (f64, f64),
         state: &mut FamilyState,
         _: &[Impulse<0>],
@@ -748,15 +746,15 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
     }
 
     fn inside(
-        stepper: &FamilyStepper<'_, M>,
-        _: Option<FamilyDense>,
+        stepper: &family::Stepper<'_, M>,
+        _: Option<family::DenseElement>,
         (start, end): (f64, f64),
-    ) -> FamilyDense {
+    ) -> family::DenseElement {
         stepper.dense(start, end)
     }
 
     fn node(
-        stepper: &mut FamilyStepper<'_, M>,
+        stepper: &mut family::Stepper<'_, M>,
         _: &M,
         (t, state): (f64, &FamilyState),
         _: &Vec<f64>,
@@ -771,7 +769,7 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
 
     fn record(
         motion: &mut Motion<0, RunTimeLength>,
-        stepper: &mut FamilyStepper<'_, M>,
+        stepper: &mut family::Stepper<'_, M>,
         model: &M,
         at: (f64, &FamilyState),
     ) {
@@ -784,7 +782,7 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
         family::allowed_velocity(self, t, state).ok()
     }
 
-    fn statistics<'s>(stepper: &'s FamilyStepper<'_, M>) -> &'s Statistics {
+    fn statistics<'s>(stepper: &'s family::Stepper<'_, M>) -> &'s Statistics {
         stepper.statistics()
     }
 
@@ -845,12 +843,17 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
         None
     }
 
-    fn outputs_along(&self, piece: &FamilyDense, values: &mut [Enclosure]) {
+    fn outputs_along(&self, piece: &family::DenseElement, values: &mut [Enclosure]) {
         let over = piece.bounds(M::FORM);
         self.observables(over.t, &over.q, second(M::FORM, &over.v, &over.p), values);
     }
 
-    fn outputs_over(&self, piece: &FamilyDense, part: (f64, f64), values: &mut [Dual<Enclosure>]) {
+    fn outputs_over(
+        &self,
+        piece: &family::DenseElement,
+        part: (f64, f64),
+        values: &mut [Dual<Enclosure>],
+    ) {
         let over = piece.bounds_over(M::FORM, part);
         self.observables(over.t, &over.q, second(M::FORM, &over.v, &over.p), values);
     }
@@ -902,9 +905,9 @@ impl<M: FamilyModel> Simulated<0, RunTimeLength> for M {
 }
 
 /// The reactions at a node of a model of run-time length.
-fn reactions<M: FamilyModel>(
+fn reactions<M: family::Model>(
     model: &M,
-    stepper: &mut FamilyStepper<'_, M>,
+    stepper: &mut family::Stepper<'_, M>,
     node: &Node<0, RunTimeLength>,
 ) -> Vec<f64> {
     if const { !M::CONSTRAINED } {
@@ -930,7 +933,7 @@ fn check_length(vector: &'static str, length: usize, expected: usize) -> Result<
     if length == expected {
         return Ok(());
     }
-    Err(RunErrorKind::Family(FamilyError::StateLength {
+    Err(RunErrorKind::Family(family::ModelError::StateLength {
         vector,
         length,
         expected,

@@ -9,12 +9,12 @@ use crate::motion::Motion;
 use std::convert::Infallible;
 use std::iter::{self, Once};
 use std::ops::Range;
-use tfe_runtime::family::{FamilyModel, FamilyState};
+use tfe_runtime::family::{self, FamilyState};
 
 /// What a refused run gives.
 type Refused = Result<Infallible, RunError<0, RunTimeLength>>;
 
-impl<M: FamilyModel> Simulation<'_, M, 0, RunTimeLength> {
+impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
     fn refuse(&self, call: &'static str, start: &FamilyState, span: &Range<f64>) -> Refused {
         let motion = Motion::unasked(span.start, start);
         Err(RunError::new(RunErrorKind::run_time_length(call), motion))

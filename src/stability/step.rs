@@ -9,7 +9,7 @@ use tfe_runtime::{Element, Model, State};
 #[cfg(feature = "sparse")]
 use super::arnoldi::{Dominant, DominantError, Iteration, dominant_of};
 #[cfg(feature = "sparse")]
-use tfe_runtime::family::{FamilyModel, FamilyState, FamilyTransition, FamilyTransitionError};
+use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use tfe_runtime::length::RunTimeLength;
 
@@ -57,9 +57,9 @@ impl<M: Model<N>, const N: usize> Transitions<M, N> for FixedLength {
 }
 
 #[cfg(feature = "sparse")]
-impl<M: FamilyModel> Transitions<M, 0> for RunTimeLength {
+impl<M: family::Model> Transitions<M, 0> for RunTimeLength {
     type State = FamilyState;
-    type Error = FamilyTransitionError;
+    type Error = family::OperatorError;
 
     fn matrix(
         model: &M,
@@ -67,8 +67,8 @@ impl<M: FamilyModel> Transitions<M, 0> for RunTimeLength {
         state: &FamilyState,
         t: f64,
         h: f64,
-    ) -> Result<DMatrix<f64>, FamilyTransitionError> {
-        Ok(FamilyTransition::of_step(model, element, state, t, h)?.matrix())
+    ) -> Result<DMatrix<f64>, family::OperatorError> {
+        Ok(family::TransitionOperator::of_step(model, element, state, t, h)?.matrix())
     }
 }
 
@@ -84,7 +84,7 @@ impl<M: FamilyModel> Transitions<M, 0> for RunTimeLength {
 /// # Shapes
 /// 2n numbers, ordered (p, q).
 /// # Errors
-/// [`FamilyTransitionError`] where a step is impossible or fails, and for models with constraints.
+/// [`family::OperatorError`] where a step is impossible or fails, and for models with constraints.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -103,14 +103,14 @@ impl<M: FamilyModel> Transitions<M, 0> for RunTimeLength {
 /// # }
 /// ```
 #[cfg(feature = "sparse")]
-pub fn transition<M: FamilyModel>(
+pub fn transition<M: family::Model>(
     model: &M,
     element: impl Into<Element>,
     state: &FamilyState,
     t: f64,
     h: f64,
-) -> Result<FamilyTransition, FamilyTransitionError> {
-    FamilyTransition::of_step(model, element.into(), state, t, h)
+) -> Result<family::TransitionOperator, family::OperatorError> {
+    family::TransitionOperator::of_step(model, element.into(), state, t, h)
 }
 
 /// The eigenvalue of largest modulus of a step, by [`dominant_of`]: its modulus is the spectral radius.
@@ -124,7 +124,7 @@ pub fn transition<M: FamilyModel>(
 /// [`DominantError`]
 #[cfg(feature = "sparse")]
 pub fn dominant(
-    transition: &FamilyTransition,
+    transition: &family::TransitionOperator,
     control: Iteration,
 ) -> Result<Dominant, DominantError> {
     let (size, n) = (transition.size(), transition.size() / 2);
@@ -150,7 +150,7 @@ pub fn dominant(
 
 /// A power of two by which momenta are larger than coordinates: √(|∂p/∂q| / |∂q/∂p|), on one vector each.
 #[cfg(feature = "sparse")]
-fn momentum_scale(transition: &FamilyTransition) -> f64 {
+fn momentum_scale(transition: &family::TransitionOperator) -> f64 {
     let (size, n) = (transition.size(), transition.size() / 2);
     let mut end = vec![0.0; size];
     let mut part = |from_p: bool| -> f64 {

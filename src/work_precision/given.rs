@@ -2,7 +2,7 @@
 
 use super::WorkPrecision;
 use super::reference::Source;
-use tfe_runtime::family::{FamilyModel, FamilyState};
+use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, State<N>> {
@@ -25,7 +25,7 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, State<N>> {
     }
 }
 
-impl<'m, M: FamilyModel> WorkPrecision<'m, M, FamilyState> {
+impl<'m, M: family::Model> WorkPrecision<'m, M, FamilyState> {
     /// What runs are compared with: the exact (q, p) at any time of the span, vectors as long as the model. Its uncertainty counts as one
     /// rounding, unless [`reference_uncertainty`](Self::reference_uncertainty) says more.
     ///

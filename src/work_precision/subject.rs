@@ -8,7 +8,7 @@ use crate::simulation::Simulation;
 use std::ops::Range;
 use tfe_runtime::ConstraintError;
 use tfe_runtime::constrained;
-use tfe_runtime::family::{self, FamilyModel, FamilyState, FamilyStepper};
+use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::legendre;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::{Element, Form, Model, State, Statistics, StepError};
@@ -42,7 +42,7 @@ impl PhasePoint for FamilyState {
 }
 
 /// A model with states of type `S` that [`WorkPrecision`](super::WorkPrecision) can measure: every [`Model`] with [`State`], every
-/// [`FamilyModel`] with [`FamilyState`], and nothing else.
+/// [`family::Model`] with [`FamilyState`], and nothing else.
 ///
 /// For functions that take either:
 ///
@@ -228,27 +228,27 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
     }
 }
 
-impl<M: FamilyModel> Steppable<FamilyState> for M {
+impl<M: family::Model> Steppable<FamilyState> for M {
     type Stepper<'m>
-        = FamilyStepper<'m, M>
+        = family::Stepper<'m, M>
     where
         M: 'm;
 
     type Velocity = Vec<f64>;
 
-    const CONSTRAINED: bool = <M as FamilyModel>::CONSTRAINED;
+    const CONSTRAINED: bool = <M as family::Model>::CONSTRAINED;
 
     fn stepper(
         &self,
         element: Element,
         control: Control,
-    ) -> Result<FamilyStepper<'_, M>, RunErrorKind> {
-        FamilyStepper::new(self, element, control).map_err(RunErrorKind::Family)
+    ) -> Result<family::Stepper<'_, M>, RunErrorKind> {
+        family::Stepper::new(self, element, control).map_err(RunErrorKind::Family)
     }
 
     #[inline]
     fn advance(
-        stepper: &mut FamilyStepper<'_, M>,
+        stepper: &mut family::Stepper<'_, M>,
         t: f64,
         h: f64,
         state: &mut FamilyState,
@@ -256,7 +256,7 @@ impl<M: FamilyModel> Steppable<FamilyState> for M {
         stepper.advance(t, h, state)
     }
 
-    fn statistics(stepper: &FamilyStepper<'_, M>) -> Statistics {
+    fn statistics(stepper: &family::Stepper<'_, M>) -> Statistics {
         *stepper.statistics()
     }
 
@@ -266,7 +266,7 @@ impl<M: FamilyModel> Steppable<FamilyState> for M {
 
     fn energy(
         &self,
-        stepper: &mut FamilyStepper<'_, M>,
+        stepper: &mut family::Stepper<'_, M>,
         t: f64,
         state: &FamilyState,
         velocity: &mut Vec<f64>,
@@ -295,9 +295,14 @@ impl<M: FamilyModel> Steppable<FamilyState> for M {
         Ok(columns.map(|at| self.column_name(at).to_string()).collect())
     }
 
-    fn outputs(&self, stepper: &mut FamilyStepper<'_, M>, t: f64, state: &FamilyState) -> Vec<f64> {
+    fn outputs(
+        &self,
+        stepper: &mut family::Stepper<'_, M>,
+        t: f64,
+        state: &FamilyState,
+    ) -> Vec<f64> {
         let mut values = vec![0.0; self.columns()];
-        match <M as FamilyModel>::FORM {
+        match <M as family::Model>::FORM {
             Form::Lagrangian => {
                 let velocity = stepper.velocity(t, state);
                 let velocity = velocity.unwrap_or_else(|_| vec![f64::NAN; self.len()]);

@@ -1,7 +1,7 @@
 //! Runs of families that go on where others ended.
 
 use tfe::error::RunErrorKind;
-use tfe::family::{self, FamilyError, FamilyModel, FamilyState};
+use tfe::family::{self, FamilyState};
 use tfe::prelude::*;
 
 #[dynamics(
@@ -16,7 +16,7 @@ struct Chain {
 }
 
 /// One run, and two of it that are cut anywhere: all states, velocities and energies are the same numbers.
-fn check<M: FamilyModel>(
+fn check<M: family::Model>(
     simulation: &family::Simulation<'_, M>,
     start: &FamilyState,
     (steps, h): (u32, f64),
@@ -142,7 +142,7 @@ fn checkpoints_of_other_runs() {
     }
     let refused = Simulation::new(&six).resume(checkpoint, 4.0);
     let error = refused.expect_err("another length");
-    let expected = FamilyError::StateLength {
+    let expected = family::ModelError::StateLength {
         vector: "q",
         length: 7,
         expected: 6,

@@ -4,7 +4,7 @@ use crate::common::larger;
 use tfe::error::RunErrorKind;
 use tfe::prelude::*;
 use tfe::runtime::ConstraintError;
-use tfe::{StepError, family::FamilyError};
+use tfe::{StepError, family};
 
 /// A chain of rods whose first one hangs on a support that swings, with damping and springs between next but one neighbours.
 #[dynamics(
@@ -210,11 +210,14 @@ fn what_cannot_hold_constraints_is_refused() {
         let run = Simulation::new(&model).element(element);
         assert_eq!(
             kind(run),
-            RunErrorKind::Family(FamilyError::ElementNotSupported { element })
+            RunErrorKind::Family(family::ModelError::ElementNotSupported { element })
         );
     }
     let run = Simulation::new(&model).solver(Solve::FixedPoint);
-    assert_eq!(kind(run), RunErrorKind::Family(FamilyError::NeedsNewton));
+    assert_eq!(
+        kind(run),
+        RunErrorKind::Family(family::ModelError::NeedsNewton)
+    );
 }
 
 /// A closed ring has a row for each rod and two pins: more rows than a chain, and none that follows from others.

@@ -1,7 +1,7 @@
 //! The kernels of constraints by site: against those of the same model of fixed size, their names, and what lengths must obey.
 
 use std::collections::BTreeMap;
-use tfe::family::{Block, Entries, FamilyError, FamilyModel};
+use tfe::family::{self, Block, Entries, Model as _};
 use tfe::prelude::*;
 use tfe::runtime::{ConstraintSecond, Model};
 
@@ -167,7 +167,7 @@ fn indices_of_constraints_are_checked() {
     assert_eq!(Ties { n: 4, w: 5 }.check(), Ok(()));
     assert_eq!(Ties { n: 4, w: 5 }.constraints(), 5);
     let error = Ties { n: 4, w: 3 }.check().expect_err("a missing tie");
-    let expected = FamilyError::Index {
+    let expected = family::ModelError::Index {
         array: "y",
         index: "i",
         ranges: "constraint(tie[i in 0..n])",
@@ -217,6 +217,6 @@ fn without_sparse_factorisations_there_is_no_motion() {
     let start = model.state(Q, [0.0; 6]);
     let error = Simulation::new(&model).run(start, 0.0..1.0);
     let error = error.expect_err("not supported");
-    let expected = tfe::RunErrorKind::Family(FamilyError::ConstraintsNotSupported);
+    let expected = tfe::RunErrorKind::Family(family::ModelError::ConstraintsNotSupported);
     assert_eq!(error.kind(), &expected);
 }

@@ -1,7 +1,7 @@
 //! Lengths that do not belong together, and what families cannot do yet: typed errors that name the sum and the index.
 
 use tfe::RunErrorKind;
-use tfe::family::{self, FamilyError, FamilyModel, FamilyState, momenta};
+use tfe::family::{self, FamilyState, Model as _, momenta};
 use tfe::prelude::*;
 
 #[dynamics(
@@ -26,7 +26,7 @@ fn coupled(n: usize, w: usize, m: usize, k: usize) -> Coupled {
 }
 
 #[track_caller]
-fn check(model: &Coupled, expected: FamilyError, message: &str) {
+fn check(model: &Coupled, expected: family::ModelError, message: &str) {
     assert_eq!(model.check(), Err(expected.clone()));
     assert_eq!(expected.to_string(), message);
     let (q, v) = (vec![0.0; model.n + model.w], vec![0.0; model.n + model.w]);
@@ -42,19 +42,19 @@ fn check(model: &Coupled, expected: FamilyError, message: &str) {
 fn lengths_are_checked_before_anything_else() {
     assert_eq!(coupled(3, 3, 3, 2).check(), Ok(()));
     assert_eq!(coupled(3, 5, 3, 2).check(), Ok(()));
-    let error = FamilyError::NoElements { array: "q[n]" };
+    let error = family::ModelError::NoElements { array: "q[n]" };
     check(
         &coupled(0, 3, 0, 0),
         error,
         "the array `q[n]` has no elements",
     );
-    let error = FamilyError::NoElements { array: "r[w]" };
+    let error = family::ModelError::NoElements { array: "r[w]" };
     check(
         &coupled(3, 0, 3, 2),
         error,
         "the array `r[w]` has no elements",
     );
-    let error = FamilyError::EmptyRange {
+    let error = family::ModelError::EmptyRange {
         ranges: "i in 0..n-1",
         start: 0,
         end: 0,
@@ -65,7 +65,7 @@ fn lengths_are_checked_before_anything_else() {
         "the sum over `i in 0..n-1` is empty: its range is 0..0",
     );
     let (field, index, ranges) = ("m", "i", "i in 0..n");
-    let error = FamilyError::FieldLength {
+    let error = family::ModelError::FieldLength {
         field,
         length: 4,
         expected: 3,
@@ -78,7 +78,7 @@ fn lengths_are_checked_before_anything_else() {
         "`m` has 4 elements, but `m[i]` in the sum over `i in 0..n` asks for 3",
     );
     let (field, ranges) = ("k", "i in 0..n-1");
-    let error = FamilyError::FieldLength {
+    let error = family::ModelError::FieldLength {
         field,
         length: 1,
         expected: 2,
@@ -91,7 +91,7 @@ fn lengths_are_checked_before_anything_else() {
         "`k` has 1 elements, but `k[i]` in the sum over `i in 0..n-1` asks for 2",
     );
     let (array, index, ranges) = ("r", "j", "j in 0..n");
-    let error = FamilyError::Index {
+    let error = family::ModelError::Index {
         array,
         index,
         ranges,
@@ -121,7 +121,7 @@ fn a_single_index_is_checked_too() {
 #[test]
 fn states_of_another_length_are_refused() {
     let model = coupled(3, 3, 3, 2);
-    let error = |vector, length| FamilyError::StateLength {
+    let error = |vector, length| family::ModelError::StateLength {
         vector,
         length,
         expected: 6,
@@ -252,34 +252,40 @@ fn what_families_cannot_do_yet_is_said() {
     let run = Simulation::new(&OffDiagonal { n: 3 }).run(start.clone(), 0.0..1.0);
     // Three masses in a row, each coupled to its neighbours alone: singular, too.
     let expected = if cfg!(feature = "sparse") {
-        FamilyError::NoVelocity
+        family::ModelError::NoVelocity
     } else {
-        FamilyError::MassNotDiagonal { row: 0, column: 1 }
+        family::ModelError::MassNotDiagonal { row: 0, column: 1 }
     };
     assert_eq!(kind(run), RunErrorKind::Family(expected));
     let run = Simulation::new(&Varying { n: 3 });
     if cfg!(feature = "sparse") {
         let run = run.solver(Solve::FixedPoint).run(start.clone(), 0.0..1.0);
-        assert_eq!(kind(run), RunErrorKind::Family(FamilyError::NeedsNewton));
+        assert_eq!(
+            kind(run),
+            RunErrorKind::Family(family::ModelError::NeedsNewton)
+        );
     } else {
         let run = run.run(start.clone(), 0.0..1.0);
-        assert_eq!(kind(run), RunErrorKind::Family(FamilyError::NotSecondOrder));
+        assert_eq!(
+            kind(run),
+            RunErrorKind::Family(family::ModelError::NotSecondOrder)
+        );
     }
     let run = Simulation::new(&Singular { n: 3 }).run(start.clone(), 0.0..1.0);
-    let expected = FamilyError::SingularMass { coordinate: 2 };
+    let expected = family::ModelError::SingularMass { coordinate: 2 };
     assert_eq!(kind(run), RunErrorKind::Family(expected));
     let model = coupled(3, 3, 3, 2);
     let start = model.state([0.1; 6], [0.0; 6]);
     if cfg!(not(feature = "sparse")) {
         let run = Simulation::new(&model).solver(Solve::Newton);
         let kind = kind(run.run(start.clone(), 0.0..1.0));
-        assert_eq!(kind, RunErrorKind::Family(FamilyError::NoNewton));
+        assert_eq!(kind, RunErrorKind::Family(family::ModelError::NoNewton));
     }
     if cfg!(not(feature = "sparse")) {
         let run = Simulation::new(&model).element(Primal::<3>);
         assert!(matches!(
             kind(run.run(start.clone(), 0.0..1.0)),
-            RunErrorKind::Family(FamilyError::ElementNotSupported { .. })
+            RunErrorKind::Family(family::ModelError::ElementNotSupported { .. })
         ));
     }
     let run = Simulation::new(&model)
@@ -287,6 +293,6 @@ fn what_families_cannot_do_yet_is_said() {
         .run(start, 0.0..1.0);
     assert!(matches!(
         kind(run),
-        RunErrorKind::Family(FamilyError::Element(_))
+        RunErrorKind::Family(family::ModelError::Element(_))
     ));
 }

@@ -2,7 +2,7 @@
 
 use crate::common::distance;
 use tfe::error::RunErrorKind;
-use tfe::family::{self, FamilyError};
+use tfe::family;
 use tfe::prelude::*;
 
 #[dynamics(
@@ -86,7 +86,7 @@ fn what_cannot_act_is_refused() {
         error.kind().clone()
     };
     let run = Simulation::new(&CHAIN).step(0.1);
-    let wrong = FamilyError::StateLength {
+    let wrong = family::ModelError::StateLength {
         vector: "of an impulse",
         length: 3,
         expected: 5,

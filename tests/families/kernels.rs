@@ -1,7 +1,7 @@
 //! The kernels of families: against those of the same model of fixed size, against differences, and their patterns.
 
 use tfe::Model;
-use tfe::family::{Block, Entries, FamilyModel, Gradient, Pattern};
+use tfe::family::{self, Block, Entries, Gradient, Model as _, Pattern};
 use tfe::prelude::dynamics;
 use tfe::runtime::{First, Second};
 
@@ -103,7 +103,7 @@ fn kernels_are_those_of_the_fixed_size() {
         q: &mut by_q,
         force: &mut force,
     };
-    FamilyModel::second(&long, T, &Q, &V, gradient, &mut dense);
+    family::Model::second(&long, T, &Q, &V, gradient, &mut dense);
     long.mass(T, &Q, &V, &mut mass);
     let blocks = [
         (Block::ZZ, &second.zz),
@@ -143,7 +143,7 @@ fn kernels_are_derivatives() {
         q: &mut by_q,
         force: &mut force,
     };
-    FamilyModel::second(&long, T, &Q, &V, gradient, &mut dense);
+    family::Model::second(&long, T, &Q, &V, gradient, &mut dense);
     let entry = |block, row, column| dense.0.get(&(block, row, column)).copied().unwrap_or(0.0);
     for j in 0..5 {
         let energy = |q: &[f64; 5], v: &[f64; 5]| long.energy_function(T, q, v);
@@ -206,7 +206,7 @@ fn the_pattern_of_a_chain_is_a_band() {
             q: &mut by_q,
             force: &mut [],
         };
-        FamilyModel::second(
+        family::Model::second(
             &chain,
             0.0,
             &q,
@@ -219,7 +219,7 @@ fn the_pattern_of_a_chain_is_a_band() {
             q: &mut by_q,
             force: &mut [],
         };
-        FamilyModel::second(&chain, 0.0, &q, &q, gradient, &mut dense);
+        family::Model::second(&chain, 0.0, &q, &q, gradient, &mut dense);
         for (place, value) in places.iter().zip(&values) {
             assert_eq!(dense.0.get(place), Some(value));
         }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use tfe::RunErrorKind;
-use tfe::family::{Block, Entries, FamilyError, FamilyModel, Gradient};
+use tfe::family::{self, Block, Entries, Gradient, Model as _};
 use tfe::prelude::*;
 
 #[dynamics(
@@ -161,7 +161,7 @@ fn entries_of_lists_are_checked() {
         model.check().expect_err("a mistake")
     };
     let outside = error(|model| model.right[3] = 4);
-    let expected = FamilyError::ListEntry {
+    let expected = family::ModelError::ListEntry {
         list: "right",
         place: 3,
         entry: 4,
@@ -174,7 +174,7 @@ fn entries_of_lists_are_checked() {
     let message = "`right[3]` is 4, which takes the index of `q[right[b]]` in the sum over `b in 0..bonds` outside of `q`, which has 4 elements";
     assert_eq!(outside.to_string(), message);
     let huge = error(|model| model.left[0] = usize::MAX);
-    let expected = FamilyError::ListEntry {
+    let expected = family::ModelError::ListEntry {
         list: "left",
         place: 0,
         entry: usize::MAX,
@@ -200,7 +200,7 @@ fn entries_of_lists_are_checked() {
     let kind = run.expect_err("a mistake").kind().clone();
     assert!(matches!(
         kind,
-        RunErrorKind::Family(FamilyError::ListEntry {
+        RunErrorKind::Family(family::ModelError::ListEntry {
             place: 5,
             entry: 9,
             ..

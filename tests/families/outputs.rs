@@ -1,6 +1,6 @@
 //! Outputs by site: one column each, and a method that gives them all.
 
-use tfe::family::{FamilyError, FamilyModel};
+use tfe::family;
 use tfe::prelude::*;
 
 #[dynamics(
@@ -101,7 +101,7 @@ fn lengths_of_outputs_are_checked() {
         ..chain()
     };
     let error = short.strain(0.0, &Q[..2], &V[..2]).expect_err("no site");
-    let expected = FamilyError::EmptyRange {
+    let expected = family::ModelError::EmptyRange {
         ranges: "output(power[site in 1..n-1])",
         start: 1,
         end: 1,
@@ -112,7 +112,7 @@ fn lengths_of_outputs_are_checked() {
     let error = chain().strain(0.0, &Q[..3], &V).expect_err("a short q");
     assert!(matches!(
         error,
-        FamilyError::StateLength { vector: "q", .. }
+        family::ModelError::StateLength { vector: "q", .. }
     ));
     // Lengths that no memory holds are refused before anything is counted.
     let huge = Chain {
@@ -137,7 +137,7 @@ fn outputs_may_be_called_like_parts_of_the_kernel() {
         n: usize,
     }
     let named = Named { n: 3 };
-    assert_eq!(FamilyModel::columns(&named), 4);
+    assert_eq!(family::Model::columns(&named), 4);
     let found = Named::columns(&named, 0.0, &Q[..3], &V[..3]);
     assert_eq!(found, Ok(Q[..3].to_vec()));
     let found = Named::constraints(&named, 0.0, &Q[..3], &V[..3]);

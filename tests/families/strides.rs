@@ -1,7 +1,7 @@
 //! Kernels that say how far they have come: nothing below that is read or written again, and the forces are those of the kernel at once.
 
 use tfe::dynamics;
-use tfe::family::{FamilyModel, Gradient, STRIDE, Sweep};
+use tfe::family::{self, Gradient, Model as _, STRIDE, Sweep};
 
 #[dynamics(
     coordinates(q[n]),
@@ -58,7 +58,7 @@ impl Sweep<f64> for Spoiler {
 
 /// How often the kernel says something.
 #[track_caller]
-fn words<M: FamilyModel>(model: &M) -> usize {
+fn words<M: family::Model>(model: &M) -> usize {
     let n = model.len();
     let q: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).sin()).collect();
     let z: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).cos()).collect();

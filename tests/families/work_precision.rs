@@ -4,7 +4,7 @@ mod constrained;
 
 use std::time::Duration;
 use tfe::RunErrorKind;
-use tfe::family::{FamilyError, FamilyState};
+use tfe::family::{self, FamilyState};
 use tfe::prelude::*;
 use tfe::work_precision::{
     Measurements, PeerRun, PhasePoint, Reference, Subject, WorkPrecisionError,
@@ -298,7 +298,7 @@ fn starts_and_models_that_do_not_fit_are_errors() {
         }
     };
     let length = |vector, length, expected| {
-        RunErrorKind::Family(FamilyError::StateLength {
+        RunErrorKind::Family(family::ModelError::StateLength {
             vector,
             length,
             expected,
@@ -313,7 +313,7 @@ fn starts_and_models_that_do_not_fit_are_errors() {
     );
     assert!(matches!(
         error(&Toda { n: 1 }, &[0.0], &[0.0]),
-        RunErrorKind::Family(FamilyError::EmptyRange { .. })
+        RunErrorKind::Family(family::ModelError::EmptyRange { .. })
     ));
     let lost = error(&toda, &[0.0, 0.0, f64::NAN, 0.0, 0.0], &[0.0; 5]);
     assert!(matches!(lost, RunErrorKind::Start { coordinate: 2, .. }));
@@ -330,7 +330,8 @@ fn what_a_family_cannot_run_is_a_failed_point() {
     };
     assert_eq!((failed.failed(), good.failed()), (2, 0));
     for point in failed.points() {
-        let expected = RunErrorKind::Family(FamilyError::ElementNotSupported { element: unfit });
+        let expected =
+            RunErrorKind::Family(family::ModelError::ElementNotSupported { element: unfit });
         assert_eq!(point.outcome, Err(expected));
     }
     let csv = measured.to_csv();
@@ -347,7 +348,7 @@ fn what_a_family_cannot_run_is_a_failed_point() {
         let measured = measure(problem.solver(Solve::Newton).solver(Solve::FixedPoint));
         let failed = |k: usize| measured.curves()[k].failed();
         assert_eq!((failed(0), failed(1)), (2, 0));
-        let kind = RunErrorKind::Family(FamilyError::NoNewton);
+        let kind = RunErrorKind::Family(family::ModelError::NoNewton);
         assert_eq!(measured.points().next().unwrap().outcome, Err(kind));
     }
 }

@@ -1,16 +1,13 @@
 //! The derivative of a step of a family.
 
 use crate::largest::larger;
-use tfe::family::{
-    Block, Declared, Entries, FamilyError, FamilyModel, FamilyState, FamilyStepper, Gradient,
-    RunTimeLength,
-};
+use tfe::family::{self, Block, Declared, Entries, FamilyState, Gradient, RunTimeLength};
 use tfe::prelude::*;
 use tfe::runtime::step::Control;
 use tfe::runtime::{CoordinateName, Facts, Form, Real};
 use tfe::stability::{
-    DominantError, FamilyTransitionError, Iteration, dominant, spectral_radius,
-    symplecticity_defect, transition, transition_matrix,
+    DominantError, Iteration, OperatorError, dominant, spectral_radius, symplecticity_defect,
+    transition, transition_matrix,
 };
 
 /// Springs with a cubic part, velocities in forces, a potential that mixes velocities and coordinates, masses of their own.
@@ -124,7 +121,7 @@ fn matrices_are_those_of_fixed_size() {
 }
 
 /// The end of one step from a state shifted by `shift` times the direction `k`.
-fn end<M: FamilyModel>(
+fn end<M: family::Model>(
     model: &M,
     element: Element,
     state: &FamilyState,
@@ -139,7 +136,7 @@ fn end<M: FamilyModel>(
         _ => {}
     }
     let h = if k < 2 * n { h } else { h + shift };
-    let mut stepper = FamilyStepper::new(model, element, Control::default()).expect("a stepper");
+    let mut stepper = family::Stepper::new(model, element, Control::default()).expect("a stepper");
     stepper.advance(t, h, &mut state).expect("a step");
     [state.p, state.q].concat()
 }
@@ -167,7 +164,7 @@ fn operators_are_derivatives_of_the_step() {
 }
 
 #[track_caller]
-fn check_derivatives<M: FamilyModel>(model: &M, start: &FamilyState, element: Element) {
+fn check_derivatives<M: family::Model>(model: &M, start: &FamilyState, element: Element) {
     let leg = (0.4, 0.2);
     let operator = transition(model, element, start, leg.0, leg.1).expect("an operator");
     let matrix = operator.matrix();
@@ -301,7 +298,7 @@ impl Declared<0> for Bound {
     type Length = RunTimeLength;
 }
 
-impl FamilyModel for Bound {
+impl family::Model for Bound {
     const FORM: Form = Form::Lagrangian;
     const FACTS: Facts = Facts::UNKNOWN;
     const MOMENTA_MOVE: bool = false;
@@ -311,7 +308,7 @@ impl FamilyModel for Bound {
         1
     }
 
-    fn check(&self) -> Result<(), FamilyError> {
+    fn check(&self) -> Result<(), family::ModelError> {
         Ok(())
     }
 
@@ -357,26 +354,26 @@ fn what_is_impossible_is_told() {
         p: vec![0.0; 5],
     };
     let error = transition(&web, Mixed::<4>, &short, 0.0, 0.1).expect_err("three of five");
-    assert!(matches!(error, FamilyTransitionError::Family(_)), "{error}");
+    assert!(matches!(error, OperatorError::Family(_)), "{error}");
     for h in [0.0, f64::NAN] {
         let error = transition(&web, Mixed::<4>, &start, 0.0, h).expect_err("no step");
-        assert!(matches!(error, FamilyTransitionError::Step(_)), "{error}");
+        assert!(matches!(error, OperatorError::Step(_)), "{error}");
     }
     let operator = transition(&web, Mixed::<4>, &start, 0.0, 0.1).expect("an operator");
     let error = operator.apply(&[0.0; 9], &mut [0.0; 10]).expect_err("nine");
     let (needed, given) = (10, 9);
-    assert_eq!(error, FamilyTransitionError::Shape { needed, given });
+    assert_eq!(error, OperatorError::Shape { needed, given });
     let chain = ByMomenta {
         n: 5,
         m: MASSES.to_vec(),
         c: 0.0,
     };
     let error = transition(&chain, Primal::<3>, &chain.state(Q, V), 0.0, 0.1).expect_err("phase");
-    assert!(matches!(error, FamilyTransitionError::Family(_)), "{error}");
+    assert!(matches!(error, OperatorError::Family(_)), "{error}");
     let state = FamilyState {
         q: vec![0.0],
         p: vec![1.0],
     };
     let error = transition(&Bound, Mixed::<4>, &state, 0.0, 0.1).expect_err("constraints");
-    assert_eq!(error, FamilyTransitionError::Constrained);
+    assert_eq!(error, OperatorError::Constrained);
 }

@@ -1,7 +1,7 @@
 //! Models of run-time length: what a generated family gives the runtime, and how it steps.
 //!
 //! A family is a model whose number of coordinates is a field of its struct. Its kernels are loops over slices, compiled once for all lengths;
-//! second derivatives are told entry by entry, so that nobody holds a matrix of zeros. [`FamilyStepper`] moves a [`FamilyState`] with all points
+//! second derivatives are told entry by entry, so that nobody holds a matrix of zeros. [`Stepper`] moves a [`FamilyState`] with all points
 //! of an element four to a register, as the stepper of fixed-size models does, in time and memory linear in the length; with the feature `sparse` it solves
 //! other kinetic energies and constraints with one sparse matrix for the rates at all points.
 
@@ -39,13 +39,13 @@ mod transition;
 #[cfg(feature = "sparse")]
 mod view;
 
-pub use dense::FamilyDense;
-pub use error::FamilyError;
-pub use model::{Block, Entries, FamilyModel, FamilyState, Gradient, STRIDE, Sweep};
+pub use dense::DenseElement;
+pub use error::ModelError;
+pub use model::{Block, Entries, FamilyState, Gradient, Model, STRIDE, Sweep};
 pub use pattern::{Pattern, Values};
-pub use stepper::{FamilyStepper, FamilySuspended};
+pub use stepper::{Stepper, Suspended};
 #[cfg(feature = "sparse")]
-pub use transition::{FamilyTransition, FamilyTransitionError};
+pub use transition::{OperatorError, TransitionOperator};
 
 use crate::legendre::largest;
 use crate::model::Form;
@@ -57,7 +57,7 @@ use model::slope;
 /// The state of coordinates and velocities at time `t`.
 ///
 /// Where there is none the velocities stand for the momenta: a run from there says what [`momenta`] would say.
-pub fn state<M: FamilyModel>(model: &M, t: f64, q: Vec<f64>, v: Vec<f64>) -> FamilyState {
+pub fn state<M: Model>(model: &M, t: f64, q: Vec<f64>, v: Vec<f64>) -> FamilyState {
     match momenta(model, t, &q, &v) {
         Ok(p) => FamilyState { q, p },
         Err(_) => FamilyState { q, p: v },
@@ -67,18 +67,13 @@ pub fn state<M: FamilyModel>(model: &M, t: f64, q: Vec<f64>, v: Vec<f64>) -> Fam
 /// The momenta of coordinates and velocities at time `t`.
 ///
 /// # Errors
-/// [`FamilyError`] where the model does not fit together, a vector has another length, or no momentum belongs to the velocities.
-pub fn momenta<M: FamilyModel>(
-    model: &M,
-    t: f64,
-    q: &[f64],
-    v: &[f64],
-) -> Result<Vec<f64>, FamilyError> {
+/// [`ModelError`] where the model does not fit together, a vector has another length, or no momentum belongs to the velocities.
+pub fn momenta<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Result<Vec<f64>, ModelError> {
     model.check()?;
     let expected = model.len();
     for (vector, length) in [("q", q.len()), ("v", v.len())] {
         if length != expected {
-            return Err(FamilyError::StateLength {
+            return Err(ModelError::StateLength {
                 vector,
                 length,
                 expected,
@@ -94,40 +89,36 @@ pub fn momenta<M: FamilyModel>(
 /// The velocities dq/dt at a state.
 ///
 /// # Errors
-/// [`FamilyError::MassNotDiagonal`], [`FamilyError::SingularMass`] of a Lagrangian.
-pub fn velocity<M: FamilyModel>(
-    model: &M,
-    t: f64,
-    state: &FamilyState,
-) -> Result<Vec<f64>, FamilyError> {
+/// [`ModelError::MassNotDiagonal`], [`ModelError::SingularMass`] of a Lagrangian.
+pub fn velocity<M: Model>(model: &M, t: f64, state: &FamilyState) -> Result<Vec<f64>, ModelError> {
     Legendre::default().velocity(model, t, state)
 }
 
 /// The velocities that constraints leave of a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, [`velocity`].
 ///
 /// # Errors
-/// [`FamilyError::NoVelocity`] where there are none, [`FamilyError::ConstraintsNotSupported`] without the feature `sparse`.
-pub fn allowed_velocity<M: FamilyModel>(
+/// [`ModelError::NoVelocity`] where there are none, [`ModelError::ConstraintsNotSupported`] without the feature `sparse`.
+pub fn allowed_velocity<M: Model>(
     model: &M,
     t: f64,
     state: &FamilyState,
-) -> Result<Vec<f64>, FamilyError> {
+) -> Result<Vec<f64>, ModelError> {
     if !M::CONSTRAINED {
         return velocity(model, t, state);
     }
     #[cfg(feature = "sparse")]
     return match instant::Instant::new(model) {
         Some(mut instant) => instant.velocity(model, t, state),
-        None => Err(FamilyError::TooLarge),
+        None => Err(ModelError::TooLarge),
     };
     #[cfg(not(feature = "sparse"))]
-    Err(FamilyError::ConstraintsNotSupported)
+    Err(ModelError::ConstraintsNotSupported)
 }
 
 /// The reactions λ of the constraints at a state with its velocities, one for each row; the forces on the coordinates are Aᵀλ (T-77). None where there are none to be had: rows that depend on
 /// each other, a kinetic energy that is singular for motions that the constraints allow, and always without the feature `sparse`.
 #[must_use]
-pub fn reactions<M: FamilyModel>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Option<Vec<f64>> {
+pub fn reactions<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Option<Vec<f64>> {
     #[cfg(feature = "sparse")]
     return instant::Instant::new(model)?
         .reactions(model, (t, q), v)
@@ -141,7 +132,7 @@ pub fn reactions<M: FamilyModel>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Opt
 
 /// The energy H = p·v − L, or H itself, at a state with its velocities.
 #[must_use]
-pub fn energy<M: FamilyModel>(model: &M, t: f64, state: &FamilyState, v: &[f64]) -> f64 {
+pub fn energy<M: Model>(model: &M, t: f64, state: &FamilyState, v: &[f64]) -> f64 {
     match M::FORM {
         Form::Lagrangian => {
             let work: f64 = state.p.iter().zip(v).map(|(p, v)| p * v).sum();
@@ -153,7 +144,7 @@ pub fn energy<M: FamilyModel>(model: &M, t: f64, state: &FamilyState, v: &[f64])
 
 /// The largest |φ| and the largest |A v + a| over the constraints; zeros where there are none.
 #[must_use]
-pub fn constraint_residual<M: FamilyModel>(model: &M, t: f64, q: &[f64], v: &[f64]) -> (f64, f64) {
+pub fn constraint_residual<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> (f64, f64) {
     struct Rates<'a> {
         v: &'a [f64],
         rates: Vec<f64>,
@@ -178,15 +169,15 @@ pub fn constraint_residual<M: FamilyModel>(model: &M, t: f64, q: &[f64], v: &[f6
 /// One of the observables.
 ///
 /// # Errors
-/// [`FamilyError`] where the model does not fit together or a vector has another length.
+/// [`ModelError`] where the model does not fit together or a vector has another length.
 #[doc(hidden)]
-pub fn observable<M: FamilyModel>(
+pub fn observable<M: Model>(
     model: &M,
     t: f64,
     q: &[f64],
     z: &[f64],
     number: usize,
-) -> Result<f64, FamilyError> {
+) -> Result<f64, ModelError> {
     let values = observables(model, t, q, z, || (number, 1))?;
     Ok(values.first().copied().unwrap_or(f64::NAN))
 }
@@ -194,15 +185,15 @@ pub fn observable<M: FamilyModel>(
 /// Some observables in a row: `place` says from which one on and how many, once lengths are known to fit.
 ///
 /// # Errors
-/// [`FamilyError`] where the model does not fit together or a vector has another length.
+/// [`ModelError`] where the model does not fit together or a vector has another length.
 #[doc(hidden)]
-pub fn observables<M: FamilyModel>(
+pub fn observables<M: Model>(
     model: &M,
     t: f64,
     q: &[f64],
     z: &[f64],
     place: impl Fn() -> (usize, usize),
-) -> Result<Vec<f64>, FamilyError> {
+) -> Result<Vec<f64>, ModelError> {
     model.check()?;
     let second = match M::FORM {
         Form::Lagrangian => "v",
@@ -211,7 +202,7 @@ pub fn observables<M: FamilyModel>(
     let expected = model.len();
     for (vector, length) in [("q", q.len()), (second, z.len())] {
         if length != expected {
-            return Err(FamilyError::StateLength {
+            return Err(ModelError::StateLength {
                 vector,
                 length,
                 expected,
@@ -227,15 +218,15 @@ pub fn observables<M: FamilyModel>(
 /// What generated code checks.
 #[doc(hidden)]
 pub mod checks {
-    use super::FamilyError;
+    use super::ModelError;
 
     /// A coordinate array has elements.
     ///
     /// # Errors
-    /// [`FamilyError::NoElements`].
-    pub fn elements(array: &'static str, length: usize) -> Result<(), FamilyError> {
+    /// [`ModelError::NoElements`].
+    pub fn elements(array: &'static str, length: usize) -> Result<(), ModelError> {
         if length == 0 {
-            return Err(FamilyError::NoElements { array });
+            return Err(ModelError::NoElements { array });
         }
         Ok(())
     }
@@ -243,10 +234,10 @@ pub mod checks {
     /// A range has turns.
     ///
     /// # Errors
-    /// [`FamilyError::EmptyRange`].
-    pub fn turns(ranges: &'static str, start: i64, end: i64) -> Result<(), FamilyError> {
+    /// [`ModelError::EmptyRange`].
+    pub fn turns(ranges: &'static str, start: i64, end: i64) -> Result<(), ModelError> {
         if start >= end {
-            return Err(FamilyError::EmptyRange { ranges, start, end });
+            return Err(ModelError::EmptyRange { ranges, start, end });
         }
         Ok(())
     }
@@ -254,16 +245,16 @@ pub mod checks {
     /// An index stays inside its array.
     ///
     /// # Errors
-    /// [`FamilyError::Index`].
+    /// [`ModelError::Index`].
     pub fn index(
         (array, index, ranges): (&'static str, &'static str, &'static str),
         value: i64,
         length: usize,
-    ) -> Result<(), FamilyError> {
+    ) -> Result<(), ModelError> {
         if usize::try_from(value).is_ok_and(|value| value < length) {
             return Ok(());
         }
-        Err(FamilyError::Index {
+        Err(ModelError::Index {
             array,
             index,
             ranges,
@@ -275,17 +266,17 @@ pub mod checks {
     /// An index made of an entry of a list (its name, the list, the place) stays inside its array.
     ///
     /// # Errors
-    /// [`FamilyError::ListEntry`].
+    /// [`ModelError::ListEntry`].
     pub fn entry(
         (array, index, ranges): (&'static str, &'static str, &'static str),
         (list, entries, place): (&'static str, &[usize], usize),
         value: i64,
         length: usize,
-    ) -> Result<(), FamilyError> {
+    ) -> Result<(), ModelError> {
         if usize::try_from(value).is_ok_and(|value| value < length) {
             return Ok(());
         }
-        Err(FamilyError::ListEntry {
+        Err(ModelError::ListEntry {
             list,
             place,
             entry: entries.get(place).copied().unwrap_or(usize::MAX),
@@ -306,15 +297,15 @@ pub mod checks {
     /// An array field is as long as the largest of its indices asks for: (length, index, ranges) of each.
     ///
     /// # Errors
-    /// [`FamilyError::FieldLength`].
+    /// [`ModelError::FieldLength`].
     pub fn field_length(
         field: &'static str,
         length: usize,
         uses: &[(i64, &'static str, &'static str)],
-    ) -> Result<(), FamilyError> {
+    ) -> Result<(), ModelError> {
         match uses.iter().max_by_key(|(expected, ..)| *expected) {
             Some((expected, index, ranges)) if usize::try_from(*expected) != Ok(length) => {
-                Err(FamilyError::FieldLength {
+                Err(ModelError::FieldLength {
                     field,
                     length,
                     expected: *expected,

@@ -6,7 +6,7 @@ use crate::model::Model;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FixedLength;
 
-/// The number of coordinates is a field of the model: `family::FamilyModel`.
+/// The number of coordinates is a field of the model: `family::Model`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RunTimeLength;
 

@@ -6,16 +6,16 @@ use crate::motion::{Motion, Node};
 use crate::periodic::kind::{Chained, Closed};
 use nalgebra::DMatrix;
 use tfe_runtime::Statistics;
-use tfe_runtime::family::{FamilyModel, FamilyState, FamilyTransition};
+use tfe_runtime::family::{self, FamilyState};
 
-impl<M: FamilyModel> Closed<M, 0> for RunTimeLength {
+impl<M: family::Model> Closed<M, 0> for RunTimeLength {
     type Solution<'m>
         = Shooting<'m, M>
     where
         M: 'm;
 }
 
-impl<M: FamilyModel> Chained<0, RunTimeLength> for Shooting<'_, M> {
+impl<M: family::Model> Chained<0, RunTimeLength> for Shooting<'_, M> {
     fn period(&self) -> f64 {
         self.period
     }
@@ -61,7 +61,7 @@ impl<M: FamilyModel> Chained<0, RunTimeLength> for Shooting<'_, M> {
         let steps = places.iter().zip(&self.nodes);
         let steps = steps.map(|((t, h), node)| (*t, *h, node));
         let mut e = 0;
-        let each = |transition: FamilyTransition| {
+        let each = |transition: family::TransitionOperator| {
             let dense = transition.into_dense();
             e += 1;
             let (end, node) = (dense.end(), &self.nodes[e]);
@@ -69,7 +69,13 @@ impl<M: FamilyModel> Chained<0, RunTimeLength> for Shooting<'_, M> {
             motion.keep_element(dense);
         };
         // These steps have been done before: they cannot fail now, and a motion that ends early would show it.
-        let _ = FamilyTransition::of_steps(self.model, self.element, self.unfolding, steps, each);
+        let _ = family::TransitionOperator::of_steps(
+            self.model,
+            self.element,
+            self.unfolding,
+            steps,
+            each,
+        );
         motion
     }
 }

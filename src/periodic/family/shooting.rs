@@ -5,9 +5,7 @@ use super::super::phase::Phase;
 use super::super::problem::Global;
 use crate::assembly::{AssemblyError, Chain, Control, Convergence, Mesh};
 use nalgebra::DMatrix;
-use tfe_runtime::family::{
-    self, FamilyModel, FamilyState, FamilyTransition, FamilyTransitionError, Gradient,
-};
+use tfe_runtime::family::{self, FamilyState, Gradient};
 use tfe_runtime::{Element, Form, Statistics};
 
 /// The chain of elements over one period, closed by periodicity, and its iterate.
@@ -27,7 +25,7 @@ pub struct Shooting<'m, M> {
     pub(super) statistics: Statistics,
 }
 
-impl<'m, M: FamilyModel> Shooting<'m, M> {
+impl<'m, M: family::Model> Shooting<'m, M> {
     /// A forced orbit through the nodes of a guess.
     pub(super) fn new(
         model: &'m M,
@@ -130,7 +128,7 @@ impl<'m, M: FamilyModel> Shooting<'m, M> {
             .collect();
         let steps = places.iter().zip(&self.nodes);
         let steps = steps.map(|((t, h), node)| (*t, *h, node));
-        let each = |transition: FamilyTransition| {
+        let each = |transition: family::TransitionOperator| {
             let e = transitions.len();
             let matrix = transition.matrix();
             let link = chain.link_mut(e);
@@ -151,10 +149,15 @@ impl<'m, M: FamilyModel> Shooting<'m, M> {
             }
             transitions.push(matrix);
         };
-        let stepped =
-            FamilyTransition::of_steps(self.model, self.element, self.unfolding, steps, each);
+        let stepped = family::TransitionOperator::of_steps(
+            self.model,
+            self.element,
+            self.unfolding,
+            steps,
+            each,
+        );
         stepped.map_err(|(element, error)| match error {
-            FamilyTransitionError::Step(source) => AssemblyError::Linearise {
+            family::OperatorError::Step(source) => AssemblyError::Linearise {
                 element,
                 time: places.get(element).map_or(f64::NAN, |(t, _)| *t),
                 source,

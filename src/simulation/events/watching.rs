@@ -10,7 +10,7 @@ use crate::simulation::kind::{Chosen, Simulated};
 use std::fmt;
 use std::sync::Arc;
 use tfe_runtime::Model;
-use tfe_runtime::family::FamilyModel;
+use tfe_runtime::family;
 
 /// What runs are asked to look for.
 pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
@@ -112,7 +112,7 @@ where
     const REMODEL: Option<Remodel<'m, M, N, FixedLength>> = Some(remodel);
 }
 
-impl<'m, M: FamilyModel + 'm> Settable<'m, 0, RunTimeLength> for M {
+impl<'m, M: family::Model + 'm> Settable<'m, 0, RunTimeLength> for M {
     const REMODEL: Option<Remodel<'m, M, 0, RunTimeLength>> = None;
 }
 

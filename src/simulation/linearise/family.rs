@@ -7,10 +7,10 @@ use crate::length::RunTimeLength;
 use crate::linearised::Linearised;
 use std::convert::identity;
 use std::ops::Range;
-use tfe_runtime::family::{FamilyModel, FamilyState, FamilyStepper};
+use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::transition::TransitionError;
 
-impl<'m, M: FamilyModel> Simulation<'m, M, 0, RunTimeLength> {
+impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion: 2n × 2n, ordered (p, q).
     ///
     /// Elements are solved once more for their matrices, which are dense: 4n² numbers an element, and 2n solutions with sparse factors.
@@ -57,19 +57,19 @@ impl<'m, M: FamilyModel> Simulation<'m, M, 0, RunTimeLength> {
         motion: crate::Motion<0, RunTimeLength>,
         elements: &[(f64, f64, FamilyState)],
     ) -> Result<Linearised<0, RunTimeLength>, RunError<0, RunTimeLength>> {
-        use tfe_runtime::family::{FamilyTransition, FamilyTransitionError};
+        use tfe_runtime::family;
         let mut transitions = Vec::with_capacity(elements.len());
         let steps = elements.iter().map(|(t, h, before)| (*t, *h, before));
-        let each = |transition: FamilyTransition| transitions.push(transition.matrix());
+        let each = |transition: family::TransitionOperator| transitions.push(transition.matrix());
         let element = self.chosen_element();
-        let found = FamilyTransition::of_steps(self.model, element, 0.0, steps, each);
+        let found = family::TransitionOperator::of_steps(self.model, element, 0.0, steps, each);
         let Err((number, error)) = found else {
             return Ok(Linearised::free(motion, transitions));
         };
         let (time, step, _) = elements[number];
         let kind = match error {
-            FamilyTransitionError::Family(error) => RunErrorKind::Family(error),
-            FamilyTransitionError::Step(source) => RunErrorKind::Solve {
+            family::OperatorError::Family(error) => RunErrorKind::Family(error),
+            family::OperatorError::Step(source) => RunErrorKind::Solve {
                 element: number,
                 time,
                 step,
@@ -87,10 +87,10 @@ struct Elements {
     passed: Vec<(f64, f64, FamilyState)>,
 }
 
-impl<'m, M: FamilyModel + 'm> Follow<'m, M, 0, RunTimeLength> for Elements {
+impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Elements {
     fn passed(
         &mut self,
-        _: &mut FamilyStepper<'m, M>,
+        _: &mut family::Stepper<'m, M>,
         passed: &Passed<'_, 0, RunTimeLength>,
     ) -> Result<(), TransitionError> {
         let element = (passed.start, passed.h, passed.before.clone());

@@ -89,6 +89,6 @@ fn constraints_need_the_feature_sparse() {
     };
     let problem = WorkPrecision::new(&rods, hanging(&rods), 0.0..0.5).element(Mixed::<3>);
     let error = problem.steps([0.05]).run().unwrap_err();
-    let kind = RunErrorKind::Family(tfe::family::FamilyError::ConstraintsNotSupported);
+    let kind = RunErrorKind::Family(tfe::family::ModelError::ConstraintsNotSupported);
     assert_eq!(error, WorkPrecisionError::Start(kind));
 }

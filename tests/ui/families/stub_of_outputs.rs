@@ -10,7 +10,7 @@ use tfe::prelude::*;
 )]
 struct Chain { n: usize, k: f64 }
 
-fn main() -> Result<(), tfe::family::FamilyError> {
+fn main() -> Result<(), tfe::family::ModelError> {
     let chain = Chain { n: 3, k: 1.0 };
     let strain: Vec<f64> = chain.strain(0.0, &[0.0; 3], &[0.0; 3])?;
     let first: f64 = chain.first(0.0, &[0.0; 3], &[0.0; 3])?;

@@ -15,7 +15,7 @@ use alloc::vec::Vec;
 ///
 /// Coordinates and momenta are polynomials that begin and end at the states of the nodes. 2 s n numbers for s stages and n coordinates.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FamilyDense {
+pub struct DenseElement {
     times: (f64, f64),
     start: FamilyState,
     end: FamilyState,
@@ -36,7 +36,7 @@ enum Momenta {
     Values(Vec<f64>),
 }
 
-impl FamilyDense {
+impl DenseElement {
     /// Nothing happens.
     pub(super) fn constant(times: (f64, f64), state: FamilyState) -> Self {
         Self {

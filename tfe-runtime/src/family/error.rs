@@ -6,7 +6,7 @@ use core::fmt;
 /// Lengths that do not belong together, and what families cannot do yet.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum FamilyError {
+pub enum ModelError {
     /// A coordinate array without elements.
     NoElements {
         /// The array as declared, `q[n]`.
@@ -114,7 +114,7 @@ fn sum_over(ranges: &str) -> &'static str {
     }
 }
 
-impl fmt::Display for FamilyError {
+impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoElements { array } => write!(f, "the array `{array}` has no elements"),
@@ -208,7 +208,7 @@ impl fmt::Display for FamilyError {
     }
 }
 
-impl core::error::Error for FamilyError {
+impl core::error::Error for ModelError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
             Self::Element(error) => Some(error),

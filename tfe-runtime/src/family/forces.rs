@@ -1,9 +1,9 @@
 //! Steps of families whose forces are the unknowns: M q̈ = f(q, q̇, t) with a constant diagonal M.
 
-use super::dense::FamilyDense;
-use super::error::FamilyError;
+use super::dense::DenseElement;
+use super::error::ModelError;
 use super::inertia::Inertia;
-use super::model::{FamilyModel, FamilyState};
+use super::model::{FamilyState, Model};
 #[cfg(feature = "sparse")]
 use super::newton::Tangent;
 use super::registers::{Outcome, Registers};
@@ -63,18 +63,18 @@ impl<M> Forces<M> {
     }
 }
 
-impl<'m, M: FamilyModel> Forces<&'m M> {
+impl<'m, M: Model> Forces<&'m M> {
     /// A stepper at rest; the model has been checked.
     ///
     /// # Errors
-    /// [`FamilyError`]: a kinetic energy that is not ½ Σ m v², Newton's method without the feature for it.
+    /// [`ModelError`]: a kinetic energy that is not ½ Σ m v², Newton's method without the feature for it.
     pub(super) fn new(
         model: &'m M,
         table: SchemeTable,
         control: Control,
-    ) -> Result<Self, FamilyError> {
+    ) -> Result<Self, ModelError> {
         if control.solve == Solve::Newton && !cfg!(feature = "sparse") {
-            return Err(FamilyError::NoNewton);
+            return Err(ModelError::NoNewton);
         }
         let n = model.len();
         let problem = Problem {
@@ -110,7 +110,7 @@ impl<'m, M: FamilyModel> Forces<&'m M> {
         self.last.is_some() && self.end == *state
     }
 
-    /// As [`FamilyStepper::advance`](super::FamilyStepper::advance), for a state that is finite and as long as the model; `continues` where the last
+    /// As [`Stepper::advance`](super::Stepper::advance), for a state that is finite and as long as the model; `continues` where the last
     /// step ended there.
     pub(super) fn advance(
         &mut self,
@@ -318,9 +318,9 @@ impl<'m, M: FamilyModel> Forces<&'m M> {
     }
 
     /// The polynomial of the last step.
-    pub(super) fn dense(&self, start: f64, end: f64) -> FamilyDense {
+    pub(super) fn dense(&self, start: f64, end: f64) -> DenseElement {
         let Some((_, h)) = self.last else {
-            return FamilyDense::constant((start, end), self.start.clone());
+            return DenseElement::constant((start, end), self.start.clone());
         };
         let scheme = self.table.view();
         let points = scheme.points();
@@ -332,6 +332,6 @@ impl<'m, M: FamilyModel> Forces<&'m M> {
             self.problem.velocity[a] + h * self.problem.inertia.inverse[a] * integral
         };
         let ends = (self.start.clone(), self.end.clone());
-        FamilyDense::of(&scheme, (start, end), h, ends, &rate, &force)
+        DenseElement::of(&scheme, (start, end), h, ends, &rate, &force)
     }
 }

@@ -1,7 +1,7 @@
 //! Mass matrices of families.
 
-use super::error::FamilyError;
-use super::model::{Block, Entries, FamilyModel, FamilyState, slope};
+use super::error::ModelError;
+use super::model::{Block, Entries, FamilyState, Model, slope};
 #[cfg(feature = "sparse")]
 use super::{node::Node, rows::Rows};
 use crate::double_double::DoubleDouble;
@@ -22,15 +22,15 @@ pub(super) struct Inertia {
 
 impl Inertia {
     /// The masses of a model whose equations are M q̈ = f.
-    pub(super) fn of<M: FamilyModel>(model: &M) -> Result<Self, FamilyError> {
+    pub(super) fn of<M: Model>(model: &M) -> Result<Self, ModelError> {
         let facts = M::FACTS;
         if !(facts.constant_mass && facts.separable) || M::MOMENTA_MOVE {
-            return Err(FamilyError::NotSecondOrder);
+            return Err(ModelError::NotSecondOrder);
         }
         let zero = vec![0.0; model.len()];
         // Momenta have to be multiples of velocities.
         if slope(model, 0.0, &zero, &zero).iter().any(|p| *p != 0.0) {
-            return Err(FamilyError::NotSecondOrder);
+            return Err(ModelError::NotSecondOrder);
         }
         let second = diagonal(model, 0.0, &zero, &zero)?;
         let over = |x: f64| DoubleDouble::ONE.over(DoubleDouble::new(x));
@@ -61,12 +61,12 @@ pub(super) struct Legendre {
 
 impl Legendre {
     /// The velocity at a state.
-    pub(super) fn velocity<M: FamilyModel>(
+    pub(super) fn velocity<M: Model>(
         &mut self,
         model: &M,
         t: f64,
         state: &FamilyState,
-    ) -> Result<Vec<f64>, FamilyError> {
+    ) -> Result<Vec<f64>, ModelError> {
         match M::FORM {
             Form::Lagrangian => self.other(model, t, &state.q, &state.p),
             Form::Hamiltonian => Ok(slope(model, t, &state.q, &state.p)),
@@ -76,20 +76,20 @@ impl Legendre {
     /// The momentum that belongs to a velocity of a Hamiltonian, or the velocity that belongs to a momentum of a Lagrangian: one step of
     /// Newton's method, from zero, where the energy is quadratic with a diagonal mass matrix; else (with the feature `sparse`) as many as
     /// it takes.
-    pub(super) fn other<M: FamilyModel>(
+    pub(super) fn other<M: Model>(
         &mut self,
         model: &M,
         t: f64,
         q: &[f64],
         wanted: &[f64],
-    ) -> Result<Vec<f64>, FamilyError> {
+    ) -> Result<Vec<f64>, ModelError> {
         let zero = vec![0.0; model.len()];
         let second = match M::FACTS.quadratic_in_z {
             true => diagonal(model, t, q, &zero),
-            false => Err(FamilyError::NotSecondOrder),
+            false => Err(ModelError::NotSecondOrder),
         };
         let second = match second {
-            Err(FamilyError::NotSecondOrder | FamilyError::MassNotDiagonal { .. })
+            Err(ModelError::NotSecondOrder | ModelError::MassNotDiagonal { .. })
                 if cfg!(feature = "sparse") =>
             {
                 return self.by_newton(model, t, q, wanted);
@@ -104,53 +104,48 @@ impl Legendre {
     }
 
     #[cfg(feature = "sparse")]
-    fn by_newton<M: FamilyModel>(
+    fn by_newton<M: Model>(
         &mut self,
         model: &M,
         t: f64,
         q: &[f64],
         wanted: &[f64],
-    ) -> Result<Vec<f64>, FamilyError> {
+    ) -> Result<Vec<f64>, ModelError> {
         let free = Rows::none();
         let node = match &mut self.node {
             Some(node) => node,
-            empty => empty.insert(Node::new(model, &free).ok_or(FamilyError::TooLarge)?),
+            empty => empty.insert(Node::new(model, &free).ok_or(ModelError::TooLarge)?),
         };
         let mut z = vec![0.0; model.len()];
         node.solve(model, (t, q), wanted, &free, &mut z)
-            .map_err(|_| FamilyError::NoVelocity)?;
+            .map_err(|_| ModelError::NoVelocity)?;
         Ok(z)
     }
 
     #[cfg(not(feature = "sparse"))]
-    fn by_newton<M: FamilyModel>(
+    fn by_newton<M: Model>(
         &mut self,
         _: &M,
         _: f64,
         _: &[f64],
         _: &[f64],
-    ) -> Result<Vec<f64>, FamilyError> {
-        Err(FamilyError::NotSecondOrder)
+    ) -> Result<Vec<f64>, ModelError> {
+        Err(ModelError::NotSecondOrder)
     }
 }
 
 /// The diagonal of ∂²/∂z∂z, of which nothing may be zero, and which may be all there is.
-fn diagonal<M: FamilyModel>(
-    model: &M,
-    t: f64,
-    q: &[f64],
-    z: &[f64],
-) -> Result<Vec<f64>, FamilyError> {
+fn diagonal<M: Model>(model: &M, t: f64, q: &[f64], z: &[f64]) -> Result<Vec<f64>, ModelError> {
     let mut found = Diagonal {
         entries: vec![0.0; model.len()],
         off: None,
     };
     model.mass(t, q, z, &mut found);
     if let Some((row, column)) = found.off {
-        return Err(FamilyError::MassNotDiagonal { row, column });
+        return Err(ModelError::MassNotDiagonal { row, column });
     }
     match found.entries.iter().position(|m| !(m.abs() > 0.0)) {
-        Some(coordinate) => Err(FamilyError::SingularMass { coordinate }),
+        Some(coordinate) => Err(ModelError::SingularMass { coordinate }),
         None => Ok(found.entries),
     }
 }

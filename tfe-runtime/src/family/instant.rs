@@ -1,7 +1,7 @@
 //! What constraints of a family do at one instant: velocities that they allow, and their reactions.
 
-use super::error::FamilyError;
-use super::model::{Block, Entries, FamilyModel, FamilyState, Gradient};
+use super::error::ModelError;
+use super::model::{Block, Entries, FamilyState, Gradient, Model};
 use super::node::Node;
 use super::rows::Rows;
 use crate::dual::Dual;
@@ -18,24 +18,24 @@ pub(super) struct Instant {
 
 impl Instant {
     /// Nothing where memory does not suffice; the model has been checked.
-    pub(super) fn new<M: FamilyModel>(model: &M) -> Option<Self> {
+    pub(super) fn new<M: Model>(model: &M) -> Option<Self> {
         let rows = Rows::new(model);
         let node = Node::new(model, &rows)?;
         Some(Self { rows, node })
     }
 
     /// The velocity that belongs to a momentum (T-74).
-    pub(super) fn velocity<M: FamilyModel>(
+    pub(super) fn velocity<M: Model>(
         &mut self,
         model: &M,
         t: f64,
         state: &FamilyState,
-    ) -> Result<Vec<f64>, FamilyError> {
+    ) -> Result<Vec<f64>, ModelError> {
         self.rows.evaluate(model, t, &state.q);
         let mut v = vec![0.0; model.len()];
         let at = (t, &state.q[..]);
         let solved = (self.node).solve(model, at, &state.p, &self.rows, &mut v);
-        solved.map_err(|_| FamilyError::NoVelocity)?;
+        solved.map_err(|_| ModelError::NoVelocity)?;
         Ok(v)
     }
 
@@ -44,7 +44,7 @@ impl Instant {
     /// ```text
     /// L_vv a + d L_v/dt|_v = L_q + Q + Aᵀλ ,     A a + d(A v + a)/dt|_v = 0 .
     /// ```
-    pub(super) fn reactions<M: FamilyModel>(
+    pub(super) fn reactions<M: Model>(
         &mut self,
         model: &M,
         (t, q): (f64, &[f64]),

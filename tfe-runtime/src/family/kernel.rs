@@ -1,6 +1,6 @@
 //! The one thing that the iteration of families asks of a model, so that everything else is compiled once, not once a model.
 
-use super::model::FamilyModel;
+use super::model::Model;
 use super::running::Running;
 use crate::lanes::Lanes;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -18,7 +18,7 @@ pub(super) trait Kernel {
     fn in_lanes(&self, t: Lanes<4>, running: &mut Running<'_, Lanes<4>, ()>);
 }
 
-impl<M: FamilyModel> Kernel for M {
+impl<M: Model> Kernel for M {
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     fn in_quads(&self, isa: V3, t: Quad, running: &mut Running<'_, Quad, V3>) {
         isa.vectorize(InRegisters {
@@ -42,7 +42,7 @@ struct InRegisters<'a, 'b, M> {
 }
 
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-impl<M: FamilyModel> pulp::NullaryFnOnce for InRegisters<'_, '_, M> {
+impl<M: Model> pulp::NullaryFnOnce for InRegisters<'_, '_, M> {
     type Output = ();
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! What a generated family gives the runtime.
 
-use super::error::FamilyError;
+use super::error::ModelError;
 use crate::length::{Declared, RunTimeLength};
 use crate::model::{CoordinateName, Facts, Form};
 use crate::real::Real;
@@ -68,7 +68,7 @@ pub trait Entries<R> {
 ///
 /// Implemented by `#[dynamics]` for models with `coordinates(q[n])`, n a field of type `usize`. All slices are as long as the model. Kernels may be
 /// called after [`check`](Self::check) has succeeded; before, they may panic or leave results out.
-pub trait FamilyModel: Declared<0, Length = RunTimeLength> {
+pub trait Model: Declared<0, Length = RunTimeLength> {
     /// By which function it was declared.
     const FORM: Form;
     /// What is known about its structure.
@@ -87,8 +87,8 @@ pub trait FamilyModel: Declared<0, Length = RunTimeLength> {
     /// Whether lengths, ranges and array fields belong together.
     ///
     /// # Errors
-    /// [`FamilyError`] names the array, the sum and the index.
-    fn check(&self) -> Result<(), FamilyError>;
+    /// [`ModelError`] names the array, the sum and the index.
+    fn check(&self) -> Result<(), ModelError>;
 
     /// L(q, v, t), or H(q, p, t).
     fn energy_function<R: Real>(&self, t: R, q: &[R], z: &[R]) -> R;
@@ -190,7 +190,7 @@ pub trait FamilyModel: Declared<0, Length = RunTimeLength> {
 }
 
 /// L_v, or H_p.
-pub(super) fn slope<M: FamilyModel>(model: &M, t: f64, q: &[f64], z: &[f64]) -> Vec<f64> {
+pub(super) fn slope<M: Model>(model: &M, t: f64, q: &[f64], z: &[f64]) -> Vec<f64> {
     let n = model.len();
     let (mut by_z, mut by_q, mut force) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     let first = Gradient {

@@ -10,7 +10,7 @@
 //! numeric factorisation only when the old one serves no longer.
 
 use super::blocked::{Blocked, Place};
-use super::model::{Block, FamilyModel, Gradient};
+use super::model::{Block, Gradient, Model};
 use super::pattern::Pattern;
 use super::space::Problem;
 use crate::error::StepError;
@@ -50,7 +50,7 @@ pub(super) struct Tangent {
 
 impl Tangent {
     /// Finds the places and orders them; nothing where memory does not suffice.
-    pub(super) fn new<M: FamilyModel>(model: &M, points: usize) -> Option<Self> {
+    pub(super) fn new<M: Model>(model: &M, points: usize) -> Option<Self> {
         Self::of(Pattern::of(model), M::FORM, model.len(), points)
     }
 
@@ -99,7 +99,7 @@ impl Tangent {
     ///
     /// # Errors
     /// As [`Blocked::factor`].
-    pub(super) fn factor<M: FamilyModel>(
+    pub(super) fn factor<M: Model>(
         &mut self,
         model: &M,
         scheme: &SchemeRef<'_>,

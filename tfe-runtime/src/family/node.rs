@@ -1,7 +1,7 @@
 //! The velocity of a momentum at one instant, under constraints, by a sparse factorisation (T-74).
 
 use super::blocked::{Blocked, Place};
-use super::model::{FamilyModel, Gradient};
+use super::model::{Gradient, Model};
 use super::pattern::Pattern;
 use super::rows::Rows;
 use crate::error::{ConstraintError, LegendreError, StepError};
@@ -36,7 +36,7 @@ pub(super) struct Node {
 
 impl Node {
     /// Finds the places and orders them; nothing where memory does not suffice.
-    pub(super) fn new<M: FamilyModel>(model: &M, rows: &Rows) -> Option<Self> {
+    pub(super) fn new<M: Model>(model: &M, rows: &Rows) -> Option<Self> {
         Self::of(Pattern::of_mass(model), model.len(), rows)
     }
 
@@ -66,7 +66,7 @@ impl Node {
     ///
     /// # Errors
     /// [`StepError`] where there is none.
-    pub(super) fn solve<M: FamilyModel>(
+    pub(super) fn solve<M: Model>(
         &mut self,
         model: &M,
         (t, q): (f64, &[f64]),
@@ -110,7 +110,7 @@ impl Node {
     }
 
     /// Factors the matrix at one instant.
-    fn factor<M: FamilyModel>(
+    fn factor<M: Model>(
         &mut self,
         model: &M,
         (t, q, z): (f64, &[f64], &[f64]),
@@ -137,7 +137,7 @@ impl Node {
     ///
     /// # Errors
     /// [`StepError`] where the matrix is singular or a number is not finite.
-    pub(super) fn solve_linear<M: FamilyModel>(
+    pub(super) fn solve_linear<M: Model>(
         &mut self,
         model: &M,
         at: (f64, &[f64], &[f64]),
@@ -156,13 +156,7 @@ impl Node {
     }
 
     /// Adds the step, or as much of it as brings ∂E/∂z nearer to what is wanted: functions like −m√(1 − v²) end where Newton's step may land.
-    fn walk<M: FamilyModel>(
-        &mut self,
-        model: &M,
-        (t, q): (f64, &[f64]),
-        wanted: &[f64],
-        z: &mut [f64],
-    ) {
+    fn walk<M: Model>(&mut self, model: &M, (t, q): (f64, &[f64]), wanted: &[f64], z: &mut [f64]) {
         let n = z.len();
         let distance = |node: &Self| {
             let off = wanted.iter().zip(&node.slope).map(|(w, slope)| w - slope);
@@ -200,7 +194,7 @@ impl Node {
         largest(&self.derivatives)
     }
 
-    fn slope<M: FamilyModel>(&mut self, model: &M, t: f64, q: &[f64], z: &[f64]) {
+    fn slope<M: Model>(&mut self, model: &M, t: f64, q: &[f64], z: &[f64]) {
         let [by_q, force] = &mut self.unused;
         let first = Gradient {
             z: &mut self.slope,

@@ -1,6 +1,6 @@
 //! Second derivatives of families: places found once, values each time.
 
-use super::model::{Block, Entries, FamilyModel, Gradient};
+use super::model::{Block, Entries, Gradient, Model};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -47,10 +47,10 @@ impl Entries<f64> for Values<'_> {
 }
 
 impl Pattern {
-    /// Of all second derivatives of a model that has been [checked](FamilyModel::check).
+    /// Of all second derivatives of a model that has been [checked](Model::check).
     ///
     /// Memory and time are linear in the number of contributions.
-    pub fn of<M: FamilyModel>(model: &M) -> Self {
+    pub fn of<M: Model>(model: &M) -> Self {
         let n = model.len();
         let (mut z, mut q, mut force) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let first = Gradient {
@@ -64,21 +64,21 @@ impl Pattern {
 
     /// Of ∂²/∂z∂z alone.
     #[cfg(feature = "sparse")]
-    pub(super) fn of_mass<M: FamilyModel>(model: &M) -> Self {
+    pub(super) fn of_mass<M: Model>(model: &M) -> Self {
         let zero = vec![0.0; model.len()];
         Self::recorded(|recorder| model.mass(0.0, &zero, &zero, recorder))
     }
 
     /// Of the rows of constraints.
     #[cfg(feature = "sparse")]
-    pub(super) fn of_rows<M: FamilyModel>(model: &M) -> Self {
+    pub(super) fn of_rows<M: Model>(model: &M) -> Self {
         let (zero, mut drift) = (vec![0.0; model.len()], vec![0.0; model.constraints()]);
         Self::recorded(|recorder| model.constraint_rows(0.0, &zero, &mut drift, recorder))
     }
 
     /// Of the second derivatives of constraints.
     #[cfg(feature = "sparse")]
-    pub(super) fn of_bends<M: FamilyModel>(model: &M) -> Self {
+    pub(super) fn of_bends<M: Model>(model: &M) -> Self {
         let (zero, mu) = (vec![0.0; model.len()], vec![0.0; model.constraints()]);
         Self::recorded(|recorder| model.constraint_second(0.0, &zero, &mu, recorder))
     }

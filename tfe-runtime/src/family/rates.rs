@@ -9,9 +9,9 @@
 //! Newton's method with one sparse matrix for rates and multipliers; its factors are kept while they serve, also from step to step.
 
 use super::blocked::Blocked;
-use super::dense::FamilyDense;
-use super::error::FamilyError;
-use super::model::{FamilyModel, FamilyState, Gradient};
+use super::dense::DenseElement;
+use super::error::ModelError;
+use super::model::{FamilyState, Gradient, Model};
 use super::node::Node;
 use super::point::Point;
 use super::rows::Rows;
@@ -94,18 +94,18 @@ impl<M> Rates<M> {
     }
 }
 
-impl<'m, M: FamilyModel> Rates<&'m M> {
+impl<'m, M: Model> Rates<&'m M> {
     /// A stepper at rest; the model has been checked.
     ///
     /// # Errors
-    /// [`FamilyError`]
+    /// [`ModelError`]
     pub(super) fn new(
         model: &'m M,
         table: SchemeTable,
         control: Control,
-    ) -> Result<Self, FamilyError> {
+    ) -> Result<Self, ModelError> {
         if control.solve == Solve::FixedPoint {
-            return Err(FamilyError::NeedsNewton);
+            return Err(ModelError::NeedsNewton);
         }
         let (n, m) = (model.len(), model.constraints());
         let rows = Rows::new(model);
@@ -113,8 +113,8 @@ impl<'m, M: FamilyModel> Rates<&'m M> {
         let unknowns = scheme.unknowns();
         let point = |node: &f64| Point::new(n, rows.values.len(), m, slopes(*node, unknowns));
         let points = scheme.nodes.iter().map(point).collect();
-        let (parts, matrix) = Parts::new(model, &rows, unknowns).ok_or(FamilyError::TooLarge)?;
-        let node = Node::new(model, &rows).ok_or(FamilyError::TooLarge)?;
+        let (parts, matrix) = Parts::new(model, &rows, unknowns).ok_or(ModelError::TooLarge)?;
+        let node = Node::new(model, &rows).ok_or(ModelError::TooLarge)?;
         let zero = || FamilyState {
             q: vec![0.0; n],
             p: vec![0.0; n],
@@ -151,7 +151,7 @@ impl<'m, M: FamilyModel> Rates<&'m M> {
         self.last.is_some() && self.end == *state
     }
 
-    /// As [`FamilyStepper::advance`](super::FamilyStepper::advance), for a state that is finite and as long as the model.
+    /// As [`Stepper::advance`](super::Stepper::advance), for a state that is finite and as long as the model.
     pub(super) fn advance(
         &mut self,
         t: f64,
@@ -483,9 +483,9 @@ impl<'m, M: FamilyModel> Rates<&'m M> {
     }
 
     /// The polynomial of the last step.
-    pub(super) fn dense(&self, start: f64, end: f64) -> FamilyDense {
+    pub(super) fn dense(&self, start: f64, end: f64) -> DenseElement {
         let Some(h) = self.last else {
-            return FamilyDense::constant((start, end), self.start.clone());
+            return DenseElement::constant((start, end), self.start.clone());
         };
         let scheme = self.table.view();
         let count = scheme.unknowns();
@@ -493,10 +493,10 @@ impl<'m, M: FamilyModel> Rates<&'m M> {
         let rate = |unknown: usize, a: usize| self.unknowns[a * count + unknown];
         if self.constraints > 0 {
             let momentum = |point: usize, a: usize| self.points[point].momentum[a];
-            return FamilyDense::with_jumps(&scheme, (start, end), h, ends, &rate, &momentum);
+            return DenseElement::with_jumps(&scheme, (start, end), h, ends, &rate, &momentum);
         }
         let force = |point: usize, a: usize| self.points[point].force[a];
-        FamilyDense::of(&scheme, (start, end), h, ends, &rate, &force)
+        DenseElement::of(&scheme, (start, end), h, ends, &rate, &force)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The constraints of a family at one instant: φ, and the entries of A = ∂φ/∂q that are not zero.
 
-use super::model::FamilyModel;
+use super::model::Model;
 use super::pattern::Pattern;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -19,7 +19,7 @@ pub(super) struct Rows {
 
 impl Rows {
     /// Where they are; the model has been checked.
-    pub(super) fn new<M: FamilyModel>(model: &M) -> Self {
+    pub(super) fn new<M: Model>(model: &M) -> Self {
         let pattern = Pattern::of_rows(model);
         let count = model.constraints();
         Self {
@@ -47,7 +47,7 @@ impl Rows {
     }
 
     /// φ, A and a at a time and coordinates.
-    pub(super) fn evaluate<M: FamilyModel>(&mut self, model: &M, t: f64, q: &[f64]) {
+    pub(super) fn evaluate<M: Model>(&mut self, model: &M, t: f64, q: &[f64]) {
         if self.phi.is_empty() {
             return;
         }

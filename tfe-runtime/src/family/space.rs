@@ -10,7 +10,7 @@
 
 use super::inertia::Inertia;
 use super::lanes::{add_exactly, at_points, product, rows};
-use super::model::{FamilyModel, FamilyState, Gradient};
+use super::model::{FamilyState, Gradient, Model};
 use crate::double_double::DoubleDouble;
 use crate::model::Form;
 use crate::points::end::moved;
@@ -43,7 +43,7 @@ pub(super) struct Kind {
 }
 
 impl Kind {
-    pub(super) fn of<M: FamilyModel>() -> Self {
+    pub(super) fn of<M: Model>() -> Self {
         Self {
             form: M::FORM,
             forced: M::FACTS.forced,

@@ -1,12 +1,12 @@
 //! Steps of families: which unknowns a model gets.
 
-use super::dense::FamilyDense;
-use super::error::FamilyError;
+use super::dense::DenseElement;
+use super::error::ModelError;
 use super::forces::Forces;
 use super::inertia::Legendre;
 #[cfg(feature = "sparse")]
 use super::instant::Instant;
-use super::model::{FamilyModel, FamilyState};
+use super::model::{FamilyState, Model};
 #[cfg(feature = "sparse")]
 use super::rates::Rates;
 use crate::cut::{Halving, in_halves, may_be_cut};
@@ -31,7 +31,7 @@ use core::convert::Infallible;
 /// # Example
 /// The example is at [`Simulation::new`](https://docs.rs/tfe), with which families are run.
 #[derive(Clone, Debug)]
-pub struct FamilyStepper<'m, M> {
+pub struct Stepper<'m, M> {
     model: &'m M,
     element: Element,
     length: usize,
@@ -42,7 +42,7 @@ pub struct FamilyStepper<'m, M> {
     instant: Option<Instant>,
     control: Control,
     /// Of a last step that was cut.
-    pieces: Vec<FamilyDense>,
+    pieces: Vec<DenseElement>,
 }
 
 /// What is solved for, by a holder of the model.
@@ -71,15 +71,15 @@ impl<M> Way<M> {
     }
 }
 
-/// All that a [`FamilyStepper`] carries from step to step, without its model: with it the next step is the same to the last bit.
+/// All that a [`Stepper`] carries from step to step, without its model: with it the next step is the same to the last bit.
 #[derive(Clone, Debug)]
-pub struct FamilySuspended {
+pub struct Suspended {
     element: Element,
     length: usize,
     way: Way<()>,
 }
 
-impl FamilySuspended {
+impl Suspended {
     /// The element of the stepper.
     #[must_use]
     pub fn element(&self) -> Element {
@@ -87,14 +87,14 @@ impl FamilySuspended {
     }
 }
 
-impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
+impl<'m, M: Model> Stepper<'m, M> {
     /// A stepper at rest.
     ///
     /// # Errors
-    /// [`FamilyError`]: lengths that do not fit together, an element that does not exist, and what families cannot do.
-    pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, FamilyError> {
+    /// [`ModelError`]: lengths that do not fit together, an element that does not exist, and what families cannot do.
+    pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ModelError> {
         model.check()?;
-        let table = SchemeTable::new(element).map_err(FamilyError::Element)?;
+        let table = SchemeTable::new(element).map_err(ModelError::Element)?;
         let way = Self::way(model, element, table, control)?;
         Ok(Self::with(model, element, way, control))
     }
@@ -115,8 +115,8 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
 
     /// Leaves the model.
     #[must_use]
-    pub fn suspend(self) -> FamilySuspended {
-        FamilySuspended {
+    pub fn suspend(self) -> Suspended {
+        Suspended {
             element: self.element,
             length: self.length,
             way: self.way.hand_over(()),
@@ -131,8 +131,8 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
         model: &'m M,
         element: Element,
         control: Control,
-        suspended: FamilySuspended,
-    ) -> Result<Self, FamilyError> {
+        suspended: Suspended,
+    ) -> Result<Self, ModelError> {
         model.check()?;
         let mut way = suspended.way.hand_over(model);
         let is_same = suspended.element == element && suspended.length == model.len();
@@ -148,7 +148,7 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
         element: Element,
         table: SchemeTable,
         control: Control,
-    ) -> Result<Way<&'m M>, FamilyError> {
+    ) -> Result<Way<&'m M>, ModelError> {
         let by_rates = cfg!(feature = "sparse") && M::FORM == Form::Lagrangian;
         let has_form = match M::FORM {
             Form::Lagrangian => element.is_collocated(),
@@ -156,24 +156,24 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
         };
         if M::CONSTRAINED {
             if !by_rates {
-                return Err(FamilyError::ConstraintsNotSupported);
+                return Err(ModelError::ConstraintsNotSupported);
             }
             if !(element.is_collocated() && element.holds(true)) {
-                return Err(FamilyError::ElementNotSupported { element });
+                return Err(ModelError::ElementNotSupported { element });
             }
         } else if has_form && table.view().points() <= 4 * MAX_GROUPS {
             match Forces::new(model, table.clone(), control) {
-                Err(FamilyError::NotSecondOrder | FamilyError::MassNotDiagonal { .. })
+                Err(ModelError::NotSecondOrder | ModelError::MassNotDiagonal { .. })
                     if by_rates => {}
                 forces => return Ok(Way::Forces(Box::new(forces?))),
             }
         } else if !by_rates {
-            return Err(FamilyError::ElementNotSupported { element });
+            return Err(ModelError::ElementNotSupported { element });
         }
         #[cfg(feature = "sparse")]
         return Ok(Way::Rates(Box::new(Rates::new(model, table, control)?)));
         #[cfg(not(feature = "sparse"))]
-        Err(FamilyError::NotSecondOrder)
+        Err(ModelError::NotSecondOrder)
     }
 
     /// Moves `state` from t to t + h. The first iterate continues the last step if `state` is where that ended; a state of one's own is as
@@ -234,12 +234,12 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
 
     /// The polynomial of the last step, from time `start` to time `end`; before the first step, and after a failed one, a constant.
     #[must_use]
-    pub fn dense(&self, start: f64, end: f64) -> FamilyDense {
-        FamilyDense::of_pieces((start, end), self.pieces.clone())
+    pub fn dense(&self, start: f64, end: f64) -> DenseElement {
+        DenseElement::of_pieces((start, end), self.pieces.clone())
             .unwrap_or_else(|| self.dense_of_last(start, end))
     }
 
-    fn dense_of_last(&self, start: f64, end: f64) -> FamilyDense {
+    fn dense_of_last(&self, start: f64, end: f64) -> DenseElement {
         match &self.way {
             Way::Forces(forces) => forces.dense(start, end),
             #[cfg(feature = "sparse")]
@@ -251,7 +251,7 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
     ///
     /// # Errors
     /// As [`velocity`](super::velocity).
-    pub fn velocity(&mut self, t: f64, state: &FamilyState) -> Result<Vec<f64>, FamilyError> {
+    pub fn velocity(&mut self, t: f64, state: &FamilyState) -> Result<Vec<f64>, ModelError> {
         self.legendre.velocity(self.model, t, state)
     }
 
@@ -305,7 +305,7 @@ impl<'m, M: FamilyModel> FamilyStepper<'m, M> {
     }
 }
 
-impl<M: FamilyModel> Halving for FamilyStepper<'_, M> {
+impl<M: Model> Halving for Stepper<'_, M> {
     type State = FamilyState;
     type Kick = Infallible;
     type Kicks = [Infallible; 0];

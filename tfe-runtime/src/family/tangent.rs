@@ -6,7 +6,7 @@
 //! ```
 
 use super::blocked::{Blocked, Place};
-use super::model::{Block, FamilyModel, Gradient};
+use super::model::{Block, Gradient, Model};
 use super::pattern::Pattern;
 use super::point::Point;
 use super::rows::Rows;
@@ -54,11 +54,7 @@ pub(super) struct Element<'a> {
 
 impl Parts {
     /// Finds all places; nothing where memory does not suffice.
-    pub(super) fn new<M: FamilyModel>(
-        model: &M,
-        rows: &Rows,
-        block: usize,
-    ) -> Option<(Self, Blocked)> {
+    pub(super) fn new<M: Model>(model: &M, rows: &Rows, block: usize) -> Option<(Self, Blocked)> {
         Self::of(
             Pattern::of(model),
             Pattern::of_bends(model),
@@ -126,7 +122,7 @@ impl Parts {
     }
 
     /// Fills the matrix.
-    pub(super) fn fill<M: FamilyModel>(
+    pub(super) fn fill<M: Model>(
         &mut self,
         model: &M,
         element: &Element<'_>,
@@ -141,7 +137,7 @@ impl Parts {
     }
 
     /// Second derivatives at one point.
-    fn add_motion<M: FamilyModel>(
+    fn add_motion<M: Model>(
         &mut self,
         model: &M,
         element: &Element<'_>,

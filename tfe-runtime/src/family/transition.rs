@@ -1,9 +1,9 @@
 //! The derivative of one step of a family by its start, as an operator: implicit differentiation (T-30).
 
 use super::blocked::Blocked;
-use super::dense::FamilyDense;
-use super::error::FamilyError;
-use super::model::{Block, FamilyModel, FamilyState, Gradient};
+use super::dense::DenseElement;
+use super::error::ModelError;
+use super::model::{Block, FamilyState, Gradient, Model};
 use super::pattern::Pattern;
 use super::rates::Rates;
 use super::view::View;
@@ -22,9 +22,9 @@ use nalgebra::DMatrix;
 /// Why there is no derivative of a step of a family.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum FamilyTransitionError {
+pub enum OperatorError {
     /// The model does not fit together, or families cannot do what was asked for.
-    Family(FamilyError),
+    Family(ModelError),
     /// The step itself failed, or its tangent is singular.
     Step(StepError),
     /// The model has constraints: not supported yet.
@@ -38,19 +38,19 @@ pub enum FamilyTransitionError {
     },
 }
 
-impl From<FamilyError> for FamilyTransitionError {
-    fn from(error: FamilyError) -> Self {
+impl From<ModelError> for OperatorError {
+    fn from(error: ModelError) -> Self {
         Self::Family(error)
     }
 }
 
-impl From<StepError> for FamilyTransitionError {
+impl From<StepError> for OperatorError {
     fn from(error: StepError) -> Self {
         Self::Step(error)
     }
 }
 
-impl fmt::Display for FamilyTransitionError {
+impl fmt::Display for OperatorError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Family(error) => error.fmt(f),
@@ -65,7 +65,7 @@ impl fmt::Display for FamilyTransitionError {
     }
 }
 
-impl core::error::Error for FamilyTransitionError {
+impl core::error::Error for OperatorError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
             Self::Family(error) => error.source(),
@@ -91,7 +91,7 @@ impl core::error::Error for FamilyTransitionError {
 /// # Example
 /// The example is at [`stability::transition`](https://docs.rs/tfe), which makes it.
 #[derive(Clone, Debug)]
-pub struct FamilyTransition {
+pub struct TransitionOperator {
     h: f64,
     table: SchemeTable,
     matrix: Blocked,
@@ -99,7 +99,7 @@ pub struct FamilyTransition {
     /// Second derivatives, point by point.
     values: Vec<f64>,
     end: FamilyState,
-    dense: FamilyDense,
+    dense: DenseElement,
     by_length: Vec<f64>,
     by_damping: Vec<f64>,
 }
@@ -112,38 +112,38 @@ struct Change<S, F, P, A> {
     advance: A,
 }
 
-impl FamilyTransition {
+impl TransitionOperator {
     /// That of the step from `state` at time t to t + h.
     ///
     /// # Errors
-    /// [`FamilyTransitionError`] where a step of this model is impossible or fails, for a state of another length, and for constraints.
-    pub fn of_step<M: FamilyModel>(
+    /// [`OperatorError`] where a step of this model is impossible or fails, for a state of another length, and for constraints.
+    pub fn of_step<M: Model>(
         model: &M,
         element: Element,
         state: &FamilyState,
         t: f64,
         h: f64,
-    ) -> Result<Self, FamilyTransitionError> {
+    ) -> Result<Self, OperatorError> {
         let mut only = None;
         Self::of_steps(model, element, 0.0, [(t, h, state)], |transition| {
             only = Some(transition);
         })
         .map_err(|(_, error)| error)?;
-        only.ok_or(FamilyTransitionError::Step(StepError::NonFinite))
+        only.ok_or(OperatorError::Step(StepError::NonFinite))
     }
 
     /// Those of several steps (t, h, state), with an additional force γ v, γ = `damping`, handed over one by one.
     ///
     /// # Errors
     /// As [`of_step`](Self::of_step), with the number of the step.
-    pub fn of_steps<'s, M: FamilyModel>(
+    pub fn of_steps<'s, M: Model>(
         model: &M,
         element: Element,
         damping: f64,
         steps: impl IntoIterator<Item = (f64, f64, &'s FamilyState)>,
         mut each: impl FnMut(Self),
-    ) -> Result<(), (usize, FamilyTransitionError)> {
-        let refused = |error: FamilyTransitionError| (0, error);
+    ) -> Result<(), (usize, OperatorError)> {
+        let refused = |error: OperatorError| (0, error);
         let table = Self::admitted::<M>(model, element).map_err(refused)?;
         let view = View::new(model, damping).map_err(|error| refused(error.into()))?;
         let rates = Rates::new(&view, table.clone(), Control::default());
@@ -157,33 +157,30 @@ impl FamilyTransition {
     }
 
     /// The tables of an element that this model can step with.
-    fn admitted<M: FamilyModel>(
-        model: &M,
-        element: Element,
-    ) -> Result<SchemeTable, FamilyTransitionError> {
+    fn admitted<M: Model>(model: &M, element: Element) -> Result<SchemeTable, OperatorError> {
         model.check()?;
         if M::CONSTRAINED {
-            return Err(FamilyTransitionError::Constrained);
+            return Err(OperatorError::Constrained);
         }
-        let table = SchemeTable::new(element).map_err(FamilyError::Element)?;
+        let table = SchemeTable::new(element).map_err(ModelError::Element)?;
         let stepped = element.has_phase_form() && table.view().points() <= 4 * MAX_GROUPS;
         if M::FORM == Form::Hamiltonian && !stepped {
-            return Err(FamilyError::ElementNotSupported { element }.into());
+            return Err(ModelError::ElementNotSupported { element }.into());
         }
         Ok(table)
     }
 
-    fn next<V: FamilyModel>(
+    fn next<V: Model>(
         view: &V,
         rates: &mut Rates<&V>,
         (table, pattern): (&SchemeTable, &Arc<Pattern>),
         state: &FamilyState,
         (t, h): (f64, f64),
-    ) -> Result<Self, FamilyTransitionError> {
+    ) -> Result<Self, OperatorError> {
         let n = view.len();
         for (vector, values) in [("q", &state.q), ("p", &state.p)] {
             if values.len() != n {
-                return Err(FamilyError::StateLength {
+                return Err(ModelError::StateLength {
                     vector,
                     length: values.len(),
                     expected: n,
@@ -227,7 +224,7 @@ impl FamilyTransition {
     }
 
     /// The derivatives by what is no state.
-    fn differentiate<V: FamilyModel>(&mut self, rates: &Rates<&V>) {
+    fn differentiate<V: Model>(&mut self, rates: &Rates<&V>) {
         let scheme = self.table.view();
         let count = scheme.unknowns();
         let sum = |weights: &[f64], a: usize| -> f64 {
@@ -264,7 +261,7 @@ impl FamilyTransition {
 
     /// The polynomial of the step, and nothing of its derivative.
     #[must_use]
-    pub fn into_dense(self) -> FamilyDense {
+    pub fn into_dense(self) -> DenseElement {
         self.dense
     }
 
@@ -283,12 +280,12 @@ impl FamilyTransition {
     /// Writes (δp₁, δq₁) for (δp₀, δq₀) = `input`.
     ///
     /// # Errors
-    /// [`FamilyTransitionError::Shape`] unless both have 2n numbers.
-    pub fn apply(&self, input: &[f64], output: &mut [f64]) -> Result<(), FamilyTransitionError> {
+    /// [`OperatorError::Shape`] unless both have 2n numbers.
+    pub fn apply(&self, input: &[f64], output: &mut [f64]) -> Result<(), OperatorError> {
         let needed = self.size();
         for given in [input.len(), output.len()] {
             if given != needed {
-                return Err(FamilyTransitionError::Shape { needed, given });
+                return Err(OperatorError::Shape { needed, given });
             }
         }
         let (p, q) = input.split_at(needed / 2);

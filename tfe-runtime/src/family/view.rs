@@ -1,8 +1,8 @@
 //! A family as its Lagrangian: what is solved for rates, however it was declared.
 
-use super::error::FamilyError;
+use super::error::ModelError;
 use super::inertia::Inertia;
-use super::model::{Block, Entries, FamilyModel, Gradient};
+use super::model::{Block, Entries, Gradient, Model};
 use crate::length::{Declared, RunTimeLength};
 use crate::model::{CoordinateName, Facts, Form};
 use crate::real::Real;
@@ -23,12 +23,12 @@ pub(super) struct View<'m, M> {
     damping: f64,
 }
 
-impl<'m, M: FamilyModel> View<'m, M> {
+impl<'m, M: Model> View<'m, M> {
     /// The view of a model that has been checked.
     ///
     /// # Errors
-    /// [`FamilyError`] for a Hamiltonian of another kind.
-    pub(super) fn new(model: &'m M, damping: f64) -> Result<Self, FamilyError> {
+    /// [`ModelError`] for a Hamiltonian of another kind.
+    pub(super) fn new(model: &'m M, damping: f64) -> Result<Self, ModelError> {
         let mass = match M::FORM {
             Form::Lagrangian => Vec::new(),
             Form::Hamiltonian => Inertia::of(model)?.mass,
@@ -100,7 +100,7 @@ impl<M> Declared<0> for View<'_, M> {
     type Length = RunTimeLength;
 }
 
-impl<M: FamilyModel> FamilyModel for View<'_, M> {
+impl<M: Model> Model for View<'_, M> {
     const FORM: Form = Form::Lagrangian;
     const FACTS: Facts = Facts {
         forced: true,
@@ -113,7 +113,7 @@ impl<M: FamilyModel> FamilyModel for View<'_, M> {
         self.model.len()
     }
 
-    fn check(&self) -> Result<(), FamilyError> {
+    fn check(&self) -> Result<(), ModelError> {
         self.model.check()
     }
 
