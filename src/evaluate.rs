@@ -20,20 +20,26 @@ pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
     /// dq/dt, looked for from `guess` on; `None` where no velocity belongs to the momentum.
     fn velocity(&self, t: f64, state: &L::State, guess: &L::Vector) -> Option<L::Vector>;
 
-    /// H = p·v − L.
-    fn energy(&self, t: f64, state: &L::State, velocity: &L::Vector) -> f64;
+    /// H = p·v − L, of coordinates and momenta with their velocities.
+    fn energy(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
 
     /// The outputs of a model that has any.
-    fn outputs(&self, t: f64, state: &L::State, velocity: &L::Vector, values: &mut [f64]);
+    fn outputs(
+        &self,
+        t: f64,
+        at: (&L::Vector, &L::Vector),
+        velocity: &L::Vector,
+        values: &mut [f64],
+    );
 
     /// Whether there are constraints.
     const IS_CONSTRAINED: bool;
 
     /// What the state leaves of the constraints.
-    fn residual(&self, t: f64, state: &L::State, velocity: &L::Vector) -> ConstraintResidual;
+    fn residual(&self, t: f64, q: &L::Vector, velocity: &L::Vector) -> ConstraintResidual;
 
     /// The reactions of the constraints; NaN where they cannot be had.
-    fn reactions(&self, t: f64, state: &L::State, velocity: &L::Vector) -> Vec<f64>;
+    fn reactions(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> Vec<f64>;
 
     /// The same model with another value of a parameter, if one can be made.
     fn with(&self, parameter: &str, value: f64) -> Option<Self>;
@@ -62,25 +68,31 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
         constrained::velocity_of(self, t, &state.q, &state.p, guess).ok()
     }
 
-    fn energy(&self, t: f64, state: &State<N>, velocity: &[f64; N]) -> f64 {
-        legendre::energy_at(self, t, &state.q, &state.p, velocity)
+    fn energy(&self, t: f64, (q, p): (&[f64; N], &[f64; N]), velocity: &[f64; N]) -> f64 {
+        legendre::energy_at(self, t, q, p, velocity)
     }
 
-    fn outputs(&self, t: f64, state: &State<N>, velocity: &[f64; N], values: &mut [f64]) {
+    fn outputs(
+        &self,
+        t: f64,
+        (q, p): (&[f64; N], &[f64; N]),
+        velocity: &[f64; N],
+        values: &mut [f64],
+    ) {
         let z = match M::FORM {
             Form::Lagrangian => velocity,
-            Form::Hamiltonian => &state.p,
+            Form::Hamiltonian => p,
         };
-        self.observables(t, &state.q, z, values);
+        self.observables(t, q, z, values);
     }
 
-    fn residual(&self, t: f64, state: &State<N>, velocity: &[f64; N]) -> ConstraintResidual {
+    fn residual(&self, t: f64, q: &[f64; N], velocity: &[f64; N]) -> ConstraintResidual {
         let (mut position, mut rate) = (0.0, 0.0);
-        for one in constrained::residuals(self, t, &state.q, velocity, 1.0) {
+        for one in constrained::residuals(self, t, q, velocity, 1.0) {
             position = larger(position, one.position.abs());
             rate = larger(rate, one.velocity.abs());
         }
-        let independent = constrained::independent(self, t, &state.q);
+        let independent = constrained::independent(self, t, q);
         ConstraintResidual {
             position,
             velocity: rate,
@@ -88,8 +100,9 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
         }
     }
 
-    fn reactions(&self, t: f64, state: &State<N>, velocity: &[f64; N]) -> Vec<f64> {
-        let reactions = constrained::reactions(self, t, state, velocity);
+    fn reactions(&self, t: f64, (q, p): (&[f64; N], &[f64; N]), velocity: &[f64; N]) -> Vec<f64> {
+        let (q, p) = (*q, *p);
+        let reactions = constrained::reactions(self, t, &State { q, p }, velocity);
         reactions.unwrap_or_else(|_| vec![f64::NAN; M::CONSTRAINTS.len()])
     }
 
@@ -119,20 +132,26 @@ impl<M: family::Model> Evaluate<0, RunTimeLength> for M {
         family::velocity(self, t, state).ok()
     }
 
-    fn energy(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>) -> f64 {
-        family::energy(self, t, state, velocity)
+    fn energy(&self, t: f64, (q, p): (&Vec<f64>, &Vec<f64>), velocity: &Vec<f64>) -> f64 {
+        family::energy_at(self, t, (q, p), velocity)
     }
 
-    fn outputs(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>, values: &mut [f64]) {
+    fn outputs(
+        &self,
+        t: f64,
+        (q, p): (&Vec<f64>, &Vec<f64>),
+        velocity: &Vec<f64>,
+        values: &mut [f64],
+    ) {
         let z = match M::FORM {
             Form::Lagrangian => velocity,
-            Form::Hamiltonian => &state.p,
+            Form::Hamiltonian => p,
         };
-        self.observables(t, &state.q, z, values);
+        self.observables(t, q, z, values);
     }
 
-    fn residual(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>) -> ConstraintResidual {
-        let (position, rate) = family::constraint_residual(self, t, &state.q, velocity);
+    fn residual(&self, t: f64, q: &Vec<f64>, velocity: &Vec<f64>) -> ConstraintResidual {
+        let (position, rate) = family::constraint_residual(self, t, q, velocity);
         ConstraintResidual {
             position,
             velocity: rate,
@@ -140,8 +159,8 @@ impl<M: family::Model> Evaluate<0, RunTimeLength> for M {
         }
     }
 
-    fn reactions(&self, t: f64, state: &FamilyState, velocity: &Vec<f64>) -> Vec<f64> {
-        let reactions = family::reactions(self, t, &state.q, velocity);
+    fn reactions(&self, t: f64, (q, _): (&Vec<f64>, &Vec<f64>), velocity: &Vec<f64>) -> Vec<f64> {
+        let reactions = family::reactions(self, t, q, velocity);
         reactions.unwrap_or_else(|| vec![f64::NAN; self.constraints()])
     }
 

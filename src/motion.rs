@@ -43,6 +43,7 @@ pub struct Node<const N: usize, L: Length<N> = FixedLength> {
 
 impl<const N: usize, L: Length<N>> Node<N, L> {
     /// A state with its velocities.
+    #[inline(always)]
     pub(crate) fn of(t: f64, state: &L::State, v: L::Vector) -> Self {
         let (q, p) = L::parts(state);
         let (q, p) = (q.clone(), p.clone());
@@ -50,6 +51,7 @@ impl<const N: usize, L: Length<N>> Node<N, L> {
     }
 
     /// A state of a model, whose velocities are looked for from `guess` on.
+    #[inline(always)]
     pub(crate) fn new<M>(model: &M, t: f64, state: &L::State, guess: &L::Vector) -> Self
     where
         M: Evaluate<N, L>,
@@ -216,41 +218,48 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// Appends a node, with its velocity, energy and observables. Where the Legendre transform has no solution at the node they are
     /// recorded as NaN: the state itself is good, and its momentum may well belong to no velocity (a singular mass matrix).
     pub(crate) fn record<M: Evaluate<N, L>>(&mut self, model: &M, t: f64, state: &L::State) {
-        let node = match self.velocities.last() {
-            Some(guess) => Node::new(model, t, state, guess),
+        let zero;
+        let guess = match self.velocities.last() {
+            Some(guess) => guess,
             None => {
                 let (_, p) = L::parts(state);
-                Node::new(model, t, state, &L::zero(p))
+                zero = L::zero(p);
+                &zero
             }
         };
-        self.record_node(model, node);
+        self.record_node(model, Node::new(model, t, state, guess));
     }
 
     /// The same where the velocity is known.
+    #[inline(always)]
     pub(crate) fn record_node<M: Evaluate<N, L>>(&mut self, model: &M, node: Node<N, L>) {
         let reactions = match M::IS_CONSTRAINED {
-            true => model.reactions(node.t, &node.state(), &node.v),
+            true => model.reactions(node.t, (&node.q, &node.p), &node.v),
             false => Vec::new(),
         };
         self.record_all(model, node, reactions);
     }
 
     /// The same where the reactions are known as well.
+    #[inline(always)]
     pub(crate) fn record_all<M>(&mut self, model: &M, node: Node<N, L>, reactions: Vec<f64>)
     where
         M: Evaluate<N, L>,
     {
-        let (t, state) = (node.t, node.state());
-        self.energies.push(model.energy(t, &state, &node.v));
+        let place = self.nodes.len();
+        self.nodes.push(node);
+        let node = &self.nodes[place];
+        let (t, at) = (node.t, (&node.q, &node.p));
+        self.energies.push(model.energy(t, at, &node.v));
         let columns = self.outputs.names.len();
         if columns > 0 {
             let start = self.outputs.values.len();
             self.outputs.values.resize(start + columns, 0.0);
             let values = &mut self.outputs.values[start..];
-            model.outputs(t, &state, &node.v, values);
+            model.outputs(t, at, &node.v, values);
         }
         if M::IS_CONSTRAINED {
-            let residual = model.residual(t, &state, &node.v);
+            let residual = model.residual(t, &node.q, &node.v);
             let largest = &mut self.residual;
             largest.position = larger(largest.position, residual.position);
             largest.velocity = larger(largest.velocity, residual.velocity);
@@ -258,7 +267,6 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
             self.reactions.values.extend(reactions);
         }
         self.velocities.push(node.v.clone());
-        self.nodes.push(node);
     }
 
     pub(crate) fn add_warning(&mut self, warning: Warning) {
@@ -449,7 +457,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
                         let found = model.velocity(t, &state, &velocity);
                         velocity = found.ok_or(AtError::NoVelocity { time: t })?;
                     }
-                    model.outputs(t, &state, &velocity, &mut values);
+                    model.outputs(t, L::parts(&state), &velocity, &mut values);
                     sum += weight * length * values[column];
                 }
             }

@@ -80,7 +80,7 @@ impl Energy {
         L: Length<N>,
     {
         Self {
-            energy: model.energy(node.t, &node.state(), &node.v),
+            energy: model.energy(node.t, (&node.q, &node.p), &node.v),
             kinetic: 0.5 * node.action().abs(),
         }
     }

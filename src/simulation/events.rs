@@ -354,7 +354,7 @@ where
     /// The values of what is watched.
     fn outputs(&self, t: f64, state: &L::State, v: &L::Vector, row: &mut Vec<f64>) {
         let mut values = self.rooms.values.borrow_mut();
-        self.model.outputs(t, state, v, &mut values);
+        self.model.outputs(t, L::parts(state), v, &mut values);
         let (q, _) = L::parts(state);
         row.extend(self.watched.iter().map(|watched| match &watched.value {
             Value::Column(column) => values[*column],

@@ -223,7 +223,7 @@ impl Recorded {
     {
         Self {
             time: node.t,
-            energy: model.energy(node.t, &node.state(), &node.v),
+            energy: model.energy(node.t, (&node.q, &node.p), &node.v),
             action: node.action(),
             is_conserved,
         }

@@ -133,12 +133,18 @@ pub fn reactions<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Option<Ve
 /// The energy H = p·v − L, or H itself, at a state with its velocities.
 #[must_use]
 pub fn energy<M: Model>(model: &M, t: f64, state: &FamilyState, v: &[f64]) -> f64 {
+    energy_at(model, t, (&state.q, &state.p), v)
+}
+
+/// The same at coordinates and momenta.
+#[must_use]
+pub fn energy_at<M: Model>(model: &M, t: f64, (q, p): (&[f64], &[f64]), v: &[f64]) -> f64 {
     match M::FORM {
         Form::Lagrangian => {
-            let work: f64 = state.p.iter().zip(v).map(|(p, v)| p * v).sum();
-            work - model.energy_function(t, &state.q, v)
+            let work: f64 = p.iter().zip(v).map(|(p, v)| p * v).sum();
+            work - model.energy_function(t, q, v)
         }
-        Form::Hamiltonian => model.energy_function(t, &state.q, &state.p),
+        Form::Hamiltonian => model.energy_function(t, q, p),
     }
 }
 

@@ -293,7 +293,7 @@ where
             true => M::node(stepper, &self.model, (t, state), &still).v,
             false => still,
         };
-        self.model.outputs(t, state, &velocity, &mut row[2 * n..]);
+        self.model.outputs(t, (q, p), &velocity, &mut row[2 * n..]);
     }
 
     fn record(

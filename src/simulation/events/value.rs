@@ -56,7 +56,7 @@ impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
         match self {
             Self::Column(column) => {
                 let z = if M::OF_VELOCITIES { v } else { &event.p };
-                let mut values = vec![Dual::ZERO; model.output_names().len()];
+                let mut values = vec![Dual::ZERO; model.output_count()];
                 let mut slope = |dt: f64, dq: &V, dz: &V| {
                     model.outputs_towards(Dual::new(*t, dt), (q, dq), (z, dz), &mut values);
                     values[*column].slope
