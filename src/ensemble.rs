@@ -6,7 +6,6 @@ mod error;
 mod family;
 mod members;
 mod plan;
-mod progress;
 mod results;
 mod setup;
 mod under_way;

@@ -26,6 +26,7 @@ mod numbers;
 pub mod optimal_control;
 pub mod periodic;
 pub mod periodic_schur;
+mod progress;
 pub mod sensitivity;
 pub mod simulation;
 pub mod stability;

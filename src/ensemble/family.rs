@@ -1,18 +1,16 @@
 //! Ensembles of models of run-time length.
 
-use super::doubts::{Energy, WarningCounts};
 use super::ends::Ends;
 use super::error::EnsembleError;
 use super::members::Models;
 use super::plan::start_of;
-use super::progress::Progress;
 use super::results::{Results, lock, summed, unlock};
 use super::setup::Ensemble;
 use crate::error::RunErrorKind;
 use crate::length::RunTimeLength;
 use crate::motion::Node;
+use crate::progress::Progress;
 use crate::simulation::mesh::Mesh;
-use crate::simulation::{Simulation, conserves_energies};
 use std::convert::Infallible;
 use std::ops::Range;
 use std::sync::Mutex;
@@ -60,15 +58,7 @@ where
         let from = span.start;
         let statistics = self.for_each(starts, span, |index, result| {
             let model = self.models.model(index);
-            let warnings = match &result {
-                // Events may change the energy.
-                Ok(node) if self.events.is_empty() => WarningCounts::of(
-                    const { conserves_energies::<M>() },
-                    Energy::of(model, from, start_of(starts, index)),
-                    Energy::at(model, node),
-                ),
-                _ => WarningCounts::default(),
-            };
+            let warnings = self.doubts(model, (from, start_of(starts, index)), &result);
             lock(&results).put(index, result, warnings);
         })?;
         Ok(unlock(results).into_ends(statistics))
@@ -93,26 +83,13 @@ where
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
         Mesh::<0>::new(&span, step, &self.breaks, &[])?;
         self.element.validate().map_err(RunErrorKind::Element)?;
-        let progress = Progress::new(self.progress, count);
+        let progress = Progress::new(self.progress, count, "runs");
         Ok(summed(
             count,
             || (),
             |_: &mut (), index| {
-                let mut run = Simulation::new(self.models.model(index))
-                    .element(self.element)
-                    .step(step)
-                    .record_every(usize::MAX)
-                    .at_kinks(self.at_kinks)
-                    .with_control(self.control);
-                for time in &self.breaks {
-                    run = run.break_at(*time);
-                }
-                let run = run.watching(&self.events);
-                let start = start_of(starts, index);
-                let (result, statistics) = match run.run(start.clone(), span.clone()) {
-                    Ok(motion) => (Ok(motion.last().clone()), *motion.statistics()),
-                    Err(error) => (Err(error.kind().clone()), *error.partial().statistics()),
-                };
+                let (model, start) = (self.models.model(index), start_of(starts, index));
+                let (result, statistics) = self.run_one(model, start, &span);
                 finished(index, result);
                 progress.advance(1);
                 statistics
@@ -123,7 +100,7 @@ where
     /// Refused: ensembles that go on where they have got to are those of models of fixed size.
     ///
     /// # Errors
-    /// [`RunErrorKind::Unsupported`], in any case. [`Simulation::resume`] goes on with single runs.
+    /// [`RunErrorKind::Unsupported`], in any case. [`Simulation::resume`](crate::Simulation::resume) goes on with single runs.
     pub fn begin(&self, _: &[FamilyState], _: f64) -> Result<Infallible, EnsembleError> {
         Err(RunErrorKind::run_time_length("Ensemble::begin").into())
     }

@@ -1,17 +1,16 @@
 //! Many runs to be, and all of them at once.
 
-use super::doubts::{Energy, WarningCounts};
 use super::ends::Ends;
 use super::error::EnsembleError;
 use super::members::{ManyModels, Members, OneModel, some_starts};
 use super::plan::{Plan, WIDTH, bad_starts, start_of};
-use super::progress::Progress;
 use super::results::{Results, lock, summed, unlock};
 use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Node;
+use crate::progress::Progress;
+use crate::simulation::Watching;
 use crate::simulation::mesh::Mesh;
-use crate::simulation::{Watching, conserves_energy};
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Mutex;
@@ -226,21 +225,10 @@ where
     pub fn run(&self, starts: &[State<N>], span: Range<f64>) -> Result<Ends<N>, EnsembleError> {
         let count = self.models.count(starts.len())?;
         let results = Mutex::new(Results::new(count));
-        let (from, to) = (span.start, span.end);
+        let from = span.start;
         let statistics = self.for_each(starts, span, |index, result| {
             let model = self.models.model(index);
-            let warnings = match &result {
-                // Events may change the energy.
-                Ok(node) if self.events.is_empty() => {
-                    let before = Energy::of(model, from, start_of(starts, index));
-                    WarningCounts::of(
-                        const { conserves_energy::<M, N>() },
-                        before,
-                        Energy::of(model, to, &node.state()),
-                    )
-                }
-                _ => WarningCounts::default(),
-            };
+            let warnings = self.doubts(model, (from, start_of(starts, index)), &result);
             lock(&results).put(index, result, warnings);
         })?;
         Ok(unlock(results).into_ends(statistics))
@@ -294,7 +282,7 @@ where
             mesh,
             done: 0,
         };
-        let progress = Progress::new(self.progress, count);
+        let progress = Progress::new(self.progress, count, "runs");
         if count == 0 {
             return Ok(Statistics::default());
         }
@@ -305,7 +293,7 @@ where
                 |_: &mut (), index| {
                     let start = start_of(starts, index);
                     let model = self.models.model(index);
-                    let (result, statistics) = self.run_watched(model, start, &span);
+                    let (result, statistics) = self.run_one(model, start, &span);
                     finished(index, result);
                     progress.advance(1);
                     statistics

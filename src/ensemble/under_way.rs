@@ -5,13 +5,14 @@ use super::ends::Ends;
 use super::error::EnsembleError;
 use super::members::{Members, OneModel, some_starts};
 use super::plan::{Failures, Plan, WIDTH, bad_starts, start_of};
-use super::progress::Progress;
 use super::results::{Results, lock, summed, unlock};
 use super::setup::Ensemble;
 use crate::error::RunErrorKind;
+use crate::length::FixedLength;
 use crate::motion::Node;
+use crate::progress::Progress;
 use crate::simulation::mesh::Mesh;
-use crate::simulation::{Reached, conserves_energy};
+use crate::simulation::{Reached, Simulated};
 use std::sync::Mutex;
 use tfe_runtime::bundle::{Bundle, Trajectories};
 use tfe_runtime::step::Stepper;
@@ -194,7 +195,7 @@ where
             .collect();
         let count = energies.len();
         let results = Mutex::new((Results::new(count), energies));
-        let progress = Progress::new(ensemble.progress, count);
+        let progress = Progress::new(ensemble.progress, count, "runs");
         let statistics = summed(
             places.len(),
             || (),
@@ -209,8 +210,11 @@ where
                     let (results, energies) = &mut *results;
                     let mut warnings = WarningCounts::default();
                     if let (Some(before), Some(after)) = (energies.get_mut(index), after) {
-                        warnings =
-                            WarningCounts::of(const { conserves_energy::<M, N>() }, *before, after);
+                        warnings = WarningCounts::of(
+                            <M as Simulated<N, FixedLength>>::CONSERVES,
+                            *before,
+                            after,
+                        );
                         *before = after;
                     }
                     results.put(index, result, warnings);

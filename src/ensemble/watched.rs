@@ -1,13 +1,13 @@
 //! Ensembles whose runs look for events, or are cut at kinks.
 
-use super::members::Members;
+use super::doubts::{Energy, WarningCounts};
 use super::setup::Ensemble;
 use crate::error::RunErrorKind;
-use crate::length::Length;
+use crate::length::{Declared, Length};
 use crate::motion::Node;
-use crate::simulation::{Act, Crossing, Occurrence, Settable, Simulation};
+use crate::simulation::{Act, Crossing, Occurrence, Settable, Simulated, Simulation};
 use std::ops::Range;
-use tfe_runtime::{Model, State, Statistics};
+use tfe_runtime::Statistics;
 
 impl<'m, M, const N: usize, K, L> Ensemble<'m, M, N, K, L>
 where
@@ -48,17 +48,21 @@ where
     }
 }
 
-impl<'m, M: Model<N> + Sync, const N: usize, K> Ensemble<'m, M, N, K>
+impl<'m, M, const N: usize, K, L> Ensemble<'m, M, N, K, L>
 where
-    K: Members<'m, M, N>,
+    M: Simulated<N, L>,
+    L: Length<N>,
 {
-    /// One run, with its events and kinks.
-    pub(super) fn run_watched(
+    /// One run as a [`Simulation`] makes it, with its events and kinks.
+    pub(super) fn run_one(
         &self,
         model: &'m M,
-        start: &State<N>,
+        start: &L::State,
         span: &Range<f64>,
-    ) -> (Result<Node<N>, RunErrorKind>, Statistics) {
+    ) -> (Result<Node<N, L>, RunErrorKind>, Statistics)
+    where
+        M: Declared<N, Length = L>,
+    {
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
         let mut run = Simulation::new(model)
             .element(self.element)
@@ -69,9 +73,25 @@ where
         for time in &self.breaks {
             run = run.break_at(*time);
         }
-        match run.watching(&self.events).run(*start, span.clone()) {
-            Ok(motion) => (Ok(*motion.last()), *motion.statistics()),
+        match run.watching(&self.events).run(start.clone(), span.clone()) {
+            Ok(motion) => (Ok(motion.last().clone()), *motion.statistics()),
             Err(error) => (Err(error.kind().clone()), *error.partial().statistics()),
+        }
+    }
+
+    /// How many runs that came to their ends are doubtful: of one, none where events may have changed the energy.
+    pub(super) fn doubts(
+        &self,
+        model: &M,
+        (from, start): (f64, &L::State),
+        result: &Result<Node<N, L>, RunErrorKind>,
+    ) -> WarningCounts {
+        match result {
+            Ok(node) if self.events.is_empty() => {
+                let (before, after) = (Energy::of(model, from, start), Energy::at(model, node));
+                WarningCounts::of(M::CONSERVES, before, after)
+            }
+            _ => WarningCounts::default(),
         }
     }
 }

@@ -2,11 +2,10 @@
 
 mod error;
 mod floquet;
-mod progress;
 
 pub use error::{FloquetError, MapError, PointError, PointFailure};
 
-use progress::Progress;
+use crate::progress::Progress;
 use std::convert::Infallible;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -145,11 +144,11 @@ impl MapPlan {
     where
         E: Send,
     {
-        let progress = Progress::new(self.progress, self.rows);
+        let progress = Progress::new(self.progress, self.rows, "rows");
         let rows = each_row(self.rows, |row| {
             let mut memory = memory();
             let row = Row::of(self, row, |x, y| point(&mut memory, x, y));
-            progress.advance();
+            progress.advance(1);
             row
         });
         StabilityMap::of(self.clone(), rows)

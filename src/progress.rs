@@ -1,28 +1,32 @@
-//! Progress of a map on standard error, from any thread.
+//! Progress on standard error, from any thread.
 
 use std::io::Write;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// A line that says how far a map is, rewritten once a second.
-pub(super) struct Progress {
+/// A line that says how much is done, rewritten once a second.
+pub(crate) struct Progress {
     shown: Option<Mutex<Shown>>,
     done: AtomicUsize,
-    rows: usize,
+    total: usize,
 }
 
 struct Shown {
+    /// What is counted, in the plural.
+    what: &'static str,
     start: Instant,
     next: Instant,
     is_begun: bool,
 }
 
 impl Progress {
-    pub(super) fn new(wanted: bool, rows: usize) -> Self {
+    /// Of so many runs, rows or steps.
+    pub(crate) fn new(is_wanted: bool, total: usize, what: &'static str) -> Self {
         let start = Instant::now();
-        let shown = wanted.then(|| {
+        let shown = is_wanted.then(|| {
             Mutex::new(Shown {
+                what,
                 start,
                 next: start + Duration::from_secs(1),
                 is_begun: false,
@@ -31,37 +35,41 @@ impl Progress {
         Self {
             shown,
             done: AtomicUsize::new(0),
-            rows,
+            total,
         }
     }
 
-    /// Counts a row.
-    pub(super) fn advance(&self) {
-        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+    pub(crate) fn is_wanted(&self) -> bool {
+        self.shown.is_some()
+    }
+
+    /// Counts what is done.
+    pub(crate) fn advance(&self, by: usize) {
+        let done = self.done.fetch_add(by, Ordering::Relaxed) + by;
         // Whoever is writing writes for all.
         if let Some(shown) = &self.shown
             && let Ok(mut shown) = shown.try_lock()
         {
-            shown.write(done, self.rows);
+            shown.write(done, self.total);
         }
     }
 }
 
 impl Shown {
-    fn write(&mut self, done: usize, rows: usize) {
+    fn write(&mut self, done: usize, total: usize) {
         let now = Instant::now();
         if now < self.next {
             return;
         }
         self.next = now + Duration::from_secs(1);
         self.is_begun = true;
-        let fraction = done as f64 / rows as f64;
+        let fraction = done as f64 / total as f64;
         let left = (now - self.start).as_secs_f64() * (1.0 / fraction - 1.0);
-        let percent = 100.0 * fraction;
+        let (what, percent) = (self.what, 100.0 * fraction);
         // Progress that cannot be shown is no reason to stop.
         let _ = write!(
             std::io::stderr(),
-            "\r{done} of {rows} rows ({percent:.0} %), {left:.0} s left "
+            "\r{done} of {total} {what} ({percent:.0} %), {left:.0} s left "
         );
     }
 }
