@@ -587,6 +587,32 @@ fn matrices_go_across_settings() {
 }
 
 /// A pendulum in Cartesian coordinates that hits a wall: the same as that of an angle, with multipliers of its rod that hold across.
+/// At late times a state behind an impact is beside the wall by what a rounding of the time makes of it; in a short rest of its element that is much, and was taken for another impact.
+#[test]
+fn impacts_at_late_times_happen_once() {
+    #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - y, event(impact) = y)]
+    struct Ball;
+    for start in [0.0, 1e3, 1e6, -1e6] {
+        for step in [0.03, 0.1, 0.3] {
+            let run = Simulation::new(&Ball).element(Mixed::<3>).step(step);
+            let run = run.on("impact", Crossing::Either, |event| {
+                Act::Restart(event.after_impact(0.9))
+            });
+            let run = run.run(Ball.state([1.0], [0.0]), start..start + 12.0);
+            let run = run.unwrap_or_else(|error| panic!("{start} {step}: {error}"));
+            // Flights of √2 · 2 · 0.9ᵏ, k = 1, 2, …, after half of one.
+            let flight = |k: i32| 8.0_f64.sqrt() * 0.9_f64.powi(k);
+            let mut time = start + 0.5 * flight(0);
+            assert_eq!(run.events().len(), 6, "{start} {step}");
+            for (event, k) in run.events().iter().zip(1..) {
+                assert!((event.t - time).abs() < 1e-12 + 1e-15 * start.abs() * 10.0);
+                assert!(!event.rises);
+                time += flight(k);
+            }
+        }
+    }
+}
+
 #[test]
 fn impacts_are_consistent_with_constraints() {
     #[dynamics(

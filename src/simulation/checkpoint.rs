@@ -102,6 +102,11 @@ where
                 .reached
                 .place(end, self.nodes.as_deref(), |span, nodes| {
                     run.nodes = nodes;
+                    // On a grid that begins anew those before it have acted.
+                    let mut run = run.clone();
+                    let direction = (end - span.start).signum();
+                    let is_behind = |time: f64| direction * time < direction * span.start;
+                    run.impulses.retain(|one| !is_behind(M::time_of(one)));
                     run.mesh(span)
                 })?;
             Ok((place, stepper))

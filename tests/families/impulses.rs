@@ -78,6 +78,33 @@ fn halves_and_steps_are_one_run() {
     }
 }
 
+/// A break moves the grid, so that the second half begins one of its own: what has acted lies before its span.
+#[test]
+fn halves_off_the_grid_leave_impulses_behind() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^4/4)]
+    struct Single;
+    let (element, step) = (Mixed::<8>, 0.1);
+    let long = struck(&[0.22]).element(element).break_at(0.37);
+    let start = || CHAIN.state(Q, [0.1; 5]);
+    let fixed = Simulation::new(&Single).element(element).step(step);
+    let fixed = fixed.impulse(0.22, [1.5]).break_at(0.22).break_at(0.37);
+    let single = || Single.state([1.0], [0.0]);
+    for (from, to) in [(0.0, 1.0), (0.5, 0.0)] {
+        let middle = 0.5 * (from + to) + 0.15 * (to - from);
+        let whole = long.run(start(), from..to).expect("a good run");
+        let first = long.run(start(), from..middle).expect("a good run");
+        let checkpoint = first.checkpoint().expect("a complete run");
+        let second = long.resume(checkpoint, to).expect("a good run");
+        assert!(distance(&second.last().q, &whole.last().q) < 1e-13);
+
+        let whole = fixed.run(single(), from..to).expect("a good run");
+        let first = fixed.run(single(), from..middle).expect("a good run");
+        let checkpoint = first.checkpoint().expect("a complete run");
+        let second = fixed.resume(checkpoint, to).expect("a good run");
+        assert!((second.last().q[0] - whole.last().q[0]).abs() < 1e-13);
+    }
+}
+
 #[test]
 fn what_cannot_act_is_refused() {
     let start = || CHAIN.state(Q, [0.0; 5]);

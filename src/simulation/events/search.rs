@@ -114,8 +114,10 @@ pub(super) fn crossings(
         } else {
             0.0
         };
+        // So is what roundings of the time leave of it, which in a short element is much.
+        let rounded = (8.0 * resolution).max(1e-12);
         let starts_off =
-            column[0].abs() > 1e-12 * column.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            column[0].abs() > rounded * column.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         for k in 0..times.len() {
             let here = column[k];
             let is_known = side != 0.0 || starts_off || here.abs() > rounding;
