@@ -22,7 +22,7 @@ use tfe_runtime::step::Impulse;
 use value::Value;
 
 /// An event that is looked for.
-pub(super) struct Watched<'m, const N: usize, L: Length<N> = FixedLength> {
+pub struct Watched<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(super) on: On<'m, N, L>,
     pub(super) value: Value<'m, L::Vector>,
 }
@@ -116,7 +116,7 @@ pub(super) struct Cut<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
 }
 
 /// The same beside the element that was to be.
-pub(super) struct Severed<'a, 'm, const N: usize, L: Length<N> = FixedLength> {
+pub struct Severed<'a, 'm, const N: usize, L: Length<N> = FixedLength> {
     /// Where the element begins.
     pub(super) start: f64,
     pub(super) length: f64,

@@ -8,14 +8,14 @@ use std::ops::ControlFlow;
 use tfe_runtime::transition::TransitionError;
 
 /// Where an element begins that a run has passed.
-pub(super) struct Passed<'a, const N: usize, L: Length<N> = FixedLength> {
+pub struct Passed<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) start: f64,
     pub(super) h: f64,
     pub(super) before: &'a L::State,
 }
 
 /// Is shown what a run does.
-pub(super) trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+pub trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// An element, to its end.
     fn passed(
         &mut self,

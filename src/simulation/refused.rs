@@ -1,13 +1,11 @@
 //! Calls that models of run-time length do not have: one typed error, [`RunErrorKind::Unsupported`], that says which.
 
-use super::events::act::Crossing;
 use super::setup::Simulation;
 use crate::driven::Interpolation;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::RunTimeLength;
 use crate::motion::Motion;
 use std::convert::Infallible;
-use std::iter::{self, Once};
 use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 
@@ -46,20 +44,6 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
     /// [`RunErrorKind::Unsupported`], in any case.
     pub fn hold(self, _: FamilyState, _: f64) -> Result<Infallible, RunErrorKind> {
         Err(RunErrorKind::run_time_length("hold"))
-    }
-
-    /// Refused; the points of a section are the [events](crate::Motion::events) of a run with [`on`](Self::on) and [`Act::Record`](crate::Act::Record).
-    ///
-    /// # Errors
-    /// [`RunErrorKind::Unsupported`], as the only item.
-    pub fn section(
-        &self,
-        _: impl Into<String>,
-        _: Crossing,
-        _: FamilyState,
-        _: f64,
-    ) -> Once<Result<Infallible, RunErrorKind>> {
-        iter::once(Err(RunErrorKind::run_time_length("section")))
     }
 
     /// Refused: parameters of models of run-time length have no derivatives.

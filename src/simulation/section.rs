@@ -3,21 +3,27 @@
 use super::events::Severed;
 use super::events::act::{Act, Crossing, Event, On};
 use super::follow::{Follow, Passed};
+use super::kind::Simulated;
 use super::pieces::{Left, Observe, Side};
 use super::sensitive::Tangents;
 use super::setup::Simulation;
 use super::steps::Way;
 use crate::error::RunErrorKind;
+use crate::length::{FixedLength, Length, RunTimeLength};
 use nalgebra::DMatrix;
 use std::collections::VecDeque;
+use std::convert::Infallible;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
-use tfe_runtime::step::Stepper;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Model, Share, State};
+use tfe_runtime::{Model, family};
 
-impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
+impl<'m, M, const N: usize, L> Simulation<'m, M, N, L>
+where
+    M: Sectioned<N, L>,
+    L: Length<N>,
+{
     /// The points at which a motion crosses the surface on which an event or output of the model vanishes: an endless iterator, in constant memory. Other [events](Self::on) are looked for
     /// as in [`steps`](Self::steps), and do what they do.
     ///
@@ -50,9 +56,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         &self,
         name: impl Into<String>,
         crossing: Crossing,
-        start: State<N>,
+        start: L::State,
         t0: f64,
-    ) -> Section<'m, M, N> {
+    ) -> Section<'m, M, N, L> {
         let mut run = self.clone();
         let which = run.events.len();
         run.events.watch(On {
@@ -62,7 +68,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             act: Arc::new(|_| Act::Record),
         });
         let beginning = (run.model.guarded(|| run.endless(&start, t0)))
-            .unwrap_or_else(|_| Err(RunErrorKind::panicked(t0)));
+            .unwrap_or_else(|| Err(RunErrorKind::panicked(t0)));
         Section {
             chosen: (run.chosen_element(), run.control),
             model: run.model.clone(),
@@ -78,12 +84,12 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 
 /// A point of a [section](Simulation::section); an [`Event`] by dereference.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SectionPoint<const N: usize> {
-    event: Event<N>,
+pub struct SectionPoint<const N: usize, L: Length<N> = FixedLength> {
+    event: Event<N, L>,
     transition: Option<DMatrix<f64>>,
 }
 
-impl<const N: usize> SectionPoint<N> {
+impl<const N: usize, L: Length<N>> SectionPoint<N, L> {
     /// The derivative of this point by the one before, or of the first by the start: 2N × 2N, ordered (p, q), for a [linearised](Section::linearised) section.
     ///
     /// It takes into account that changed motions cross the section at other times,
@@ -99,28 +105,90 @@ impl<const N: usize> SectionPoint<N> {
     }
 }
 
-impl<const N: usize> Deref for SectionPoint<N> {
-    type Target = Event<N>;
+impl<const N: usize, L: Length<N>> Deref for SectionPoint<N, L> {
+    type Target = Event<N, L>;
 
-    fn deref(&self) -> &Event<N> {
+    fn deref(&self) -> &Event<N, L> {
         &self.event
     }
 }
 
 /// The points of a section, one after the other; made by [`Simulation::section`]. After an error, or where an event stops the motion, it is finished.
-pub struct Section<'m, M: Model<N>, const N: usize> {
+pub struct Section<'m, M, const N: usize, L = FixedLength>
+where
+    M: Sectioned<N, L> + 'm,
+    L: Length<N>,
+{
     chosen: (tfe_runtime::Element, tfe_runtime::step::Control),
-    model: Share<'m, M>,
-    way: Way<'m, M, N>,
-    crossings: Crossings<'m, M, N>,
+    model: L::Held<'m, M>,
+    way: Way<'m, M, N, L>,
+    crossings: Crossings<'m, M, N, L>,
 }
 
-impl<M: Model<N>, const N: usize> fmt::Debug for Section<'_, M, N> {
+impl<M, const N: usize, L> fmt::Debug for Section<'_, M, N, L>
+where
+    M: Sectioned<N, L>,
+    L: Length<N>,
+{
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Section")
             .field("time", &self.way.course.time())
             .field("state", &self.way.state)
             .finish_non_exhaustive()
+    }
+}
+
+/// A model with sections: those of fixed size have matrices from point to point.
+pub trait Sectioned<const N: usize, L: Length<N>>: Simulated<N, L> {
+    /// What carries them along.
+    type Tangents<'m>: Carry<'m, Self, N, L>
+    where
+        Self: 'm;
+}
+
+impl<M: Model<N>, const N: usize> Sectioned<N, FixedLength> for M {
+    type Tangents<'m>
+        = Tangents<'m, M, N>
+    where
+        M: 'm;
+}
+
+impl<M: family::Model> Sectioned<0, RunTimeLength> for M {
+    type Tangents<'m>
+        = Infallible
+    where
+        M: 'm;
+}
+
+/// Carries matrices from point to point.
+pub trait Carry<'m, M: 'm, const N: usize, L: Length<N>>: Follow<'m, M, N, L> {
+    /// The matrix up to a point.
+    fn crossed(&mut self, severed: &Severed<'_, 'm, N, L>)
+    -> Result<DMatrix<f64>, TransitionError>;
+}
+
+impl<'m, M: Model<N> + 'm, const N: usize> Carry<'m, M, N, FixedLength> for Tangents<'m, M, N> {
+    fn crossed(&mut self, severed: &Severed<'_, 'm, N>) -> Result<DMatrix<f64>, TransitionError> {
+        self.crossed(severed)
+    }
+}
+
+impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Infallible {
+    fn passed(
+        &mut self,
+        _: &mut family::Stepper<'m, M>,
+        _: &Passed<'_, 0, RunTimeLength>,
+    ) -> Result<(), TransitionError> {
+        match *self {}
+    }
+}
+
+impl<'m, M: family::Model + 'm> Carry<'m, M, 0, RunTimeLength> for Infallible {
+    fn crossed(
+        &mut self,
+        _: &Severed<'_, 'm, 0, RunTimeLength>,
+    ) -> Result<DMatrix<f64>, TransitionError> {
+        match *self {}
     }
 }
 
@@ -133,8 +201,12 @@ impl<M: Model<N>, const N: usize> Section<'_, M, N> {
     }
 }
 
-impl<M: Model<N>, const N: usize> Iterator for Section<'_, M, N> {
-    type Item = Result<SectionPoint<N>, RunErrorKind>;
+impl<M, const N: usize, L> Iterator for Section<'_, M, N, L>
+where
+    M: Sectioned<N, L>,
+    L: Length<N>,
+{
+    type Item = Result<SectionPoint<N, L>, RunErrorKind>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
@@ -152,19 +224,23 @@ impl<M: Model<N>, const N: usize> Iterator for Section<'_, M, N> {
 }
 
 /// Lines up the points of an element.
-struct Crossings<'m, M, const N: usize> {
+struct Crossings<'m, M: Sectioned<N, L> + 'm, const N: usize, L: Length<N>> {
     /// The section, among all events.
     which: usize,
     /// Since the last point.
-    tangents: Option<Tangents<'m, M, N>>,
-    points: VecDeque<Result<SectionPoint<N>, RunErrorKind>>,
+    tangents: Option<M::Tangents<'m>>,
+    points: VecDeque<Result<SectionPoint<N, L>, RunErrorKind>>,
 }
 
-impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Crossings<'m, M, N> {
+impl<'m, M, const N: usize, L> Follow<'m, M, N, L> for Crossings<'m, M, N, L>
+where
+    M: Sectioned<N, L>,
+    L: Length<N>,
+{
     fn passed(
         &mut self,
-        stepper: &mut Stepper<'m, M, N>,
-        passed: &Passed<'_, N>,
+        stepper: &mut L::Stepper<'m, M>,
+        passed: &Passed<'_, N, L>,
     ) -> Result<(), TransitionError> {
         match &mut self.tangents {
             Some(tangents) => tangents.passed(stepper, passed),
@@ -172,7 +248,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Crossings<'m, M, N> {
         }
     }
 
-    fn met(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+    fn met(&mut self, severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         if severed.which != self.which {
             return Ok(());
         }
@@ -184,7 +260,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Crossings<'m, M, N> {
         Ok(())
     }
 
-    fn cut(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
+    fn cut(&mut self, severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         match &mut self.tangents {
             Some(tangents) => tangents.cut(severed),
             None => Ok(()),
@@ -197,7 +273,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Crossings<'m, M, N> {
         }
     }
 
-    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+    fn set(&mut self, model: &L::Held<'m, M>) -> Result<(), RunErrorKind> {
         match &mut self.tangents {
             Some(tangents) => tangents.set(model),
             None => Ok(()),
@@ -205,10 +281,14 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Crossings<'m, M, N> {
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Observe<'m, M, N> for Crossings<'m, M, N> {
+impl<'m, M, const N: usize, L> Observe<'m, M, N, L> for Crossings<'m, M, N, L>
+where
+    M: Sectioned<N, L>,
+    L: Length<N>,
+{
     fn keeps(&self) -> bool {
         false
     }
 
-    fn at_event(&mut self, _: &mut Stepper<'m, M, N>, _: &M, _: Side, _: (f64, &State<N>)) {}
+    fn at_event(&mut self, _: &mut L::Stepper<'m, M>, _: &M, _: Side, _: (f64, &L::State)) {}
 }

@@ -52,7 +52,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 }
 
 /// Derivatives on their way along a run.
-pub(super) struct Tangents<'m, M, const N: usize> {
+pub struct Tangents<'m, M, const N: usize> {
     model: Share<'m, M>,
     chosen: (Element, Control),
     /// The parameters, among all, and as directions.

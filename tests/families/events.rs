@@ -189,6 +189,22 @@ fn every_kind_of_run() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// Points of a section are the events of a run.
+#[test]
+fn sections() -> Result<(), Box<dyn Error>> {
+    let start = || CHAIN.state(Q, V);
+    let run = long().on("first", Crossing::Rising, |_| Act::Record);
+    let run = run.run(start(), 0.0..50.0)?;
+    let points = long().section("first", Crossing::Rising, start(), 0.0);
+    let points: Vec<_> = points.take(run.events().len()).collect::<Result<_, _>>()?;
+    assert!(points.len() > 5);
+    for (point, event) in points.iter().zip(run.events()) {
+        assert!((point.t - event.t).abs() < 1e-12 && point.transition().is_none());
+        assert!(distance(&point.p, &event.p) < 1e-12);
+    }
+    Ok(())
+}
+
 #[test]
 fn what_cannot_be_is_a_typed_error() {
     let kind = |run: family::Simulation<'static, Chain>| {

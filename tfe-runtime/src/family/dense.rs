@@ -2,10 +2,14 @@
 
 use super::model::FamilyState;
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
+#[cfg(feature = "std")]
 use crate::dense::bounds::{LongArguments, Rows};
 use crate::dense::piece_at;
+#[cfg(feature = "std")]
 use crate::dual::Dual;
+#[cfg(feature = "std")]
 use crate::enclosure::Enclosure;
+#[cfg(feature = "std")]
 use crate::model::Form;
 use crate::scheme::SchemeRef;
 use alloc::vec;
@@ -139,17 +143,20 @@ impl DenseElement {
     /// Bounds of what outputs of a `form` are functions of, all along an element of one [piece](Self::pieces), as
     /// [`DenseElement::bounds`](crate::step::DenseElement::bounds).
     #[must_use]
+    #[cfg(feature = "std")]
     pub fn bounds(&self, form: Form) -> LongArguments<Enclosure> {
         self.rows().bounds(form)
     }
 
     /// Bounds over a part of an element of one [piece](Self::pieces), from τ to τ, and of the derivatives by τ.
     #[must_use]
+    #[cfg(feature = "std")]
     pub fn bounds_over(&self, form: Form, part: (f64, f64)) -> LongArguments<Dual<Enclosure>> {
         let centre = self.at(0.5 * (part.0 + part.1));
         self.rows().bounds_over(form, part, [&centre.q, &centre.p])
     }
 
+    #[cfg(feature = "std")]
     fn rows(&self) -> Rows<'_> {
         let forces = match &self.momenta {
             Momenta::Rates(rates) => &rates[..],
