@@ -1,4 +1,4 @@
-//! Runs of models of run-time length.
+//! Impulses on models of run-time length, which act between elements.
 
 use super::setup::Simulation;
 use crate::length::RunTimeLength;

@@ -1,0 +1,321 @@
+//! Models of fixed size.
+
+use super::super::checks::{check_constraints, check_start, conserves_energy};
+use super::super::mesh::{Grid, Mesh, within};
+use super::super::watch::resolution::{Again, Examined, Resolution};
+use super::super::watch::{Watch, mass_signs};
+use super::{Chosen, Simulated, second};
+use crate::error::RunErrorKind;
+use crate::length::FixedLength;
+use crate::motion::{Motion, Node, Warning};
+use crate::sensitivity::slopes::momentum_by;
+use std::ops::Range;
+use tfe_runtime::constrained::{self, Trail};
+use tfe_runtime::dual::{Dual, duals};
+use tfe_runtime::enclosure::Enclosure;
+use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper, Suspended};
+use tfe_runtime::{
+    CoordinateName, Element, ElementError, Facts, First, Form, Model, Second, Share, State,
+    Statistics, StepError,
+};
+
+/// A stepper that cuts its steps at kinks, if it is to.
+fn cutting<'m, M: Model<N>, const N: usize>(
+    stepper: Result<Stepper<'m, M, N>, ElementError>,
+    at_kinks: bool,
+) -> Result<Stepper<'m, M, N>, RunErrorKind> {
+    let stepper = stepper.map_err(RunErrorKind::Element)?;
+    Ok(match at_kinks {
+        true => stepper.at_kinks(),
+        false => stepper,
+    })
+}
+
+impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
+    const FACTS: Facts = M::FACTS;
+    const MAY_ITERATE: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
+    const CUTS_AT_KINKS: bool = true;
+    const CONSERVES: bool = conserves_energy::<M, N>();
+    const HAS_PARAMETERS: bool = true;
+    const OF_VELOCITIES: bool = matches!(M::FORM, Form::Lagrangian);
+
+    fn coordinates(&self) -> usize {
+        N
+    }
+
+    fn output_count(&self) -> usize {
+        self.columns()
+    }
+
+    fn is_of_first_order(&self, t: f64, start: &State<N>) -> bool {
+        let (mut first, mut second) = (First::ZERO, Second::ZERO);
+        let may_be = M::FORM == Form::Hamiltonian && M::FACTS.quadratic_in_z;
+        if may_be {
+            self.second(t, &start.q, &start.p, &mut first, &mut second);
+        }
+        may_be && second.zz.as_flattened().iter().all(|entry| *entry == 0.0)
+    }
+
+    fn time_of(impulse: &Impulse<N>) -> f64 {
+        impulse.time
+    }
+
+    fn inner(impulses: &[Impulse<N>]) -> &[Impulse<N>] {
+        impulses
+    }
+
+    fn leave(stepper: &Stepper<'_, M, N>, trail: &mut Trail) {
+        stepper.leave(trail);
+    }
+
+    fn foresee(stepper: &mut Stepper<'_, M, N>, trail: &Trail, step: (f64, f64)) {
+        stepper.foresee(trail, step);
+    }
+
+    fn set_tolerance(stepper: &mut Stepper<'_, M, N>, tolerance: f64) {
+        stepper.set_tolerance(tolerance);
+    }
+
+    fn take_statistics(stepper: &mut Stepper<'_, M, N>) -> Statistics {
+        stepper.take_statistics()
+    }
+
+    fn check_start(&self, start: &State<N>, _: &[Impulse<N>], _: bool) -> Result<(), RunErrorKind> {
+        check_start(start)
+    }
+
+    fn check_first(&self, (t, h): (f64, f64), start: &State<N>) -> Result<(), RunErrorKind> {
+        check_constraints(self, t, h, start)
+    }
+
+    fn mesh(span: &Range<f64>, grid: &Grid<'_, Impulse<N>>) -> Result<Mesh<N>, RunErrorKind> {
+        grid.mesh(span, grid.impulses)
+    }
+
+    fn leave_behind(impulses: &mut Vec<Impulse<N>>, t: f64) {
+        // The last element of a run takes those at its end.
+        impulses.retain(|impulse| impulse.time != t);
+    }
+
+    fn first_node(
+        &self,
+        (t, start): (f64, &State<N>),
+        _: Option<&mut Stepper<'_, M, N>>,
+    ) -> Motion<N> {
+        Motion::from_start(self, t, start)
+    }
+
+    fn stepper<'m>(model: Share<'m, M>, chosen: Chosen) -> Result<Stepper<'m, M, N>, RunErrorKind>
+    where
+        M: 'm,
+    {
+        let stepper = Stepper::sharing(model, chosen.element, chosen.control);
+        cutting(stepper, chosen.at_kinks)
+    }
+
+    fn resumed<'m>(
+        model: Share<'m, M>,
+        chosen: Chosen,
+        suspended: Suspended<N>,
+    ) -> Result<Stepper<'m, M, N>, RunErrorKind>
+    where
+        M: 'm,
+    {
+        if suspended.element() != chosen.element {
+            return M::stepper(model, chosen);
+        }
+        let stepper = Stepper::resume(model, chosen.control, suspended);
+        cutting(stepper, chosen.at_kinks)
+    }
+
+    fn suspended(stepper: Stepper<'_, M, N>) -> Suspended<N> {
+        stepper.suspend()
+    }
+
+    fn ends_only<'m>(stepper: Stepper<'m, M, N>) -> Stepper<'m, M, N>
+    where
+        M: 'm,
+    {
+        stepper.ends_only()
+    }
+
+    fn check_velocity(_: &mut Stepper<'_, M, N>, _: (f64, &State<N>)) -> Result<(), RunErrorKind> {
+        Ok(())
+    }
+
+    fn chosen(stepper: &Stepper<'_, M, N>) -> (Element, Control) {
+        (stepper.element(), stepper.control())
+    }
+
+    fn exchange<'m>(
+        stepper: &mut Stepper<'m, M, N>,
+        model: Share<'m, M>,
+    ) -> Result<(), RunErrorKind>
+    where
+        M: 'm,
+    {
+        stepper.set_model(model).map_err(RunErrorKind::Element)
+    }
+
+    fn advance(
+        stepper: &mut Stepper<'_, M, N>,
+        (t, h): (f64, f64),
+        state: &mut State<N>,
+        impulses: &[Impulse<N>],
+    ) -> Result<(), StepError> {
+        stepper.advance(t, h, state, impulses)
+    }
+
+    fn inside(
+        stepper: &Stepper<'_, M, N>,
+        spare: Option<DenseElement<N>>,
+        (start, end): (f64, f64),
+    ) -> DenseElement<N> {
+        stepper.dense_in(spare, start, end)
+    }
+
+    fn node(
+        _: &mut Stepper<'_, M, N>,
+        model: &M,
+        (t, state): (f64, &State<N>),
+        guess: &[f64; N],
+    ) -> Node<N> {
+        Node::new(model, t, state, guess)
+    }
+
+    fn record(
+        motion: &mut Motion<N>,
+        _: &mut Stepper<'_, M, N>,
+        model: &M,
+        (t, state): (f64, &State<N>),
+    ) {
+        motion.record(model, t, state);
+    }
+
+    fn allowed_velocity(&self, t: f64, state: &State<N>, guess: &[f64; N]) -> Option<[f64; N]> {
+        constrained::velocity(self, t, &state.q, &state.p, guess).ok()
+    }
+
+    fn statistics<'s>(stepper: &'s Stepper<'_, M, N>) -> &'s Statistics {
+        stepper.statistics()
+    }
+
+    fn acting(impulses: &[Impulse<N>], (t, next): (f64, f64)) -> Vec<Impulse<N>> {
+        let acts = |impulse: &&Impulse<N>| within(impulse.time, t, next);
+        impulses.iter().filter(acts).copied().collect()
+    }
+
+    fn kick(&self, _: &[Impulse<N>], _: f64, _: &mut State<N>) -> bool {
+        false
+    }
+
+    fn check_restart(&self, t: f64, h: f64, state: &State<N>) -> Result<(), RunErrorKind> {
+        check_start(state)?;
+        check_constraints(self, t, h, state)
+    }
+
+    fn resolution<'m>(again: Again<'m, M, N>) -> Option<Resolution<'m, M, N>>
+    where
+        M: 'm,
+    {
+        Some(Resolution::new(again))
+    }
+
+    #[inline(always)]
+    fn examine(
+        resolution: &mut Option<Resolution<'_, M, N>>,
+        statistics: &Statistics,
+        element: Examined<'_, N>,
+    ) {
+        if let Some(resolution) = resolution {
+            resolution.look(statistics, element);
+        }
+    }
+
+    fn doubt(resolution: &Option<Resolution<'_, M, N>>, last: &State<N>) -> Option<Warning> {
+        resolution.as_ref()?.warning(last)
+    }
+
+    fn exchange_in<'m>(resolution: &mut Option<Resolution<'m, M, N>>, model: Share<'m, M>)
+    where
+        M: 'm,
+    {
+        if let Some(resolution) = resolution {
+            resolution.set_model(model);
+        }
+    }
+
+    fn look(
+        &self,
+        watch: &mut Watch,
+        number: usize,
+        at: (f64, f64),
+        state: &State<N>,
+        failed: bool,
+    ) {
+        match failed {
+            true => watch.examine(self, number, at, state),
+            false => watch.look(self, number, at, state),
+        }
+    }
+
+    fn weigh(&self, start: &Node<N>) -> Option<Warning> {
+        mass_signs(self, start)
+    }
+
+    fn outputs_along(&self, piece: &DenseElement<N>, values: &mut [Enclosure]) {
+        let over = piece.bounds(M::FORM);
+        self.observables(over.t, &over.q, second(M::FORM, &over.v, &over.p), values);
+    }
+
+    fn outputs_over(
+        &self,
+        piece: &DenseElement<N>,
+        part: (f64, f64),
+        values: &mut [Dual<Enclosure>],
+    ) {
+        let over = piece.bounds_over(part);
+        self.observables(over.t, &over.q, second(M::FORM, &over.v, &over.p), values);
+    }
+
+    fn outputs_towards(
+        &self,
+        t: Dual<f64>,
+        q: (&[f64; N], &[f64; N]),
+        z: (&[f64; N], &[f64; N]),
+        values: &mut [Dual<f64>],
+    ) {
+        self.observables(t, &duals(q.0, q.1), &duals(z.0, z.1), values);
+    }
+
+    fn momenta(&self, t: f64, q: &[f64; N], v: &[f64; N]) -> [f64; N] {
+        tfe_runtime::__private::state(self, t, *q, *v).p
+    }
+
+    fn momenta_by(
+        &self,
+        t: f64,
+        q: &[f64; N],
+        (v, p): (&[f64; N], &[f64; N]),
+        number: usize,
+    ) -> [f64; N] {
+        momentum_by(self, t, (q, v, p), number)
+    }
+
+    fn parameter_names(&self) -> Vec<CoordinateName> {
+        let numbers = 0..self.parameters();
+        numbers.map(|number| self.parameter_name(number)).collect()
+    }
+
+    fn parameter_value(&self, number: usize) -> f64 {
+        self.parameter(number)
+    }
+
+    fn guarded<T>(&self, f: impl FnOnce() -> T) -> Option<T> {
+        Model::guarded(self, f).ok()
+    }
+
+    fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
+        RunErrorKind::of_element(self, element, at, source)
+    }
+}
