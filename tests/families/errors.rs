@@ -296,3 +296,27 @@ fn what_families_cannot_do_yet_is_said() {
         RunErrorKind::Family(family::ModelError::Element(_))
     ));
 }
+
+/// Twice the same rod: the sparse matrix would be singular.
+#[cfg(feature = "sparse")]
+#[test]
+fn dependent_rows_are_refused() {
+    #[dynamics(
+        coordinates(x[n], y[n]),
+        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
+        constraint(rod[i in 0..n]) = x[i]^2 + y[i]^2 - 1,
+        constraint(again) = 2*x[0]^2 + 2*y[0]^2 - 2,
+    )]
+    struct Rods {
+        n: usize,
+    }
+    let rods = Rods { n: 2 };
+    let start = rods.state([0.6, 1.0, -0.8, 0.0], [0.0; 4]);
+    let error = Simulation::new(&rods).step(0.1).run(start, 0.0..1.0);
+    let error = error.expect_err("one row follows from another");
+    let message = error.to_string();
+    assert!(
+        message.contains("constraints depend on one another"),
+        "{message}"
+    );
+}

@@ -79,6 +79,9 @@ pub enum ConstraintError {
     NeedsNewton,
     /// No velocity belongs to the momentum: the kinetic energy is singular for motions that the constraints allow.
     SingularMass,
+    /// Rows of constraints follow from others, of a model of run-time length, whose sparse factorisations need all to be independent; or the kinetic energy is singular for motions that they
+    /// allow.
+    DependentRows,
     /// The number of independent constraints is not the same at all nodes.
     RankChanged,
     /// The derivative by a parameter was asked for that the model does not tell: see [`Model::parameters`](crate::Model::parameters).
@@ -122,6 +125,9 @@ impl fmt::Display for ConstraintError {
             Self::SingularMass => {
                 f.write_str("the kinetic energy is singular for motions that the constraints allow")
             }
+            Self::DependentRows => f.write_str(
+                "constraints depend on one another, which those of a model of run-time length must not: leave out what follows from the others (or the kinetic energy is singular for motions that they allow)",
+            ),
             Self::RankChanged => {
                 f.write_str("the number of independent constraints changes along the motion")
             }

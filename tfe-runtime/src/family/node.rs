@@ -86,8 +86,12 @@ impl Node {
             for (entry, rate) in self.vector[n..].iter_mut().zip(&self.rate) {
                 *entry = -rate;
             }
+            let is_posed = largest(&self.vector).is_finite();
             // The multiplier is solved for anew each time: it enters linearly.
             self.matrix.solve(&mut self.vector);
+            if is_posed && !rows.phi.is_empty() && !largest(&self.vector).is_finite() {
+                return Err(ConstraintError::DependentRows.into());
+            }
             let step = largest(&self.vector[..n]);
             self.walk(model, (t, q), wanted, z);
             let scale = largest(z);
