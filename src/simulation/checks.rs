@@ -19,7 +19,12 @@ pub(crate) const fn conserves_energies<M: family::Model>() -> bool {
 
 /// Refuses start values that are not finite.
 pub(crate) fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErrorKind> {
-    for (coordinate, (&q, &p)) in state.q.iter().zip(&state.p).enumerate() {
+    check_finite(&state.q, &state.p)
+}
+
+/// The same of models of either kind of length.
+pub(super) fn check_finite(q: &[f64], p: &[f64]) -> Result<(), RunErrorKind> {
+    for (coordinate, (&q, &p)) in q.iter().zip(p).enumerate() {
         if !(q.is_finite() && p.is_finite()) {
             return Err(RunErrorKind::Start { coordinate, q, p });
         }

@@ -333,7 +333,7 @@ where
 
     /// Whether anything that is watched is a function of velocities; those of a Hamiltonian are of momenta.
     fn needs_velocity(&self) -> bool {
-        M::OF_VELOCITIES || self.has_functions()
+        M::NEEDS_VELOCITY || self.has_functions()
     }
 
     fn has_functions(&self) -> bool {

@@ -19,9 +19,11 @@ pub trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// An element, to its end.
     fn passed(
         &mut self,
-        stepper: &mut L::Stepper<'m, M>,
-        passed: &Passed<'_, N, L>,
-    ) -> Result<(), TransitionError>;
+        _stepper: &mut L::Stepper<'m, M>,
+        _passed: &Passed<'_, N, L>,
+    ) -> Result<(), TransitionError> {
+        Ok(())
+    }
 
     /// An event inside an element that goes on as if nothing had happened; before the element is passed or cut.
     fn met(&mut self, _severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
@@ -58,15 +60,7 @@ pub trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
 /// Nobody goes along.
 pub(super) struct Nobody;
 
-impl<'m, M: 'm, const N: usize, L: Length<N>> Follow<'m, M, N, L> for Nobody {
-    fn passed(
-        &mut self,
-        _: &mut L::Stepper<'m, M>,
-        _: &Passed<'_, N, L>,
-    ) -> Result<(), TransitionError> {
-        Ok(())
-    }
-}
+impl<'m, M: 'm, const N: usize, L: Length<N>> Follow<'m, M, N, L> for Nobody {}
 
 impl<'m, M, F, const N: usize, L> Follow<'m, M, N, L> for &mut F
 where

@@ -38,8 +38,6 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     const CONSERVES: bool;
     /// Whether parameters have numbers by which they can be set.
     const HAS_PARAMETERS: bool;
-    /// Whether outputs are functions of velocities; of a Hamiltonian they are of momenta.
-    const OF_VELOCITIES: bool;
 
     /// The number of coordinates.
     fn coordinates(&self) -> usize;

@@ -1,7 +1,7 @@
 //! The endless sequence of states.
 
 use super::course::{Course, Leg};
-use super::follow::{Follow, Passed};
+use super::follow::Follow;
 use super::kind::Simulated;
 use super::mesh::Endless;
 use super::pieces::{Left, Observe, Piece, Pieces, Planned, Side};
@@ -14,7 +14,6 @@ use crate::motion::{Event, Node};
 use std::collections::VecDeque;
 use std::fmt;
 use tfe_runtime::Statistics;
-use tfe_runtime::transition::TransitionError;
 
 /// The endless sequence of states of [`Simulation::steps`](crate::Simulation::steps).
 pub struct Steps<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
@@ -318,13 +317,6 @@ where
     M: 'm,
     L: Length<N>,
 {
-    fn passed(
-        &mut self,
-        _: &mut L::Stepper<'m, M>,
-        _: &Passed<'_, N, L>,
-    ) -> Result<(), TransitionError> {
-        Ok(())
-    }
 }
 
 impl<'m, M, const N: usize, L> Observe<'m, M, N, L> for Nodes<'_, 'm, M, N, L>

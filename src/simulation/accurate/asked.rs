@@ -1,7 +1,7 @@
 //! What is asked for: runs with an estimate of their error, or with an accuracy.
 
 use super::super::events::Severed;
-use super::super::follow::{Follow, Passed};
+use super::super::follow::Follow;
 use super::super::kind::{Chosen, Simulated};
 use super::super::mesh::{Grid, Mesh};
 use super::super::setup::Simulation;
@@ -289,7 +289,7 @@ where
             return;
         }
         let still = L::zero(q);
-        let velocity = match M::OF_VELOCITIES {
+        let velocity = match M::NEEDS_VELOCITY {
             true => M::node(stepper, &self.model, (t, state), &still).v,
             false => still,
         };
@@ -375,14 +375,6 @@ where
     M: 'm,
     L: Length<N>,
 {
-    fn passed(
-        &mut self,
-        _: &mut L::Stepper<'m, M>,
-        _: &Passed<'_, N, L>,
-    ) -> Result<(), TransitionError> {
-        Ok(())
-    }
-
     fn cut(&mut self, _: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         self.acts += 1;
         Ok(())

@@ -1,4 +1,4 @@
-//! What a search asks of a run: the trait that models of both kinds of length implement.
+//! What a search asks of a run.
 
 use crate::error::RunErrorKind;
 use crate::simulation::mesh::Mesh;
@@ -39,18 +39,11 @@ pub(crate) trait Repeatable<const N: usize> {
         state: &mut Self::State,
     ) -> Result<(), StepError>;
     /// Adds the last element of a stepper to a trail, where that is of use.
-    fn leave(_: &Self::Stepper, _: &mut Trail) {}
+    fn leave(stepper: &Self::Stepper, trail: &mut Trail);
     /// Has an element of a stepper, its start and length, start from what a trail says.
-    fn foresee(_: &mut Self::Stepper, _: &Trail, _: (f64, f64)) {}
+    fn foresee(stepper: &mut Self::Stepper, trail: &Trail, step: (f64, f64));
     /// Why an element could not be solved.
-    fn failed(&self, element: usize, (time, step): (f64, f64), source: StepError) -> RunErrorKind {
-        RunErrorKind::Solve {
-            element,
-            time,
-            step,
-            source,
-        }
-    }
+    fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind;
     fn set_tolerance(stepper: &mut Self::Stepper, tolerance: f64);
     fn statistics(stepper: &Self::Stepper) -> Statistics;
     /// The same since the last call.
@@ -66,9 +59,7 @@ pub(crate) trait Repeatable<const N: usize> {
         passed: &mut Passing<'_, Self::Stepper, Self::State>,
     ) -> Result<Self::Motion, Broken<Self::Motion>>;
     /// Whether the run looks for events, so that elements alone do not make it.
-    fn has_events(&self) -> bool {
-        false
-    }
+    fn has_events(&self) -> bool;
     /// Whether steps go across kinks or jumps of forces, so that errors need not fall with the order of the element.
     fn crosses_kinks(&self) -> bool;
     /// A motion of the start and one other state.

@@ -55,7 +55,7 @@ impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
         let coordinates = q.as_ref().len();
         match self {
             Self::Column(column) => {
-                let z = if M::OF_VELOCITIES { v } else { &event.p };
+                let z = if M::NEEDS_VELOCITY { v } else { &event.p };
                 let mut values = vec![Dual::ZERO; model.output_count()];
                 let mut slope = |dt: f64, dq: &V, dz: &V| {
                     model.outputs_towards(Dual::new(*t, dt), (q, dq), (z, dz), &mut values);

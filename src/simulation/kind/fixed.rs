@@ -37,7 +37,6 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     const CUTS_AT_KINKS: bool = true;
     const CONSERVES: bool = conserves_energy::<M, N>();
     const HAS_PARAMETERS: bool = true;
-    const OF_VELOCITIES: bool = matches!(M::FORM, Form::Lagrangian);
 
     fn coordinates(&self) -> usize {
         N

@@ -1,6 +1,6 @@
 //! Models of run-time length.
 
-use super::super::checks::conserves_energies;
+use super::super::checks::{check_finite, conserves_energies};
 use super::super::mesh::{Grid, Mesh, is_same};
 use super::super::watch::Watch;
 use super::super::watch::resolution::{Again, Examined, Resolution};
@@ -14,7 +14,7 @@ use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::step::{Control, Impulse};
-use tfe_runtime::{CoordinateName, Element, Facts, Form, Statistics, StepError};
+use tfe_runtime::{CoordinateName, Element, Facts, Statistics, StepError};
 
 impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     const FACTS: Facts = M::FACTS;
@@ -23,7 +23,6 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     const CUTS_AT_KINKS: bool = false;
     const CONSERVES: bool = conserves_energies::<M>();
     const HAS_PARAMETERS: bool = false;
-    const OF_VELOCITIES: bool = matches!(M::FORM, Form::Lagrangian);
 
     fn coordinates(&self) -> usize {
         self.len()
@@ -345,12 +344,7 @@ fn reactions<M: family::Model>(
 fn check_lengths(expected: usize, state: &FamilyState) -> Result<(), RunErrorKind> {
     check_length("q", state.q.len(), expected)?;
     check_length("p", state.p.len(), expected)?;
-    for (coordinate, (&q, &p)) in state.q.iter().zip(&state.p).enumerate() {
-        if !(q.is_finite() && p.is_finite()) {
-            return Err(RunErrorKind::Start { coordinate, q, p });
-        }
-    }
-    Ok(())
+    check_finite(&state.q, &state.p)
 }
 
 fn check_length(vector: &'static str, length: usize, expected: usize) -> Result<(), RunErrorKind> {
