@@ -8,12 +8,21 @@ pub use largest::larger;
 
 use nalgebra::DMatrix;
 use serde_json::Value;
+use std::path::Path;
+
+/// The folder of the workspace: tests belong to the package there, or to one in a folder below.
+fn root() -> &'static Path {
+    let mut above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    let is_root = |folder: &&Path| folder.join("tests/reference").is_dir();
+    above.find(is_root).expect("tests/reference")
+}
 
 /// A table of `tests/reference`.
 pub fn reference(name: &str) -> Value {
-    let path = format!("{}/tests/reference/{name}.json", env!("CARGO_MANIFEST_DIR"));
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
-    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{path}: {error}"))
+    let path = root().join(format!("tests/reference/{name}.json"));
+    let at = path.display();
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{at}: {error}"));
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{at}: {error}"))
 }
 
 /// A number of a table.

@@ -331,7 +331,7 @@ fn the_table() {
         let [b, c, d] = others.map(|other| &other.1);
         writeln!(table, "| {name} | {outcome} | {b} | {c} | {d} |").expect("a string");
     }
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/calls.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/calls.md");
     let page = std::fs::read_to_string(path).expect("a page");
     let (before, rest) = page.split_once("| call |").expect("a table");
     let after = rest.split_once("\n\n").map_or("", |(_, after)| after);

@@ -14,7 +14,7 @@ use cases::Outcome;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/record.txt");
+const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../reference/record.txt");
 
 /// What roundings of twenty steps explain, relative to the largest number of a case.
 const ROUNDINGS: f64 = 1e-11;

@@ -138,13 +138,13 @@ impl Enclosure {
         }
     }
 
-    /// Whether one of the numbers first + k · period may be within.
-    fn may_hold(self, first: f64, period: f64) -> bool {
+    /// The first k of those numbers first + k · period that may be within, if there is one.
+    fn first_within(self, first: f64, period: f64) -> Option<f64> {
         const MARGIN: f64 = 1e-9;
         let margin = MARGIN * (1.0 + self.low.abs().max(self.high.abs()));
-        let next = first + period * ((self.low - margin - first) / period).ceil();
+        let next = ((self.low - margin - first) / period).ceil();
         // Also of NaN.
-        !(next > self.high + margin)
+        (!(first + period * next > self.high + margin)).then_some(next)
     }
 
     /// A function that oscillates between −1 and 1, the latter at `top` + 2πk.
@@ -154,16 +154,19 @@ impl Enclosure {
         }
         let (a, b) = (function(self.low), function(self.high));
         let ends = Self::widened(a.min(b), a.max(b), ELEMENTARY);
-        let low = if self.may_hold(top + PI, TAU) {
-            -1.0
-        } else {
-            ends.low.max(-1.0)
-        };
-        let high = if self.may_hold(top, TAU) {
-            1.0
-        } else {
-            ends.high.min(1.0)
-        };
+        let (mut low, mut high) = (ends.low.max(-1.0), ends.high.min(1.0));
+        if let Some(k) = self.first_within(top, PI) {
+            // An extreme, the lower ones at odd k; the other kind may be behind it.
+            let is_lower = (k as i64) % 2 != 0;
+            let other = if is_lower { top } else { top + PI };
+            let has_other = self.first_within(other, TAU).is_some();
+            if is_lower || has_other {
+                low = -1.0;
+            }
+            if !is_lower || has_other {
+                high = 1.0;
+            }
+        }
         Self { low, high }
     }
 
@@ -284,7 +287,7 @@ impl Real for Enclosure {
         self.wave(0.0, <f64 as Real>::cos)
     }
     fn tan(self) -> Self {
-        if !(self.high - self.low < PI) || self.may_hold(FRAC_PI_2, PI) {
+        if !(self.high - self.low < PI) || self.first_within(FRAC_PI_2, PI).is_some() {
             return Self::WHOLE;
         }
         self.rising((f64::NEG_INFINITY, f64::INFINITY), <f64 as Real>::tan)

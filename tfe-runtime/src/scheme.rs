@@ -259,13 +259,29 @@ pub struct SchemeTable {
     parts: alloc::sync::Arc<Parts>,
 }
 
-/// The numbers of all tables one after the other, and where each begins and the last ends.
+/// The numbers of all tables: each a slice of its own, so that what is not asked for of a view costs nothing.
 #[cfg(feature = "alloc")]
 #[derive(Debug)]
 struct Parts {
-    offsets: [usize; SchemeTable::PARTS + 1],
-    numbers: alloc::boxed::Box<[f64]>,
+    nodes: Numbers,
+    weights: Numbers,
+    weights_low: Numbers,
+    unknown_nodes: Numbers,
+    velocity: Numbers,
+    position: Numbers,
+    position_low: Numbers,
+    momentum: Numbers,
+    force: Numbers,
+    force_low: Numbers,
+    advance: Numbers,
+    advance_low: Numbers,
+    impulse: Numbers,
+    rate: Numbers,
+    force_rate: Numbers,
 }
+
+#[cfg(feature = "alloc")]
+type Numbers = alloc::boxed::Box<[f64]>;
 
 /// The tables computed so far. There are a few hundred elements in all.
 #[cfg(feature = "std")]
@@ -300,65 +316,46 @@ impl SchemeTable {
     /// The tables of a valid element.
     fn computed(element: Element) -> Self {
         let (k, u, s) = (element.points(), element.unknowns(), element.degree());
-        let offsets = Self::offsets(k, u, s);
-        let mut numbers = alloc::vec![0.0; offsets[Self::PARTS]].into_boxed_slice();
-        let mut rest = &mut numbers[..];
-        let mut take = |length: usize| {
-            let (part, tail) = core::mem::take(&mut rest).split_at_mut(length);
-            rest = tail;
-            part
+        let zeros = |length| -> Numbers { alloc::vec![0.0; length].into_boxed_slice() };
+        let mut parts = Parts {
+            nodes: zeros(k),
+            weights: zeros(k),
+            weights_low: zeros(k),
+            unknown_nodes: zeros(u),
+            velocity: zeros(k * u),
+            position: zeros(k * u),
+            position_low: zeros(k * u),
+            momentum: zeros(u * k),
+            force: zeros(u * k),
+            force_low: zeros(u * k),
+            advance: zeros(u),
+            advance_low: zeros(u),
+            impulse: zeros(u * MAX_NODES),
+            rate: zeros(s * u),
+            force_rate: zeros(s * k),
         };
         let mut target = Target {
-            nodes: take(k),
-            weights: take(k),
-            weights_low: take(k),
-            unknown_nodes: take(u),
-            velocity: take(k * u),
-            position: take(k * u),
-            position_low: take(k * u),
-            momentum: take(u * k),
-            force: take(u * k),
-            force_low: take(u * k),
-            advance: take(u),
-            advance_low: take(u),
-            impulse: take(u * MAX_NODES),
-            rate: take(s * u),
-            force_rate: take(s * k),
+            nodes: &mut parts.nodes,
+            weights: &mut parts.weights,
+            weights_low: &mut parts.weights_low,
+            unknown_nodes: &mut parts.unknown_nodes,
+            velocity: &mut parts.velocity,
+            position: &mut parts.position,
+            position_low: &mut parts.position_low,
+            momentum: &mut parts.momentum,
+            force: &mut parts.force,
+            force_low: &mut parts.force_low,
+            advance: &mut parts.advance,
+            advance_low: &mut parts.advance_low,
+            impulse: &mut parts.impulse,
+            rate: &mut parts.rate,
+            force_rate: &mut parts.force_rate,
         };
         target.fill(element);
         Self {
             element,
-            parts: alloc::sync::Arc::new(Parts { offsets, numbers }),
+            parts: alloc::sync::Arc::new(parts),
         }
-    }
-
-    const PARTS: usize = 15;
-
-    /// Where each part begins, and where the last ends.
-    fn offsets(k: usize, u: usize, s: usize) -> [usize; Self::PARTS + 1] {
-        let ku = k * u;
-        let lengths = [
-            k,
-            k,
-            k,
-            u,
-            ku,
-            ku,
-            ku,
-            ku,
-            ku,
-            ku,
-            u,
-            u,
-            u * MAX_NODES,
-            s * u,
-            s * k,
-        ];
-        let mut offsets = [0; Self::PARTS + 1];
-        for (part, length) in lengths.iter().enumerate() {
-            offsets[part + 1] = offsets[part] + length;
-        }
-        offsets
     }
 }
 
@@ -372,26 +369,25 @@ impl Tables for SchemeTable {
     #[inline]
     fn view(&self) -> SchemeRef<'_> {
         let element = self.element;
-        let Parts { offsets, numbers } = &*self.parts;
-        let part = |index: usize| &numbers[offsets[index]..offsets[index + 1]];
+        let parts = &*self.parts;
         SchemeRef {
             element,
             collocated: element.is_collocated(),
-            nodes: part(0),
-            weights: part(1),
-            weights_low: part(2),
-            unknown_nodes: part(3),
-            velocity: part(4),
-            position: part(5),
-            position_low: part(6),
-            momentum: part(7),
-            force: part(8),
-            force_low: part(9),
-            advance: part(10),
-            advance_low: part(11),
-            impulse: part(12),
-            rate: part(13),
-            force_rate: part(14),
+            nodes: &parts.nodes,
+            weights: &parts.weights,
+            weights_low: &parts.weights_low,
+            unknown_nodes: &parts.unknown_nodes,
+            velocity: &parts.velocity,
+            position: &parts.position,
+            position_low: &parts.position_low,
+            momentum: &parts.momentum,
+            force: &parts.force,
+            force_low: &parts.force_low,
+            advance: &parts.advance,
+            advance_low: &parts.advance_low,
+            impulse: &parts.impulse,
+            rate: &parts.rate,
+            force_rate: &parts.force_rate,
         }
     }
 }

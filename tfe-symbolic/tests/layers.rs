@@ -1,5 +1,5 @@
-//! The plan of the workspace by its imports: no circles among the files of any crate, nor among their folders, folders of the engine in layers, and a line in `ARCHITECTURE.md` for
-//! every module.
+//! The plan of the workspace by its imports: no circles among the files of any crate, nor among their folders, folders of the engine in layers, a line in `ARCHITECTURE.md` for
+//! every module, and every file of tests in a manifest.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -88,6 +88,35 @@ fn every_module_has_a_line_in_the_tables() {
             });
             assert!(has_line, "{crate_sources}: no line for {name}");
         }
+    }
+}
+
+/// Tests are named in manifests, and a file that none names would be run by nobody.
+#[test]
+fn every_file_of_tests_is_run() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests");
+    let manifests = ["../Cargo.toml", "light/Cargo.toml"].map(|path| {
+        let path = folder.join(path);
+        fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    });
+    let entries = fs::read_dir(&folder).expect("a folder of tests");
+    let mut tests = Vec::new();
+    for entry in entries {
+        let path = entry.expect("an entry").path();
+        let is_test =
+            path.extension().is_some_and(|kind| kind == "rs") || path.join("main.rs").exists();
+        if is_test && let Some(name) = path.file_stem() {
+            tests.push(name.to_string_lossy().into_owned());
+        }
+    }
+    assert!(tests.len() > 30, "{tests:?}");
+    for test in tests {
+        let line = format!("\n[[test]]\nname = \"{test}\"\n");
+        let named: usize = manifests
+            .iter()
+            .map(|text| text.matches(&line).count())
+            .sum();
+        assert_eq!(named, 1, "{test} is named {named} times");
     }
 }
 
