@@ -12,9 +12,9 @@ use crate::error::StepError;
 use crate::lu::Block;
 use crate::model::{First, Form, Model, Second};
 use crate::phase_form::PhaseForm;
-use crate::tape::Tape;
+use crate::tape::{LANES, Places, Tape};
 use crate::velocity_form::{PointDerivatives, VelocityForm};
-use alloc::{vec, vec::Vec};
+use alloc::vec::Vec;
 
 /// Whether directions are parameters and nothing else, and so many that all parameters are differentiated at once.
 pub(crate) fn are_parameters<M: Model<N>, const N: usize>(
@@ -24,56 +24,69 @@ pub(crate) fn are_parameters<M: Model<N>, const N: usize>(
     /// With fewer, dual numbers take less.
     const LEAST: usize = 4;
     let is_one = |direction: &Direction| {
-        let alone = Direction {
-            parameter: direction.parameter,
-            ..Direction::default()
-        };
+        let moves = [direction.time, direction.length, direction.damping] != [0.0; 3];
         let index = direction.parameter.and_then(|one| one.any(model));
-        *direction == alone && index.is_some_and(|index| index < model.parameters())
+        !moves && index.is_some_and(|index| index < model.parameters())
     };
     M::CONSTRAINTS.is_empty() && directions.len() >= LEAST && directions.iter().all(is_one)
 }
 
-/// What weights of first derivatives at points have of parameters, into the sums of directions.
-pub(crate) struct Backwards<'a, M, const N: usize> {
-    model: &'a M,
+/// Elements backwards: what they have of all parameters, added up, and the memory that it takes.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Backwards<const N: usize> {
     tape: Tape,
-    sums: Vec<f64>,
+    points: Points<N>,
+    /// Room for what elements need that are not iterated.
+    pub(crate) extra: Vec<f64>,
 }
 
-impl<'a, M: Model<N>, const N: usize> Backwards<'a, M, N> {
-    pub(crate) fn new(model: &'a M) -> Self {
-        Self {
-            model,
-            tape: Tape::default(),
-            sums: vec![0.0; model.parameters()],
-        }
+impl<const N: usize> Backwards<N> {
+    /// Nothing yet, of so many parameters.
+    pub(crate) fn begin(&mut self, parameters: usize) {
+        self.tape.begin(parameters);
     }
 
     /// Of an element in phase space, with μ of (T-127).
-    pub(crate) fn of_phase(&mut self, equations: &PhaseForm<'_, M, N>, x: &[f64], mu: &[f64]) {
-        let (forces, velocities) = mu.as_chunks::<N>().0.split_at(equations.scheme.points());
-        for (k, (force, velocity)) in forces.iter().zip(velocities).enumerate() {
-            let (t, q, p) = equations.place(k, x);
-            let weights = First {
-                z: *velocity,
-                q: force.map(|weight| -weight),
-                force: *force,
-            };
-            (self.tape).add_derivatives(self.model, (t, &q, &p), &weights, &mut self.sums);
+    pub(crate) fn of_phase<M: Model<N>>(
+        &mut self,
+        equations: &PhaseForm<'_, M, N>,
+        x: &[f64],
+        mu: &[f64],
+    ) {
+        if self.tape.parameters() == 0 {
+            return;
+        }
+        let points = equations.scheme.points();
+        let (forces, velocities) = mu.as_chunks::<N>().0.split_at(points);
+        for from in (0..points).step_by(LANES) {
+            let mut places = Places::NONE;
+            for k in from..points.min(from + LANES) {
+                let (t, q, p) = equations.place(k, x);
+                let weights = First {
+                    z: velocities[k],
+                    q: forces[k].map(|weight| -weight),
+                    force: forces[k],
+                };
+                places.push((t, &q, &p), &weights);
+            }
+            (self.tape).add_derivatives(equations.model, &places);
         }
     }
 
     /// Of an element in velocities, with λ of the momenta at its end.
-    pub(crate) fn of_velocities(
+    pub(crate) fn of_velocities<M: Model<N>>(
         &mut self,
         equations: &mut VelocityForm<'_, M, N>,
         x: &[f64],
         (lambda, mu): (&[f64; N], &[f64]),
     ) -> Result<(), StepError> {
+        if self.tape.parameters() == 0 {
+            return Ok(());
+        }
         let (rates, mu) = (x.as_chunks::<N>().0, mu.as_chunks::<N>().0);
         let (scheme, h) = (equations.scheme, equations.span.h);
         let points = scheme.points();
+        let mut places = Places::NONE;
         for l in 0..points {
             let (mut momentum, mut force) = ([0.0; N], [0.0; N]);
             for a in 0..N {
@@ -117,28 +130,44 @@ impl<'a, M: Model<N>, const N: usize> Backwards<'a, M, N> {
                     (point.p, weights)
                 }
             };
-            (self.tape).add_derivatives(self.model, (t, &q, &z), &weights, &mut self.sums);
+            places.push((t, &q, &z), &weights);
+            if (l + 1) % LANES == 0 || l + 1 == points {
+                (self.tape).add_derivatives(equations.model, &places);
+                places = Places::NONE;
+            }
         }
         Ok(())
     }
 
     /// Adds what was found to the sums of directions.
-    pub(crate) fn add_to(&self, directions: &[Direction], by_direction: &mut [f64]) {
+    pub(crate) fn add_to<M: Model<N>>(
+        &self,
+        model: &M,
+        directions: &[Direction],
+        by_direction: &mut [f64],
+    ) {
         for (direction, sum) in directions.iter().zip(by_direction) {
-            let index = direction.parameter.and_then(|one| one.any(self.model));
-            *sum += index.map_or(0.0, |index| self.sums[index]);
+            let index = direction.parameter.and_then(|one| one.any(model));
+            *sum += index.map_or(0.0, |index| self.tape.sum(index));
         }
     }
 }
 
-/// What (T-150) needs of a point.
-struct Backward<const N: usize> {
-    force_q: [[f64; N]; N],
-    force_v: [[f64; N]; N],
-    momentum_q: [[f64; N]; N],
+/// What (T-150) needs of points; where it is zero there is nothing.
+#[derive(Clone, Debug, Default)]
+struct Points<const N: usize> {
+    force_q: Vec<[[f64; N]; N]>,
+    force_v: Vec<[[f64; N]; N]>,
+    momentum_q: Vec<[[f64; N]; N]>,
+    /// One where it is constant.
+    masses: Vec<Mass<N>>,
+    mu: Vec<[f64; N]>,
+    pulled: Vec<[f64; N]>,
+    rows: Vec<[f64; N]>,
 }
 
 /// L_vv, as it is divided by.
+#[derive(Clone, Debug)]
 enum Mass<const N: usize> {
     Diagonal([f64; N]),
     Full(Block<N>),
@@ -162,11 +191,12 @@ impl<const N: usize> Mass<N> {
         Some(Self::Diagonal(diagonal))
     }
 
+    #[inline(always)]
     fn solve(&self, row: &mut [f64; N]) {
         match self {
             Self::Diagonal(diagonal) => {
-                for (entry, mass) in row.iter_mut().zip(diagonal) {
-                    *entry /= mass;
+                for a in 0..N {
+                    row[a] /= diagonal[a];
                 }
             }
             Self::Full(block) => block.solve(row),
@@ -174,126 +204,219 @@ impl<const N: usize> Mass<N> {
     }
 }
 
+/// sum += factor · row
+#[inline(always)]
+fn add_multiple<const N: usize>(factor: f64, row: &[f64; N], sum: &mut [f64; N]) {
+    for a in 0..N {
+        sum[a] += factor * row[a];
+    }
+}
+
 /// sum += matrixᵀ row
+#[inline(always)]
 fn add_transposed<const N: usize>(matrix: &[[f64; N]; N], row: &[f64; N], sum: &mut [f64; N]) {
-    for (entries, factor) in matrix.iter().zip(row) {
-        for (sum, entry) in sum.iter_mut().zip(entries) {
-            *sum += factor * entry;
+    for a in 0..N {
+        add_multiple(row[a], &matrix[a], sum);
+    }
+}
+
+impl<const N: usize> Points<N> {
+    /// Those of an element; false if a mass matrix is singular.
+    fn set<M: Model<N>>(
+        &mut self,
+        equations: &mut VelocityForm<'_, M, N>,
+        rates: &[[f64; N]],
+    ) -> Result<bool, StepError> {
+        let points = equations.scheme.points();
+        for matrices in [&mut self.force_q, &mut self.force_v, &mut self.momentum_q] {
+            matrices.clear();
+        }
+        self.masses.clear();
+        let mut point = PointDerivatives {
+            p: [0.0; N],
+            force: [0.0; N],
+            second: Second::ZERO,
+        };
+        for l in 0..points {
+            equations.derivatives(l, rates, &mut point)?;
+            let second = &point.second;
+            self.force_q.push(second.qq);
+            if M::FACTS.forced {
+                add(&second.force_q, &mut self.force_q[l]);
+            }
+            if has_velocities::<M, N>() {
+                let mut force_v = second.force_z;
+                for a in 0..N {
+                    for b in 0..N {
+                        force_v[a][b] += second.zq[b][a];
+                    }
+                }
+                self.force_v.push(force_v);
+            }
+            if !M::FACTS.separable {
+                self.momentum_q.push(second.zq);
+            }
+            if self.masses.is_empty() || !M::FACTS.constant_mass {
+                let Some(mass) = Mass::of(&second.zz) else {
+                    return Ok(false);
+                };
+                self.masses.push(mass);
+            }
+        }
+        for rows in [&mut self.mu, &mut self.pulled, &mut self.rows] {
+            rows.clear();
+            rows.resize(points, [0.0; N]);
+        }
+        Ok(true)
+    }
+
+    /// μ by iteration, with what goes to λ; false where that does not contract.
+    fn iterate<M: Model<N>>(&mut self, equations: &VelocityForm<'_, M, N>, lambda: &[f64]) -> bool {
+        let iteration = Iteration {
+            points: self,
+            equations,
+            lambda,
+        };
+        #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+        if let Some(isa) = pulp::x86::V3::try_new() {
+            return isa.vectorize(iteration);
+        }
+        iteration.run()
+    }
+}
+
+/// The iteration of (T-150).
+struct Iteration<'a, 'e, M, const N: usize> {
+    points: &'a mut Points<N>,
+    equations: &'a VelocityForm<'e, M, N>,
+    lambda: &'a [f64],
+}
+
+/// In wide registers, with the same roundings.
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for Iteration<'_, '_, M, N> {
+    type Output = bool;
+    #[inline(always)]
+    fn call(self) -> bool {
+        self.run()
+    }
+}
+
+impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
+    // Loops and no closures, which would be compiled for the instruction set of the crate.
+    #[inline(always)]
+    fn run(self) -> bool {
+        /// Each increment is at most this part of the one before, or factors cost less.
+        const CONTRACTION: f64 = 0.2;
+        /// Increments beside μ that are roundings.
+        const ROUNDING: f64 = 1e-16;
+
+        let Points {
+            force_q,
+            force_v,
+            momentum_q,
+            masses,
+            mu,
+            pulled,
+            rows,
+        } = self.points;
+        let (scheme, h) = (&self.equations.scheme, self.equations.span.h);
+        let points = scheme.points();
+        let (of_p, of_q) = self.lambda.split_at(N);
+        let mut before = f64::INFINITY;
+        loop {
+            for l in 0..points {
+                let mut seed = [0.0; N];
+                for a in 0..N {
+                    seed[a] = h * scheme.weights[l] * of_p[a];
+                    rows[l][a] = h * scheme.advance[l] * of_q[a];
+                }
+                for i in 0..points {
+                    add_multiple(h * scheme.force[i * points + l], &mu[i], &mut seed);
+                }
+                pulled[l] = [0.0; N];
+                add_transposed(&force_q[l], &seed, &mut pulled[l]);
+                if const { has_velocities::<M, N>() } {
+                    add_transposed(&force_v[l], &seed, &mut rows[l]);
+                }
+                if const { !M::FACTS.separable } {
+                    let mut negative = mu[l];
+                    for a in 0..N {
+                        negative[a] = -negative[a];
+                    }
+                    add_transposed(&momentum_q[l], &negative, &mut pulled[l]);
+                }
+            }
+            let (mut increment, mut size) = (0.0_f64, 0.0_f64);
+            for j in 0..points {
+                let mut row = rows[j];
+                for l in 0..points {
+                    add_multiple(h * scheme.position[l * points + j], &pulled[l], &mut row);
+                }
+                masses[j.min(masses.len() - 1)].solve(&mut row);
+                for a in 0..N {
+                    let change = (row[a] - mu[j][a]).abs();
+                    // A maximum would ignore what is not a number.
+                    increment = if change > increment || change.is_nan() {
+                        change
+                    } else {
+                        increment
+                    };
+                    size = size.max(row[a].abs());
+                    mu[j][a] = row[a];
+                }
+            }
+            if increment <= ROUNDING * size {
+                return true;
+            }
+            if !(increment <= CONTRACTION * before) {
+                // Roundings do not shrink.
+                return increment <= 64.0 * ROUNDING * size;
+            }
+            before = increment;
         }
     }
 }
 
-/// μ and the new λ by iteration; nothing where that does not contract, and λ stays.
-pub(crate) fn iterated<M: Model<N>, const N: usize>(
-    equations: &mut VelocityForm<'_, M, N>,
-    x: &[f64],
-    lambda: &mut [f64],
-) -> Result<Option<Vec<[f64; N]>>, StepError> {
-    /// Each increment is at most this part of the one before, or factors cost less.
-    const CONTRACTION: f64 = 0.2;
-    /// Increments beside μ that are roundings.
-    const ROUNDING: f64 = 1e-16;
+/// Whether forces depend on velocities.
+const fn has_velocities<M: Model<N>, const N: usize>() -> bool {
+    M::FACTS.forced || !M::FACTS.separable
+}
 
-    let scheme = equations.scheme;
-    if M::FORM != Form::Lagrangian || !scheme.collocated || !M::CONSTRAINTS.is_empty() {
-        return Ok(None);
+/// sum += matrix
+fn add<const N: usize>(matrix: &[[f64; N]; N], sum: &mut [[f64; N]; N]) {
+    for (sum, entry) in sum.as_flattened_mut().iter_mut().zip(matrix.as_flattened()) {
+        *sum += entry;
     }
-    let (rates, h, points) = (x.as_chunks::<N>().0, equations.span.h, scheme.points());
-    let mut at_points = Vec::with_capacity(points);
-    let mut masses: Vec<Mass<N>> = Vec::with_capacity(points);
-    let mut point = PointDerivatives {
-        p: [0.0; N],
-        force: [0.0; N],
-        second: Second::ZERO,
-    };
-    for l in 0..points {
-        equations.derivatives(l, rates, &mut point)?;
-        let second = &point.second;
-        let mut own = Backward {
-            force_q: second.qq,
-            force_v: second.force_z,
-            momentum_q: second.zq,
-        };
-        for a in 0..N {
-            for b in 0..N {
-                own.force_q[a][b] += second.force_q[a][b];
-                own.force_v[a][b] += second.zq[b][a];
+}
+
+impl<const N: usize> Backwards<N> {
+    /// μ and the new λ by iteration, with what the element has of parameters; false where that does not contract, and λ stays.
+    pub(crate) fn is_iterated<M: Model<N>>(
+        &mut self,
+        equations: &mut VelocityForm<'_, M, N>,
+        x: &[f64],
+        lambda: &mut [f64],
+    ) -> Result<bool, StepError> {
+        if M::FORM != Form::Lagrangian
+            || !equations.scheme.collocated
+            || !M::CONSTRAINTS.is_empty()
+            || !self.points.set(equations, x.as_chunks::<N>().0)?
+            || !self.points.iterate(equations, lambda)
+        {
+            return Ok(false);
+        }
+        let mut of_p = [0.0; N];
+        of_p.copy_from_slice(&lambda[..N]);
+        for (mu, pulled) in self.points.mu.iter().zip(&self.points.pulled) {
+            for a in 0..N {
+                lambda[a] += mu[a];
+                lambda[N + a] += pulled[a];
             }
         }
-        if masses.is_empty() || !M::FACTS.constant_mass {
-            let Some(mass) = Mass::of(&second.zz) else {
-                return Ok(None);
-            };
-            masses.push(mass);
-        }
-        at_points.push(own);
+        let mu = core::mem::take(&mut self.points.mu);
+        self.of_velocities(equations, x, (&of_p, mu.as_flattened()))?;
+        self.points.mu = mu;
+        Ok(true)
     }
-    let (mut of_p, mut of_q) = ([0.0; N], [0.0; N]);
-    of_p.copy_from_slice(&lambda[..N]);
-    of_q.copy_from_slice(&lambda[N..]);
-    let mut mu = vec![[0.0; N]; points];
-    let mut pulled = vec![[0.0; N]; points];
-    let mut rows = vec![[0.0; N]; points];
-    let mut before = f64::INFINITY;
-    loop {
-        for (l, at) in at_points.iter().enumerate() {
-            let mut seed = of_p.map(|of_p| h * scheme.weights[l] * of_p);
-            for (i, mu) in mu.iter().enumerate() {
-                let weight = h * scheme.force[i * points + l];
-                for (seed, mu) in seed.iter_mut().zip(mu) {
-                    *seed += weight * mu;
-                }
-            }
-            pulled[l] = [0.0; N];
-            add_transposed(&at.force_q, &seed, &mut pulled[l]);
-            rows[l] = of_q.map(|of_q| h * scheme.advance[l] * of_q);
-            if M::FACTS.forced || !M::FACTS.separable {
-                add_transposed(&at.force_v, &seed, &mut rows[l]);
-            }
-            if !M::FACTS.separable {
-                add_transposed(&at.momentum_q, &mu[l].map(|mu| -mu), &mut pulled[l]);
-            }
-        }
-        let (mut increment, mut size) = (0.0_f64, 0.0_f64);
-        for j in 0..points {
-            let mut row = rows[j];
-            for (l, pulled) in pulled.iter().enumerate() {
-                let weight = h * scheme.position[l * points + j];
-                for (row, pulled) in row.iter_mut().zip(pulled) {
-                    *row += weight * pulled;
-                }
-            }
-            masses[j.min(masses.len() - 1)].solve(&mut row);
-            for (mu, row) in mu[j].iter_mut().zip(row) {
-                let change = (row - *mu).abs();
-                // A maximum would ignore what is not a number.
-                increment = if change > increment || change.is_nan() {
-                    change
-                } else {
-                    increment
-                };
-                size = size.max(row.abs());
-                *mu = row;
-            }
-        }
-        if increment <= ROUNDING * size {
-            break;
-        }
-        // Roundings do not shrink.
-        let is_round_off = increment <= 64.0 * ROUNDING * size;
-        if !(increment <= CONTRACTION * before) {
-            if is_round_off {
-                break;
-            }
-            return Ok(None);
-        }
-        before = increment;
-    }
-    for (mu, pulled) in mu.iter().zip(&pulled) {
-        for a in 0..N {
-            lambda[a] += mu[a];
-            lambda[N + a] += pulled[a];
-        }
-    }
-    Ok(Some(mu))
 }

@@ -249,14 +249,6 @@ impl System<'_> {
     }
 }
 
-/// What is made of the linear system of an element.
-pub(crate) enum Asked<'a> {
-    /// The derivatives of the end, row by row, with the columns of the sides.
-    Matrix(&'a mut [f64]),
-    /// Their product with λ, from the left: that with the columns of the start takes the place of λ, those of the directions are added to others.
-    Product(&'a mut [f64], &'a mut [f64]),
-}
-
 impl<'a> System<'a> {
     /// The product (T-127): one solution with the transposed factors, whatever the number of columns. The residual holds λᵀ ∂(end)/∂(interior); what is solved for is returned.
     pub(crate) fn product(

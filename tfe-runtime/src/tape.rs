@@ -6,101 +6,229 @@
 //! ∂(w·r)/∂a = Σ over operations from the last to the first: adjoint of an operand += adjoint of the result × ∂result/∂operand .        (T-149)
 //! ```
 //!
-//! Only operations that a parameter has a part in are written down; coordinates, velocities and the time are mere numbers.
+//! Only operations that a parameter has a part in are written down; coordinates, velocities and the time are mere numbers. Several points go side by side, as the operations are the same at all of them.
 
 use crate::model::{First, Model};
 use crate::real::Real;
 use alloc::vec::Vec;
+use core::array::from_fn;
 use core::cell::RefCell;
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+/// Points side by side: elements mostly have no more.
+pub(crate) const LANES: usize = 4;
+
+/// A number for each point.
+type Row = [f64; LANES];
+
+const ZERO: Row = [0.0; LANES];
+
 /// No operand, or a number that no parameter has a part in.
 const NONE: u32 = u32::MAX;
 
-/// One operation: its operands and the derivatives by them. A parameter has its index as `first`, and `second` is itself.
+/// The derivative of an operation by one of its operands.
 #[derive(Clone, Copy, Debug)]
-struct Operation {
-    first: u32,
-    second: u32,
-    by_first: f64,
-    by_second: f64,
+enum Slope {
+    One,
+    MinusOne,
+    Of(Row),
 }
 
-/// The operations of one kernel call.
-#[derive(Debug, Default)]
+/// An operand, and where the derivative by it stands: of sums that is known, and takes no memory.
+#[derive(Clone, Copy, Debug)]
+struct Operand {
+    place: u32,
+    slope: u32,
+}
+
+impl Operand {
+    const ONE: u32 = u32::MAX;
+    const MINUS_ONE: u32 = u32::MAX - 1;
+    const NONE: Self = Self {
+        place: NONE,
+        slope: Self::ONE,
+    };
+}
+
+/// The operations of one kernel call; parameters have the places before them.
+#[derive(Clone, Debug, Default)]
+struct Operations {
+    parameters: usize,
+    list: Vec<[Operand; 2]>,
+    slopes: Vec<Row>,
+}
+
+impl Operations {
+    #[inline]
+    fn operand(&mut self, place: u32, slope: Slope) -> Operand {
+        let slope = match slope {
+            Slope::One => Operand::ONE,
+            Slope::MinusOne => Operand::MINUS_ONE,
+            Slope::Of(row) => {
+                self.slopes.push(row);
+                self.slopes.len() as u32 - 1
+            }
+        };
+        Operand { place, slope }
+    }
+}
+
+/// What kernels are given at points, and the weights of what they give.
+pub(crate) struct Places<const N: usize> {
+    count: usize,
+    t: Row,
+    q: [Row; N],
+    z: [Row; N],
+    /// Of the derivatives by z, by q, and of forces.
+    weights: [[Row; N]; 3],
+}
+
+impl<const N: usize> Places<N> {
+    pub(crate) const NONE: Self = Self {
+        count: 0,
+        t: ZERO,
+        q: [ZERO; N],
+        z: [ZERO; N],
+        weights: [[ZERO; N]; 3],
+    };
+
+    /// One more, of at most [`LANES`].
+    pub(crate) fn push(&mut self, (t, q, z): (f64, &[f64; N], &[f64; N]), weights: &First<f64, N>) {
+        // Where there are no more points the first one stands, without weights.
+        let lanes = match self.count {
+            0 => 0..LANES,
+            count => count..count + 1,
+        };
+        self.t[lanes.clone()].fill(t);
+        for a in 0..N {
+            self.q[a][lanes.clone()].fill(q[a]);
+            self.z[a][lanes.clone()].fill(z[a]);
+            for (rows, part) in
+                (self.weights.iter_mut()).zip([&weights.z, &weights.q, &weights.force])
+            {
+                rows[a][self.count] = part[a];
+            }
+        }
+        self.count += 1;
+    }
+}
+
+/// The operations of one kernel call, and what is read of all of them.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Tape {
-    operations: RefCell<Vec<Operation>>,
-    adjoints: Vec<f64>,
+    operations: Operations,
+    /// Those of parameters, sums over all calls, and those of operations, zeros between the calls.
+    adjoints: Vec<Row>,
 }
 
 impl Tape {
-    /// Adds Σ weights · ∂(first derivatives and forces)/∂a to `sums` for every parameter a.
+    /// Sums of so many parameters, zeros.
+    pub(crate) fn begin(&mut self, parameters: usize) {
+        let operations = &mut self.operations;
+        if operations.parameters != parameters {
+            self.adjoints.clear();
+            operations.parameters = parameters;
+        }
+        let missing = parameters.saturating_sub(self.adjoints.len());
+        self.adjoints.extend(core::iter::repeat_n(ZERO, missing));
+        self.adjoints[..parameters].fill(ZERO);
+    }
+
+    /// How many there are.
+    pub(crate) fn parameters(&self) -> usize {
+        self.operations.parameters
+    }
+
+    /// The sum of a parameter, by its number.
+    pub(crate) fn sum(&self, parameter: usize) -> f64 {
+        self.adjoints[parameter].iter().sum()
+    }
+
+    /// Adds Σ weights · ∂(first derivatives and forces)/∂a over some points to the sum of every parameter a.
     pub(crate) fn add_derivatives<M: Model<N>, const N: usize>(
         &mut self,
         model: &M,
-        (t, q, z): (f64, &[f64; N], &[f64; N]),
-        weights: &First<f64, N>,
-        sums: &mut [f64],
+        places: &Places<N>,
     ) {
-        self.operations.borrow_mut().clear();
-        self.adjoints.clear();
+        self.operations.list.clear();
+        self.operations.slopes.clear();
+        // Numbers share what they write to for as long as the kernel runs.
+        let operations = RefCell::new(core::mem::take(&mut self.operations));
         let ends = {
-            let number = |value| Taped {
-                value,
-                place: NONE,
-                tape: None,
-            };
             let time = Taped {
-                tape: Some(&self.operations),
-                ..number(t)
+                tape: Some(&operations),
+                ..Taped::of(places.t)
             };
             let mut first = First::zero();
-            model.first(time, &q.map(number), &z.map(number), &mut first);
+            model.first(
+                time,
+                &places.q.map(Taped::of),
+                &places.z.map(Taped::of),
+                &mut first,
+            );
             let parts = [first.z, first.q, first.force];
             parts.map(|part| part.map(|result| result.place))
         };
-        let operations = self.operations.borrow();
-        self.adjoints.resize(operations.len(), 0.0);
-        for (places, weights) in ends.iter().zip([&weights.z, &weights.q, &weights.force]) {
-            for (place, weight) in places.iter().zip(weights) {
-                if let Some(adjoint) = self.adjoints.get_mut(*place as usize) {
-                    *adjoint += weight;
+        self.operations = operations.into_inner();
+        let operations = &self.operations;
+        let count = operations.parameters + operations.list.len();
+        if self.adjoints.len() < count {
+            self.adjoints.resize(count, ZERO);
+        }
+        for (place, weights) in ends
+            .as_flattened()
+            .iter()
+            .zip(places.weights.as_flattened())
+        {
+            if let Some(adjoint) = self.adjoints.get_mut(*place as usize) {
+                for lane in 0..LANES {
+                    adjoint[lane] += weights[lane];
                 }
             }
         }
-        read_backwards(&operations, &mut self.adjoints, sums);
+        read_backwards(operations, &mut self.adjoints);
     }
 }
 
-/// From the adjoints of results to the derivatives by parameters (T-149).
-fn read_backwards(operations: &[Operation], adjoints: &mut [f64], sums: &mut [f64]) {
-    for (place, operation) in operations.iter().enumerate().rev() {
-        let adjoint = adjoints[place];
-        // An infinite derivative along which nothing changes is none.
-        if adjoint == 0.0 {
+/// From the adjoints of results to those of parameters (T-149); those of operations are zeros then.
+fn read_backwards(operations: &Operations, adjoints: &mut [Row]) {
+    for (place, operation) in operations.list.iter().enumerate().rev() {
+        let own = &mut adjoints[operations.parameters + place];
+        let adjoint = core::mem::replace(own, ZERO);
+        if adjoint == ZERO {
             continue;
         }
-        if operation.second as usize == place {
-            if let Some(sum) = sums.get_mut(operation.first as usize) {
-                *sum += adjoint;
+        for operand in operation {
+            if operand.place == NONE {
+                continue;
             }
-            continue;
-        }
-        adjoints[operation.first as usize] += adjoint * operation.by_first;
-        if operation.second != NONE {
-            adjoints[operation.second as usize] += adjoint * operation.by_second;
+            let sum = &mut adjoints[operand.place as usize];
+            match operand.slope {
+                Operand::ONE => (0..LANES).for_each(|lane| sum[lane] += adjoint[lane]),
+                Operand::MINUS_ONE => (0..LANES).for_each(|lane| sum[lane] -= adjoint[lane]),
+                slope => add(sum, &adjoint, &operations.slopes[slope as usize]),
+            }
         }
     }
 }
 
-/// A number and the place where the operation stands that it comes from.
+/// sum += adjoint · derivative, where an infinite derivative along which nothing changes is none.
+#[inline]
+fn add(sum: &mut Row, adjoint: &Row, derivative: &Row) {
+    for lane in 0..LANES {
+        let product = adjoint[lane] * derivative[lane];
+        sum[lane] += if adjoint[lane] == 0.0 { 0.0 } else { product };
+    }
+}
+
+/// A number for each point, and the place where the operation stands that it comes from.
 #[derive(Clone, Copy)]
 pub(crate) struct Taped<'t> {
-    value: f64,
+    value: Row,
     place: u32,
     /// Where its operation stands; of the time, where those of parameters are to stand.
-    tape: Option<&'t RefCell<Vec<Operation>>>,
+    tape: Option<&'t RefCell<Operations>>,
 }
 
 impl fmt::Debug for Taped<'_> {
@@ -110,58 +238,103 @@ impl fmt::Debug for Taped<'_> {
 }
 
 impl Taped<'_> {
-    /// f(x), with f′(x).
+    /// Mere numbers.
     #[inline]
-    fn one(self, value: f64, slope: impl FnOnce() -> f64) -> Self {
-        match self.tape {
-            Some(tape) if self.place != NONE => Self {
-                value,
-                ..self.written(tape, (self.place, slope()), (NONE, 0.0))
-            },
-            _ => Self::from_f64(value),
+    fn of(value: Row) -> Self {
+        Self {
+            value,
+            place: NONE,
+            tape: None,
         }
     }
 
-    /// f(x, y), with both derivatives.
+    /// y = f(x), with f′ of x and y.
+    #[inline]
+    fn one(self, f: impl Fn(f64) -> f64, slope: impl Fn(f64, f64) -> f64) -> Self {
+        let value = self.value.map(f);
+        let slope = |lane: usize| slope(self.value[lane], value[lane]);
+        self.follows(value, || Slope::Of(from_fn(slope)))
+    }
+
+    /// The same of values that are known.
+    #[inline]
+    fn follows(self, value: Row, slope: impl FnOnce() -> Slope) -> Self {
+        match self.tape {
+            Some(tape) if self.place != NONE => Self {
+                value,
+                ..self.written(tape, (self.place, slope()), None)
+            },
+            _ => Self::of(value),
+        }
+    }
+
+    /// z = f(x, y), with both derivatives of x, y and z.
     #[inline]
     fn two(
         self,
         other: Self,
-        value: f64,
-        by_self: impl FnOnce() -> f64,
-        by_other: impl FnOnce() -> f64,
+        f: impl Fn(f64, f64) -> f64,
+        by_self: impl Fn(f64, f64, f64) -> f64,
+        by_other: impl Fn(f64, f64, f64) -> f64,
+    ) -> Self {
+        let (x, y) = (self.value, other.value);
+        let z: Row = from_fn(|lane| f(x[lane], y[lane]));
+        let by_self = || Slope::Of(from_fn(|lane| by_self(x[lane], y[lane], z[lane])));
+        let by_other = || Slope::Of(from_fn(|lane| by_other(x[lane], y[lane], z[lane])));
+        self.follow(other, z, by_self, by_other)
+    }
+
+    /// The same of values that are known.
+    #[inline]
+    fn follow(
+        self,
+        other: Self,
+        value: Row,
+        by_self: impl FnOnce() -> Slope,
+        by_other: impl FnOnce() -> Slope,
     ) -> Self {
         if other.place == NONE {
-            return self.one(value, by_self);
+            return self.follows(value, by_self);
         }
         if self.place == NONE {
-            return other.one(value, by_other);
+            return other.follows(value, by_other);
         }
         match self.tape {
             Some(tape) => Self {
                 value,
-                ..self.written(tape, (self.place, by_self()), (other.place, by_other()))
+                ..self.written(
+                    tape,
+                    (self.place, by_self()),
+                    Some((other.place, by_other())),
+                )
             },
-            None => Self::from_f64(value),
+            None => Self::of(value),
         }
     }
 
     #[inline]
     fn written(
         self,
-        tape: &RefCell<Vec<Operation>>,
-        (first, by_first): (u32, f64),
-        (second, by_second): (u32, f64),
+        tape: &RefCell<Operations>,
+        first: (u32, Slope),
+        second: Option<(u32, Slope)>,
     ) -> Self {
         let mut operations = tape.borrow_mut();
-        let place = operations.len() as u32;
-        operations.push(Operation {
-            first,
-            second,
-            by_first,
-            by_second,
-        });
+        let place = (operations.parameters + operations.list.len()) as u32;
+        let first = operations.operand(first.0, first.1);
+        let second = match second {
+            Some((place, slope)) => operations.operand(place, slope),
+            None => Operand::NONE,
+        };
+        operations.list.push([first, second]);
         Self { place, ..self }
+    }
+
+    /// x ± y.
+    #[inline]
+    fn sum(self, other: Self, f: impl Fn(f64, f64) -> f64, by_other: Slope) -> Self {
+        let value = from_fn(|lane| f(self.value[lane], other.value[lane]));
+        self.follow(other, value, || Slope::One, || by_other)
     }
 }
 
@@ -169,7 +342,7 @@ impl Add for Taped<'_> {
     type Output = Self;
     #[inline]
     fn add(self, other: Self) -> Self {
-        self.two(other, self.value + other.value, || 1.0, || 1.0)
+        self.sum(other, |x, y| x + y, Slope::One)
     }
 }
 
@@ -177,7 +350,7 @@ impl Sub for Taped<'_> {
     type Output = Self;
     #[inline]
     fn sub(self, other: Self) -> Self {
-        self.two(other, self.value - other.value, || 1.0, || -1.0)
+        self.sum(other, |x, y| x - y, Slope::MinusOne)
     }
 }
 
@@ -185,8 +358,7 @@ impl Mul for Taped<'_> {
     type Output = Self;
     #[inline]
     fn mul(self, other: Self) -> Self {
-        let product = self.value * other.value;
-        self.two(other, product, || other.value, || self.value)
+        self.two(other, |x, y| x * y, |_, y, _| y, |x, _, _| x)
     }
 }
 
@@ -194,8 +366,7 @@ impl Div for Taped<'_> {
     type Output = Self;
     #[inline]
     fn div(self, other: Self) -> Self {
-        let ratio = self.value / other.value;
-        self.two(other, ratio, || 1.0 / other.value, || -ratio / other.value)
+        self.two(other, |x, y| x / y, |_, y, _| 1.0 / y, |_, y, z| -z / y)
     }
 }
 
@@ -203,7 +374,7 @@ impl Neg for Taped<'_> {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
-        self.one(-self.value, || -1.0)
+        self.follows(self.value.map(|x| -x), || Slope::MinusOne)
     }
 }
 
@@ -222,135 +393,144 @@ impl SubAssign for Taped<'_> {
 }
 
 impl Real for Taped<'_> {
-    type Mask = bool;
+    type Mask = [bool; LANES];
 
     #[inline]
     fn from_f64(value: f64) -> Self {
-        Self {
-            value,
-            place: NONE,
-            tape: None,
-        }
+        Self::of([value; LANES])
     }
+    #[inline]
     fn parameter(self, index: usize, value: f64) -> Self {
-        let Some(tape) = self.tape else {
-            return Self::from_f64(value);
-        };
-        let place = tape.borrow().len() as u32;
         Self {
-            value,
-            ..self.written(tape, (index as u32, 0.0), (place, 0.0))
+            value: [value; LANES],
+            place: index as u32,
+            ..self
         }
     }
     fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
         // Inputs are functions of the time, in which no parameter has a part.
-        self.one(function(self.value), || f64::NAN)
+        let value = self.value.map(function);
+        self.follows(value, || Slope::Of([f64::NAN; LANES]))
     }
     fn sin_cos(self) -> (Self, Self) {
-        let (sin, cos) = Real::sin_cos(self.value);
-        (self.one(sin, || cos), self.one(cos, || -sin))
-    }
-    fn sin(self) -> Self {
-        self.one(Real::sin(self.value), || Real::cos(self.value))
-    }
-    fn cos(self) -> Self {
-        self.one(Real::cos(self.value), || -Real::sin(self.value))
-    }
-    fn tan(self) -> Self {
-        let tan = Real::tan(self.value);
-        self.one(tan, || 1.0 + tan * tan)
-    }
-    fn asin(self) -> Self {
-        let x = self.value;
-        self.one(Real::asin(x), || 1.0 / Real::sqrt(1.0 - x * x))
-    }
-    fn acos(self) -> Self {
-        let x = self.value;
-        self.one(Real::acos(x), || -1.0 / Real::sqrt(1.0 - x * x))
-    }
-    fn atan(self) -> Self {
-        let x = self.value;
-        self.one(Real::atan(x), || 1.0 / (1.0 + x * x))
-    }
-    fn atan2(self, x: Self) -> Self {
-        let square = x.value * x.value + self.value * self.value;
-        let angle = Real::atan2(self.value, x.value);
-        self.two(x, angle, || x.value / square, || -self.value / square)
-    }
-    fn sinh(self) -> Self {
-        self.one(Real::sinh(self.value), || Real::cosh(self.value))
-    }
-    fn cosh(self) -> Self {
-        self.one(Real::cosh(self.value), || Real::sinh(self.value))
-    }
-    fn tanh(self) -> Self {
-        let tanh = Real::tanh(self.value);
-        self.one(tanh, || 1.0 - tanh * tanh)
-    }
-    fn asinh(self) -> Self {
-        let x = self.value;
-        self.one(Real::asinh(x), || 1.0 / Real::sqrt(x * x + 1.0))
-    }
-    fn acosh(self) -> Self {
-        let x = self.value;
-        self.one(Real::acosh(x), || 1.0 / Real::sqrt(x * x - 1.0))
-    }
-    fn atanh(self) -> Self {
-        let x = self.value;
-        self.one(Real::atanh(x), || 1.0 / (1.0 - x * x))
-    }
-    fn exp(self) -> Self {
-        let exp = Real::exp(self.value);
-        self.one(exp, || exp)
-    }
-    fn ln(self) -> Self {
-        self.one(Real::ln(self.value), || 1.0 / self.value)
-    }
-    fn sqrt(self) -> Self {
-        let root = Real::sqrt(self.value);
-        self.one(root, || 0.5 / root)
-    }
-    fn abs(self) -> Self {
-        self.one(Real::abs(self.value), || Real::sign(self.value))
-    }
-    fn sign(self) -> Self {
-        Self::from_f64(Real::sign(self.value))
-    }
-    fn min(self, other: Self) -> Self {
-        Self::select(other.value < self.value, other, self)
-    }
-    fn max(self, other: Self) -> Self {
-        Self::select(self.value < other.value, other, self)
-    }
-    fn hypot(self, other: Self) -> Self {
-        let root = Real::hypot(self.value, other.value);
-        self.two(other, root, || self.value / root, || other.value / root)
-    }
-    fn powi(self, exponent: i32) -> Self {
-        let power = |exponent| Real::powi(self.value, exponent);
-        self.one(power(exponent), || match exponent {
-            0 => 0.0,
-            _ => f64::from(exponent) * power(exponent.saturating_sub(1)),
-        })
-    }
-    fn powf(self, exponent: Self) -> Self {
-        let (x, y) = (self.value, exponent.value);
-        let power = Real::powf(x, y);
-        self.two(
-            exponent,
-            power,
-            || y * Real::powf(x, y - 1.0),
-            || power * Real::ln(x),
+        let (mut sin, mut cos) = (ZERO, ZERO);
+        for lane in 0..LANES {
+            (sin[lane], cos[lane]) = Real::sin_cos(self.value[lane]);
+        }
+        (
+            self.follows(sin, || Slope::Of(cos)),
+            self.follows(cos, || Slope::Of(sin.map(|sin| -sin))),
         )
     }
-    fn less(self, other: Self) -> bool {
-        self.value < other.value
+    fn sin(self) -> Self {
+        self.one(Real::sin, |x, _| Real::cos(x))
     }
-    fn less_or_equal(self, other: Self) -> bool {
-        self.value <= other.value
+    fn cos(self) -> Self {
+        self.one(Real::cos, |x, _| -Real::sin(x))
     }
-    fn select(mask: bool, then: Self, otherwise: Self) -> Self {
-        if mask { then } else { otherwise }
+    fn tan(self) -> Self {
+        self.one(Real::tan, |_, tan| 1.0 + tan * tan)
+    }
+    fn asin(self) -> Self {
+        self.one(Real::asin, |x, _| 1.0 / Real::sqrt(1.0 - x * x))
+    }
+    fn acos(self) -> Self {
+        self.one(Real::acos, |x, _| -1.0 / Real::sqrt(1.0 - x * x))
+    }
+    fn atan(self) -> Self {
+        self.one(Real::atan, |x, _| 1.0 / (1.0 + x * x))
+    }
+    fn atan2(self, x: Self) -> Self {
+        let by_y = |y: f64, x: f64, _: f64| x / (x * x + y * y);
+        let by_x = |y: f64, x: f64, _: f64| -y / (x * x + y * y);
+        self.two(x, Real::atan2, by_y, by_x)
+    }
+    fn sinh(self) -> Self {
+        self.one(Real::sinh, |x, _| Real::cosh(x))
+    }
+    fn cosh(self) -> Self {
+        self.one(Real::cosh, |x, _| Real::sinh(x))
+    }
+    fn tanh(self) -> Self {
+        self.one(Real::tanh, |_, tanh| 1.0 - tanh * tanh)
+    }
+    fn asinh(self) -> Self {
+        self.one(Real::asinh, |x, _| 1.0 / Real::sqrt(x * x + 1.0))
+    }
+    fn acosh(self) -> Self {
+        self.one(Real::acosh, |x, _| 1.0 / Real::sqrt(x * x - 1.0))
+    }
+    fn atanh(self) -> Self {
+        self.one(Real::atanh, |x, _| 1.0 / (1.0 - x * x))
+    }
+    fn exp(self) -> Self {
+        self.one(Real::exp, |_, exp| exp)
+    }
+    fn ln(self) -> Self {
+        self.one(Real::ln, |x, _| 1.0 / x)
+    }
+    fn sqrt(self) -> Self {
+        self.one(Real::sqrt, |_, root| 0.5 / root)
+    }
+    fn abs(self) -> Self {
+        self.one(Real::abs, |x, _| Real::sign(x))
+    }
+    fn sign(self) -> Self {
+        Self::of(self.value.map(Real::sign))
+    }
+    fn min(self, other: Self) -> Self {
+        Self::select(other.less(self), other, self)
+    }
+    fn max(self, other: Self) -> Self {
+        Self::select(self.less(other), other, self)
+    }
+    fn hypot(self, other: Self) -> Self {
+        self.two(
+            other,
+            Real::hypot,
+            |x, _, root| x / root,
+            |_, y, root| y / root,
+        )
+    }
+    fn powi(self, exponent: i32) -> Self {
+        let slope = |x: f64, _: f64| match exponent {
+            0 => 0.0,
+            _ => f64::from(exponent) * Real::powi(x, exponent.saturating_sub(1)),
+        };
+        self.one(|x| Real::powi(x, exponent), slope)
+    }
+    fn powf(self, exponent: Self) -> Self {
+        let by_base = |x: f64, y: f64, _: f64| y * Real::powf(x, y - 1.0);
+        self.two(exponent, Real::powf, by_base, |x, _, power| {
+            power * Real::ln(x)
+        })
+    }
+    fn less(self, other: Self) -> Self::Mask {
+        from_fn(|lane| self.value[lane] < other.value[lane])
+    }
+    fn less_or_equal(self, other: Self) -> Self::Mask {
+        from_fn(|lane| self.value[lane] <= other.value[lane])
+    }
+    fn select(mask: Self::Mask, then: Self, otherwise: Self) -> Self {
+        if mask == [true; LANES] {
+            return then;
+        }
+        if mask == [false; LANES] {
+            return otherwise;
+        }
+        let chosen = |then: Row, otherwise: Row| -> Row {
+            from_fn(|lane| {
+                if mask[lane] {
+                    then[lane]
+                } else {
+                    otherwise[lane]
+                }
+            })
+        };
+        let value = chosen(then.value, otherwise.value);
+        let one = [1.0; LANES];
+        let by_then = || Slope::Of(chosen(one, ZERO));
+        then.follow(otherwise, value, by_then, || Slope::Of(chosen(ZERO, one)))
     }
 }
 
@@ -394,32 +574,68 @@ mod tests {
         ]
     }
 
-    /// Every function by both parameters, as dual numbers have it.
+    /// Every function by both parameters, as dual numbers have it, at several points.
     #[test]
     fn backwards_is_forwards() {
-        let (x, y) = (0.37, 0.61);
-        let tape = RefCell::new(Vec::new());
+        let tape = RefCell::new(Operations {
+            parameters: 2,
+            ..Operations::default()
+        });
         let time = Taped {
             tape: Some(&tape),
             ..Taped::from_f64(0.0)
         };
-        let results = values(time.parameter(0, x), time.parameter(1, y));
+        // Choices are of each point its own.
+        let x_of = |lane: usize| 0.37 + 0.06 * lane as f64;
+        let (x, y) = (time.parameter(0, 0.37), time.parameter(1, 0.61));
+        let along = Taped::of(from_fn(|lane| x_of(lane) - 0.37));
+        let results = values(x + along, y);
         let operations = tape.borrow();
-        let by_x = values(Dual::new(x, 1.0), Dual::new(y, 0.0));
-        let by_y = values(Dual::new(x, 0.0), Dual::new(y, 1.0));
         for (at, (name, result)) in results.iter().enumerate() {
-            let mut adjoints = vec![0.0; operations.len()];
-            adjoints[result.place as usize] = 1.0;
-            let mut sums = [0.0; 2];
-            read_backwards(&operations, &mut adjoints, &mut sums);
-            assert_eq!(result.value, by_x[at].1.value, "{name}");
-            for (sum, forwards) in sums.iter().zip([by_x[at].1.slope, by_y[at].1.slope]) {
-                let size = forwards.abs().max(1.0);
-                assert!(
-                    (sum - forwards).abs() < 4e-15 * size,
-                    "{name}: {sum} {forwards}"
-                );
+            let mut adjoints = vec![ZERO; 2 + operations.list.len()];
+            adjoints[result.place as usize] = [1.0; LANES];
+            read_backwards(&operations, &mut adjoints);
+            for lane in 0..LANES {
+                let x = x_of(lane);
+                let by_x = values(Dual::new(x, 1.0), Dual::new(0.61, 0.0))[at].1;
+                let by_y = values(Dual::new(x, 0.0), Dual::new(0.61, 1.0))[at].1;
+                let off = result.value[lane] - by_x.value;
+                assert!(off.abs() <= 4e-15 * by_x.value.abs(), "{name}: {off}");
+                for (sum, forwards) in [adjoints[0][lane], adjoints[1][lane]]
+                    .iter()
+                    .zip([by_x.slope, by_y.slope])
+                {
+                    let size = forwards.abs().max(1.0);
+                    assert!(
+                        (sum - forwards).abs() < 1e-14 * size,
+                        "{name}: {sum} {forwards}"
+                    );
+                }
             }
         }
+    }
+
+    /// What is not chosen has no part, be its derivative infinite.
+    #[test]
+    fn what_is_not_chosen_has_no_part() {
+        let tape = RefCell::new(Operations {
+            parameters: 1,
+            ..Operations::default()
+        });
+        let time = Taped {
+            tape: Some(&tape),
+            ..Taped::from_f64(0.0)
+        };
+        let x = time.parameter(0, 0.0) + Taped::of(from_fn(|lane| lane as f64));
+        let root = Taped::select(x.less(Taped::from_f64(0.5)), x, x.sqrt());
+        let operations = tape.borrow();
+        let mut adjoints = vec![ZERO; 1 + operations.list.len()];
+        adjoints[root.place as usize] = [1.0; LANES];
+        read_backwards(&operations, &mut adjoints);
+        let expected: Row = from_fn(|lane| match lane {
+            0 => 1.0,
+            _ => 0.5 / (lane as f64).sqrt(),
+        });
+        assert_eq!(adjoints[0], expected);
     }
 }

@@ -4,9 +4,9 @@
 //! singular at isolated steps, is never inverted.
 
 #[cfg(feature = "alloc")]
-use crate::backwards::{Backwards, are_parameters, iterated};
+use crate::backwards::Backwards;
 use crate::condense::{
-    Asked, Direction, EndForces, System, phase_ends, phase_weights, velocity_ends, velocity_weights,
+    Direction, EndForces, System, phase_ends, phase_weights, velocity_ends, velocity_weights,
 };
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
@@ -47,6 +47,24 @@ where
     stepper.advance(t, h, &mut end, &[])?;
     stepper.transition(matrix)?;
     Ok(end)
+}
+
+/// What is made of the linear system of an element.
+enum Asked<'a, const N: usize> {
+    /// The derivatives of the end, row by row, with the columns of the sides.
+    Matrix(&'a mut [f64]),
+    /// Their product with λ, from the left: that with the columns of the start takes the place of λ, those of the directions are added to others.
+    Product(Product<'a, N>),
+}
+
+/// What is multiplied, and where the product goes.
+struct Product<'a, const N: usize> {
+    /// λ
+    lambda: &'a mut [f64],
+    by_direction: &'a mut [f64],
+    /// For all parameters at once, which are no directions then.
+    #[cfg(feature = "alloc")]
+    at_once: Option<&'a mut Backwards<N>>,
 }
 
 impl<M, T> Method<'_, M, T>
@@ -122,8 +140,34 @@ where
         if lambda.len() != 2 * N || by_direction.len() != directions.len() {
             return Err(TransitionError::Shape { needed, given });
         }
-        let asked = Asked::Product(lambda, by_direction);
+        let asked = Asked::Product(Product {
+            lambda,
+            by_direction,
+            #[cfg(feature = "alloc")]
+            at_once: None,
+        });
         self.differentiate(memory, workspace, extra, (impulses, directions), asked)
+    }
+
+    /// The same by all parameters at once, of a model without constraints.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn adjoint_at_once<const N: usize>(
+        &self,
+        memory: &mut Memory<N>,
+        workspace: Workspace<'_>,
+        extra: &mut [f64],
+        impulses: &[Impulse<N>],
+        (lambda, backwards): (&mut [f64], &mut Backwards<N>),
+    ) -> Result<(), TransitionError>
+    where
+        M: Model<N>,
+    {
+        let asked = Asked::Product(Product {
+            lambda,
+            by_direction: &mut [],
+            at_once: Some(backwards),
+        });
+        self.differentiate(memory, workspace, extra, (impulses, &[]), asked)
     }
 
     fn differentiate<const N: usize>(
@@ -132,7 +176,7 @@ where
         workspace: Workspace<'_>,
         extra: &mut [f64],
         (impulses, directions): (&[Impulse<N>], &[Direction]),
-        #[cfg_attr(not(feature = "alloc"), expect(unused_mut))] mut asked: Asked<'_>,
+        asked: Asked<'_, N>,
     ) -> Result<(), TransitionError>
     where
         M: Model<N>,
@@ -142,14 +186,6 @@ where
         };
         let scheme = self.tables.view();
         let parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
-        // Many parameters backwards are differentiated all at once, and have no columns.
-        #[cfg(feature = "alloc")]
-        let (at_once, directions): (&[Direction], &[Direction]) =
-            if matches!(asked, Asked::Product(..)) && are_parameters(self.model, directions) {
-                (directions, &[])
-            } else {
-                (&[], directions)
-            };
         let columns = 2 * N + directions.len();
         let constraints = M::CONSTRAINTS.len();
         let needed = linearised_len(scheme.element, M::FORM, N, constraints, directions.len());
@@ -216,8 +252,8 @@ where
             let x = &*parts.unknowns;
             let linearised = match asked {
                 Asked::Matrix(matrix) => linearise(&mut form, x, directions, false, system, matrix),
-                Asked::Product(lambda, by_direction) => {
-                    let sums = (lambda, by_direction);
+                Asked::Product(product) => {
+                    let sums = (product.lambda, product.by_direction);
                     constrained_product(&mut form, x, directions, system, sums)
                 }
             };
@@ -246,15 +282,14 @@ where
                     let sides = system.solve()?.sides;
                     phase_ends::<N>(scheme, span.h, x, directions, sides, matrix);
                 }
-                Asked::Product(lambda, by_direction) => {
+                Asked::Product(product) => {
+                    let (lambda, by_direction) = (product.lambda, product.by_direction);
                     let sums = (&*lambda, &mut *by_direction, &mut *system.residual);
                     phase_weights::<N>(scheme, span.h, x, directions, sums);
                     let _mu = system.product(lambda, by_direction)?;
                     #[cfg(feature = "alloc")]
-                    if !at_once.is_empty() {
-                        let mut backwards = Backwards::new(self.model);
+                    if let Some(backwards) = product.at_once {
                         backwards.of_phase(&equations, x, _mu);
-                        backwards.add_to(at_once, by_direction);
                     }
                 }
             }
@@ -271,21 +306,23 @@ where
                 statistics: &mut memory.statistics,
             };
             #[cfg(feature = "alloc")]
-            if let (Asked::Product(lambda, by_direction), true) =
-                (&mut asked, directions.is_empty())
-            {
-                let mut of_p = [0.0; N];
-                of_p.copy_from_slice(&lambda[..N]);
-                let x = &*parts.unknowns;
-                if let Some(mu) = iterated(&mut equations, x, lambda)? {
-                    if !at_once.is_empty() {
-                        let mut backwards = Backwards::new(self.model);
-                        backwards.of_velocities(&mut equations, x, (&of_p, mu.as_flattened()))?;
-                        backwards.add_to(at_once, by_direction);
+            let asked = match asked {
+                Asked::Product(Product {
+                    lambda,
+                    by_direction,
+                    at_once: Some(backwards),
+                }) => {
+                    if backwards.is_iterated(&mut equations, parts.unknowns, lambda)? {
+                        return Ok(());
                     }
-                    return Ok(());
+                    Asked::Product(Product {
+                        lambda,
+                        by_direction,
+                        at_once: Some(backwards),
+                    })
                 }
-            }
+                asked => asked,
+            };
             let mut forces = EndForces::of(forces, m);
             system.of_velocities(&mut equations, parts.unknowns, directions, &mut forces)?;
             let (x, h) = (&*parts.unknowns, span.h);
@@ -294,17 +331,16 @@ where
                     let sides = system.solve()?.sides;
                     velocity_ends(&scheme, h, x, directions, &forces, sides, matrix);
                 }
-                Asked::Product(lambda, by_direction) => {
+                Asked::Product(product) => {
+                    let (lambda, by_direction) = (product.lambda, product.by_direction);
                     let mut _of_p = [0.0; N];
                     _of_p.copy_from_slice(&lambda[..N]);
                     let sums = (&mut *lambda, &mut *by_direction, &mut *system.residual);
                     velocity_weights(&scheme, h, x, (directions, &forces), sums);
                     let _mu = system.product(lambda, by_direction)?;
                     #[cfg(feature = "alloc")]
-                    if !at_once.is_empty() {
-                        let mut backwards = Backwards::new(self.model);
+                    if let Some(backwards) = product.at_once {
                         backwards.of_velocities(&mut equations, x, (&_of_p, _mu))?;
-                        backwards.add_to(at_once, by_direction);
                     }
                 }
             }

@@ -1,6 +1,7 @@
 //! Derivatives of the last step by its start and by parameters, forwards and backwards.
 
 use super::setup::Stepper;
+use crate::backwards::are_parameters;
 use crate::condense::Direction;
 use crate::error::{ConstraintError, StepError, TransitionError};
 use crate::method::{Impulse, Last, Memory, Method};
@@ -133,9 +134,14 @@ where
         directions: &[Direction],
         matrix: &mut [f64],
     ) -> Result<(), TransitionError> {
-        self.of_last(directions, |method, memory, workspace, extra, given| {
-            method.linearise(memory, workspace, extra, given, matrix)
-        })
+        let extra = &mut Vec::new();
+        self.of_last(
+            extra,
+            directions,
+            |method, memory, workspace, extra, given| {
+                method.linearise(memory, workspace, extra, given, matrix)
+            },
+        )
     }
 
     fn adjoint_of_last(
@@ -144,14 +150,39 @@ where
         lambda: &mut [f64],
         by_direction: &mut [f64],
     ) -> Result<(), TransitionError> {
-        self.of_last(directions, |method, memory, workspace, extra, given| {
-            method.adjoint(memory, workspace, extra, given, (lambda, by_direction))
-        })
+        let is_free = M::CONSTRAINTS.is_empty();
+        if !(is_free && (directions.is_empty() || are_parameters(&*self.model, directions))) {
+            let extra = &mut Vec::new();
+            return self.of_last(
+                extra,
+                directions,
+                |method, memory, workspace, extra, given| {
+                    method.adjoint(memory, workspace, extra, given, (lambda, by_direction))
+                },
+            );
+        }
+        let mut backwards = core::mem::take(&mut self.backwards);
+        backwards.begin(directions.len());
+        let mut extra = core::mem::take(&mut backwards.extra);
+        let done = self.of_last(
+            &mut extra,
+            &[],
+            |method, memory, workspace, extra, given| {
+                method.adjoint_at_once(memory, workspace, extra, given.0, (lambda, &mut backwards))
+            },
+        );
+        backwards.extra = extra;
+        if done.is_ok() {
+            backwards.add_to(&*self.model, directions, by_direction);
+        }
+        self.backwards = backwards;
+        done
     }
 
-    /// Differentiates the last step with what is known of it.
+    /// Differentiates the last step with what is known of it; `extra` is memory for it.
     fn of_last(
         &mut self,
+        extra: &mut Vec<f64>,
         directions: &[Direction],
         differentiate: impl FnOnce(
             Method<'_, M, SchemeTable>,
@@ -164,7 +195,8 @@ where
         let element = self.table.element();
         let constraints = M::CONSTRAINTS.len();
         let length = linearised_len(element, M::FORM, N, constraints, directions.len());
-        let mut extra = vec![0.0; length];
+        extra.clear();
+        extra.resize(length, 0.0);
         self.make_room();
         if let Some(numbers) = self.retrace() {
             self.numbers = numbers;
@@ -180,6 +212,6 @@ where
             control: self.control,
         };
         let given = (self.impulses.as_slice(), directions);
-        differentiate(method, &mut self.memory, workspace, &mut extra, given)
+        differentiate(method, &mut self.memory, workspace, extra, given)
     }
 }

@@ -1,6 +1,7 @@
 //! A stepper and its memory.
 
 use super::piece::{Ahead, Piece};
+use crate::backwards::Backwards;
 use crate::constrained::Foreseen;
 use crate::element::{Element, ElementError};
 use crate::method::{Impulse, Memory};
@@ -91,6 +92,8 @@ pub struct Stepper<'m, M, const N: usize> {
     pub(super) solve: Solve,
     /// Of a run of the same motion, where the iteration of the next step may start.
     pub(super) foreseen: Foreseen,
+    /// What elements backwards need.
+    pub(super) backwards: Backwards<N>,
 }
 
 // Not derived: the model is borrowed, it need not be `Clone`.
@@ -115,6 +118,7 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             at_kinks: self.at_kinks,
             solve: self.solve,
             foreseen: self.foreseen.clone(),
+            backwards: Backwards::default(),
         }
     }
 }
@@ -178,6 +182,7 @@ where
             at_kinks: false,
             solve: control.solve,
             foreseen: Foreseen::default(),
+            backwards: Backwards::default(),
         };
         if stepper.points.is_none() {
             stepper.make_room();

@@ -2,6 +2,7 @@
 
 use super::piece::{Ahead, Piece};
 use super::setup::Stepper;
+use crate::backwards::Backwards;
 use crate::constrained::Foreseen;
 use crate::element::{Element, ElementError};
 use crate::method::{Impulse, Memory};
@@ -95,6 +96,7 @@ where
             at_kinks: false,
             solve: control.solve,
             foreseen: Foreseen::default(),
+            backwards: Backwards::default(),
         })
     }
 }

@@ -1,0 +1,98 @@
+//! Gradients by many parameters over the runs that they are of: `cargo bench --bench gradients`.
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+use tfe::prelude::*;
+use tfe::sensitivity::Loss;
+
+type Failure = Box<dyn std::error::Error>;
+
+/// Twelve masses on springs of a cubic force, each with its own mass, stiffness and damping.
+#[dynamics(
+    coordinates(q[12]),
+    lagrangian = sum(i in 0..12, m[i]/2*dot(q[i])^2) - k[0]/2*q[0]^2 - sum(i in 1..12, k[i]/2*(q[i] - q[i-1])^2 + (q[i] - q[i-1])^4/4),
+    force(q[i]) = -c[i]*dot(q[i]),
+)]
+struct Chain {
+    m: [f64; 12],
+    k: [f64; 12],
+    c: [f64; 12],
+}
+
+/// Thirty-two masses, a spring between any two of them, and one of another force to the ground.
+#[dynamics(
+    coordinates(q[32]),
+    lagrangian = sum(i in 0..32, dot(q[i])^2/2 - a*q[i]^4/4)
+        - sum(i in 1..32, sum(j in 0..i, (k[32*i+j] + k[32*j+i])*(q[i] - q[j])^2/4)),
+)]
+struct Net {
+    a: f64,
+    k: [f64; 1024],
+}
+
+/// The least time of several calls of both, one after the other so that both see the same machine.
+fn least(
+    mut calls: [&mut dyn FnMut() -> Result<(), Failure>; 2],
+) -> Result<[Duration; 2], Failure> {
+    const TURNS: usize = 15;
+    let mut least = [Duration::MAX; 2];
+    for _ in 0..TURNS {
+        for (call, least) in calls.iter_mut().zip(&mut least) {
+            let begin = Instant::now();
+            call()?;
+            *least = begin.elapsed().min(*least);
+        }
+    }
+    Ok(least)
+}
+
+fn compare<M, const N: usize>(name: &str, model: &M, start: State<N>) -> Result<(), Failure>
+where
+    M: tfe::runtime::Model<N>
+        + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
+{
+    const STEPS: u32 = 200;
+    const STEP: f64 = 0.1;
+    let simulation = Simulation::new(model).step(STEP);
+    let span = || 0.0..STEP * f64::from(STEPS);
+    let loss = Loss::at_end(|node| 0.5 * node.q[0] * node.q[0]);
+    let mut run = || {
+        black_box(simulation.run(start, span())?);
+        Ok(())
+    };
+    let mut gradient = || {
+        black_box(simulation.gradient(start, span(), &loss)?);
+        Ok(())
+    };
+    let [of_run, of_gradient] = least([&mut run, &mut gradient])?;
+    let micros = |time: Duration| time.as_secs_f64() * 1e6 / f64::from(STEPS);
+    println!(
+        "{name:6} {:4} parameters: {:6.2} µs a step of a run, {:6.2} of a gradient, {:.1} times as long",
+        model.parameters(),
+        micros(of_run),
+        micros(of_gradient),
+        micros(of_gradient) / micros(of_run)
+    );
+    Ok(())
+}
+
+fn main() -> Result<(), Failure> {
+    let swing = |a: usize| (a as f64).sin();
+    let chain = Chain {
+        m: [1.0; 12],
+        k: std::array::from_fn(|a| 1.0 + 0.1 * swing(a)),
+        c: [0.05; 12],
+    };
+    let still = [0.0; 12];
+    compare(
+        "chain",
+        &chain,
+        chain.state(std::array::from_fn(swing), still),
+    )?;
+    let net = Net {
+        a: 0.1,
+        k: std::array::from_fn(|pair| 0.01 + 0.001 * swing(pair)),
+    };
+    let still = [0.0; 32];
+    compare("net", &net, net.state(std::array::from_fn(swing), still))
+}
