@@ -1,7 +1,8 @@
 //! Derivatives of motions by parameters and starts, against differences of runs.
 
 use tfe::prelude::*;
-use tfe::runtime::Model;
+use tfe::runtime::step::{Control, Stepper};
+use tfe::runtime::{Direction, Model, Parameter};
 use tfe::sensitivity::Loss;
 use tfe::{RunErrorKind, Sensitive};
 
@@ -770,28 +771,59 @@ struct Row {
     omega: f64,
 }
 
-/// Many parameters at once, by operations read backwards; with an iteration and, where steps are too long for it, with factors.
+const ROW: Row = Row {
+    m: [1.0, 1.1, 0.9, 1.3, 0.8],
+    k: [2.0, 1.5, 1.7, 2.2, 0.5],
+    a: [0.3, 0.2, 0.4, 0.1],
+    c: [0.05, 0.1, 0.02, 0.07],
+    b: 0.1,
+    f: 0.4,
+    omega: 1.9,
+};
+
+/// Many parameters at once, by operations read backwards; with an iteration and, where steps are too long for it, with factors; of elements with fewer points than go side by side, and more.
 #[test]
 fn gradients_by_many_parameters_are_derivatives_forwards() {
-    let row = Row {
-        m: [1.0, 1.1, 0.9, 1.3, 0.8],
-        k: [2.0, 1.5, 1.7, 2.2, 0.5],
-        a: [0.3, 0.2, 0.4, 0.1],
-        c: [0.05, 0.1, 0.02, 0.07],
-        b: 0.1,
-        f: 0.4,
-        omega: 1.9,
-    };
-    let start = row.state([0.3, -0.2, 0.1, 0.4, -0.5], [0.1, 0.0, -0.3, 0.2, 0.4]);
+    let start = ROW.state([0.3, -0.2, 0.1, 0.4, -0.5], [0.1, 0.0, -0.3, 0.2, 0.4]);
     for (element, step) in [
         (Element::from(Mixed::<4>), 0.1),
         (Mixed::<3>.into(), 0.5),
+        (Mixed::<7>.into(), 0.2),
+        (Mixed::<10>.into(), 0.2),
         (Primal::<3>.into(), 0.1),
         (EnergyConserving::<3>.into(), 0.1),
     ] {
-        let simulation = Simulation::new(&row).element(element).step(step);
+        let simulation = Simulation::new(&ROW).element(element).step(step);
         check_gradient(&simulation, start, "middle");
     }
+}
+
+/// Some of many parameters, in any order, have what they have among all.
+#[test]
+fn some_parameters_backwards_are_those_among_all() {
+    let mut state = ROW.state([0.3, -0.2, 0.1, 0.4, -0.5], [0.1, 0.0, -0.3, 0.2, 0.4]);
+    let mut stepper =
+        Stepper::new(&ROW, Mixed::<5>.into(), Control::default()).expect("an element");
+    stepper.advance(0.0, 0.2, &mut state, &[]).expect("a step");
+    let lambda: [f64; 10] = std::array::from_fn(|row| 1.0 / (row + 1) as f64);
+    let mut by = |indices: &[usize]| {
+        let direction = |index: &usize| Direction {
+            parameter: Some(Parameter::Any(*index)),
+            ..Direction::default()
+        };
+        let directions: Vec<_> = indices.iter().map(direction).collect();
+        let (mut rest, mut sums) = (lambda, vec![0.0; indices.len()]);
+        let product = stepper.adjoint(&directions, &mut rest, &mut sums);
+        product.expect("a derivative");
+        (rest, sums)
+    };
+    let all: Vec<usize> = (0..ROW.parameters()).collect();
+    let (by_start, by_all) = by(&all);
+    assert!(by_all.iter().filter(|sum| **sum != 0.0).count() > 18);
+    let some = [17, 3, 20, 0, 9];
+    let (again, by_some) = by(&some);
+    assert_eq!(again, by_start);
+    assert_eq!(by_some, some.map(|index| by_all[index]));
 }
 
 #[test]

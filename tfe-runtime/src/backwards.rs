@@ -392,7 +392,7 @@ fn add<const N: usize>(matrix: &[[f64; N]; N], sum: &mut [[f64; N]; N]) {
 
 impl<const N: usize> Backwards<N> {
     /// μ and the new λ by iteration, with what the element has of parameters; false where that does not contract, and λ stays.
-    pub(crate) fn is_iterated<M: Model<N>>(
+    pub(crate) fn try_iteration<M: Model<N>>(
         &mut self,
         equations: &mut VelocityForm<'_, M, N>,
         x: &[f64],

@@ -6,7 +6,7 @@
 //! ∂(w·r)/∂a = Σ over operations from the last to the first: adjoint of an operand += adjoint of the result × ∂result/∂operand .        (T-149)
 //! ```
 //!
-//! Only operations that a parameter has a part in are written down; coordinates, velocities and the time are mere numbers. Several points go side by side, as the operations are the same at all of them.
+//! Only operations that a parameter has a part in are written down; coordinates, velocities and the time are mere numbers. Some points go side by side, as the operations are the same at all of them.
 
 use crate::model::{First, Model};
 use crate::real::Real;
@@ -16,7 +16,7 @@ use core::cell::RefCell;
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Points side by side: elements mostly have no more.
+/// Points side by side. With more, what is written down is more than the fast memory of a processor holds: eight take half as long again.
 pub(crate) const LANES: usize = 4;
 
 /// A number for each point.

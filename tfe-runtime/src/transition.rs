@@ -312,7 +312,7 @@ where
                     by_direction,
                     at_once: Some(backwards),
                 }) => {
-                    if backwards.is_iterated(&mut equations, parts.unknowns, lambda)? {
+                    if backwards.try_iteration(&mut equations, parts.unknowns, lambda)? {
                         return Ok(());
                     }
                     Asked::Product(Product {

@@ -162,7 +162,10 @@ where
             );
         }
         let mut backwards = core::mem::take(&mut self.backwards);
-        backwards.begin(directions.len());
+        backwards.begin(match directions {
+            [] => 0,
+            _ => self.model.parameters(),
+        });
         let mut extra = core::mem::take(&mut backwards.extra);
         let done = self.of_last(
             &mut extra,
