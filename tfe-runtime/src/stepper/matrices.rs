@@ -161,7 +161,7 @@ where
                 },
             );
         }
-        let mut backwards = core::mem::take(&mut self.backwards);
+        let mut backwards = self.backwards.take().unwrap_or_default();
         backwards.begin(match directions {
             [] => 0,
             _ => self.model.parameters(),
@@ -178,7 +178,7 @@ where
         if done.is_ok() {
             backwards.add_to(&*self.model, directions, by_direction);
         }
-        self.backwards = backwards;
+        self.backwards = Some(backwards);
         done
     }
 
@@ -198,8 +198,11 @@ where
         let element = self.table.element();
         let constraints = M::CONSTRAINTS.len();
         let length = linearised_len(element, M::FORM, N, constraints, directions.len());
-        extra.clear();
-        extra.resize(length, 0.0);
+        if extra.len() == length {
+            extra.fill(0.0);
+        } else {
+            *extra = vec![0.0; length];
+        }
         self.make_room();
         if let Some(numbers) = self.retrace() {
             self.numbers = numbers;

@@ -15,6 +15,7 @@ use crate::scheme::{SchemeTable, Tables};
 use crate::share::Share;
 use crate::statistics::Statistics;
 use crate::workspace::{numbers_len, pivots_len};
+use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -92,8 +93,8 @@ pub struct Stepper<'m, M, const N: usize> {
     pub(super) solve: Solve,
     /// Of a run of the same motion, where the iteration of the next step may start.
     pub(super) foreseen: Foreseen,
-    /// What elements backwards need.
-    pub(super) backwards: Backwards<N>,
+    /// What elements backwards need, if there were any.
+    pub(super) backwards: Option<Box<Backwards<N>>>,
 }
 
 // Not derived: the model is borrowed, it need not be `Clone`.
@@ -118,7 +119,7 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             at_kinks: self.at_kinks,
             solve: self.solve,
             foreseen: self.foreseen.clone(),
-            backwards: Backwards::default(),
+            backwards: None,
         }
     }
 }
@@ -182,7 +183,7 @@ where
             at_kinks: false,
             solve: control.solve,
             foreseen: Foreseen::default(),
-            backwards: Backwards::default(),
+            backwards: None,
         };
         if stepper.points.is_none() {
             stepper.make_room();

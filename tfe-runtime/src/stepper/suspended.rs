@@ -2,7 +2,6 @@
 
 use super::piece::{Ahead, Piece};
 use super::setup::Stepper;
-use crate::backwards::Backwards;
 use crate::constrained::Foreseen;
 use crate::element::{Element, ElementError};
 use crate::method::{Impulse, Memory};
@@ -96,7 +95,7 @@ where
             at_kinks: false,
             solve: control.solve,
             foreseen: Foreseen::default(),
-            backwards: Backwards::default(),
+            backwards: None,
         })
     }
 }
