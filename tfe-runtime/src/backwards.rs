@@ -7,12 +7,12 @@
 //! L_vv μ_j = h b_j λ_q + h Σ_l A_lj F_l + (L_qv + Q_v)ᵀ φ_j ;     λ_p += Σ μ_i ,     λ_q += Σ F_l .                  (T-150)
 //! ```
 
-use crate::condense::Direction;
+use crate::condense::{Direction, add_multiple};
 use crate::error::StepError;
 use crate::lu::Block;
-use crate::model::{First, Form, Model, Second};
+use crate::model::{First, Form, Model};
 use crate::phase_form::PhaseForm;
-use crate::tape::{LANES, Places, Tape};
+use crate::tape::{Places, Tape};
 use crate::velocity_form::{PointDerivatives, VelocityForm};
 use alloc::vec::Vec;
 
@@ -36,8 +36,6 @@ pub(crate) fn are_parameters<M: Model<N>, const N: usize>(
 pub(crate) struct Backwards<const N: usize> {
     tape: Tape,
     points: Points<N>,
-    /// Room for what elements need that are not iterated.
-    pub(crate) extra: Vec<f64>,
 }
 
 impl<const N: usize> Backwards<N> {
@@ -58,18 +56,18 @@ impl<const N: usize> Backwards<N> {
         }
         let points = equations.scheme.points();
         let (forces, velocities) = mu.as_chunks::<N>().0.split_at(points);
-        for from in (0..points).step_by(LANES) {
-            let mut places = Places::NONE;
-            for k in from..points.min(from + LANES) {
-                let (t, q, p) = equations.place(k, x);
-                let weights = First {
-                    z: velocities[k],
-                    q: forces[k].map(|weight| -weight),
-                    force: forces[k],
-                };
-                places.push((t, &q, &p), &weights);
+        let mut places = Places::NONE;
+        for k in 0..points {
+            let (t, q, p) = equations.place(k, x);
+            let weights = First {
+                z: velocities[k],
+                q: forces[k].map(|weight| -weight),
+                force: forces[k],
+            };
+            places.push((t, &q, &p), &weights);
+            if places.is_full() || k + 1 == points {
+                (self.tape).take_derivatives(equations.model, &mut places);
             }
-            (self.tape).add_derivatives(equations.model, &places);
         }
     }
 
@@ -108,11 +106,7 @@ impl<const N: usize> Backwards<N> {
                 }
                 // At fixed v the momentum moves: H_pp δp = −H_pa, and with it H_q and Q.
                 Form::Hamiltonian => {
-                    let mut point = PointDerivatives {
-                        p: [0.0; N],
-                        force: [0.0; N],
-                        second: Second::ZERO,
-                    };
+                    let mut point = PointDerivatives::ZERO;
                     equations.derivatives(l, rates, &mut point)?;
                     let second = &point.second;
                     let mut of_z = [0.0; N];
@@ -131,9 +125,8 @@ impl<const N: usize> Backwards<N> {
                 }
             };
             places.push((t, &q, &z), &weights);
-            if (l + 1) % LANES == 0 || l + 1 == points {
-                (self.tape).add_derivatives(equations.model, &places);
-                places = Places::NONE;
+            if places.is_full() || l + 1 == points {
+                (self.tape).take_derivatives(equations.model, &mut places);
             }
         }
         Ok(())
@@ -204,19 +197,11 @@ impl<const N: usize> Mass<N> {
     }
 }
 
-/// sum += factor · row
-#[inline(always)]
-fn add_multiple<const N: usize>(factor: f64, row: &[f64; N], sum: &mut [f64; N]) {
-    for a in 0..N {
-        sum[a] += factor * row[a];
-    }
-}
-
 /// sum += matrixᵀ row
 #[inline(always)]
 fn add_transposed<const N: usize>(matrix: &[[f64; N]; N], row: &[f64; N], sum: &mut [f64; N]) {
     for a in 0..N {
-        add_multiple(row[a], &matrix[a], sum);
+        add_multiple(sum, row[a], &matrix[a]);
     }
 }
 
@@ -232,17 +217,14 @@ impl<const N: usize> Points<N> {
             matrices.clear();
         }
         self.masses.clear();
-        let mut point = PointDerivatives {
-            p: [0.0; N],
-            force: [0.0; N],
-            second: Second::ZERO,
-        };
+        let mut point = PointDerivatives::ZERO;
         for l in 0..points {
             equations.derivatives(l, rates, &mut point)?;
             let second = &point.second;
             self.force_q.push(second.qq);
             if M::FACTS.forced {
-                add(&second.force_q, &mut self.force_q[l]);
+                let sum = self.force_q[l].as_flattened_mut();
+                add_multiple(sum, 1.0, second.force_q.as_flattened());
             }
             if has_velocities::<M, N>() {
                 let mut force_v = second.force_z;
@@ -332,7 +314,7 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
                     rows[l][a] = h * scheme.advance[l] * of_q[a];
                 }
                 for i in 0..points {
-                    add_multiple(h * scheme.force[i * points + l], &mu[i], &mut seed);
+                    add_multiple(&mut seed, h * scheme.force[i * points + l], &mu[i]);
                 }
                 pulled[l] = [0.0; N];
                 add_transposed(&force_q[l], &seed, &mut pulled[l]);
@@ -351,7 +333,7 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
             for j in 0..points {
                 let mut row = rows[j];
                 for l in 0..points {
-                    add_multiple(h * scheme.position[l * points + j], &pulled[l], &mut row);
+                    add_multiple(&mut row, h * scheme.position[l * points + j], &pulled[l]);
                 }
                 masses[j.min(masses.len() - 1)].solve(&mut row);
                 for a in 0..N {
@@ -381,13 +363,6 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
 /// Whether forces depend on velocities.
 const fn has_velocities<M: Model<N>, const N: usize>() -> bool {
     M::FACTS.forced || !M::FACTS.separable
-}
-
-/// sum += matrix
-fn add<const N: usize>(matrix: &[[f64; N]; N], sum: &mut [[f64; N]; N]) {
-    for (sum, entry) in sum.as_flattened_mut().iter_mut().zip(matrix.as_flattened()) {
-        *sum += entry;
-    }
 }
 
 impl<const N: usize> Backwards<N> {

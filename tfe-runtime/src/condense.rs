@@ -175,11 +175,7 @@ impl System<'_> {
                 self.sides[(i * N + a) * columns + a] = 1.0;
             }
         }
-        let mut point = PointDerivatives {
-            p: [0.0; N],
-            force: [0.0; N],
-            second: Second::ZERO,
-        };
+        let mut point = PointDerivatives::ZERO;
         for l in 0..count {
             equations.derivatives(l, rates, &mut point)?;
             equations.forces[l] = point.force;
@@ -315,12 +311,12 @@ pub(crate) fn velocity_weights<const N: usize>(
         }
     }
     for (a, of_p) in of_p.iter().enumerate() {
-        add(
+        add_multiple(
             weights,
             *of_p,
             &forces.by_interior[a * x.len()..][..x.len()],
         );
-        add(of_q, *of_p, &forces.by_start[a]);
+        add_multiple(of_q, *of_p, &forces.by_start[a]);
         for (sum, by_direction) in by_direction.iter_mut().zip(&*forces.by_direction) {
             *sum += by_direction[a] * of_p;
         }
@@ -454,7 +450,7 @@ pub(crate) fn phase_ends<const N: usize>(
         for (l, weight) in scheme.weights.iter().enumerate() {
             let at = block * half + l * N + a;
             rate += weight * x[at];
-            add(end, h * weight, &sides[at * columns..(at + 1) * columns]);
+            add_multiple(end, h * weight, &sides[at * columns..(at + 1) * columns]);
         }
         for (entry, direction) in end[2 * N..].iter_mut().zip(directions) {
             *entry += direction.length * rate;
@@ -486,7 +482,7 @@ pub(crate) fn velocity_ends<const N: usize>(
     {
         end.fill(0.0);
         for (weight, side) in weights.iter().zip(sides.chunks_exact(columns)) {
-            add(end, *weight, side);
+            add_multiple(end, *weight, side);
         }
         end[a] += 1.0;
         for b in 0..N {
@@ -502,7 +498,7 @@ pub(crate) fn velocity_ends<const N: usize>(
         for (j, weight) in scheme.advance.iter().enumerate() {
             let at = j * N + a;
             rate += weight * x[at];
-            add(end, h * weight, &sides[at * columns..(at + 1) * columns]);
+            add_multiple(end, h * weight, &sides[at * columns..(at + 1) * columns]);
         }
         end[N + a] += 1.0;
         for (entry, direction) in end[2 * N..].iter_mut().zip(directions) {
@@ -513,8 +509,11 @@ pub(crate) fn velocity_ends<const N: usize>(
 
 /// sum += weight · row
 #[inline(always)]
-fn add(sum: &mut [f64], weight: f64, row: &[f64]) {
-    for (sum, entry) in sum.iter_mut().zip(row) {
-        *sum += weight * entry;
+pub(crate) fn add_multiple(sum: &mut [f64], weight: f64, row: &[f64]) {
+    // A loop and no iterators, which would be compiled for the instruction set of the crate.
+    let count = sum.len().min(row.len());
+    let (sum, row) = (&mut sum[..count], &row[..count]);
+    for a in 0..count {
+        sum[a] += weight * row[a];
     }
 }

@@ -17,7 +17,7 @@ use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Points side by side. With more, what is written down is more than the fast memory of a processor holds: eight take half as long again.
-pub(crate) const LANES: usize = 4;
+const LANES: usize = 4;
 
 /// A number for each point.
 type Row = [f64; LANES];
@@ -93,7 +93,12 @@ impl<const N: usize> Places<N> {
         weights: [[ZERO; N]; 3],
     };
 
-    /// One more, of at most [`LANES`].
+    /// Whether there is room for no more.
+    pub(crate) fn is_full(&self) -> bool {
+        self.count == LANES
+    }
+
+    /// One more, where there is room.
     pub(crate) fn push(&mut self, (t, q, z): (f64, &[f64; N], &[f64; N]), weights: &First<f64, N>) {
         // Where there are no more points the first one stands, without weights.
         let lanes = match self.count {
@@ -145,11 +150,11 @@ impl Tape {
         self.adjoints[parameter].iter().sum()
     }
 
-    /// Adds Σ weights · ∂(first derivatives and forces)/∂a over some points to the sum of every parameter a.
-    pub(crate) fn add_derivatives<M: Model<N>, const N: usize>(
+    /// Adds Σ weights · ∂(first derivatives and forces)/∂a over some points to the sum of every parameter a, and leaves none of them.
+    pub(crate) fn take_derivatives<M: Model<N>, const N: usize>(
         &mut self,
         model: &M,
-        places: &Places<N>,
+        places: &mut Places<N>,
     ) {
         self.operations.list.clear();
         self.operations.slopes.clear();
@@ -188,6 +193,7 @@ impl Tape {
             }
         }
         read_backwards(operations, &mut self.adjoints);
+        *places = Places::NONE;
     }
 }
 

@@ -306,23 +306,14 @@ where
                 statistics: &mut memory.statistics,
             };
             #[cfg(feature = "alloc")]
-            let asked = match asked {
-                Asked::Product(Product {
-                    lambda,
-                    by_direction,
-                    at_once: Some(backwards),
-                }) => {
-                    if backwards.try_iteration(&mut equations, parts.unknowns, lambda)? {
-                        return Ok(());
-                    }
-                    Asked::Product(Product {
-                        lambda,
-                        by_direction,
-                        at_once: Some(backwards),
-                    })
-                }
-                asked => asked,
-            };
+            let mut asked = asked;
+            #[cfg(feature = "alloc")]
+            if let Asked::Product(product) = &mut asked
+                && let Some(backwards) = &mut product.at_once
+                && backwards.try_iteration(&mut equations, parts.unknowns, product.lambda)?
+            {
+                return Ok(());
+            }
             let mut forces = EndForces::of(forces, m);
             system.of_velocities(&mut equations, parts.unknowns, directions, &mut forces)?;
             let (x, h) = (&*parts.unknowns, span.h);

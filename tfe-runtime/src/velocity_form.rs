@@ -35,6 +35,14 @@ pub(crate) struct PointDerivatives<const N: usize> {
     pub(crate) second: Second<f64, N>,
 }
 
+impl<const N: usize> PointDerivatives<N> {
+    pub(crate) const ZERO: Self = Self {
+        p: [0.0; N],
+        force: [0.0; N],
+        second: Second::ZERO,
+    };
+}
+
 /// The derivatives of momentum and force at a point by its velocity and by h times the rate of its coordinates.
 pub(crate) struct PointTangent<const N: usize> {
     pub(crate) momentum_v: [[f64; N]; N],
@@ -382,11 +390,7 @@ where
         let points = self.scheme.points();
         rows.fill([0.0; N]);
         tangent.fill(0.0);
-        let mut point = PointDerivatives {
-            p: [0.0; N],
-            force: [0.0; N],
-            second: Second::ZERO,
-        };
+        let mut point = PointDerivatives::ZERO;
         for l in 0..points {
             self.derivatives(l, rates, &mut point)?;
             let by = PointTangent::of(self.span.h, &point.second);

@@ -221,11 +221,7 @@ where
             derivatives.tangent.fill(0.0);
             derivatives.by_start.fill(0.0);
         }
-        let mut point = PointDerivatives {
-            p: [0.0; N],
-            force: [0.0; N],
-            second: Second::ZERO,
-        };
+        let mut point = PointDerivatives::ZERO;
         for l in 0..points {
             let (t, q, v) = self.inner.place(l, rates);
             if derivatives.is_some() {

@@ -134,14 +134,9 @@ where
         directions: &[Direction],
         matrix: &mut [f64],
     ) -> Result<(), TransitionError> {
-        let extra = &mut Vec::new();
-        self.of_last(
-            extra,
-            directions,
-            |method, memory, workspace, extra, given| {
-                method.linearise(memory, workspace, extra, given, matrix)
-            },
-        )
+        self.of_last(directions, |method, memory, workspace, extra, given| {
+            method.linearise(memory, workspace, extra, given, matrix)
+        })
     }
 
     fn adjoint_of_last(
@@ -152,29 +147,18 @@ where
     ) -> Result<(), TransitionError> {
         let is_free = M::CONSTRAINTS.is_empty();
         if !(is_free && (directions.is_empty() || are_parameters(&*self.model, directions))) {
-            let extra = &mut Vec::new();
-            return self.of_last(
-                extra,
-                directions,
-                |method, memory, workspace, extra, given| {
-                    method.adjoint(memory, workspace, extra, given, (lambda, by_direction))
-                },
-            );
+            return self.of_last(directions, |method, memory, workspace, extra, given| {
+                method.adjoint(memory, workspace, extra, given, (lambda, by_direction))
+            });
         }
         let mut backwards = self.backwards.take().unwrap_or_default();
         backwards.begin(match directions {
             [] => 0,
             _ => self.model.parameters(),
         });
-        let mut extra = core::mem::take(&mut backwards.extra);
-        let done = self.of_last(
-            &mut extra,
-            &[],
-            |method, memory, workspace, extra, given| {
-                method.adjoint_at_once(memory, workspace, extra, given.0, (lambda, &mut backwards))
-            },
-        );
-        backwards.extra = extra;
+        let done = self.of_last(&[], |method, memory, workspace, extra, given| {
+            method.adjoint_at_once(memory, workspace, extra, given.0, (lambda, &mut backwards))
+        });
         if done.is_ok() {
             backwards.add_to(&*self.model, directions, by_direction);
         }
@@ -182,10 +166,9 @@ where
         done
     }
 
-    /// Differentiates the last step with what is known of it; `extra` is memory for it.
+    /// Differentiates the last step with what is known of it.
     fn of_last(
         &mut self,
-        extra: &mut Vec<f64>,
         directions: &[Direction],
         differentiate: impl FnOnce(
             Method<'_, M, SchemeTable>,
@@ -198,10 +181,10 @@ where
         let element = self.table.element();
         let constraints = M::CONSTRAINTS.len();
         let length = linearised_len(element, M::FORM, N, constraints, directions.len());
-        if extra.len() == length {
-            extra.fill(0.0);
+        if self.extra.len() == length {
+            self.extra.fill(0.0);
         } else {
-            *extra = vec![0.0; length];
+            self.extra = vec![0.0; length];
         }
         self.make_room();
         if let Some(numbers) = self.retrace() {
@@ -218,6 +201,6 @@ where
             control: self.control,
         };
         let given = (self.impulses.as_slice(), directions);
-        differentiate(method, &mut self.memory, workspace, extra, given)
+        differentiate(method, &mut self.memory, workspace, &mut self.extra, given)
     }
 }

@@ -93,6 +93,8 @@ pub struct Stepper<'m, M, const N: usize> {
     pub(super) solve: Solve,
     /// Of a run of the same motion, where the iteration of the next step may start.
     pub(super) foreseen: Foreseen,
+    /// What derivatives of the last step need, besides its workspace.
+    pub(super) extra: Vec<f64>,
     /// What elements backwards need, if there were any.
     pub(super) backwards: Option<Box<Backwards<N>>>,
 }
@@ -119,6 +121,7 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             at_kinks: self.at_kinks,
             solve: self.solve,
             foreseen: self.foreseen.clone(),
+            extra: Vec::new(),
             backwards: None,
         }
     }
@@ -183,6 +186,7 @@ where
             at_kinks: false,
             solve: control.solve,
             foreseen: Foreseen::default(),
+            extra: Vec::new(),
             backwards: None,
         };
         if stepper.points.is_none() {

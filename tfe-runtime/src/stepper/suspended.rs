@@ -95,6 +95,7 @@ where
             at_kinks: false,
             solve: control.solve,
             foreseen: Foreseen::default(),
+            extra: Vec::new(),
             backwards: None,
         })
     }
