@@ -126,7 +126,9 @@ fn the_same_numbers_where_the_fixed_point_does_not_contract() {
     let start = links.state([2.1, -0.4], [0.2, 0.5]);
     let four = same!(links, start, FourNodes, Element::mixed(4), 0.17);
     let two = same!(links, start, TwoNodes, Element::mixed(2), 0.2);
-    for (newton, cuts) in [four, two] {
+    let by_primal = same!(links, start, Displacement, Element::primal(3), 0.2);
+    let lobatto = same!(links, start, Lobatto, Element::primal(4).lobatto(), 0.2);
+    for (newton, cuts) in [four, two, by_primal, lobatto] {
         assert!(newton > 0 && cuts > 0, "{newton} {cuts}");
     }
     let stiff = Blade { k: 1e4, c: 0.1 };

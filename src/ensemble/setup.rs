@@ -41,8 +41,8 @@ use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 ///
 /// # How it runs
 /// With the feature `parallel` trajectories are shared among all processors. With one model, on each of them eight run side by side
-/// in vector instructions ([`Bundle`]), if the element is a Runge–Kutta method in the form at hand (two-field elements are) and the model has no
-/// constraints; all others run one after the other. Parameter sets ([`of_models`](Self::of_models)) go side by side, too: each lane computes with the parameters of its own model.
+/// in vector instructions ([`Bundle`]), if the model has no constraints and the element no more than sixteen points, and of a Hamiltonian that is not M q̈ = f if it is a
+/// two-field element; all others run one after the other. Parameter sets ([`of_models`](Self::of_models)) go side by side, too: each lane computes with the parameters of its own model.
 /// Those of hand-written models that do not number their [parameters](Model::parameters) run one after the other.
 ///
 /// Runs of models of run-time length go one by one, on all processors.

@@ -397,6 +397,7 @@ struct Fast {
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
             { Fast::SIZES[5usize] },
+            { Fast::SIZES[6usize] },
         >,
         {
             ::tfe::__private::numbers_len(
@@ -421,7 +422,7 @@ struct Fast {
 impl Fast {
     const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::primal(3)
         .reduced();
-    const SIZES: [usize; 6] = ::tfe::__private::sizes::<Contact, 2>(Fast::ELEMENT);
+    const SIZES: [usize; 7] = ::tfe::__private::sizes::<Contact, 2>(Fast::ELEMENT);
     const SCHEME: ::tfe::__private::Scheme<
         { Fast::ELEMENT.points() },
         { Fast::ELEMENT.unknowns() },
@@ -434,6 +435,7 @@ impl Fast {
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
             { Fast::SIZES[5usize] },
+            { Fast::SIZES[6usize] },
         >,
     > = ::tfe::__private::Fixed::new(&Self::SCHEME);
     /// The size of the stepper, all its memory included.

@@ -254,6 +254,7 @@ struct Fast {
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
             { Fast::SIZES[5usize] },
+            { Fast::SIZES[6usize] },
         >,
         {
             ::tfe::__private::numbers_len(
@@ -277,7 +278,7 @@ struct Fast {
 #[allow(dead_code)]
 impl Fast {
     const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::mixed(2);
-    const SIZES: [usize; 6] = ::tfe::__private::sizes::<Spring, 1>(Fast::ELEMENT);
+    const SIZES: [usize; 7] = ::tfe::__private::sizes::<Spring, 1>(Fast::ELEMENT);
     const SCHEME: ::tfe::__private::Scheme<
         { Fast::ELEMENT.points() },
         { Fast::ELEMENT.unknowns() },
@@ -290,6 +291,7 @@ impl Fast {
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
             { Fast::SIZES[5usize] },
+            { Fast::SIZES[6usize] },
         >,
     > = ::tfe::__private::Fixed::new(&Self::SCHEME);
     /// The size of the stepper, all its memory included.

@@ -342,6 +342,7 @@ struct Fast {
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
             { Fast::SIZES[5usize] },
+            { Fast::SIZES[6usize] },
         >,
         {
             ::tfe::__private::numbers_len(
@@ -365,7 +366,7 @@ struct Fast {
 #[allow(dead_code)]
 impl Fast {
     const ELEMENT: ::tfe::__private::Element = ::tfe::__private::Element::mixed(3);
-    const SIZES: [usize; 6] = ::tfe::__private::sizes::<KnifeEdge, 3>(Fast::ELEMENT);
+    const SIZES: [usize; 7] = ::tfe::__private::sizes::<KnifeEdge, 3>(Fast::ELEMENT);
     const SCHEME: ::tfe::__private::Scheme<
         { Fast::ELEMENT.points() },
         { Fast::ELEMENT.unknowns() },
@@ -378,6 +379,7 @@ impl Fast {
             { Fast::SIZES[3usize] },
             { Fast::SIZES[4usize] },
             { Fast::SIZES[5usize] },
+            { Fast::SIZES[6usize] },
         >,
     > = ::tfe::__private::Fixed::new(&Self::SCHEME);
     /// The size of the stepper, all its memory included.

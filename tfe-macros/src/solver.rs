@@ -36,7 +36,7 @@ pub(crate) fn expand(
     );
     let text = name.to_string();
     let own = docs.attributes("solver", &solver.name);
-    let sizes = (0..6_usize).map(|size| quote!({ #name::SIZES[#size] }));
+    let sizes = (0..7_usize).map(|size| quote!({ #name::SIZES[#size] }));
     let inline = quote!(#path::Inline<#(#sizes),*>);
     quote! {
         #own
@@ -55,7 +55,7 @@ pub(crate) fn expand(
         #[allow(dead_code)]
         impl #name {
             const ELEMENT: #path::Element = #element;
-            const SIZES: [usize; 6] = #path::sizes::<#model, #dof>(#name::ELEMENT);
+            const SIZES: [usize; 7] = #path::sizes::<#model, #dof>(#name::ELEMENT);
             const SCHEME: #path::Scheme<{ #name::ELEMENT.points() }, { #name::ELEMENT.unknowns() }> =
                 #path::Scheme::new(#name::ELEMENT);
             const TABLES: #path::Fixed<#inline> = #path::Fixed::new(&Self::SCHEME);

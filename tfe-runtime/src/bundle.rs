@@ -5,8 +5,8 @@
 //! stepper, of second order where the model allows it. A lane that has converged is held while others go on, so that what a trajectory does never
 //! depends, not by one bit, on which others are beside it. A lane whose iteration does not contract takes this step and some that follow with a stepper of its own, by Newton's method; one that fails there is out.
 //!
-//! Lanes are used for two-field elements (and others that are Runge–Kutta methods in the form at hand) and models without constraints whose
-//! kernels can be solved by a fixed point: any Lagrangian, and Hamiltonians in phase space. Everything else runs too, lane after lane.
+//! Lanes are used for models without constraints: any Lagrangian; Hamiltonians with two-field elements, and with all others where they are M q̈ = f. Everything
+//! else runs too, lane after lane.
 
 mod engine;
 mod first_order;
@@ -25,6 +25,7 @@ use crate::model::{Model, State};
 use crate::newton::{Control, Preference, Solve};
 use crate::points::has_form;
 use crate::registers::pair::LANES;
+use crate::registers::storage::MAX_GROUPS;
 use crate::scheme::{SchemeTable, Tables};
 use crate::statistics::Statistics;
 use crate::stepper::Stepper;
@@ -222,7 +223,8 @@ where
     /// Whether this model with this element and control is stepped in lanes; else lane after lane, as by a [`Stepper`].
     #[must_use]
     pub fn uses_lanes(element: &Element, control: &Control) -> bool {
-        has_form::<T::Kernels, N>(element)
+        element.points() <= 4 * MAX_GROUPS
+            && has_form::<T::Kernels, N>(element)
             && M::CONSTRAINTS.is_empty()
             && control.solve != Solve::Newton
     }

@@ -196,19 +196,67 @@ pub(crate) fn continued_ratio(ratio: f64) -> f64 {
 
 /// Old unknown rates to new ones: the polynomial of the last element, continued (T-65).
 pub(crate) const fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix: &mut [f64]) {
-    let (unknowns, rates) = (scheme.unknown_nodes.len(), scheme.element.degree());
+    let degrees = scheme.element.degree();
+    extrapolate(scheme.unknown_nodes, (scheme.rate, degrees), ratio, matrix);
+}
+
+/// The same of numbers at the points. Where these are more than the unknown rates, forces are known by one degree more than rates.
+pub(crate) const fn set_extrapolation_at_points(
+    scheme: &SchemeRef<'_>,
+    ratio: f64,
+    matrix: &mut [f64],
+) {
+    let (points, degrees) = (scheme.nodes.len(), scheme.element.degree());
+    extrapolate(scheme.nodes, (scheme.force_rate, degrees), ratio, matrix);
+    if scheme.collocated {
+        return;
+    }
+    let (mut norm, mut l) = (0.0, 0);
+    while l < points {
+        let value = legendre_of(degrees, scheme.nodes[l]);
+        norm += scheme.weights[l] * value * value;
+        l += 1;
+    }
     let mut i = 0;
-    while i < unknowns {
-        let mut values = [0.0; MAX_NODES];
-        legendre(1.0 + scheme.unknown_nodes[i] * ratio, &mut values);
+    while i < points {
+        let ahead = legendre_of(degrees, 1.0 + scheme.nodes[i] * ratio) / norm;
         let mut j = 0;
-        while j < unknowns {
+        while j < points {
+            let value = scheme.weights[j] * legendre_of(degrees, scheme.nodes[j]);
+            matrix[i * points + j] += ahead * value;
+            j += 1;
+        }
+        i += 1;
+    }
+}
+
+/// P_degree(τ) on the unit interval.
+const fn legendre_of(degree: usize, tau: f64) -> f64 {
+    let mut values = [0.0; MAX_NODES];
+    legendre(tau, &mut values);
+    values[degree]
+}
+
+/// Numbers at the places of one element to those at the places of the next, by a matrix that turns them into so many Legendre coefficients.
+const fn extrapolate(
+    places: &[f64],
+    (coefficients, degrees): (&[f64], usize),
+    ratio: f64,
+    matrix: &mut [f64],
+) {
+    let count = places.len();
+    let mut i = 0;
+    while i < count {
+        let mut values = [0.0; MAX_NODES];
+        legendre(1.0 + places[i] * ratio, &mut values);
+        let mut j = 0;
+        while j < count {
             let (mut entry, mut degree) = (0.0, 0);
-            while degree < rates {
-                entry += values[degree] * scheme.rate[degree * unknowns + j];
+            while degree < degrees {
+                entry += values[degree] * coefficients[degree * count + j];
                 degree += 1;
             }
-            matrix[i * unknowns + j] = entry;
+            matrix[i * count + j] = entry;
             j += 1;
         }
         i += 1;

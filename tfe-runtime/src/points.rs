@@ -1,11 +1,19 @@
 //! All points of an element at once, four to a register: the fixed-point iteration of smooth steps.
 //!
-//! The same equations as those of the other forms, for elements that are Runge–Kutta methods with K points, coefficients A, b, c:
+//! The same equations as those of the other forms; for elements that are Runge–Kutta methods with K points, coefficients A, b, c:
 //!
 //! ```text
 //! second order   M q̈ = f(q, t):   q_l = q₀ + h Σ A_lj v₀ + h² Σ (A²)_lj M⁻¹ f_j ,          unknown f
 //! velocities     p = L_v:         q_l = q₀ + h Σ A_lj v_j ,  p_l = p₀ + h Σ A_lj f_j ,     unknown v
 //! phase space    v = H_p:         the same with v_j = H_p(q_j, p_j),                       unknown v and f
+//! ```
+//!
+//! Primal elements with more points than unknown rates keep rates at all points, too, as numbers that lie on a polynomial of degree n − 2. E P, the nearest
+//! such polynomial in the norm of the rule, leaves them as they are, and the equations of `scheme` are, with its matrices:
+//!
+//! ```text
+//! second order   q_l = q₀ + h Σ C_lj v₀ + h² Σ (C G)_lj M⁻¹ f_j ,                                        unknown f
+//! velocities     q_l = q₀ + h Σ (C P)_lj v_j ,  Σ (E P)_lj (p_j − p₀) = h Σ (E G)_lj f_j ,               unknown v
 //! ```
 //!
 //! Where kinetic energy is a constant quadratic form of the velocities alone, the first serves and one product with a matrix does for two. What
@@ -22,6 +30,7 @@ pub(crate) mod tables;
 
 use crate::double_double::DoubleDouble;
 use crate::element::Element;
+use crate::equations::weighted;
 use crate::error::StepError;
 use crate::lanes::Lanes;
 use crate::lu::Block;
@@ -29,7 +38,7 @@ use crate::method::{cold_rate, cold_rates, may_be_phase};
 use crate::model::{First, Form, Model, State};
 use crate::registers::four::{Apart, Four};
 use crate::registers::storage::{Fixed, Keep, List, MAX_GROUPS, Row, Storage};
-use crate::scheme::Tables;
+use crate::scheme::{SchemeRef, Tables};
 use crate::workspace::width;
 use core::marker::PhantomData;
 
@@ -115,7 +124,7 @@ struct Outcome<const N: usize> {
 }
 
 impl<const N: usize, S: Storage> Points<N, S> {
-    /// For a nonlinear model without constraints, and an element that is a Runge–Kutta method of no more than 16 points.
+    /// For a nonlinear model without constraints, and an element of no more than 16 points that has the form.
     pub(crate) fn new<M>(model: &M, tables: tables::Tables<S>) -> Option<Self>
     where
         M: Model<N>,
@@ -153,12 +162,18 @@ impl<const N: usize, S: Storage> Points<N, S> {
         let element = tables.element();
         let length = element.points() * N;
         let unknowns = element.unknowns() * width(&element, M::FORM, N);
-        let (first, rest) = numbers.split_at_mut(length);
         if const { may_be_phase::<M, N>() } && element.has_phase_form() {
-            self.unknowns::<M>(&mut rest[..length], first);
+            let (forces, rates) = numbers.split_at_mut(length);
+            self.unknowns::<M>(&mut rates[..length], forces);
+            return true;
+        }
+        let (rates, rest) = numbers.split_at_mut(unknowns);
+        let forces = &mut rest[2 * unknowns..2 * unknowns + length];
+        if element.is_collocated() {
+            self.unknowns::<M>(rates, forces);
         } else {
-            let start = 3 * unknowns - length;
-            self.unknowns::<M>(first, &mut rest[start..start + length]);
+            spread(&self.forces, forces);
+            self.unknown_rates::<M>(&tables.view(), forces, rates);
         }
         true
     }
@@ -183,14 +198,35 @@ impl<const N: usize, S: Storage> Points<N, S> {
     {
         if is_second_order::<M, N>() {
             self.set_rates::<M>(rates);
+        } else {
+            spread(&self.rates, rates);
         }
-        for l in 0..self.tables.points {
-            let (group, lane) = (l / 4, l % 4);
-            for a in 0..N {
-                if !is_second_order::<M, N>() {
-                    rates[l * N + a] = self.rates[group][a][lane];
+        spread(&self.forces, forces);
+    }
+
+    /// The unknown rates of an element with more points than these, a row of N for each.
+    fn unknown_rates<M>(&self, scheme: &SchemeRef<'_>, forces: &[f64], rates: &mut [f64])
+    where
+        M: Model<N>,
+    {
+        let points = scheme.points();
+        let forces = forces.as_chunks::<N>().0;
+        for (i, rate) in rates.as_chunks_mut::<N>().0.iter_mut().enumerate() {
+            let row = i * points..(i + 1) * points;
+            if is_second_order::<M, N>() {
+                // ν = v₀ + h M⁻¹ G f
+                let impulse = weighted(&scheme.force[row.clone()], &scheme.force_low[row], forces);
+                let change = self.inertia.times(0.0, &impulse);
+                for a in 0..N {
+                    rate[a] = self.velocity[a] + self.last_step * change[a];
                 }
-                forces[l * N + a] = self.forces[group][a][lane];
+                continue;
+            }
+            *rate = [0.0; N];
+            for (l, weight) in scheme.momentum[row].iter().enumerate() {
+                for a in 0..N {
+                    rate[a] += weight * self.rates[l / 4][a][l % 4];
+                }
             }
         }
     }
@@ -206,6 +242,17 @@ impl<const N: usize, S: Storage> Points<N, S> {
             return like.apart(Velocities::<M, S, N>::of(self, rates));
         }
         Velocities::<M, S, N>::of(self, rates).run(Lanes([0.0; 4]));
+    }
+}
+
+/// From groups of four points to a row of N for each.
+fn spread<const N: usize>(groups: &[Row<N>], rows: &mut [f64]) {
+    for (group, rows) in groups.iter().zip(rows.as_chunks_mut::<N>().0.chunks_mut(4)) {
+        for (lane, row) in rows.iter_mut().enumerate() {
+            for a in 0..N {
+                row[a] = group[a][lane];
+            }
+        }
     }
 }
 
@@ -291,7 +338,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
     }
 }
 
-/// Whether there are points of that kind: for a nonlinear model without constraints, and an element that is a Runge–Kutta method of no more than 16 points.
+/// Whether there are points of that kind: for a nonlinear model without constraints, and an element of no more than 16 points that has the form.
 pub(crate) const fn are_possible<M, const N: usize>(element: &Element) -> bool
 where
     M: Model<N>,
@@ -417,15 +464,23 @@ where
     matches!(M::FORM, Form::Hamiltonian)
 }
 
-/// Whether the element is a Runge–Kutta method for the model as it was declared.
+/// Whether the element has one of the three forms for the model as it was declared: all have but those that ask a Hamiltonian for velocities.
 pub(crate) const fn has_form<M, const N: usize>(element: &Element) -> bool
 where
     M: Model<N>,
 {
     match M::FORM {
-        Form::Lagrangian => element.is_collocated(),
-        Form::Hamiltonian => element.has_phase_form(),
+        Form::Lagrangian => true,
+        Form::Hamiltonian => element.has_phase_form() || is_second_order::<M, N>(),
     }
+}
+
+/// Whether rates at more points than it has unknown ones are those of the element.
+pub(crate) const fn is_projected<M, const N: usize>(element: &Element) -> bool
+where
+    M: Model<N>,
+{
+    !element.is_collocated() && !is_second_order::<M, N>()
 }
 
 /// The largest magnitude.
@@ -458,7 +513,7 @@ pub(crate) mod tests {
     use crate::real::Real;
     use crate::registers::storage::Heap;
     use crate::scheme::SchemeTable;
-    use crate::{Mixed, Radau};
+    use crate::{Mixed, Primal, Radau};
 
     /// Two bodies, an angle, a force: products, quotients, roots, sines.
     pub(crate) struct Planet;
@@ -546,7 +601,17 @@ pub(crate) mod tests {
     ) where
         M: Model<N>,
     {
-        for element in [Mixed::<4>.into(), Mixed::<9>.into(), Radau::<11>.into()] {
+        let elements = [
+            Mixed::<4>.into(),
+            Mixed::<9>.into(),
+            Radau::<11>.into(),
+            Primal::<3>.into(),
+            Primal::<7>.lobatto(),
+        ];
+        for element in elements {
+            if !has_form::<M, N>(&element) {
+                continue;
+            }
             let table = SchemeTable::new(element).unwrap();
             let tables = tables::Tables::of(&table.view());
             let with = Points::<N, Heap>::new(model, tables).unwrap();

@@ -7,7 +7,7 @@ use crate::method::{Interval, Memory, Method};
 use crate::model::{Model, State};
 use crate::newton::{Control, Solve, Standard};
 use crate::points::tables::Tables;
-use crate::points::{Points, Together, are_possible, is_second_order};
+use crate::points::{Points, Together, are_possible, is_projected, is_second_order};
 use crate::registers::storage::Storage;
 use crate::scheme::Scheme;
 use crate::statistics::Statistics;
@@ -23,12 +23,12 @@ const MOST_IN_REGISTERS: usize = 8;
 
 /// The sizes of [`Inline`](crate::registers::storage::Inline) for a model and an element; zeros where steps go one point after the other.
 #[must_use]
-pub const fn sizes<M, const N: usize>(element: Element) -> [usize; 6]
+pub const fn sizes<M, const N: usize>(element: Element) -> [usize; 7]
 where
     M: Model<N>,
 {
     if !IS_LARGE || !are_possible::<M, N>(&element) {
-        return [0; 6];
+        return [0; 7];
     }
     let (points, groups) = (element.points(), element.points().div_ceil(4));
     let first = if is_second_order::<M, N>() { 0 } else { groups };
@@ -38,7 +38,8 @@ where
         (groups, 0)
     };
     let kept = if N * groups > MOST_IN_REGISTERS { 1 } else { 0 };
-    [points, groups, first, varying, square, kept]
+    let projected = if is_projected::<M, N>(&element) { 1 } else { 0 };
+    [points, groups, first, varying, square, kept, projected]
 }
 
 /// Steps of one length, with all memory in place.

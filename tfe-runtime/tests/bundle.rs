@@ -93,6 +93,9 @@ fn lagrangian_in_lanes() {
         Mixed::<6>.into(),
         Radau::<4>.into(),
         Primal::<4>.reduced(),
+        Primal::<3>.into(),
+        Primal::<6>.lobatto(),
+        Element::energy_conserving(8),
     ] {
         agree(&PendulumL {}, element, &pendulums(10));
     }
@@ -100,14 +103,24 @@ fn lagrangian_in_lanes() {
 
 #[test]
 fn hamiltonian_in_lanes() {
-    for element in [Element::from(Mixed::<3>), Mixed::<6>.into()] {
+    for element in [
+        Element::from(Mixed::<3>),
+        Mixed::<6>.into(),
+        Primal::<4>.into(),
+    ] {
         agree(&PendulumH {}, element, &pendulums(10));
     }
 }
 
 #[test]
 fn time_and_position_dependent_masses_in_lanes() {
-    agree(&DuffingL { d: 0.1 }, Mixed::<5>.into(), &pendulums(7));
+    for element in [
+        Element::from(Mixed::<5>),
+        Primal::<4>.into(),
+        Primal::<9>.lobatto(),
+    ] {
+        agree(&DuffingL { d: 0.1 }, element, &pendulums(7));
+    }
 }
 
 #[test]
@@ -123,15 +136,19 @@ fn neighbours_and_order_change_no_bit() {
 
 #[test]
 fn what_has_no_lanes_runs_one_by_one() {
-    // Full quadrature is no Runge–Kutta method.
-    let element = Element::from(Primal::<3>);
     let control = Control::default();
-    assert!(!Bundle::<PendulumL, 1, 4>::uses_lanes(&element, &control));
-    let starts = pendulums(5);
-    let (ends, _) = together::<_, 1, 4>(&PendulumL {}, element, &starts, 50);
-    for (start, end) in starts.iter().zip(&ends) {
-        let expected = alone(&PendulumL {}, element, start, 50).map(|(state, _)| state);
-        assert_eq!(*end, expected);
+    // More than sixteen points.
+    for element in [
+        Element::energy_conserving(9),
+        Element::primal(3).quadrature(32),
+    ] {
+        assert!(!Bundle::<PendulumL, 1, 4>::uses_lanes(&element, &control));
+        let starts = pendulums(5);
+        let (ends, _) = together::<_, 1, 4>(&PendulumL {}, element, &starts, 50);
+        for (start, end) in starts.iter().zip(&ends) {
+            let expected = alone(&PendulumL {}, element, start, 50).map(|(state, _)| state);
+            assert_eq!(*end, expected);
+        }
     }
     let newton = Control {
         solve: Solve::Newton,

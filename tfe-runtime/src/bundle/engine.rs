@@ -70,7 +70,7 @@ impl<T: Together<N>, const N: usize> Job<'_, T, N> {
 }
 
 impl<const N: usize> Engine<N> {
-    /// For an element that is a Runge–Kutta method; nothing if a constant mass matrix is singular.
+    /// For an element of no more than 16 points; nothing if a constant mass matrix is singular.
     pub(super) fn new<M>(model: &M, table: &SchemeTable) -> Option<Self>
     where
         M: Model<N>,

@@ -18,7 +18,11 @@ where
     #[inline(always)]
     pub(super) fn begin<V: Eight>(&self, like: V, group: &Group<N>, work: &mut Work<N>) {
         let table = &self.tables.once_low;
-        apply(like, table, &group.rates, &mut work.products);
+        let of_rates = match self.tables.projected.first() {
+            None => table,
+            Some(projection) => &projection.position_low,
+        };
+        apply(like, of_rates, &group.rates, &mut work.products);
         apply(like, table, &group.forces, &mut work.more_products);
         let (h, points) = (like.like(self.h), self.tables.points);
         let products = &work.products[..points];
@@ -52,10 +56,16 @@ where
         let forces = &mut group.forces[..points];
         let momenta = &mut work.momenta[..points];
         let products = &mut work.products[..points];
+        let more_products = &mut work.more_products[..points];
         let low_position = &work.low_position[..points];
         let low_momentum = &work.low_momentum[..points];
         let nodes = &self.tables.nodes.as_flattened()[..points];
-        apply(like, &self.tables.once, rates, products);
+        let projection = self.tables.projected.first();
+        let to_positions = match projection {
+            None => &self.tables.once,
+            Some(projection) => &projection.position,
+        };
+        apply(like, to_positions, rates, products);
         for l in 0..points {
             let mut q = start_q;
             for a in 0..N {
@@ -73,9 +83,13 @@ where
                 self.model.first_inline(t, &q, &v, &mut first);
             }
             for a in 0..N {
-                momenta[l][a] = first.z[a].lanes();
+                momenta[l][a] = (first.z[a] - start_p[a]).lanes();
                 replace::<V>(mask, &mut forces[l][a], first.q[a] + first.force[a]);
             }
+        }
+        if let Some(projection) = projection {
+            more_products.copy_from_slice(momenta);
+            apply(like, &projection.onto_rates, more_products, momenta);
         }
         apply(like, &self.tables.once, forces, products);
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
@@ -83,7 +97,7 @@ where
             let mut step = [zero; N];
             for a in 0..N {
                 let wanted = h * like.with(products[l][a]) + like.with(low_momentum[l][a]);
-                step[a] = wanted - (like.with(momenta[l][a]) - start_p[a]);
+                step[a] = wanted - like.with(momenta[l][a]);
             }
             if const { M::FACTS.constant_mass } {
                 step = self.inertia.times(like, &step);
@@ -91,9 +105,22 @@ where
                 solve(like, &work.masses[l], &mut step);
             }
             for a in 0..N {
-                let old = &mut rates[l][a];
-                let rate = like.with(*old) + step[a];
-                changed.raise(step[a]);
+                more_products[l][a] = step[a].lanes();
+            }
+        }
+        let steps = match projection {
+            None => more_products,
+            Some(projection) => {
+                // With one mass matrix for all points these would lie among the rates already.
+                apply(like, &projection.onto_rates, more_products, products);
+                products
+            }
+        };
+        for l in 0..points {
+            for a in 0..N {
+                let (old, step) = (&mut rates[l][a], like.with(steps[l][a]));
+                let rate = like.with(*old) + step;
+                changed.raise(step);
                 // What is not finite shows in the change.
                 size.raise_finite(rate);
                 replace::<V>(mask, old, rate);

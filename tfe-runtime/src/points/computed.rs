@@ -1,7 +1,7 @@
 //! Tables that are computed when the program runs.
 
-use super::tables::{Tables, Target};
-use crate::registers::storage::{Fixed, Heap, Matrix, Weights};
+use super::tables::{ProjectionTarget, Tables, Target};
+use crate::registers::storage::{Fixed, Heap, Matrix, Projection, Weights};
 use crate::scheme::SchemeRef;
 use alloc::sync::Arc;
 use alloc::vec;
@@ -12,7 +12,7 @@ static KNOWN: std::sync::Mutex<std::vec::Vec<(crate::Element, Arc<Fixed<Heap>>)>
     std::sync::Mutex::new(std::vec::Vec::new());
 
 impl Tables<Heap> {
-    /// Of an element that is a Runge–Kutta method; clones share what no step changes. With the feature `std` they are computed once in a program.
+    /// Of an element of no more than 16 points; clones share what no step changes. With the feature `std` they are computed once in a program.
     pub(crate) fn of(scheme: &SchemeRef<'_>) -> Self {
         Self::new(Self::shared(scheme))
     }
@@ -53,6 +53,11 @@ impl Fixed<Heap> {
         let groups = points.div_ceil(4);
         let (row, matrix) = (vec![[0.0; 4]; groups], Matrix::empty(points));
         let weights = Weights(vec![[[0.0; 4]; 2]; groups]);
+        let projection = Projection {
+            position: matrix.clone(),
+            position_low: matrix.clone(),
+            onto_rates: matrix.clone(),
+        };
         let mut fixed = Self {
             points,
             groups,
@@ -65,6 +70,7 @@ impl Fixed<Heap> {
             twice_low: matrix.clone(),
             weights: weights.clone(),
             lever: weights,
+            projected: vec![projection; usize::from(!scheme.collocated)],
             continued: matrix,
         };
         let mut target = Target {
@@ -78,6 +84,11 @@ impl Fixed<Heap> {
             weights: &mut fixed.weights.0,
             lever: &mut fixed.lever.0,
             continued: &mut fixed.continued.columns,
+            projection: fixed.projected.first_mut().map(|one| ProjectionTarget {
+                position: &mut one.position.columns,
+                position_low: &mut one.position_low.columns,
+                onto_rates: &mut one.onto_rates.columns,
+            }),
         };
         target.fill(scheme);
         fixed

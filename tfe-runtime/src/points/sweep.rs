@@ -103,7 +103,10 @@ impl<const N: usize, S: Storage> Work<N, S> {
     #[inline(always)]
     pub(super) fn set_low<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
         let (products, more_products) = (&mut self.products, &mut self.more_products);
-        (leg.tables.once_low).apply(like, &self.rates, products);
+        match leg.tables.projected.first() {
+            None => (leg.tables.once_low).apply(like, &self.rates, products),
+            Some(projection) => (projection.position_low).apply(like, &self.rates, products),
+        }
         (leg.tables.once_low).apply(like, &self.forces, more_products);
         let h = like.like(leg.h);
         for (low, product) in self.low_position.iter_mut().zip(products.iter()) {
@@ -142,7 +145,12 @@ impl<const N: usize, S: Storage> Work<N, S> {
         let low_momentum = &self.low_momentum[..count];
         let nodes = &leg.tables.nodes[..count];
         let masses = &mut self.masses;
-        leg.tables.once.apply(like, rates, products);
+        let more_products = &mut self.more_products[..count];
+        let projection = leg.tables.projected.first();
+        match projection {
+            None => leg.tables.once.apply(like, rates, products),
+            Some(projection) => projection.position.apply(like, rates, products),
+        }
         for c in 0..count {
             let (mut q, mut v) = ([zero; N], [zero; N]);
             for a in 0..N {
@@ -162,29 +170,46 @@ impl<const N: usize, S: Storage> Work<N, S> {
                 V::first(model, t, &q, &v, &mut first);
             }
             for a in 0..N {
-                momenta[c][a] = first.z[a].lanes();
+                momenta[c][a] = (first.z[a] - like.like(leg.start.p[a])).lanes();
                 forces[c][a] = (first.q[a] + first.force[a]).lanes();
             }
         }
+        if let Some(projection) = projection {
+            more_products.copy_from_slice(momenta);
+            projection.onto_rates.apply(like, more_products, momenta);
+        }
         leg.tables.once.apply(like, forces, products);
         let (mut changed, mut size) = (Magnitude::none(like), Magnitude::none(like));
-        for c in 0..count {
-            let mut step = [zero; N];
-            for a in 0..N {
-                let low = like.with(low_momentum[c][a]);
-                let wanted = h.times_plus(like.with(products[c][a]), low);
-                step[a] = wanted - (like.with(momenta[c][a]) - like.like(leg.start.p[a]));
+        // The loops apart: the one without projection is what most elements go through.
+        if let Some(projection) = projection {
+            for c in 0..count {
+                let momenta = (&products[c], &low_momentum[c], &momenta[c]);
+                let step = leg.missing_velocity::<V, M>(like, momenta, masses.get(c));
+                for a in 0..N {
+                    more_products[c][a] = step[a].lanes();
+                }
             }
-            if const { M::FACTS.constant_mass } {
-                step = leg.inertia.times(like, &step);
-            } else {
-                solve(like, &masses[c], &mut step);
+            // With one mass matrix for all points these would lie among the rates already.
+            projection.onto_rates.apply(like, more_products, products);
+            for c in 0..count {
+                for a in 0..N {
+                    let step = like.with(products[c][a]);
+                    let rate = like.with(rates[c][a]) + step;
+                    rates[c][a] = rate.lanes();
+                    changed.raise(step);
+                    size.raise(rate);
+                }
             }
-            for a in 0..N {
-                let rate = like.with(rates[c][a]) + step[a];
-                rates[c][a] = rate.lanes();
-                changed.raise(step[a]);
-                size.raise(rate);
+        } else {
+            for c in 0..count {
+                let momenta = (&products[c], &low_momentum[c], &momenta[c]);
+                let step = leg.missing_velocity::<V, M>(like, momenta, masses.get(c));
+                for a in 0..N {
+                    let rate = like.with(rates[c][a]) + step[a];
+                    rates[c][a] = rate.lanes();
+                    changed.raise(step[a]);
+                    size.raise(rate);
+                }
             }
         }
         let (changed, size) = (changed.get(), size.get());
@@ -290,6 +315,33 @@ impl<const N: usize, S: Storage> Work<N, S> {
             position.max(momentum)
         };
         Increment { relative, position }
+    }
+}
+
+impl<const N: usize, S: Storage> Leg<'_, N, S> {
+    /// M⁻¹ times what momenta lack: from products of the tables with forces, low words, and what the momenta are more than that at the start.
+    #[inline(always)]
+    fn missing_velocity<V: Four, M>(
+        &self,
+        like: V,
+        (products, low, momenta): (&Row<N>, &Row<N>, &Row<N>),
+        mass: Option<&[Row<N>; N]>,
+    ) -> [V; N]
+    where
+        M: Model<N>,
+    {
+        let (h, mut step) = (like.like(self.h), [like.like(0.0); N]);
+        for a in 0..N {
+            let wanted = h.times_plus(like.with(products[a]), like.with(low[a]));
+            step[a] = wanted - like.with(momenta[a]);
+        }
+        if const { M::FACTS.constant_mass } {
+            return self.inertia.times(like, &step);
+        }
+        if let Some(mass) = mass {
+            solve(like, mass, &mut step);
+        }
+        step
     }
 }
 

@@ -20,6 +20,8 @@ pub trait Storage: Clone + Debug + Sized {
     type Kept<T: Clone + Debug>: Keep<T>;
     /// The rows of a constant matrix that is not diagonal.
     type Square<const N: usize>: List<[f64; N]>;
+    /// What elements with more points than unknown rates need besides, of equations of first order; empty of others.
+    type Projected: Deref<Target = [Projection<Self>]> + Clone + Debug;
     /// The tables that no step changes.
     type Fixed: Deref<Target = Fixed<Self>> + Clone + Debug;
 }
@@ -38,6 +40,16 @@ pub struct Matrix<S: Storage> {
     pub(crate) columns: S::Lines,
 }
 
+/// Rates of degree n − 2 at more points than they have coefficients.
+#[derive(Clone, Debug)]
+pub struct Projection<S: Storage> {
+    /// C P: rates to coordinates.
+    pub(crate) position: Matrix<S>,
+    pub(crate) position_low: Matrix<S>,
+    /// E P: numbers at the points to the nearest rates, in the norm of the rule.
+    pub(crate) onto_rates: Matrix<S>,
+}
+
 /// A weight for each point and what rounding took from it; zeros beyond the last.
 #[derive(Clone, Debug)]
 pub(crate) struct Weights<S: Storage>(pub(crate) S::Groups<[[f64; 4]; 2]>);
@@ -49,19 +61,21 @@ pub struct Fixed<S: Storage> {
     pub(crate) groups: usize,
     /// c
     pub(crate) nodes: S::Groups<[f64; 4]>,
-    /// A 1: how far a constant velocity reaches. It is c for collocation methods only.
+    /// C 1: how far a constant velocity reaches. It is c for collocation methods and primal elements.
     pub(crate) reach: S::Groups<[f64; 4]>,
     pub(crate) reach_low: S::Groups<[f64; 4]>,
-    /// A
+    /// E G, which is A for Runge–Kutta methods: rates of momenta to momenta.
     pub(crate) once: Matrix<S>,
     pub(crate) once_low: Matrix<S>,
-    /// A²: what two integrations make of accelerations.
+    /// C G, which is A² for Runge–Kutta methods: what two integrations make of accelerations.
     pub(crate) twice: Matrix<S>,
     pub(crate) twice_low: Matrix<S>,
     /// b
     pub(crate) weights: Weights<S>,
-    /// bᵀA
+    /// βᵀG, which is bᵀA for Runge–Kutta methods.
     pub(crate) lever: Weights<S>,
+    /// C P and E P where they are neither A nor one.
+    pub(crate) projected: S::Projected,
     /// From one element to the next that is as long.
     pub(crate) continued: Matrix<S>,
 }
@@ -95,6 +109,7 @@ impl Storage for Heap {
     type Lines = alloc::vec::Vec<[f64; 4]>;
     type Kept<T: Clone + Debug> = Always<T>;
     type Square<const N: usize> = alloc::vec::Vec<[f64; N]>;
+    type Projected = alloc::vec::Vec<Projection<Self>>;
     type Fixed = alloc::sync::Arc<Fixed<Self>>;
 }
 
@@ -135,7 +150,8 @@ impl<T: Clone + Debug, const KEPT: usize> Keep<T> for Array<T, KEPT> {
 }
 
 /// Memory in place, for K points in C groups; `FIRST`, `VARYING` and `SQUARE` are how many of the lists for equations of first order, for mass matrices that vary, and for
-/// one that does not are there: all or none. `KEPT` is one for models so large that making the memory of a step anew takes time.
+/// one that does not are there: all or none. `KEPT` is one for models so large that making the memory of a step anew takes time, `PROJECTED` for elements with more
+/// points than unknown rates.
 #[derive(Clone, Debug)]
 pub struct Inline<
     const K: usize,
@@ -144,6 +160,7 @@ pub struct Inline<
     const VARYING: usize,
     const SQUARE: usize,
     const KEPT: usize,
+    const PROJECTED: usize,
 >;
 
 impl<
@@ -153,7 +170,8 @@ impl<
     const VARYING: usize,
     const SQUARE: usize,
     const KEPT: usize,
-> Storage for Inline<K, C, FIRST, VARYING, SQUARE, KEPT>
+    const PROJECTED: usize,
+> Storage for Inline<K, C, FIRST, VARYING, SQUARE, KEPT, PROJECTED>
 {
     const GROUPS: usize = C;
     type Groups<T: Copy + Debug> = Array<T, C>;
@@ -162,6 +180,7 @@ impl<
     type Lines = Lines<K, C>;
     type Kept<T: Clone + Debug> = Array<T, KEPT>;
     type Square<const N: usize> = Array<[f64; N], SQUARE>;
+    type Projected = Array<Projection<Self>, PROJECTED>;
     type Fixed = &'static Fixed<Self>;
 }
 
