@@ -200,7 +200,7 @@ pub(crate) const fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix
     extrapolate(scheme.unknown_nodes, (scheme.rate, degrees), ratio, matrix);
 }
 
-/// The same of numbers at the points. Where these are more than the unknown rates, forces are known by one degree more than rates.
+/// The same of numbers at the points. Where these are more than s, forces are known by one degree more than rates of the coordinates.
 pub(crate) const fn set_extrapolation_at_points(
     scheme: &SchemeRef<'_>,
     ratio: f64,
@@ -208,7 +208,7 @@ pub(crate) const fn set_extrapolation_at_points(
 ) {
     let (points, degrees) = (scheme.nodes.len(), scheme.element.degree());
     extrapolate(scheme.nodes, (scheme.force_rate, degrees), ratio, matrix);
-    if scheme.collocated {
+    if points == degrees {
         return;
     }
     let (mut norm, mut l) = (0.0, 0);
