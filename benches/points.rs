@@ -35,6 +35,29 @@ struct DoublePendulum {
 #[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2 + x^2 + y^2)/2 + x^2*y - y^3/3)]
 struct HenonHeiles {}
 
+/// Toda's lattice of three masses: exponentials.
+#[dynamics(
+    coordinates(a, b, c),
+    momenta(pa, pb, pc),
+    hamiltonian = (pa^2 + pb^2 + pc^2)/2 + exp(a - b) + exp(b - c) + exp(c - a),
+)]
+struct Toda {}
+
+/// Coulomb friction made smooth.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = -mu*tanh(dot(x)/eps))]
+struct Friction {
+    mu: f64,
+    eps: f64,
+}
+
+/// Forces that are logarithms.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - x^2/2 - y^2/2,
+    force(x) = -ln(1 + x^2 + y^2), force(y) = x*ln(2 + x^2),
+)]
+struct Logarithms {}
+
 const STEPS: u32 = 2_000;
 const ELEMENT: Element = Mixed::<9>.element();
 
@@ -125,5 +148,14 @@ fn main() -> Result<(), Failure> {
         q: [0.1, 0.0],
         p: [0.0, 0.5],
     };
-    measure("Hénon–Heiles", &HenonHeiles {}, start, 0.2)
+    measure("Hénon–Heiles", &HenonHeiles {}, start, 0.2)?;
+    let start = State {
+        q: [0.3, 0.0, -0.2],
+        p: [0.0, 0.5, -0.5],
+    };
+    measure("Toda's lattice", &Toda {}, start, 0.1)?;
+    let friction = Friction { mu: 0.1, eps: 0.5 };
+    measure("friction", &friction, friction.state([1.0], [0.0]), 0.05)?;
+    let start = Logarithms {}.state([0.5, 0.0], [0.0, 0.5]);
+    measure("logarithms", &Logarithms {}, start, 0.1)
 }

@@ -1,5 +1,6 @@
 //! Numbers that kernels compute with: single ones, and several side by side.
 
+use crate::exponential;
 use crate::real::{Real, integer_power};
 use crate::trigonometry;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -56,9 +57,19 @@ impl<const W: usize> SubAssign for Lanes<W> {
 
 /// The elementary functions of `f64` and `f32`: from `std`, or from `libm` without it.
 macro_rules! elementary {
-    ($($(#[$doc:meta])* $name:ident($($argument:ident),*) = $std:ident, $libm:ident, $libm32:ident;)*) => {
+    (
+        in lanes { $($own:ident = $own_std:ident, $own_libm:ident, $own_libm32:ident;)* }
+        lane by lane { $($name:ident($($argument:ident),*) = $std:ident, $libm:ident, $libm32:ident;)* }
+    ) => {
         impl Real for f64 {
             scalar_items!(f64);
+            $(#[inline]
+            fn $own(self) -> Self {
+                #[cfg(feature = "std")]
+                { f64::$own_std(self) }
+                #[cfg(not(feature = "std"))]
+                { libm::$own_libm(self) }
+            })*
             $(#[inline]
             fn $name(self $(, $argument: Self)*) -> Self {
                 #[cfg(feature = "std")]
@@ -77,6 +88,13 @@ macro_rules! elementary {
         }
         impl Real for f32 {
             scalar_items!(f32);
+            $(#[inline]
+            fn $own(self) -> Self {
+                #[cfg(feature = "std")]
+                { f32::$own_std(self) }
+                #[cfg(not(feature = "std"))]
+                { libm::$own_libm32(self) }
+            })*
             $(#[inline]
             fn $name(self $(, $argument: Self)*) -> Self {
                 #[cfg(feature = "std")]
@@ -103,6 +121,10 @@ macro_rules! elementary {
             fn cos(self) -> Self {
                 Self(trigonometry::cos(&self.0))
             }
+            $(#[inline]
+            fn $own(self) -> Self {
+                Self(exponential::$own(&self.0))
+            })*
             $(lane_function!($name $($argument)*);)*
         }
     };
@@ -305,22 +327,26 @@ macro_rules! lane_items {
 }
 
 elementary! {
-    tan() = tan, tan, tanf;
-    asin() = asin, asin, asinf;
-    acos() = acos, acos, acosf;
-    atan() = atan, atan, atanf;
-    atan2(x) = atan2, atan2, atan2f;
-    sinh() = sinh, sinh, sinhf;
-    cosh() = cosh, cosh, coshf;
-    tanh() = tanh, tanh, tanhf;
-    asinh() = asinh, asinh, asinhf;
-    acosh() = acosh, acosh, acoshf;
-    atanh() = atanh, atanh, atanhf;
-    exp() = exp, exp, expf;
-    ln() = ln, log, logf;
-    sqrt() = sqrt, sqrt, sqrtf;
-    hypot(other) = hypot, hypot, hypotf;
-    powf(exponent) = powf, pow, powf;
+    in lanes {
+        exp = exp, exp, expf;
+        ln = ln, log, logf;
+        tanh = tanh, tanh, tanhf;
+    }
+    lane by lane {
+        tan() = tan, tan, tanf;
+        asin() = asin, asin, asinf;
+        acos() = acos, acos, acosf;
+        atan() = atan, atan, atanf;
+        atan2(x) = atan2, atan2, atan2f;
+        sinh() = sinh, sinh, sinhf;
+        cosh() = cosh, cosh, coshf;
+        asinh() = asinh, asinh, asinhf;
+        acosh() = acosh, acosh, acoshf;
+        atanh() = atanh, atanh, atanhf;
+        sqrt() = sqrt, sqrt, sqrtf;
+        hypot(other) = hypot, hypot, hypotf;
+        powf(exponent) = powf, pow, powf;
+    }
 }
 
 #[cfg(test)]

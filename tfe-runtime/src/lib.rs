@@ -37,6 +37,7 @@ pub mod enclosure;
 mod equations;
 pub mod error;
 mod evidence;
+mod exponential;
 #[cfg(feature = "alloc")]
 pub mod family;
 mod input;

@@ -86,7 +86,7 @@ pub(crate) fn sin<const W: usize>(x: &[f64; W]) -> [f64; W] {
         sin[lane] = sin_of_small(x[lane]);
     }
     if !are_small(x) {
-        replace_large(x, &mut sin, Real::sin);
+        replace_outside(x, &mut sin, (-LIMIT, LIMIT), Real::sin);
     }
     sin
 }
@@ -102,21 +102,22 @@ pub(crate) fn cos<const W: usize>(x: &[f64; W]) -> [f64; W] {
         cos[lane] = cos_of_small(x[lane]);
     }
     if !are_small(x) {
-        replace_large(x, &mut cos, Real::cos);
+        replace_outside(x, &mut cos, (-LIMIT, LIMIT), Real::cos);
     }
     cos
 }
 
-/// Puts a function of the arguments that are not small where they are.
+/// Puts a function of the arguments that are outside of the limits where they are.
 #[inline(always)]
-pub(crate) fn replace_large<const W: usize>(
+pub(crate) fn replace_outside<const W: usize>(
     x: &[f64; W],
-    results: &mut [f64; W],
+    values: &mut [f64; W],
+    (low, high): (f64, f64),
     function: impl Fn(f64) -> f64,
 ) {
     for lane in 0..W {
-        if !(x[lane].abs() <= LIMIT) {
-            results[lane] = function(x[lane]);
+        if !(low <= x[lane] && x[lane] <= high) {
+            values[lane] = function(x[lane]);
         }
     }
 }

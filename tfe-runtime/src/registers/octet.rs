@@ -8,18 +8,17 @@ use pulp::{Simd, b8, f64x8, u64x8};
 crate::registers::quad::register! {
     /// Eight numbers, and the proof that the processor has registers for them.
     Octet: 8 of V4,
-    f64x8, b8, u64x8, mul_sub_f64x8, mul_add_f64x8, shl_const_u64x8
+    f64x8, b8, u64x8, mul_sub_f64x8, mul_add_f64x8, shl_const_u64x8, shr_const_u64x8
 }
 
 impl Octet {
-    /// Whether all arguments are reduced here.
+    /// Whether all lanes are within limits.
     #[inline(always)]
-    fn is_small(self) -> bool {
+    fn is_within(self, (low, high): (f64, f64)) -> bool {
         let isa = self.isa;
-        let limit = isa.splat_f64s(LIMIT);
-        isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), limit)
-            .0
-            == u8::MAX
+        let above = isa.less_than_or_equal_f64s(isa.splat_f64s(low), self.value);
+        let below = isa.less_than_or_equal_f64s(self.value, isa.splat_f64s(high));
+        (above.0 & below.0) == u8::MAX
     }
 
     /// Whether a number is positive.

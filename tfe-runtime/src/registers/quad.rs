@@ -1,8 +1,8 @@
 //! Numbers in registers of the processor, chosen at run time: four with AVX2.
 //!
-//! The operations are those of IEEE 754, so that a kernel gives the same digits as with plain numbers. Products with tables and the polynomials of sines are fused with
+//! The operations are those of IEEE 754, so that a kernel gives the same digits as with plain numbers. Products with tables and the polynomials of sines and exponentials are fused with
 //! the sums that follow, and so they are without these registers ([`fused`](crate::real::fused)), where that is a call of a function on old processors; sine
-//! and cosine are those of [`trigonometry`](crate::trigonometry). Code that computes with these numbers has to be compiled for that
+//! and cosine are those of [`trigonometry`](crate::trigonometry), exponential, logarithm and hyperbolic tangent those of [`exponential`](crate::exponential). Code that computes with these numbers has to be compiled for that
 //! instruction set, hence everything is written into the place of its call, and the outermost call goes through [`pulp`].
 
 use crate::real::Real;
@@ -17,7 +17,7 @@ macro_rules! register {
     (
         $(#[$doc:meta])*
         $name:ident: $count:literal of $isa:ident,
-        $value:ident, $mask:ident, $bits:ident, $product_less:ident, $fused:ident, $shift:ident
+        $value:ident, $mask:ident, $bits:ident, $product_less:ident, $fused:ident, $shift:ident, $shift_right:ident
     ) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
@@ -56,14 +56,19 @@ macro_rules! register {
                 self.with(lanes)
             }
 
-            /// What was found for small arguments, and a function of the lanes that are not.
+            /// What was found for arguments within limits, and a function of the lanes that are outside.
             #[inline(always)]
-            fn or_by_lanes(self, found: Self, function: impl Fn(f64) -> f64) -> Self {
-                if self.is_small() {
+            fn or_by_lanes(
+                self,
+                found: Self,
+                limits: (f64, f64),
+                function: impl Fn(f64) -> f64,
+            ) -> Self {
+                if self.is_within(limits) {
                     return found;
                 }
                 let (x, mut found) = (self.lanes(), found.lanes());
-                crate::trigonometry::replace_large(&x, &mut found, function);
+                crate::trigonometry::replace_outside(&x, &mut found, limits, function);
                 self.with(found)
             }
 
@@ -156,12 +161,12 @@ macro_rules! register {
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
                 let (sin, cos) = crate::trigonometry::reduced(self);
-                if self.is_small() {
+                if self.is_within((-LIMIT, LIMIT)) {
                     return (sin, cos);
                 }
                 let (x, mut sin, mut cos) = (self.lanes(), sin.lanes(), cos.lanes());
                 for lane in 0..$count {
-                    if !(x[lane].abs() <= crate::trigonometry::LIMIT) {
+                    if !(x[lane].abs() <= LIMIT) {
                         (sin[lane], cos[lane]) = crate::real::Real::sin_cos(x[lane]);
                     }
                 }
@@ -172,6 +177,7 @@ macro_rules! register {
             fn sin(self) -> Self {
                 self.or_by_lanes(
                     crate::trigonometry::sin_of_small(self),
+                    (-LIMIT, LIMIT),
                     <f64 as crate::real::Real>::sin,
                 )
             }
@@ -180,13 +186,62 @@ macro_rules! register {
             fn cos(self) -> Self {
                 self.or_by_lanes(
                     crate::trigonometry::cos_of_small(self),
+                    (-LIMIT, LIMIT),
                     <f64 as crate::real::Real>::cos,
                 )
             }
 
+            #[inline(always)]
+            fn exp(self) -> Self {
+                self.or_by_lanes(
+                    crate::exponential::exp_of_small(self),
+                    (-crate::exponential::EXP_LIMIT, crate::exponential::EXP_LIMIT),
+                    <f64 as crate::real::Real>::exp,
+                )
+            }
+
+            #[inline(always)]
+            fn ln(self) -> Self {
+                self.or_by_lanes(
+                    crate::exponential::ln_of_normal(self),
+                    crate::exponential::LN_LIMITS,
+                    <f64 as crate::real::Real>::ln,
+                )
+            }
+
+            #[inline(always)]
+            fn tanh(self) -> Self {
+                self.or_by_lanes(
+                    crate::exponential::tanh_of_finite(self),
+                    (-crate::exponential::TANH_LIMIT, crate::exponential::TANH_LIMIT),
+                    <f64 as crate::real::Real>::tanh,
+                )
+            }
+
             crate::registers::quad::lane_by_lane! {
-                tan(); asin(); acos(); atan(); atan2(x); sinh(); cosh(); tanh(); asinh(); acosh(); atanh(); exp(); ln(); hypot(other);
-                powf(exponent); sign(); min(other); max(other);
+                tan(); asin(); acos(); atan(); atan2(x); sinh(); cosh(); asinh(); acosh(); atanh(); hypot(other);
+                powf(exponent);
+            }
+
+            /// A NaN stays one, and a zero what it is.
+            #[inline(always)]
+            fn sign(self) -> Self {
+                let (zero, one) = (self.like(0.0), self.like(1.0));
+                let negative = Self::select(self.less(zero), -one, self);
+                Self::select(zero.less(self), one, negative)
+            }
+
+            /// A NaN on either side is not lost.
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                let smaller = Self::select(other.less(self), other, self);
+                Self::select(other.less_or_equal(other), smaller, other)
+            }
+
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                let larger = Self::select(self.less(other), other, self);
+                Self::select(other.less_or_equal(other), larger, other)
             }
 
             #[inline(always)]
@@ -220,6 +275,32 @@ macro_rules! register {
             fn select(mask: $mask, then: Self, otherwise: Self) -> Self {
                 let value = then.isa.select_f64s(mask, then.value, otherwise.value);
                 Self { value, ..then }
+            }
+        }
+
+        impl crate::exponential::Scale for $name {
+            #[inline(always)]
+            fn times_power_of_two(self, count: Self) -> Self {
+                let (value, count): ($bits, $bits) = (pulp::cast(self.value), pulp::cast(count.value));
+                let exponent = self.isa.$shift::<52>(count);
+                let value = pulp::cast(self.isa.add_u64s(value, exponent));
+                Self { value, ..self }
+            }
+
+            #[inline(always)]
+            fn parted(self) -> (Self, Self) {
+                use crate::exponential::{BIAS, FRACTION, HALF_ROOT, SHIFTED, TO_ONE};
+                let isa = self.isa;
+                let bits = isa.add_u64s(pulp::cast(self.value), isa.splat_u64s(TO_ONE));
+                let fraction = isa.and_u64s(bits, isa.splat_u64s(FRACTION));
+                let part = isa.add_u64s(fraction, isa.splat_u64s(HALF_ROOT));
+                let exponent = isa.or_u64s(
+                    isa.$shift_right::<52>(bits),
+                    isa.splat_u64s(SHIFTED.to_bits()),
+                );
+                let (part, exponent) = (pulp::cast(part), pulp::cast(exponent));
+                let exponent = Self { isa, value: exponent };
+                (Self { isa, value: part }, exponent - crate::real::Real::like(self, SHIFTED + BIAS))
             }
         }
 
@@ -289,16 +370,17 @@ pub(crate) use {lane_by_lane, operators, register};
 register! {
     /// Four numbers, and the proof that the processor has registers for them.
     Quad: 4 of V3,
-    f64x4, m64x4, u64x4, mul_sub_f64x4, mul_add_f64x4, shl_const_u64x4
+    f64x4, m64x4, u64x4, mul_sub_f64x4, mul_add_f64x4, shl_const_u64x4, shr_const_u64x4
 }
 
 impl Quad {
-    /// Whether all arguments are reduced here.
+    /// Whether all lanes are within limits.
     #[inline(always)]
-    fn is_small(self) -> bool {
+    fn is_within(self, (low, high): (f64, f64)) -> bool {
         let isa = self.isa;
-        let small = isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), self.like(LIMIT).value);
-        isa.first_true_m64s(isa.not_m64x4(small)) == 4
+        let above = isa.less_than_or_equal_f64s(self.like(low).value, self.value);
+        let below = isa.less_than_or_equal_f64s(self.value, self.like(high).value);
+        isa.first_true_m64s(isa.not_m64x4(isa.and_m64x4(above, below))) == 4
     }
 
     /// Runs work in a function of its own.
@@ -313,7 +395,8 @@ impl Quad {
     /// sin and cos of both: the chains of operations overlap.
     #[inline(always)]
     pub(crate) fn sin_cos_of_two(self, other: Self) -> ((Self, Self), (Self, Self)) {
-        if !(self.is_small() & other.is_small()) {
+        let limits = (-LIMIT, LIMIT);
+        if !(self.is_within(limits) & other.is_within(limits)) {
             return (self.sin_cos(), other.sin_cos());
         }
         let (sin, cos) = reduced(Pair(self, other));
@@ -385,6 +468,49 @@ mod tests {
                 bits(register.cos().lanes()),
                 bits(crate::trigonometry::cos(&x))
             );
+        }
+    }
+
+    #[test]
+    fn functions_have_the_bits_of_plain_lanes() {
+        let Some(isa) = V3::try_new() else {
+            return; // Nothing to compare with on this processor.
+        };
+        let rare = [
+            f64::NAN,
+            f64::INFINITY,
+            -0.0,
+            0.0,
+            -1.0,
+            5e-324,
+            709.5,
+            -800.0,
+        ];
+        for k in 0..2000 {
+            let x = f64::from(k - 1000) * 0.0731;
+            let other = rare[k as usize % rare.len()];
+            let given = if k % 3 == 0 {
+                [x, other, -x, 1e-8 * x]
+            } else {
+                [x, 0.1 * x, x * x, 1e-3 * x]
+            };
+            let (lanes, register) = (crate::lanes::Lanes(given), Quad::of(isa, given));
+            let second = [0.3, x, other, -0.0];
+            let (second, in_register) = (crate::lanes::Lanes(second), Quad::of(isa, second));
+            // The bits of a NaN may be any.
+            let bits = |numbers: [f64; 4]| {
+                numbers.map(|x| if x.is_nan() { f64::NAN } else { x }.to_bits())
+            };
+            for (found, expected) in [
+                (register.exp(), lanes.exp()),
+                (register.ln(), lanes.ln()),
+                (register.tanh(), lanes.tanh()),
+                (register.sign(), lanes.sign()),
+                (register.min(in_register), lanes.min(second)),
+                (register.max(in_register), lanes.max(second)),
+            ] {
+                assert_eq!(bits(found.lanes()), bits(expected.0), "{given:?}");
+            }
         }
     }
 }

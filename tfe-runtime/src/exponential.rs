@@ -1,0 +1,353 @@
+//! Exponential, logarithm and hyperbolic tangent of several numbers at once, without branches: the same digits on every processor.
+//!
+//! ```text
+//! exp:    x = n ln 2 + r ,  |r| ≤ ½ ln 2 ,      eˣ = 2ⁿ (1 + r + r² Q(r))
+//! tanh:   t = e^(−2|x|) − 1 = 2ⁿ (r + r² Q(r)) + (2ⁿ − 1) ,      tanh |x| = −t/(t + 2)
+//! ln:     x = 2ᵏ m ,  ½√2 ≤ m < √2 ,      ln x = k ln 2 + ln m ,      s = (m − 1)/(m + 1) ,      ln m = 2 artanh s
+//! ```
+//!
+//! Q is Taylor's series up to r¹³/13!. ln 2 is taken in two parts, the first of 33 bits, so that n times it is exact, fused or not. The polynomial of the logarithm, and how
+//! its parts are put together, are those of fdlibm (K. C. Ng). Arguments outside the limits below are rare and go to the functions of the system, lane by lane.
+//!
+//! Judged in double-double arithmetic, the exponential is off by less than one unit in the last place, the logarithm by less than one, the tangent by less than
+//! three. A single number is left to the functions of the system.
+
+use crate::real::Real;
+use crate::trigonometry::{Turn, replace_outside};
+
+/// Between these eˣ is neither infinite nor subnormal.
+pub(crate) const EXP_LIMIT: f64 = 700.0;
+
+/// The numbers whose logarithm is computed here.
+pub(crate) const LN_LIMITS: (f64, f64) = (f64::MIN_POSITIVE, f64::MAX);
+
+/// Any number that is finite.
+pub(crate) const TANH_LIMIT: f64 = f64::MAX;
+
+/// Adding it rounds to a whole number, which the last bits of the sum then hold.
+const ROUNDER: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
+
+/// The parts of ln 2.
+const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
+const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+
+/// 1/2!, 1/3!, …, 1/13!
+const TAYLOR: [f64; 12] = [
+    0.5,
+    1.0 / 6.0,
+    1.0 / 24.0,
+    1.0 / 120.0,
+    1.0 / 720.0,
+    1.0 / 5040.0,
+    1.0 / 40320.0,
+    1.0 / 362_880.0,
+    1.0 / 3_628_800.0,
+    1.0 / 39_916_800.0,
+    1.0 / 479_001_600.0,
+    1.0 / 6_227_020_800.0,
+];
+
+/// (ln m − 2s)/s in powers of s².
+const LN: [f64; 7] = [
+    0.666_666_666_666_673_5,
+    0.399_999_999_994_094_2,
+    0.285_714_287_436_623_9,
+    0.222_221_984_321_497_84,
+    0.181_835_721_616_180_5,
+    0.153_138_376_992_093_73,
+    0.147_981_986_051_165_86,
+];
+
+/// Numbers whose exponents can be taken and given.
+pub(crate) trait Scale: Turn {
+    /// x 2ⁿ, n in the last bits of `count`; for results that are normal numbers.
+    fn times_power_of_two(self, count: Self) -> Self;
+
+    /// m and k of x = m 2ᵏ, ½√2 ≤ m < √2; of positive normal numbers.
+    fn parted(self) -> (Self, Self);
+}
+
+/// The bits of ½√2, rounded.
+pub(crate) const HALF_ROOT: u64 = 0x3fe6_a09e_667f_3bcd;
+/// What makes exponents of m zero: the bits of one less those.
+pub(crate) const TO_ONE: u64 = 0x3ff0_0000_0000_0000 - HALF_ROOT;
+/// The bits of a number that are not its exponent.
+pub(crate) const FRACTION: u64 = 0x000f_ffff_ffff_ffff;
+/// 2⁵², the last bits of which are those of a whole number added to it, and the bias of exponents.
+pub(crate) const SHIFTED: f64 = 4_503_599_627_370_496.0;
+pub(crate) const BIAS: f64 = 1023.0;
+
+impl Scale for f64 {
+    #[inline(always)]
+    fn times_power_of_two(self, count: Self) -> Self {
+        Self::from_bits(self.to_bits().wrapping_add(count.to_bits() << 52))
+    }
+
+    #[inline(always)]
+    fn parted(self) -> (Self, Self) {
+        let bits = self.to_bits().wrapping_add(TO_ONE);
+        let part = Self::from_bits((bits & FRACTION).wrapping_add(HALF_ROOT));
+        let exponent = Self::from_bits((bits >> 52) | SHIFTED.to_bits());
+        (part, exponent - (SHIFTED + BIAS))
+    }
+}
+
+/// n in the last bits of a number, r = x − n ln 2 and e^r − 1, for |x| ≤ [`EXP_LIMIT`].
+#[inline(always)]
+fn reduced<R: Scale>(x: R) -> (R, R) {
+    let shifted = x.fused(x.like(core::f64::consts::LOG2_E), x.like(ROUNDER));
+    let n = shifted - x.like(ROUNDER);
+    let high = n.fused(x.like(-LN_2_HIGH), x);
+    let part = n * x.like(LN_2_LOW);
+    let r = high - part;
+    let low = (high - r) - part;
+    // By halves (Estrin), so that no chain of operations is long.
+    let c = &TAYLOR;
+    let z = r * r;
+    let square = z * z;
+    let first = z.fused(
+        r.fused(x.like(c[3]), x.like(c[2])),
+        r.fused(x.like(c[1]), x.like(c[0])),
+    );
+    let second = z.fused(
+        r.fused(x.like(c[7]), x.like(c[6])),
+        r.fused(x.like(c[5]), x.like(c[4])),
+    );
+    let third = z.fused(
+        r.fused(x.like(c[11]), x.like(c[10])),
+        r.fused(x.like(c[9]), x.like(c[8])),
+    );
+    let series = square.fused(square.fused(third, second), first);
+    (shifted, r + z.fused(series, low))
+}
+
+/// eˣ for |x| ≤ [`EXP_LIMIT`].
+#[inline(always)]
+pub(crate) fn exp_of_small<R: Scale>(x: R) -> R {
+    let (shifted, less_one) = reduced(x);
+    (x.like(1.0) + less_one).times_power_of_two(shifted)
+}
+
+/// tanh x of finite numbers; the sign of zero is lost.
+#[inline(always)]
+pub(crate) fn tanh_of_finite<R: Scale>(x: R) -> R {
+    /// Beyond it the tangent is one.
+    const FAR: f64 = -80.0;
+
+    let (zero, one) = (x.like(0.0), x.like(1.0));
+    let is_negative = x.less(zero);
+    let size = R::select(is_negative, -x, x);
+    let twice = -(size + size);
+    let twice = R::select(twice.less(x.like(FAR)), x.like(FAR), twice);
+    let (shifted, less_one) = reduced(twice);
+    let power = one.times_power_of_two(shifted);
+    let less_one = less_one.fused(power, power - one);
+    let tangent = -(less_one / (less_one + x.like(2.0)));
+    R::select(is_negative, -tangent, tangent)
+}
+
+/// ln x of positive normal numbers.
+#[inline(always)]
+pub(crate) fn ln_of_normal<R: Scale>(x: R) -> R {
+    let (part, exponent) = x.parted();
+    let f = part - x.like(1.0);
+    let half = x.like(0.5) * (f * f);
+    let s = f / (x.like(2.0) + f);
+    let z = s * s;
+    let w = z * z;
+    let c = &LN;
+    let even = w.fused(
+        w.fused(w.fused(x.like(c[6]), x.like(c[4])), x.like(c[2])),
+        x.like(c[0]),
+    );
+    let odd = w * w.fused(w.fused(x.like(c[5]), x.like(c[3])), x.like(c[1]));
+    let series = z.fused(even, odd);
+    let small = s.fused(half + series, exponent * x.like(LN_2_LOW));
+    exponent.fused(x.like(LN_2_HIGH), f - (half - small))
+}
+
+/// A function of W numbers, those outside of the limits left to another.
+#[inline(always)]
+fn within<const W: usize>(
+    x: &[f64; W],
+    (low, high): (f64, f64),
+    function: impl Fn(f64) -> f64,
+    of_others: impl Fn(f64) -> f64,
+) -> [f64; W] {
+    let (mut values, mut all) = ([0.0; W], true);
+    for lane in 0..W {
+        values[lane] = function(x[lane]);
+        all &= (low <= x[lane]) & (x[lane] <= high);
+    }
+    if !all {
+        replace_outside(x, &mut values, (low, high), of_others);
+    }
+    values
+}
+
+/// eˣ of W numbers.
+#[inline]
+pub(crate) fn exp<const W: usize>(x: &[f64; W]) -> [f64; W] {
+    let limits = (-EXP_LIMIT, EXP_LIMIT);
+    within(x, limits, exp_of_small, Real::exp)
+}
+
+/// tanh x of W numbers.
+#[inline]
+pub(crate) fn tanh<const W: usize>(x: &[f64; W]) -> [f64; W] {
+    let limits = (-TANH_LIMIT, TANH_LIMIT);
+    within(x, limits, tanh_of_finite, Real::tanh)
+}
+
+/// ln x of W numbers.
+#[inline]
+pub(crate) fn ln<const W: usize>(x: &[f64; W]) -> [f64; W] {
+    within(x, LN_LIMITS, ln_of_normal, Real::ln)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::double_double::DoubleDouble;
+    use crate::lanes::Lanes;
+
+    /// ln 2 in three parts.
+    const LN_2: [f64; 3] = [
+        core::f64::consts::LN_2,
+        2.319_046_813_846_299_6e-17,
+        5.707_708_438_416_212e-34,
+    ];
+
+    /// eˣ − 1 by a series in double-double arithmetic, of x = n ln 2 + r; 2ⁿ (e^r − 1), and 2ⁿ − 1.
+    fn exact_parts(x: f64) -> (f64, DoubleDouble) {
+        let n = (x * core::f64::consts::LOG2_E).round();
+        let mut r = DoubleDouble::new(x);
+        for part in LN_2 {
+            r = r.minus(DoubleDouble::product(n, part));
+        }
+        let (mut term, mut sum) = (r, r);
+        for k in 2..30 {
+            term = term.times(r).over(DoubleDouble::integer(k));
+            sum = sum.plus(term);
+        }
+        (n, sum)
+    }
+
+    fn exact_exp(x: f64) -> DoubleDouble {
+        let (n, less_one) = exact_parts(x);
+        let power = DoubleDouble::new(2.0_f64.powi(n as i32));
+        less_one.plus(DoubleDouble::ONE).times(power)
+    }
+
+    fn exact_tanh(x: f64) -> DoubleDouble {
+        let (n, less_one) = exact_parts(-2.0 * x);
+        let power = DoubleDouble::new(2.0_f64.powi(n as i32));
+        let less_one = less_one.times(power).plus(power.minus(DoubleDouble::ONE));
+        less_one
+            .over(less_one.plus(DoubleDouble::new(2.0)))
+            .negated()
+    }
+
+    /// By Newton's method from the logarithm of the system.
+    fn exact_ln(x: f64) -> DoubleDouble {
+        let first = f64::ln(x);
+        let quotient = DoubleDouble::new(x).over(exact_exp(first));
+        let d = quotient.minus(DoubleDouble::ONE);
+        // ln (1 + d), d some 1e-16
+        let correction = d.minus(d.times(d).half());
+        DoubleDouble::new(first).plus(correction)
+    }
+
+    /// Units in the last place by which a result is off.
+    fn units(result: f64, exact: DoubleDouble) -> f64 {
+        let size = exact.high.abs();
+        ((result - exact.high) - exact.low).abs() / (size.next_up() - size)
+    }
+
+    /// The worst of many numbers between two, crowded at `dense` powers of ten around the first.
+    fn worst(
+        numbers: impl Iterator<Item = f64>,
+        function: impl Fn(Lanes<4>) -> Lanes<4>,
+        exact: impl Fn(f64) -> DoubleDouble,
+    ) -> f64 {
+        let mut worst = 0.0_f64;
+        for x in numbers {
+            let lanes = Lanes([x, 0.77 * x, 0.5 * x, 1e-3 * x]);
+            let values = function(lanes);
+            for lane in 0..4 {
+                worst = worst.max(units(values.0[lane], exact(lanes.0[lane])));
+            }
+        }
+        println!("{worst} units in the last place");
+        worst
+    }
+
+    #[test]
+    fn exponentials_are_good_to_a_unit() {
+        let numbers = (0..40_000).map(|k| f64::from(k - 20_000) * 0.034_999_1);
+        assert!(worst(numbers, Real::exp, exact_exp) < 1.0);
+    }
+
+    #[test]
+    fn tangents_are_good_to_three_units() {
+        let far = (1..20_000).map(|k| f64::from(k) * 2.13e-3);
+        let near = (1..20_000).map(|k| f64::from(k) * -3.1e-5);
+        let tiny = (1..300).map(|k| 0.3 * 10.0_f64.powi(-k));
+        let numbers = far.chain(near).chain(tiny);
+        assert!(worst(numbers, Real::tanh, exact_tanh) < 3.0);
+    }
+
+    #[test]
+    fn logarithms_are_good_to_a_unit() {
+        // Near one, where all digits cancel, at the ends of the parts, and far away.
+        let near = (1..20_000).map(|k| 1.0 + f64::from(k) * 3.7e-5);
+        let next = (0..50).flat_map(|k| {
+            let one = 1.0_f64.to_bits();
+            [
+                f64::from_bits(one + (1 << k)),
+                f64::from_bits(one - (1 << k)),
+            ]
+        });
+        let ends =
+            (1..2000).map(|k| core::f64::consts::SQRT_2 * (1.0 + f64::from(k - 1000) * 1e-9));
+        let far = (0..600).map(|k| 1.7 * 10.0_f64.powi(k - 300));
+        let numbers = near.chain(next).chain(ends).chain(far);
+        let numbers = numbers.filter(|x| *x != 1.0);
+        assert!(worst(numbers, Real::ln, exact_ln) < 1.0);
+    }
+
+    #[test]
+    fn what_is_extraordinary_is_that_of_numbers() {
+        let given = [
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            0.0,
+            -0.0,
+            -1.0,
+            5e-324,
+            f64::MAX,
+            f64::MIN,
+            f64::MIN_POSITIVE,
+            709.0,
+            -745.0,
+            800.0,
+            1.0,
+        ];
+        let same = |a: f64, b: f64| a == b || (a.is_nan() && b.is_nan());
+        for x in given {
+            let lanes = Lanes([x, 0.5, 1.0, 2.0]);
+            for (found, expected) in [
+                (Real::exp(lanes).0[0], f64::exp(x)),
+                (Real::tanh(lanes).0[0], f64::tanh(x)),
+                (Real::ln(lanes).0[0], f64::ln(x)),
+            ] {
+                let near = (found - expected).abs() <= 4.0 * f64::EPSILON * expected.abs();
+                assert!(same(found, expected) || near, "{x}: {found}, {expected}");
+            }
+        }
+        assert_eq!(Real::exp(Lanes([0.0; 4])).0, [1.0; 4]);
+        assert_eq!(Real::ln(Lanes([1.0; 4])).0, [0.0; 4]);
+        assert_eq!(Real::tanh(Lanes([0.0; 4])).0, [0.0; 4]);
+    }
+}
