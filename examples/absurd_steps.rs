@@ -138,11 +138,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut counts: BTreeMap<String, Count> = BTreeMap::new();
     for run in 0..runs {
         let nodes = 2 + run as usize / 6 % 5;
-        let element = match run / 30 % 5 {
+        let family = run / 30 % 8;
+        let element = match family {
             0 | 1 => Element::mixed(nodes),
             2 => Element::primal(nodes).reduced(),
             3 => Element::radau(nodes),
-            _ => Element::energy_conserving(nodes),
+            4 => Element::energy_conserving(nodes),
+            5 => Element::primal(nodes),
+            6 => Element::primal(nodes).lobatto(),
+            _ => Element::three_field(nodes).quadrature(nodes + 2),
         };
         let h = 10_f64.powf(random.between(-2.0, 0.3));
         let mut near = |middle: f64, width: f64| random.between(middle - width, middle + width);
@@ -187,7 +191,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let (angle, rate) = (near(0.0, 3.0), near(0.0, 5.0));
                 let (s, c) = angle.sin_cos();
                 let start = Rod.state([c, s], [-s * rate, c * rate]);
-                let element = if matches!(run / 30 % 5, 3 | 4) {
+                let element = if matches!(family, 3 | 4) {
                     Element::mixed(nodes)
                 } else {
                     element
