@@ -1,0 +1,263 @@
+//! Transition matrices, sections and orbits across events.
+
+use super::*;
+
+/// The product of the matrices is the derivative of the end of whole runs, across six impacts of the tip of a double pendulum on a wall.
+#[test]
+fn matrices_go_across_impacts() {
+    let pendulum = TwoLinks { g: 9.81, w: 0.6 };
+    let simulation = Simulation::new(&pendulum)
+        .element(Mixed::<6>)
+        .step(0.02)
+        .on("wall", Crossing::Falling, |event| {
+            Act::Restart(event.after_impact(0.8))
+        });
+    let start = pendulum.state([-0.9, -1.2], [0.0, 0.0]);
+    let span = 0.0..6.0;
+    let run = simulation
+        .run_linearised(start, span.clone())
+        .expect("a run");
+    let count = run.motion().events().len();
+    assert!(count >= 2, "{count}");
+    assert_eq!(run.transitions().len(), 300);
+    // The same bits as without matrices.
+    let plain = simulation.run(start, span.clone()).expect("a run");
+    assert_eq!(plain.states(), run.motion().states());
+    let product = run.product();
+    let end = |change: [f64; 4]| {
+        let moved = State {
+            q: [start.q[0] + change[2], start.q[1] + change[3]],
+            p: [start.p[0] + change[0], start.p[1] + change[1]],
+        };
+        let motion = simulation.run(moved, span.clone()).expect("a run");
+        assert_eq!(motion.events().len(), plain.events().len());
+        let last = *motion.last();
+        [last.p[0], last.p[1], last.q[0], last.q[1]]
+    };
+    for column in 0..4 {
+        let difference = |distance: f64| -> [f64; 4] {
+            let moved = |s: f64| {
+                let mut change = [0.0; 4];
+                change[column] = s;
+                end(change)
+            };
+            let (high, low) = (moved(distance), moved(-distance));
+            std::array::from_fn(|row| (high[row] - low[row]) / (2.0 * distance))
+        };
+        // Extrapolated: of fourth order.
+        let (far, near) = (difference(2e-5), difference(1e-5));
+        for row in 0..4 {
+            let expected = (4.0 * near[row] - far[row]) / 3.0;
+            let off = (product[(row, column)] - expected).abs();
+            assert!(
+                off < 1e-8 * product.amax(),
+                "({row}, {column}): {} for {expected}",
+                product[(row, column)]
+            );
+        }
+    }
+    // Without losses impacts are symplectic.
+    let elastic = Simulation::new(&pendulum)
+        .element(Mixed::<6>)
+        .step(0.02)
+        .on("wall", Crossing::Falling, |event| {
+            Act::Restart(event.after_impact(1.0))
+        });
+    let run = elastic.run_linearised(start, span).expect("a run");
+    let product = run.product();
+    let defect = stability::symplecticity_defect(&product) / product.amax().powi(2);
+    assert!(
+        run.motion().events().len() >= 3 && defect < 1e-9,
+        "{defect:e}"
+    );
+    assert!(run.motion().energy_error() < 1e-9);
+}
+
+/// Parameters that change on the way: x from rest at 1 with k = 4, then 1. The saltation of a force that jumps at x = 0, where it vanishes, is none: the matrix is the product of two rotations.
+#[test]
+fn matrices_go_across_settings() {
+    let springs = Springs { m: 1.0, k: 4.0 };
+    let simulation = Simulation::new(&springs).element(Mixed::<8>).step(0.1).on(
+        "middle",
+        Crossing::Either,
+        |event| Act::Set(Settings::new("k", if event.rises { 4.0 } else { 1.0 })),
+    );
+    // A whole period: every motion is periodic with the same period, so the matrix is the identity.
+    let run = simulation
+        .run_linearised(springs.state([1.0], [0.0]), 0.0..1.5 * PI)
+        .expect("a run");
+    let product = run.product();
+    for row in 0..2 {
+        for column in 0..2 {
+            let expected = if row == column { 1.0 } else { 0.0 };
+            assert!(
+                (product[(row, column)] - expected).abs() < 1e-9,
+                "{product}"
+            );
+        }
+    }
+}
+
+/// The iterator gives the events of a run; its matrices are derivatives of the return map.
+#[test]
+fn sections_are_events_with_matrices() {
+    let start = State {
+        q: [0.0, 0.1],
+        p: [0.4, 0.1],
+    };
+    let simulation = Simulation::new(&HenonHeiles).element(Mixed::<8>).step(0.3);
+    let motion = simulation
+        .clone()
+        .on("section", Crossing::Rising, |_| Act::Record)
+        .run(start, 0.0..150.0)
+        .expect("a run");
+    let points = |start: State<2>| {
+        let section = simulation.section("section", Crossing::Rising, start, 0.0);
+        section.map(|point| point.expect("a point"))
+    };
+    let of_run = motion.events();
+    assert!(of_run.len() > 20);
+    for (point, event) in points(start).zip(of_run) {
+        assert!((point.t - event.t).abs() < 1e-12 && point.transition().is_none());
+        assert!((point.q[1] - event.q[1]).abs() < 1e-12);
+    }
+    // Five returns, by the start.
+    let mut product = nalgebra::DMatrix::identity(4, 4);
+    let section = simulation.section("section", Crossing::Rising, start, 0.0);
+    for point in section.linearised().take(5) {
+        let point = point.expect("a point");
+        product = point.transition().expect("linearised") * product;
+    }
+    let end = |column: usize, s: f64| {
+        let mut moved = start;
+        match column.checked_sub(2) {
+            None => moved.p[column] += s,
+            Some(a) => moved.q[a] += s,
+        }
+        let point = points(moved).nth(4).expect("endless");
+        [point.p[0], point.p[1], point.q[0], point.q[1]]
+    };
+    // The start lies on the section: a change along the normal moves the first crossing to before it, or is one itself.
+    for column in [0, 1, 3] {
+        let difference =
+            |s: f64, row: usize| (end(column, s)[row] - end(column, -s)[row]) / (2.0 * s);
+        for row in 0..4 {
+            let expected = (4.0 * difference(1e-4, row) - difference(2e-4, row)) / 3.0;
+            let found = product[(row, column)];
+            assert!(
+                (found - expected).abs() < 1e-8 * product.amax(),
+                "({row}, {column}): {found} for {expected}"
+            );
+        }
+    }
+    // Section coordinates y, p_y: the return map keeps the area at constant energy, and g stays zero.
+    assert!((0..4).all(|column| product[(2, column)].abs() < 1e-9 * product.amax()));
+    let error = simulation
+        .section("sektion", Crossing::Rising, start, 0.0)
+        .next()
+        .expect("one")
+        .expect_err("no output");
+    assert!(matches!(error, RunErrorKind::NoEvent { .. }));
+}
+
+/// x″ + x = F cos ωt against a wall at x = 0 with restitution e: orbits with one impact in n periods of the forcing, in closed form.
+///
+/// From an impact at t = 0 with the forcing F cos(ωt + ψ), γ = F/(1 − ω²), P = γ cos ψ, S = −γω sin ψ and T = 2πn/ω: x = a cos t + b sin t + γ cos(ωt + ψ) with a = −P and
+/// b = a tan T/2, S = −b (1 − e)/(1 + e), so b² (cot² T/2 + ((1 − e)/((1 + e) ω))²) = γ². The monodromy matrix has the determinant e² and the trace −2e cos T + (1 + e) f sin T/v₋ with the
+/// acceleration f = F cos ψ at the impact.
+#[test]
+fn orbits_with_impacts_are_those_of_closed_forms() {
+    #[dynamics(
+        coordinates(x),
+        lagrangian = (dot(x)^2 - x^2)/2 + f*cos(omega*t)*x,
+        event(wall) = -x,
+    )]
+    struct ImpactOscillator {
+        f: f64,
+        omega: f64,
+    }
+
+    let (f, e) = (1.0, 0.8_f64);
+    for (n, omega) in [(1.0, 2.2), (2.0, 4.4), (1.0, 2.6), (2.0, 4.1)] {
+        let period = 2.0 * PI * n / omega;
+        let gamma = f / (1.0 - omega * omega);
+        let loss = (1.0 - e) / (1.0 + e);
+        let cot = 1.0 / (period / 2.0).tan();
+        let b = -gamma.abs() / (cot * cot + (loss / omega).powi(2)).sqrt();
+        let (a, s) = (b * cot, -b * loss);
+        let psi = (-s / (gamma * omega)).atan2(-a / gamma);
+        // From the middle of the flight on.
+        let model = ImpactOscillator { f, omega };
+        let from = psi / omega + period / 2.0;
+        let (half, angle) = (period / 2.0, omega * period / 2.0 + psi);
+        let x = a * half.cos() + b * half.sin() + gamma * angle.cos();
+        let v = -a * half.sin() + b * half.cos() - gamma * omega * angle.sin();
+        let bounce = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.8));
+        let simulation =
+            Simulation::new(&model)
+                .element(Mixed::<8>)
+                .on("wall", Crossing::Falling, bounce);
+        let orbit = PeriodicOrbit::of_simulation(&simulation)
+            .start_time(from)
+            .period(period)
+            .guess_from(model.state([1.01 * x], [v + 0.02]))
+            .solve()
+            .expect("an orbit");
+        let start = orbit.start();
+        assert!(
+            (start.q[0] - x).abs() < 1e-11 && (start.p[0] - v).abs() < 1e-11,
+            "n = {n}, ω = {omega}: {start:?} for {x}, {v}"
+        );
+        let [event] = orbit.motion().events() else {
+            panic!("{:?}", orbit.motion().events());
+        };
+        assert!((event.t - psi / omega - period).abs() < 1e-11);
+        let before = -(b + s) / e;
+        assert!((event.v[0] - before).abs() < 1e-11);
+        let trace = -2.0 * e * period.cos() + (1.0 + e) * f * psi.cos() * period.sin() / before;
+        let root = nalgebra::Complex::new(trace * trace / 4.0 - e * e, 0.0).sqrt();
+        let expected = [trace / 2.0 + root, trace / 2.0 - root];
+        for multiplier in orbit.multipliers() {
+            let off = expected.map(|one| (one - multiplier).norm());
+            assert!(
+                off[0].min(off[1]) < 1e-9,
+                "{:?} for {expected:?}",
+                orbit.multipliers()
+            );
+        }
+        assert!((orbit.monodromy().determinant() - e * e).abs() < 1e-10);
+        assert_eq!(
+            orbit.is_stable(),
+            expected[0].norm().max(expected[1].norm()) <= 1.0
+        );
+    }
+}
+
+/// Orbits that switch, with their period: a spring that is stiff on one side.
+#[test]
+fn orbits_with_settings_and_unknown_periods() {
+    let springs = Springs { m: 1.0, k: 4.0 };
+    let simulation =
+        Simulation::new(&springs)
+            .element(Mixed::<8>)
+            .on("middle", Crossing::Either, |event| {
+                Act::Set(Settings::new("k", if event.rises { 4.0 } else { 1.0 }))
+            });
+    let orbits = PeriodicOrbit::of_simulation(&simulation)
+        .unknown_period(4.5)
+        .guess_from(springs.state([1.0], [0.1]));
+    let orbit = orbits.solve().expect("an orbit");
+    assert!(
+        (orbit.period() - 1.5 * PI).abs() < 1e-10,
+        "{}",
+        orbit.period()
+    );
+    assert!((orbit.multipliers()[orbit.trivial()[0]].re - 1.0).abs() < 1e-6);
+    let stopping = Simulation::new(&springs).on("middle", Crossing::Either, |_| Act::Stop);
+    let error = PeriodicOrbit::of_simulation(&stopping)
+        .period(4.5)
+        .guess_from(springs.state([1.0], [0.0]))
+        .solve()
+        .expect_err("it stops");
+    assert!(matches!(error, tfe::periodic::OrbitError::Stopped { .. }));
+}

@@ -1,0 +1,295 @@
+//! All events are met, at the right time and in order, and none that is not there.
+
+use super::*;
+
+/// Fifty bounces, tₖ₊₁ = tₖ + 2 eᵏ⁺¹ v/g: hops become shorter than an element, and than a sample of it.
+#[test]
+fn a_ball_bounces_when_it_should() {
+    for (step, e) in [(0.01, 0.9), (0.07, 0.9), (0.5, 0.8), (0.01, 0.8)] {
+        for element in [Element::mixed(4), Element::radau(3), Element::primal(3)] {
+            let bounce = move |event: &tfe::Occurrence<'_, 1>| {
+                Act::Restart(event.state_with_velocity([-e * event.v[0]]))
+            };
+            let first = (2.0 / BALL.g).sqrt();
+            let mut times = vec![first];
+            let mut hop = 2.0 * first;
+            for k in 0..49 {
+                hop *= e;
+                times.push(times[k] + hop);
+            }
+            let end = times[49] + 0.4 * e * hop;
+            let motion = Simulation::new(&BALL)
+                .element(element)
+                .step(step)
+                .on("height", Crossing::Falling, bounce)
+                .run(BALL.state([1.0], [0.0]), 0.0..end)
+                .expect("a run");
+            let events = motion.events();
+            assert_eq!(events.len(), 50, "{element}, h = {step}");
+            for (event, time) in events.iter().zip(&times) {
+                assert!(
+                    (event.t - time).abs() < 1e-13,
+                    "{element}: {} for {time}",
+                    event.t
+                );
+                assert!(event.q[0].abs() < 1e-14 && !event.rises && event.v[0] < 0.0);
+            }
+            // Two nodes at each bounce, one with either velocity; dense output stays above the ground.
+            let doubled = motion
+                .states()
+                .windows(2)
+                .filter(|pair| pair[0].t == pair[1].t);
+            for pair in doubled {
+                assert!((pair[1].v[0] + e * pair[0].v[0]).abs() < 1e-14);
+            }
+            for k in 0..1000 {
+                let node = motion.at(end * f64::from(k) / 1000.0).expect("inside");
+                assert!(node.q[0] > -1e-14, "{node:?}");
+            }
+            assert_eq!(motion.last().t, end);
+        }
+    }
+}
+
+/// It comes to rest by infinitely many bounces.
+#[test]
+fn bounces_without_end_are_told() {
+    let error = Simulation::new(&BALL)
+        .step(0.1)
+        .on("height", Crossing::Falling, |event| {
+            Act::Restart(event.state_with_velocity([-0.5 * event.v[0]]))
+        })
+        .run(BALL.state([1.0], [0.0]), 0.0..5.0)
+        .expect_err("a ball at rest");
+    let end = 3.0 * (2.0 / BALL.g).sqrt();
+    match error.kind() {
+        RunErrorKind::EventsWithoutEnd { name, time } => {
+            assert_eq!(name, "height");
+            assert!((time - end).abs() < 1e-6, "{time} for {end}");
+        }
+        other => panic!("{other:?}"),
+    }
+    assert!(error.partial().last().t > 1.0 && error.partial().events().len() > 20);
+}
+
+/// x = cos t: pairs within one element and one sample, roots at nodes, backwards, all in order and with their directions.
+#[test]
+fn all_crossings_of_an_oscillator_are_met() {
+    for level in [0.0, 0.5, 0.99, 0.9999, 1.0 - 1e-10, -0.9999, 1.0001] {
+        for (h, sign) in [(0.1, 1.0), (1.0, 1.0), (PI / 4.0, 1.0), (0.3, -1.0)] {
+            let model = Oscillator { level };
+            let end = sign * 20.0;
+            let motion = Simulation::new(&model)
+                .element(Mixed::<10>)
+                .step(h)
+                .on("above", Crossing::Either, |_| Act::Record)
+                .run(model.state([1.0], [0.0]), 0.0..end)
+                .expect("a run");
+            let mut expected = Vec::new();
+            if level < 1.0 {
+                let angle = level.acos();
+                for k in 0..4 {
+                    let turn = 2.0 * PI * f64::from(k);
+                    expected.extend([turn + angle, turn + 2.0 * PI - angle]);
+                }
+                expected.retain(|time| *time < 20.0);
+            }
+            let found: Vec<_> = motion.events().iter().map(|event| sign * event.t).collect();
+            assert_eq!(found.len(), expected.len(), "{level}, h = {h}: {found:?}");
+            // Near the top x is flat: roundings of x are larger ones of the time.
+            let most = 1e-13 / (1.0 - level * level).abs().sqrt();
+            for (k, (time, expected)) in found.iter().zip(&expected).enumerate() {
+                assert!(
+                    (time - expected).abs() < most,
+                    "{level}, h = {h}: {time} for {expected}"
+                );
+                assert_eq!(motion.events()[k].rises, k % 2 == 1);
+            }
+        }
+    }
+}
+
+fn section(start: State<2>, element: Element, step: f64, end: f64) -> Vec<[f64; 3]> {
+    let motion = Simulation::new(&HenonHeiles)
+        .element(element)
+        .step(step)
+        .record_every(1000)
+        .on("section", Crossing::Rising, |_| Act::Record)
+        .run(start, 0.0..end)
+        .expect("a run");
+    let point = |event: &tfe::Event<2>| [event.t, event.q[1], event.p[1]];
+    motion.events().iter().map(point).collect()
+}
+
+/// Regular motion, so that errors grow with the time alone: a section against one of a tenth of the step.
+#[test]
+fn a_thousand_points_of_a_section_are_those_of_finer_runs() {
+    let start = State {
+        q: [0.0, 0.1],
+        p: [0.25, 0.1],
+    };
+    let points = section(start, Element::mixed(9), 0.25, 6400.0);
+    let finer = section(start, Element::mixed(9), 0.025, 6400.0);
+    assert!(
+        points.len() >= 1000 && points.len() == finer.len(),
+        "{}",
+        points.len()
+    );
+    for (point, fine) in points.iter().zip(&finer) {
+        // Two roundings of the time, which is 9e-13 apart at the end.
+        let most = [2.0 * fine[0] * f64::EPSILON, 1e-12, 1e-12];
+        for ((a, b), most) in point.iter().zip(fine).zip(most) {
+            assert!((a - b).abs() <= most, "{point:?} for {fine:?}");
+        }
+    }
+}
+
+/// Random events of random motions, among them pairs closer than a scan sees, products, waves, jumps and functions of the time, beside scans in 8000 places.
+/// `cargo run --release --example events_beside_scans -- 100000` does the same with more of them.
+#[test]
+fn events_are_those_of_a_scan() {
+    let (mut random, mut tally) = (scans::Random(7), scans::Tally::default());
+    for number in 0..600 {
+        scans::run(number, &mut random, &mut tally).expect("a run");
+    }
+    assert!(tally.events > 2000 && tally.pairs > 5, "{tally:?}");
+    assert_eq!((tally.missed, tally.invented), (0, 0), "{tally:?}");
+}
+
+/// Both walls of a corner at once.
+#[test]
+fn simultaneous_events_are_all_met() {
+    #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2, output(right) = 1 - x, output(top) = 1 - y)]
+    struct Corner;
+
+    let back = |a: usize| {
+        move |event: &tfe::Occurrence<'_, 2>| {
+            let mut p = [0.0; 2];
+            p[a] = -2.0 * event.p[a];
+            Act::Impulse(p)
+        }
+    };
+    let motion = Simulation::new(&Corner)
+        .step(0.3)
+        .on("right", Crossing::Falling, back(0))
+        .on("top", Crossing::Falling, back(1))
+        .run(Corner.state([0.0, 0.0], [1.0, 1.0]), 0.0..2.0)
+        .expect("a run");
+    assert_eq!(motion.events().len(), 2);
+    let last = motion.last();
+    assert!(
+        last.q[0].abs() < 1e-14 && last.q[1].abs() < 1e-14,
+        "{last:?}"
+    );
+}
+
+/// A pendulum in Cartesian coordinates that hits a wall: the same as that of an angle, with multipliers of its rod that hold across.
+/// At late times a state behind an impact is beside the wall by what a rounding of the time makes of it; in a short rest of its element that is much, and was taken for another impact.
+#[test]
+fn impacts_at_late_times_happen_once() {
+    #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - y, event(impact) = y)]
+    struct Ball;
+    for start in [0.0, 1e3, 1e6, -1e6] {
+        for step in [0.03, 0.1, 0.3] {
+            let run = Simulation::new(&Ball).element(Mixed::<3>).step(step);
+            let run = run.on("impact", Crossing::Either, |event| {
+                Act::Restart(event.after_impact(0.9))
+            });
+            let run = run.run(Ball.state([1.0], [0.0]), start..start + 12.0);
+            let run = run.unwrap_or_else(|error| panic!("{start} {step}: {error}"));
+            // Flights of √2 · 2 · 0.9ᵏ, k = 1, 2, …, after half of one.
+            let flight = |k: i32| 8.0_f64.sqrt() * 0.9_f64.powi(k);
+            let mut time = start + 0.5 * flight(0);
+            assert_eq!(run.events().len(), 6, "{start} {step}");
+            for (event, k) in run.events().iter().zip(1..) {
+                assert!((event.t - time).abs() < 1e-12 + 1e-15 * start.abs() * 10.0);
+                assert!(!event.rises);
+                time += flight(k);
+            }
+        }
+    }
+}
+
+/// A function that the model does not declare, beside the output that is the same.
+#[test]
+fn functions_are_events() {
+    let model = Oscillator { level: 0.3 };
+    let start = model.state([1.0], [0.2]);
+    let simulation = Simulation::new(&model).element(Mixed::<8>).step(0.3);
+    let declared = simulation
+        .clone()
+        .on("above", Crossing::Either, |_| Act::Record)
+        .run(start, 0.0..20.0)
+        .expect("a run");
+    let function = simulation
+        .clone()
+        .on_function(
+            "above",
+            Crossing::Either,
+            |_, q, _| q[0] - 0.3,
+            |_| Act::Record,
+        )
+        .run(start, 0.0..20.0)
+        .expect("a run");
+    assert_eq!(declared.events().len(), 6);
+    for (a, b) in declared.events().iter().zip(function.events()) {
+        assert!((a.t - b.t).abs() < 1e-14 && a.rises == b.rises && a.name == b.name);
+    }
+    // Derivatives, and impacts, know it as well: the energy ½ (v² + x²) − ⅛ and a moving wall.
+    let energy = simulation.clone().on_function(
+        "wall",
+        Crossing::Falling,
+        |t, q, _| q[0] + 0.5 - 0.01 * t,
+        |event| Act::Restart(event.after_impact(1.0)),
+    );
+    let run = energy.run_linearised(start, 0.0..12.0).expect("a run");
+    let product = run.product();
+    let end = |x: f64, p: f64| {
+        let last = *energy
+            .run(State { q: [x], p: [p] }, 0.0..12.0)
+            .expect("a run")
+            .last();
+        [last.p[0], last.q[0]]
+    };
+    for (column, (dx, dp)) in [(0.0, 1e-5), (1e-5, 0.0)].into_iter().enumerate() {
+        let high = end(start.q[0] + dx, start.p[0] + dp);
+        let low = end(start.q[0] - dx, start.p[0] - dp);
+        for row in 0..2 {
+            let expected = (high[row] - low[row]) / 2e-5;
+            assert!(
+                (product[(row, column)] - expected).abs() < 1e-7,
+                "{product}"
+            );
+        }
+    }
+    for event in run.motion().events() {
+        let after = run
+            .motion()
+            .states()
+            .iter()
+            .rev()
+            .find(|node| node.t == event.t);
+        let rate = after.expect("a node").v[0] - 0.01;
+        assert!((rate + (event.v[0] - 0.01)).abs() < 1e-12);
+    }
+}
+
+/// A value that touches zero, and one that grazes it so that both crossings lie within a hundredth of an element.
+#[test]
+fn tangent_events() {
+    for (over, count) in [(0.0, 0), (-1e-9, 0), (1e-6, 2), (1e-10, 2)] {
+        let model = Oscillator { level: 1.0 - over };
+        let motion = Simulation::new(&model)
+            .element(Mixed::<10>)
+            .step(0.7)
+            .on("above", Crossing::Either, |_| Act::Record)
+            .run(model.state([0.0], [1.0]), 0.0..3.0)
+            .expect("a run");
+        assert_eq!(motion.events().len(), count, "{over:e}");
+        if let [up, down] = motion.events() {
+            let half = (2.0 * over).sqrt();
+            assert!((up.t - (PI / 2.0 - half)).abs() < 2e-2 * half && up.rises);
+            assert!((down.t - (PI / 2.0 + half)).abs() < 2e-2 * half && !down.rises);
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! Gradients of losses.
+
+use super::*;
+
+/// The gradient of a loss, backwards, is what derivatives, forwards, make of it.
+#[track_caller]
+fn check_gradient<M: Model<N> + Sync, const N: usize>(
+    simulation: &Simulation<'_, M, N>,
+    start: State<N>,
+    output: &str,
+) {
+    let times = [0.0, 0.31, 0.5, 1.0];
+    let values = [0.2, -0.1, 0.4, 0.3];
+    let loss = Loss::at_end(|node: &Node<N>| {
+        node.q[0].sin() + 0.5 * node.p[N - 1].powi(2) + node.q[N - 1] * node.v[0]
+    })
+    .and(Loss::squares(output, times, values))
+    .and(Loss::output_at_end(output));
+    let (value, gradient) = simulation
+        .gradient(start, 0.0..1.0, &loss)
+        .expect("a gradient");
+    let run = times
+        .iter()
+        .fold(simulation.clone(), |run, t| run.break_at(*t));
+    let s = run.run_sensitive(start, 0.0..1.0).expect("derivatives");
+    let last = s.motion().last();
+    let nodes = s.motion().states();
+    let at = times.map(|t| nodes.iter().position(|node| node.t == t).expect("a node"));
+    let outputs = s.motion().outputs().column(output).expect("declared");
+    let squares = at
+        .iter()
+        .zip(values)
+        .map(|(at, m)| 0.5 * (outputs[*at] - m).powi(2));
+    let (q, p, v) = (last.q, last.p, last.v);
+    let direct = q[0].sin() + 0.5 * p[N - 1].powi(2) + q[N - 1] * v[0] + outputs[at[3]];
+    assert!((value - squares.sum::<f64>() - direct).abs() < 1e-13 * value.abs().max(1.0));
+    let size = gradient
+        .by_parameters()
+        .iter()
+        .fold(1.0_f64, |m, x| m.max(x.abs()));
+    for name in s.parameters() {
+        let by = s.by(name).last();
+        let slopes = s.by(name).output(output).expect("declared");
+        let squares = at
+            .iter()
+            .zip(values)
+            .map(|(at, m)| (outputs[*at] - m) * slopes[*at]);
+        let expected = squares.sum::<f64>()
+            + q[0].cos() * by.q[0]
+            + p[N - 1] * by.p[N - 1]
+            + by.q[N - 1] * v[0]
+            + q[N - 1] * by.v[0]
+            + slopes[at[3]];
+        let found = gradient.by(name);
+        assert!(
+            (found - expected).abs() < 1e-12 * size,
+            "{name}: {found} {expected}"
+        );
+    }
+    let by_start = s.by_start().output(output).expect("declared");
+    let matrix = s.by_start().last();
+    for a in 0..N {
+        // The velocity at the end follows from differences of runs only: a loss without it.
+        let loss = Loss::squares(output, times, values).and(Loss::at_end(|node: &Node<N>| {
+            node.q[0].sin() + 0.5 * node.p[N - 1].powi(2)
+        }));
+        let (_, gradient) = simulation
+            .gradient(start, 0.0..1.0, &loss)
+            .expect("a gradient");
+        let squares = at.iter().zip(values);
+        let squares: f64 = squares
+            .map(|(at, m)| (outputs[*at] - m) * by_start[*at].q[a])
+            .sum();
+        let expected =
+            squares + q[0].cos() * matrix.q_by_q()[(0, a)] + p[N - 1] * matrix.p_by_q()[(N - 1, a)];
+        let found = gradient.by_start().q[a];
+        assert!(
+            (found - expected).abs() < 1e-12 * size.max(expected.abs()),
+            "{a}: {found} {expected}"
+        );
+    }
+}
+
+#[test]
+fn gradients_backwards_are_derivatives_forwards() {
+    let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
+    let elements: [Element; 5] = [
+        Mixed::<4>.into(),
+        Primal::<3>.into(),
+        Primal::<4>.reduced(),
+        Radau::<3>.into(),
+        Element::primal(4).lobatto(),
+    ];
+    for element in elements {
+        let simulation = Simulation::new(&PENDULUMS).element(element).step(0.05);
+        check_gradient(&simulation, start, "height");
+        check_gradient(&simulation.impulse(0.42, [0.1, -0.2]), start, "speed");
+    }
+    // Steps that are cut into pieces.
+    let simulation = Simulation::new(&PENDULUMS).step(0.9).element(Mixed::<3>);
+    check_gradient(&simulation, start, "speed");
+    let driven = Driven {
+        m: 1.2,
+        k: 1.0,
+        b: 0.8,
+        a: 0.3,
+        omega: 1.7,
+        c: 0.05,
+    };
+    let start = State {
+        q: [0.2, 0.3],
+        p: [0.1, -0.2],
+    };
+    for element in [Mixed::<4>.into(), Element::primal(3)] {
+        let simulation = Simulation::new(&driven).element(element).step(0.1);
+        check_gradient(&simulation, start, "moment");
+    }
+    let ball = Ball {
+        m: 1.0,
+        g: 9.81,
+        floor: 0.0,
+    };
+    let start = ball.state([0.6], [0.0]);
+    check_gradient(&bouncing(&ball), start, "velocity");
+    let rod = Rod {
+        m: 1.3,
+        g: 9.81,
+        c: 0.2,
+        l: 1.0,
+    };
+    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
+    check_gradient(&Simulation::new(&rod).step(0.02), start, "height");
+}
+
+/// Masses in a row, with a friction between neighbours that depends on where they are, and springs that are all different.
+#[dynamics(
+    coordinates(q[5]),
+    lagrangian = sum(i in 0..5, m[i]/2*dot(q[i])^2 + b*q[i]*dot(q[i])^2/2) - sum(i in 0..4, k[i]/2*(q[i+1]-q[i])^2 + a[i]/4*(q[i+1]-q[i])^4) - k[4]/2*q[0]^2,
+    dissipation = sum(i in 0..4, c[i]/2*(dot(q[i+1]) - dot(q[i]))^2),
+    force(q[4]) = f*sin(omega*t),
+    output(middle) = q[2]*k[1],
+)]
+struct Row {
+    m: [f64; 5],
+    k: [f64; 5],
+    a: [f64; 4],
+    c: [f64; 4],
+    b: f64,
+    f: f64,
+    omega: f64,
+}
+
+const ROW: Row = Row {
+    m: [1.0, 1.1, 0.9, 1.3, 0.8],
+    k: [2.0, 1.5, 1.7, 2.2, 0.5],
+    a: [0.3, 0.2, 0.4, 0.1],
+    c: [0.05, 0.1, 0.02, 0.07],
+    b: 0.1,
+    f: 0.4,
+    omega: 1.9,
+};
+
+/// Many parameters at once, by operations read backwards; with an iteration and, where steps are too long for it, with factors; of elements with fewer points than go side by side, and more.
+#[test]
+fn gradients_by_many_parameters_are_derivatives_forwards() {
+    let start = ROW.state([0.3, -0.2, 0.1, 0.4, -0.5], [0.1, 0.0, -0.3, 0.2, 0.4]);
+    for (element, step) in [
+        (Element::from(Mixed::<4>), 0.1),
+        (Mixed::<3>.into(), 0.5),
+        (Mixed::<7>.into(), 0.2),
+        (Mixed::<10>.into(), 0.2),
+        (Primal::<3>.into(), 0.1),
+        (EnergyConserving::<3>.into(), 0.1),
+    ] {
+        let simulation = Simulation::new(&ROW).element(element).step(step);
+        check_gradient(&simulation, start, "middle");
+    }
+}
+
+/// Some of many parameters, in any order, have what they have among all.
+#[test]
+fn some_parameters_backwards_are_those_among_all() {
+    let mut state = ROW.state([0.3, -0.2, 0.1, 0.4, -0.5], [0.1, 0.0, -0.3, 0.2, 0.4]);
+    let mut stepper =
+        Stepper::new(&ROW, Mixed::<5>.into(), Control::default()).expect("an element");
+    stepper.advance(0.0, 0.2, &mut state, &[]).expect("a step");
+    let lambda: [f64; 10] = std::array::from_fn(|row| 1.0 / (row + 1) as f64);
+    let mut by = |indices: &[usize]| {
+        let direction = |index: &usize| Direction {
+            parameter: Some(Parameter::Any(*index)),
+            ..Direction::default()
+        };
+        let directions: Vec<_> = indices.iter().map(direction).collect();
+        let (mut rest, mut sums) = (lambda, vec![0.0; indices.len()]);
+        let product = stepper.adjoint(&directions, &mut rest, &mut sums);
+        product.expect("a derivative");
+        (rest, sums)
+    };
+    let all: Vec<usize> = (0..ROW.parameters()).collect();
+    let (by_start, by_all) = by(&all);
+    assert!(by_all.iter().filter(|sum| **sum != 0.0).count() > 18);
+    let some = [17, 3, 20, 0, 9];
+    let (again, by_some) = by(&some);
+    assert_eq!(again, by_start);
+    assert_eq!(by_some, some.map(|index| by_all[index]));
+}
+
+#[test]
+fn losses_that_are_none_are_told() {
+    let simulation = Simulation::new(&PENDULUMS).step(0.05);
+    let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
+    let error = |loss: Loss<'_, 2>| {
+        let error = simulation
+            .gradient(start, 0.0..1.0, &loss)
+            .expect_err("no gradient");
+        error.kind().clone()
+    };
+    let unknown = error(Loss::output_at_end("hight"));
+    assert!(unknown.to_string().contains("height"), "{unknown}");
+    for (times, values) in [
+        (vec![0.5], vec![]),
+        (vec![1.5], vec![1.0]),
+        (vec![f64::NAN], vec![1.0]),
+        (vec![0.5], vec![f64::NAN]),
+    ] {
+        let kind = error(Loss::squares("height", times, values));
+        assert!(matches!(kind, RunErrorKind::Loss { .. }), "{kind}");
+    }
+    let gradient = simulation.gradient(start, 0.0..1.0, &Loss::output_at_end("height"));
+    let (_, gradient) = gradient.expect("a gradient");
+    assert_eq!(
+        (gradient.get("nothing"), gradient.parameters().len()),
+        (None, 6)
+    );
+}

@@ -1,0 +1,163 @@
+//! Derivatives across events.
+
+use super::*;
+
+#[test]
+fn derivatives_go_through_bounces() {
+    let ball = Ball {
+        m: 1.0,
+        g: 9.81,
+        floor: 0.0,
+    };
+    let s = bouncing(&ball)
+        .run_sensitive(ball.state([1.0], [0.0]), 0.0..1.5)
+        .expect("derivatives");
+    assert_eq!(s.motion().events().len(), 2);
+    // From rest at the height H: τ = √(2H/g), the second bounce at 2.6 τ, then y = 0.64 g τ s − g s²/2 with s = t − 2.6 τ.
+    let tau = |height: f64, g: f64| (2.0 * height / g).sqrt();
+    let y = |height: f64, g: f64| {
+        let s = 1.5 - 2.6 * tau(height, g);
+        0.64 * g * tau(height, g) * s - g * s * s / 2.0
+    };
+    let [by_g] = difference(|g| [y(1.0, g)], 9.81);
+    let [by_height] = difference(|height| [y(height, 9.81)], 1.0);
+    assert!((s.motion().last().q[0] - y(1.0, 9.81)).abs() < 1e-14);
+    assert!((s.by("g").last().q[0] - by_g).abs() < 1e-12);
+    let found = s.by_start().last().q_by_q()[(0, 0)];
+    assert!((found - by_height).abs() < 1e-11, "{found} {by_height}");
+    // A floor that is raised is a ball that is lowered.
+    let by_floor = s.by("floor").last().q[0];
+    assert!((by_floor - (1.0 - by_height)).abs() < 1e-11, "{by_floor}");
+    assert!(s.by("m").last().q[0].abs() < 1e-12);
+    let times = [0, 1].map(|event| s.by("g").event_time(event).expect("a bounce"));
+    assert!((times[0] + tau(1.0, 9.81) / (2.0 * 9.81)).abs() < 1e-14);
+    assert!((times[1] + 2.6 * tau(1.0, 9.81) / (2.0 * 9.81)).abs() < 1e-13);
+    assert_eq!(s.by("g").event_time(2), None);
+    assert_eq!(s.by("g").states().len(), s.motion().states().len());
+    // The velocity before the first bounce is −√(2gH), after it 0.8 times the other way.
+    let nodes = s.motion().states();
+    let at = nodes
+        .windows(2)
+        .position(|two| two[0].t == two[1].t)
+        .expect("a bounce");
+    let speeds = s.by("g").output("velocity").expect("declared");
+    let rate = 0.5 * (2.0 / 9.81_f64).sqrt();
+    assert!((speeds[at] + rate).abs() < 1e-13 && (speeds[at + 1] - 0.8 * rate).abs() < 1e-12);
+}
+
+/// The same ball with an input, whose model belongs to the run; and in velocities of a Hamiltonian, whose mass the momentum after the bounce depends on.
+#[test]
+fn derivatives_go_through_events_of_other_models() {
+    #[dynamics(
+        coordinates(y),
+        lagrangian = m/2*dot(y)^2 - m*g*y,
+        input(u),
+        force(y) = u,
+        event(impact) = y,
+    )]
+    struct Pushed {
+        m: f64,
+        g: f64,
+    }
+    #[dynamics(
+        coordinates(y),
+        momenta(p),
+        hamiltonian = p^2/(2*m) + m*g*y,
+        event(impact) = y,
+    )]
+    struct Canonical {
+        m: f64,
+        g: f64,
+    }
+    fn bounce<const N: usize>(event: &tfe::simulation::Occurrence<'_, N>) -> Act<N> {
+        // Faster the faster it comes: not linear.
+        Act::Restart(event.state_with_velocity(event.v.map(|v| -0.8 * v - 0.02 * v * v)))
+    }
+    fn pushed(model: &Pushed) -> Simulation<'_, tfe::Driven<'_, Pushed>, 1> {
+        Simulation::new(model)
+            .step(0.1)
+            .on("impact", Crossing::Falling, bounce)
+            .input("u", |t| 0.3 * t)
+    }
+    fn canonical(model: &Canonical) -> Simulation<'_, Canonical, 1> {
+        Simulation::new(model)
+            .step(0.1)
+            .on("impact", Crossing::Falling, bounce)
+    }
+    let start = State { q: [1.0], p: [0.4] };
+    let ends = |motion: &Motion<1>| [motion.last().q[0], motion.last().p[0]];
+    let model = Pushed { m: 1.3, g: 9.81 };
+    let s = pushed(&model)
+        .run_sensitive(start, 0.0..1.1)
+        .expect("derivatives");
+    assert_eq!(s.motion().events().len(), 1);
+    let other = Canonical { m: 1.3, g: 9.81 };
+    let h = canonical(&other)
+        .run_sensitive(start, 0.0..1.1)
+        .expect("derivatives");
+    for (name, by) in [("m", 1.3), ("g", 9.81)] {
+        let with = |x: f64| if name == "m" { (x, 9.81) } else { (1.3, x) };
+        let expected = difference(
+            |x| {
+                let (m, g) = with(x);
+                ends(
+                    &pushed(&Pushed { m, g })
+                        .run(start, 0.0..1.1)
+                        .expect("a run"),
+                )
+            },
+            by,
+        );
+        let found = s.by(name).last();
+        assert!((found.q[0] - expected[0]).abs() < 1e-11, "{name}");
+        assert!((found.p[0] - expected[1]).abs() < 1e-10, "{name}");
+        let expected = difference(
+            |x| {
+                let (m, g) = with(x);
+                ends(
+                    &canonical(&Canonical { m, g })
+                        .run(start, 0.0..1.1)
+                        .expect("a run"),
+                )
+            },
+            by,
+        );
+        let found = h.by(name).last();
+        assert!((found.q[0] - expected[0]).abs() < 1e-11, "{name}");
+        assert!((found.p[0] - expected[1]).abs() < 1e-10, "{name}");
+    }
+}
+
+/// Two pendulums that hit a wall, several times, with an impulse along the normal of the wall; and the derivative where the run stops at the next one.
+#[test]
+fn derivatives_go_through_impacts() {
+    #[dynamics(
+        coordinates(a, b),
+        lagrangian = m/2*dot(a)^2 + dot(b)^2/2 + dot(a)*dot(b)*cos(a - b)/2 + g*(cos(a) + cos(b)/2),
+        event(wall) = a - w,
+    )]
+    struct Hitting {
+        m: f64,
+        g: f64,
+        w: f64,
+    }
+    fn simulation(model: &Hitting) -> Simulation<'_, Hitting, 2> {
+        Simulation::new(model).step(0.05).element(Mixed::<5>).on(
+            "wall",
+            Crossing::Rising,
+            |event| {
+                let cos = (event.q[0] - event.q[1]).cos() / 2.0;
+                let mass = 1.3 - cos * cos;
+                Act::Impulse([-1.7 * mass * event.v[0], 0.0])
+            },
+        )
+    }
+    let model = Hitting {
+        m: 1.3,
+        g: 9.81,
+        w: 0.1,
+    };
+    let start = model.state([-0.8, 0.2], [0.0, 0.3]);
+    let s = check::<_, 2, 4>(&model, start, 2.5, 1e-10, simulation, true);
+    assert_eq!(s.motion().events().len(), 2);
+}

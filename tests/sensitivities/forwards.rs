@@ -1,0 +1,265 @@
+//! Derivatives along a run: parameters, starts, outputs, constraints.
+
+use super::*;
+
+#[test]
+fn parameters_are_numbered_as_they_stand() {
+    let names = (0..PENDULUMS.parameters()).map(|k| PENDULUMS.parameter_name(k).to_string());
+    let names: Vec<_> = names.collect();
+    assert_eq!(names, ["l[0]", "l[1]", "m1", "m2", "g", "c"]);
+    let values: Vec<_> = (0..7).map(|k| PENDULUMS.parameter(k)).collect();
+    assert_eq!(values[..6], [1.0, 0.8, 1.0, 0.7, 9.81, 0.1]);
+    assert!(values[6].is_nan() && PENDULUMS.with_parameter(6, 1.0).is_none());
+    let other = PENDULUMS.with_parameter(1, 0.5).expect("numbers alone");
+    assert_eq!((other.l, other.g), ([1.0, 0.5], 9.81));
+    assert_eq!(PENDULUMS.find_parameter("l[1]"), Some(1));
+    assert_eq!(PENDULUMS.find_parameter("l[1"), None);
+    assert_eq!(PENDULUMS.find_parameter("l[1]2"), None);
+}
+
+/// Every kind of element.
+#[test]
+fn derivatives_are_those_of_the_numbers_of_a_run() {
+    let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
+    let elements: [Element; 7] = [
+        Mixed::<4>.into(),
+        Mixed::<2>.into(),
+        Primal::<3>.into(),
+        Primal::<4>.reduced(),
+        Radau::<3>.into(),
+        Mixed::<6>.into(),
+        Element::primal(4).lobatto(),
+    ];
+    for element in elements {
+        check::<_, 2, 4>(
+            &PENDULUMS,
+            start,
+            1.0,
+            1e-11,
+            |model| Simulation::new(model).element(element).step(0.05),
+            true,
+        );
+    }
+}
+
+#[test]
+fn hamiltonians_have_derivatives() {
+    let driven = Driven {
+        m: 1.2,
+        k: 1.0,
+        b: 0.8,
+        a: 0.3,
+        omega: 1.7,
+        c: 0.05,
+    };
+    let start = State {
+        q: [0.2, 0.3],
+        p: [0.1, -0.2],
+    };
+    for element in [Mixed::<4>.into(), Element::primal(3), Radau::<4>.into()] {
+        let s = check::<_, 2, 4>(
+            &driven,
+            start,
+            3.0,
+            1e-11,
+            |model| Simulation::new(model).element(element).step(0.1),
+            true,
+        );
+        // The output is one of the state alone.
+        let (last, state) = (s.by("b").last(), s.motion().last());
+        let expected = last.q[0] * state.p[1] + state.q[0] * last.p[1]
+            - last.q[1] * state.p[0]
+            - state.q[1] * last.p[0];
+        let found = s.by("b").output("moment").expect("declared");
+        assert!((found[30] - expected).abs() < 1e-14);
+        // v = p/m
+        let expected = last.p[0] / driven.m;
+        assert!((last.v[0] - expected).abs() < 1e-14);
+        let by_mass = s.by("m").last();
+        let expected = by_mass.p[0] / driven.m - state.p[0] / driven.m.powi(2);
+        assert!((by_mass.v[0] - expected).abs() < 1e-14);
+    }
+}
+
+/// Velocities and outputs between the nodes of a run are not asked for; at nodes they are those of the state.
+#[test]
+fn velocities_and_outputs_move_with_the_state() {
+    let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
+    fn simulation(model: &Pendulums) -> Simulation<'_, Pendulums, 2> {
+        Simulation::new(model).step(0.05)
+    }
+    let s = simulation(&PENDULUMS)
+        .run_sensitive(start, 0.0..1.0)
+        .expect("derivatives");
+    for (index, name) in s.parameters().iter().enumerate() {
+        let values = |value| {
+            let other = PENDULUMS.with_parameter(index, value).expect("numbers");
+            let motion = simulation(&other).run(start, 0.0..1.0).expect("a run");
+            let speed = motion.outputs().column("speed").expect("declared");
+            let height = motion.outputs().column("height").expect("declared");
+            [
+                motion.last().v[0],
+                motion.last().v[1],
+                speed[20],
+                height[20],
+            ]
+        };
+        let expected = difference(values, PENDULUMS.parameter(index));
+        let by = s.by(name);
+        let v = by.last().v;
+        let [speed, height] = ["speed", "height"].map(|name| by.output(name).expect("declared"));
+        for (found, expected) in [v[0], v[1], speed[20], height[20]].iter().zip(expected) {
+            let error = (found - expected).abs();
+            assert!(error < 1e-11 * expected.abs().max(1.0), "{name}: {error:e}");
+        }
+    }
+    let gradient = s.by_start().output("height").expect("declared");
+    assert_eq!(gradient.len(), 21);
+    let height = |q: f64| {
+        let start = State {
+            q: [q, start.q[1]],
+            ..start
+        };
+        let motion = simulation(&PENDULUMS).run(start, 0.0..1.0).expect("a run");
+        [motion.outputs().column("height").expect("declared")[20]]
+    };
+    let [expected] = difference(height, start.q[0]);
+    assert!((gradient[20].q[0] - expected).abs() < 1e-11);
+    assert!(s.get("nothing").is_none() && s.by("g").output("nothing").is_none());
+}
+
+/// Parameters that are not in constraints: a run from another start is as good, so that differences know the derivative.
+#[test]
+fn constrained_motions_have_derivatives() {
+    let rod = Rod {
+        m: 1.3,
+        g: 9.81,
+        c: 0.2,
+        l: 1.0,
+    };
+    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
+    let simulation = Simulation::new(&rod).step(0.02);
+    let s = simulation
+        .run_sensitive(start, 0.0..1.0)
+        .expect("derivatives");
+    for (index, name) in ["m", "g", "c"].into_iter().enumerate() {
+        let expected = difference(
+            |value| {
+                let other = rod.with_parameter(index, value).expect("numbers");
+                end::<_, 2, 4>(&Simulation::new(&other).step(0.02), start, 1.0)
+            },
+            rod.parameter(index),
+        );
+        let last = s.by(name).last();
+        for (found, expected) in [last.q[0], last.q[1], last.p[0], last.p[1]]
+            .iter()
+            .zip(expected)
+        {
+            assert!(
+                (found - expected).abs() < 1e-10,
+                "{name}: {found} {expected}"
+            );
+        }
+        // Motions stay on the rod: x δx + y δy = 0.
+        let node = s.motion().last();
+        assert!((node.q[0] * last.q[0] + node.q[1] * last.q[1]).abs() < 1e-13);
+    }
+    let blade = Blade {
+        m: 1.0,
+        j: 0.4,
+        g: 9.81,
+        slope: 0.3,
+    };
+    let start = blade.state(
+        [0.0, 0.0, 0.5],
+        [0.2 * 0.5_f64.cos(), 0.2 * 0.5_f64.sin(), 1.5],
+    );
+    let simulation = Simulation::new(&blade).step(0.02);
+    let s = simulation
+        .run_sensitive(start, 0.0..1.0)
+        .expect("derivatives");
+    for (index, name) in ["m", "j", "g", "slope"].into_iter().enumerate().skip(1) {
+        let expected = difference(
+            |value| {
+                let other = blade.with_parameter(index, value).expect("numbers");
+                end::<_, 3, 6>(&Simulation::new(&other).step(0.02), start, 1.0)
+            },
+            blade.parameter(index),
+        );
+        let last = s.by(name).last();
+        for (a, expected) in expected.into_iter().enumerate() {
+            let found = if a < 3 { last.q[a] } else { last.p[a - 3] };
+            let error = (found - expected).abs();
+            assert!(
+                error < 1e-10 * expected.abs().max(1.0),
+                "{name}: {found} {expected}"
+            );
+        }
+    }
+}
+
+/// By the length of the rod, with a start that moves along: q₀ = l (sin, −cos), p₀ = m l ω (cos, sin).
+#[test]
+fn parameters_of_constraints_count() {
+    fn at(l: f64) -> State<2> {
+        let (sin, cos) = 0.6_f64.sin_cos();
+        State {
+            q: [l * sin, -l * cos],
+            p: [1.3 * l * 0.7 * cos, 1.3 * l * 0.7 * sin],
+        }
+    }
+    let rod = Rod {
+        m: 1.3,
+        g: 9.81,
+        c: 0.2,
+        l: 1.0,
+    };
+    let twice = Twice {
+        m: 1.3,
+        g: 9.81,
+        l: 1.0,
+    };
+    let start = at(1.0);
+    let both = [
+        (
+            Simulation::new(&rod)
+                .step(0.02)
+                .run_sensitive(start, 0.0..1.0),
+            difference(
+                |l| {
+                    let other = Rod { l, ..rod };
+                    end::<_, 2, 4>(&Simulation::new(&other).step(0.02), at(l), 1.0)
+                },
+                1.0,
+            ),
+        ),
+        (
+            Simulation::new(&twice)
+                .step(0.02)
+                .run_sensitive(start, 0.0..1.0),
+            difference(
+                |l| {
+                    let other = Twice { l, ..twice };
+                    end::<_, 2, 4>(&Simulation::new(&other).step(0.02), at(l), 1.0)
+                },
+                1.0,
+            ),
+        ),
+    ];
+    for (s, expected) in both {
+        let s = s.expect("derivatives");
+        // The start is proportional to l.
+        let (by, matrix) = (s.by("l").last(), s.by_start().last());
+        let moved = [start.p[0], start.p[1], start.q[0], start.q[1]];
+        let total = |row: usize| (0..4).map(|k| matrix[(row, k)] * moved[k]).sum::<f64>();
+        let found = [
+            by.q[0] + total(2),
+            by.q[1] + total(3),
+            by.p[0] + total(0),
+            by.p[1] + total(1),
+        ];
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-10, "{found} {expected}");
+        }
+    }
+}

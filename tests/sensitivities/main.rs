@@ -1,0 +1,206 @@
+//! Derivatives of motions by parameters and starts, against differences of runs.
+
+mod backwards;
+mod events;
+mod forwards;
+
+use tfe::prelude::*;
+use tfe::runtime::step::{Control, Stepper};
+use tfe::runtime::{Direction, Model, Parameter};
+use tfe::sensitivity::Loss;
+use tfe::{RunErrorKind, Sensitive};
+
+/// The derivative of a function at `x`: of eighth order, over a distance at which roundings of 1e-15 of the values leave some 1e-13 of them.
+fn difference<const N: usize>(of: impl Fn(f64) -> [f64; N], x: f64) -> [f64; N] {
+    let distance = 4e-3 * x.abs().max(0.1);
+    let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
+    let mut sum = [0.0; N];
+    for (k, weight) in (1..).zip(weights) {
+        let step = f64::from(k) * distance;
+        let (high, low) = (of(x + step), of(x - step));
+        for a in 0..N {
+            sum[a] += weight * (high[a] - low[a]) / distance;
+        }
+    }
+    sum
+}
+
+/// The state at the end of a run as one array, q and p.
+fn end<M: Model<N> + Sync, const N: usize, const D: usize>(
+    simulation: &Simulation<'_, M, N>,
+    start: State<N>,
+    end: f64,
+) -> [f64; D] {
+    let motion = simulation.run(start, 0.0..end).expect("a good run");
+    let last = motion.last();
+    std::array::from_fn(|a| if a < N { last.q[a] } else { last.p[a - N] })
+}
+
+/// Compares all derivatives of a run with differences; `allowed` is relative to the largest derivative by the same thing.
+fn check<M: Model<N> + Sync, const N: usize, const D: usize>(
+    model: &M,
+    start: State<N>,
+    length: f64,
+    allowed: f64,
+    simulation: impl for<'m> Fn(&'m M) -> Simulation<'m, M, N>,
+    by_start: bool,
+) -> Sensitive<N> {
+    assert_eq!(D, 2 * N);
+    let s = simulation(model)
+        .run_sensitive(start, 0.0..length)
+        .expect("derivatives");
+    assert_eq!(s.motion().last().t, length);
+    assert_eq!(s.parameters().len(), model.parameters());
+    let compare = |what: &str, found: [f64; D], expected: [f64; D]| {
+        let scale = expected.iter().fold(1e-3_f64, |m, x| m.max(x.abs()));
+        for a in 0..D {
+            let error = (found[a] - expected[a]).abs() / scale;
+            assert!(
+                error < allowed,
+                "{what}, entry {a}: {} instead of {}, off by {error:.1e}",
+                found[a],
+                expected[a]
+            );
+        }
+    };
+    for (index, name) in s.parameters().iter().enumerate() {
+        let expected = difference(
+            |value| {
+                let other = model.with_parameter(index, value).expect("numbers alone");
+                end::<M, N, D>(&simulation(&other), start, length)
+            },
+            model.parameter(index),
+        );
+        let last = s.by(name).last();
+        let found = std::array::from_fn(|a| if a < N { last.q[a] } else { last.p[a - N] });
+        compare(name, found, expected);
+        assert_eq!(s.by(name).states().len(), s.motion().states().len());
+        assert_eq!(s.by(name).states()[0].q, [0.0; N], "{name}");
+    }
+    if by_start {
+        let matrix = s.by_start().last();
+        for k in 0..D {
+            let changed = |x: f64| {
+                let mut start = start;
+                if k < N {
+                    start.q[k] = x;
+                } else {
+                    start.p[k - N] = x;
+                }
+                end::<M, N, D>(&simulation(model), start, length)
+            };
+            let x = if k < N { start.q[k] } else { start.p[k - N] };
+            // Matrices are ordered (p, q).
+            let (row, column) = (|a| (a + N) % D, (k + N) % D);
+            let found = std::array::from_fn(|a| matrix[(row(a), column)]);
+            compare(&format!("start {k}"), found, difference(changed, x));
+        }
+    }
+    s
+}
+
+/// Two pendulums with friction; the names of `sensitivity` have kernels of their own, the others are differentiated by dual numbers.
+#[dynamics(
+    coordinates(theta[2]),
+    let x1 = l[0]*sin(theta[0]), let y1 = -l[0]*cos(theta[0]),
+    let x2 = x1 + l[1]*sin(theta[1]), let y2 = y1 - l[1]*cos(theta[1]),
+    lagrangian = m1/2*(dot(x1)^2 + dot(y1)^2) + m2/2*(dot(x2)^2 + dot(y2)^2) - g*(m1*y1 + m2*y2),
+    force(theta[0]) = -c*dot(theta[0]),
+    force(theta[1]) = -c*(dot(theta[1]) - dot(theta[0])),
+    sensitivity(g, l[1]),
+    output(height) = y2,
+    output(speed) = sqrt(dot(x2)^2 + dot(y2)^2),
+)]
+struct Pendulums {
+    l: [f64; 2],
+    m1: f64,
+    m2: f64,
+    g: f64,
+    c: f64,
+}
+
+const PENDULUMS: Pendulums = Pendulums {
+    l: [1.0, 0.8],
+    m1: 1.0,
+    m2: 0.7,
+    g: 9.81,
+    c: 0.1,
+};
+
+/// A Hamiltonian, in phase space and in velocities, whose time appears too.
+#[dynamics(
+    coordinates(x, y),
+    hamiltonian = (px^2 + py^2)/(2*m) + k*(x^2 + y^2)/2 + b*(x^2*y - y^3/3) + a*x*cos(omega*t),
+    momenta(px, py),
+    force(y) = -c*py,
+    output(moment) = x*py - y*px,
+)]
+struct Driven {
+    m: f64,
+    k: f64,
+    b: f64,
+    a: f64,
+    omega: f64,
+    c: f64,
+}
+
+/// A pendulum on a rod, with the angle of its trajectory as a redundant constraint: the length is a parameter of constraints.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    force(x) = -c*dot(x),
+    constraint(rod) = x^2 + y^2 - l^2,
+    output(height) = y,
+)]
+struct Rod {
+    m: f64,
+    g: f64,
+    c: f64,
+    l: f64,
+}
+
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    constraint(rod) = x^2 + y^2 - l^2,
+    constraint(again) = (x^2 + y^2)/l - l,
+)]
+struct Twice {
+    m: f64,
+    g: f64,
+    l: f64,
+}
+
+/// A blade on a slope: a constraint of velocities whose direction turns.
+#[dynamics(
+    coordinates(x, y, phi),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(phi)^2 + m*g*slope*x,
+    constraint(blade) = sin(phi)*dot(x) - cos(phi)*dot(y),
+)]
+struct Blade {
+    m: f64,
+    j: f64,
+    g: f64,
+    slope: f64,
+}
+
+/// A ball that bounces: by closed forms, and of the time of the bounce.
+#[dynamics(
+    coordinates(y),
+    lagrangian = m/2*dot(y)^2 - m*g*y,
+    event(impact) = y - floor,
+    output(velocity) = dot(y),
+)]
+struct Ball {
+    m: f64,
+    g: f64,
+    floor: f64,
+}
+
+fn bouncing(ball: &Ball) -> Simulation<'_, Ball, 1> {
+    Simulation::new(ball)
+        .step(0.1)
+        .on("impact", Crossing::Falling, |event| {
+            Act::Restart(event.state_with_velocity([-0.8 * event.v[0]]))
+        })
+}
