@@ -49,6 +49,8 @@ pub type Motion = crate::Motion<0, RunTimeLength>;
 pub type Node = crate::Node<0, RunTimeLength>;
 /// [`RunError`](crate::RunError) of a model of run-time length.
 pub type RunError = crate::RunError<0, RunTimeLength>;
+/// [`Sensitive`](crate::Sensitive) of a model of run-time length.
+pub type Sensitive = crate::Sensitive<0, RunTimeLength>;
 /// [`Steps`](crate::Steps) of a model of run-time length.
 pub type Steps<'m, M> = crate::Steps<'m, M, 0, RunTimeLength>;
 /// [`Checkpoint`](crate::Checkpoint) of a model of run-time length.

@@ -1,12 +1,14 @@
 //! A motion with its derivatives by parameters and by its start.
 
 pub(crate) mod loss;
+#[cfg(feature = "sparse")]
+pub(crate) mod run_time;
 pub(crate) mod slopes;
 
+use crate::length::{FixedLength, Length};
 use crate::motion::{Motion, Node};
 use nalgebra::DMatrix;
 use std::fmt;
-use tfe_runtime::State;
 
 pub use loss::{Loss, LossGradient};
 
@@ -43,8 +45,8 @@ pub use loss::{Loss, LossGradient};
 /// # }
 /// ```
 #[derive(Clone)]
-pub struct Sensitive<const N: usize> {
-    motion: Motion<N>,
+pub struct Sensitive<const N: usize, L: Length<N> = FixedLength> {
+    motion: Motion<N, L>,
     parameters: Vec<String>,
     nodes: Vec<Slopes>,
     events: Vec<(usize, Vec<f64>)>,
@@ -61,9 +63,9 @@ pub(crate) struct Slopes {
     pub(crate) outputs: DMatrix<f64>,
 }
 
-impl<const N: usize> Sensitive<N> {
+impl<const N: usize, L: Length<N>> Sensitive<N, L> {
     pub(crate) fn new(
-        motion: Motion<N>,
+        motion: Motion<N, L>,
         parameters: Vec<String>,
         nodes: Vec<Slopes>,
         events: Vec<(usize, Vec<f64>)>,
@@ -76,8 +78,13 @@ impl<const N: usize> Sensitive<N> {
         }
     }
 
+    /// The number of coordinates.
+    fn coordinates(&self) -> usize {
+        self.motion.last().q.as_ref().len()
+    }
+
     /// The motion.
-    pub fn motion(&self) -> &Motion<N> {
+    pub fn motion(&self) -> &Motion<N, L> {
         &self.motion
     }
 
@@ -91,7 +98,7 @@ impl<const N: usize> Sensitive<N> {
     /// # Panics
     /// Where no parameter has this name, as an index out of bounds does; [`get`](Self::get) does not.
     #[track_caller]
-    pub fn by(&self, name: &str) -> ByParameter<'_, N> {
+    pub fn by(&self, name: &str) -> ByParameter<'_, N, L> {
         self.get(name).unwrap_or_else(|| {
             panic!(
                 "the model has no parameter `{name}`, only `{}`",
@@ -101,16 +108,16 @@ impl<const N: usize> Sensitive<N> {
     }
 
     /// The derivatives by a parameter; `None` where none has this name.
-    pub fn get(&self, name: &str) -> Option<ByParameter<'_, N>> {
+    pub fn get(&self, name: &str) -> Option<ByParameter<'_, N, L>> {
         let place = self.parameters.iter().position(|own| own == name)?;
         Some(ByParameter {
             of: self,
-            column: 2 * N + place,
+            column: 2 * self.coordinates() + place,
         })
     }
 
     /// The derivatives by the start.
-    pub fn by_start(&self) -> ByStart<'_, N> {
+    pub fn by_start(&self) -> ByStart<'_, N, L> {
         ByStart { of: self }
     }
 
@@ -120,20 +127,20 @@ impl<const N: usize> Sensitive<N> {
         let values = self.motion.outputs().row(node);
         let value = values.and_then(|row| row.get(output)).copied();
         let slopes = &self.nodes[node].outputs;
-        Self::parted(value.unwrap_or(f64::NAN), slopes, output)
+        self.parted(value.unwrap_or(f64::NAN), slopes, output)
     }
 
     /// The same of a coordinate.
     #[cfg(feature = "fit")]
     pub(crate) fn coordinate_at(&self, node: usize, a: usize) -> (f64, Vec<f64>, Vec<f64>) {
-        let value = self.motion.states()[node].q[a];
-        Self::parted(value, &self.nodes[node].state, N + a)
+        let value = self.motion.states()[node].q.as_ref()[a];
+        self.parted(value, &self.nodes[node].state, self.coordinates() + a)
     }
 
     #[cfg(feature = "fit")]
-    fn parted(value: f64, slopes: &DMatrix<f64>, row: usize) -> (f64, Vec<f64>, Vec<f64>) {
+    fn parted(&self, value: f64, slopes: &DMatrix<f64>, row: usize) -> (f64, Vec<f64>, Vec<f64>) {
         let all: Vec<f64> = slopes.row(row).iter().copied().collect();
-        let (by_start, by_parameters) = all.split_at(2 * N);
+        let (by_start, by_parameters) = all.split_at(2 * self.coordinates());
         (value, by_parameters.to_vec(), by_start.to_vec())
     }
 
@@ -154,7 +161,7 @@ impl<const N: usize> Sensitive<N> {
     }
 }
 
-impl<const N: usize> fmt::Debug for Sensitive<N> {
+impl<const N: usize, L: Length<N>> fmt::Debug for Sensitive<N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Sensitive")
             .field("parameters", &self.parameters)
@@ -165,19 +172,19 @@ impl<const N: usize> fmt::Debug for Sensitive<N> {
 
 /// The derivatives of a motion by one parameter a.
 #[derive(Clone, Copy, Debug)]
-pub struct ByParameter<'s, const N: usize> {
-    of: &'s Sensitive<N>,
+pub struct ByParameter<'s, const N: usize, L: Length<N> = FixedLength> {
+    of: &'s Sensitive<N, L>,
     column: usize,
 }
 
-impl<const N: usize> ByParameter<'_, N> {
+impl<const N: usize, L: Length<N>> ByParameter<'_, N, L> {
     /// ∂q/∂a, ∂p/∂a and ∂v/∂a at the last node, with its time.
-    pub fn last(&self) -> Node<N> {
+    pub fn last(&self) -> Node<N, L> {
         self.at(self.of.motion.last().t, self.of.last())
     }
 
     /// The same at all recorded nodes, in the order of [`Motion::states`].
-    pub fn states(&self) -> Vec<Node<N>> {
+    pub fn states(&self) -> Vec<Node<N, L>> {
         let nodes = self.of.motion.states().iter().zip(&self.of.nodes);
         nodes
             .map(|(node, slopes)| self.at(node.t, slopes))
@@ -197,46 +204,50 @@ impl<const N: usize> ByParameter<'_, N> {
         found.and_then(|(_, slopes)| slopes.get(self.column).copied())
     }
 
-    fn at(&self, t: f64, slopes: &Slopes) -> Node<N> {
+    fn at(&self, t: f64, slopes: &Slopes) -> Node<N, L> {
         let state = |row: usize| slopes.state[(row, self.column)];
         let velocity = |row: usize| slopes.velocity[(row, self.column)];
+        let (like, n) = (&self.of.motion.last().q, self.of.coordinates());
         Node {
             t,
-            q: std::array::from_fn(|a| state(N + a)),
-            p: std::array::from_fn(state),
-            v: std::array::from_fn(velocity),
+            q: L::from_fn(like, |a| state(n + a)),
+            p: L::from_fn(like, state),
+            v: L::from_fn(like, velocity),
         }
     }
 }
 
 /// The derivatives of a motion by its start: matrices of 2N × 2N, ordered (p, q), whose blocks have names ([`Blocks`](crate::stability::Blocks)).
 #[derive(Clone, Copy, Debug)]
-pub struct ByStart<'s, const N: usize> {
-    of: &'s Sensitive<N>,
+pub struct ByStart<'s, const N: usize, L: Length<N> = FixedLength> {
+    of: &'s Sensitive<N, L>,
 }
 
-impl<const N: usize> ByStart<'_, N> {
+impl<const N: usize, L: Length<N>> ByStart<'_, N, L> {
     /// ∂(p, q)/∂(p₀, q₀) at the last node.
     pub fn last(&self) -> DMatrix<f64> {
-        Self::of(self.of.last())
+        self.matrix(self.of.last())
     }
 
     /// The same at all recorded nodes, in the order of [`Motion::states`].
     pub fn matrices(&self) -> Vec<DMatrix<f64>> {
-        self.of.nodes.iter().map(Self::of).collect()
+        (self.of.nodes.iter().map(|slopes| self.matrix(slopes))).collect()
     }
 
     /// The gradients of an output at all recorded nodes, by q₀ and p₀; `None` where the model declares no such name.
-    pub fn output(&self, name: &str) -> Option<Vec<State<N>>> {
+    pub fn output(&self, name: &str) -> Option<Vec<L::State>> {
         let row = self.of.output(name)?;
-        let gradient = |slopes: &Slopes| State {
-            q: std::array::from_fn(|a| slopes.outputs[(row, N + a)]),
-            p: std::array::from_fn(|a| slopes.outputs[(row, a)]),
+        let (like, n) = (&self.of.motion.last().q, self.of.coordinates());
+        let gradient = |slopes: &Slopes| {
+            let q = L::from_fn(like, |a| slopes.outputs[(row, n + a)]);
+            let p = L::from_fn(like, |a| slopes.outputs[(row, a)]);
+            L::state(q, p)
         };
         Some(self.of.nodes.iter().map(gradient).collect())
     }
 
-    fn of(slopes: &Slopes) -> DMatrix<f64> {
-        slopes.state.columns(0, 2 * N).into_owned()
+    fn matrix(&self, slopes: &Slopes) -> DMatrix<f64> {
+        let size = 2 * self.of.coordinates();
+        slopes.state.columns(0, size).into_owned()
     }
 }

@@ -1,6 +1,6 @@
 //! Runs with the transition matrix of every element.
 
-mod family;
+pub(in crate::simulation) mod family;
 
 use super::events::Severed;
 use super::follow::{Follow, Passed};

@@ -46,15 +46,7 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
         Err(RunErrorKind::run_time_length("hold"))
     }
 
-    /// Refused: parameters of models of run-time length have no derivatives.
-    ///
-    /// # Errors
-    /// [`RunErrorKind::Unsupported`], in any case.
-    pub fn run_sensitive(&self, start: FamilyState, span: Range<f64>) -> Refused {
-        self.refuse("run_sensitive", &start, &span)
-    }
-
-    /// Refused, as [`run_sensitive`](Self::run_sensitive) is.
+    /// Refused: losses of models of run-time length have no gradients backwards. [`run_sensitive`](Self::run_sensitive) gives derivatives.
     ///
     /// # Errors
     /// [`RunErrorKind::Unsupported`], in any case.

@@ -1,5 +1,7 @@
 //! Runs with derivatives by parameters and by the start (T-123, T-124).
 
+mod family;
+
 use super::checks::check_start;
 use super::events::Severed;
 use super::events::act::{Near, state_after};

@@ -18,6 +18,8 @@ mod outputs;
 #[cfg(feature = "sparse")]
 mod rates;
 #[cfg(feature = "sparse")]
+mod sensitive;
+#[cfg(feature = "sparse")]
 mod stiff;
 mod strides;
 #[cfg(feature = "sparse")]

@@ -115,8 +115,8 @@ const _: () = {
                 q: &mut first.q[..__tfe_length],
                 force: &mut first.force[..__tfe_length],
             };
-            let a = t.like(self.a);
-            let k = t.like(self.k);
+            let a = t.parameter(self.m.len() + 1, self.a);
+            let k = t.parameter(self.m.len(), self.k);
             first.q.fill(t.like(0.0));
             /// L_v, L_q, Q
             let t0 = q[0] - q[1];
@@ -127,7 +127,7 @@ const _: () = {
             first.force[self.n] = -z[self.n];
             /// L_v
             for i in 0..self.n {
-                first.z[i + 1] = t.like(self.m[i]) * z[i + 1];
+                first.z[i + 1] = t.parameter(i, self.m[i]) * z[i + 1];
             }
             /// L_q
             for i in 0..self.w {
@@ -265,6 +265,39 @@ const _: () = {
             let __tfe_length = 1usize.saturating_add(self.n);
             let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
             values[0] = q[self.n] - q[1];
+        }
+        fn parameters(&self) -> usize {
+            self.m.len() + 1 + 1
+        }
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            if index < self.m.len() {
+                return __tfe::CoordinateName::element("m", index);
+            }
+            let index = index - self.m.len();
+            if index == 0 {
+                return __tfe::CoordinateName::single("k");
+            }
+            let index = index - 1;
+            if index == 0 {
+                return __tfe::CoordinateName::single("a");
+            }
+            let index = index - 1;
+            __tfe::CoordinateName::element("", index)
+        }
+        fn parameter(&self, index: usize) -> f64 {
+            if index < self.m.len() {
+                return self.m[index];
+            }
+            let index = index - self.m.len();
+            if index == 0 {
+                return self.k;
+            }
+            let index = index - 1;
+            if index == 0 {
+                return self.a;
+            }
+            let index = index - 1;
+            ::core::primitive::f64::NAN
         }
     }
 };

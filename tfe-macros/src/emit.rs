@@ -21,6 +21,8 @@ pub(crate) struct Emitter<'a> {
     inputs: &'a [String],
     /// The numbers of parameters, of arrays that of the first element, by their fields.
     places: &'a BTreeMap<String, Affine>,
+    /// The same of a model of run-time length.
+    run_time_places: BTreeMap<String, TokenStream>,
     /// Where second derivatives go: `second.`, or nothing where the mass matrix alone is an argument.
     second: TokenStream,
     /// Second derivatives are told entry by entry, as those of models of run-time length are.
@@ -88,6 +90,7 @@ impl<'a> Emitter<'a> {
             taken: BTreeSet::new(),
             numbered: 0,
             parameters: BTreeMap::new(),
+            run_time_places: BTreeMap::new(),
             keeps: BTreeMap::new(),
             value: None,
         }
@@ -102,6 +105,15 @@ impl<'a> Emitter<'a> {
     /// The same for a model whose parameters have numbers.
     pub(crate) fn with_parameters(mut self, places: &'a BTreeMap<String, Affine>) -> Self {
         self.places = places;
+        self
+    }
+
+    /// The same for a model of run-time length.
+    pub(crate) fn with_run_time_parameters(
+        mut self,
+        places: BTreeMap<String, TokenStream>,
+    ) -> Self {
+        self.run_time_places = places;
         self
     }
 
@@ -232,7 +244,9 @@ impl<'a> Emitter<'a> {
     /// The parameters that have been read so far.
     pub(crate) fn parameters(&self) -> TokenStream {
         let parameters = self.parameters.iter().map(|(field, local)| {
-            let (place, field) = (self.places.get(field).map(index), identifier(field));
+            let place = self.places.get(field).map(index);
+            let place = place.or_else(|| self.run_time_places.get(field).cloned());
+            let field = identifier(field);
             match place {
                 Some(place) => quote!(let #local = t.parameter(#place, self.#field);),
                 None => quote!(let #local = t.like(self.#field);),
@@ -587,7 +601,17 @@ impl<'a> Emitter<'a> {
                         let place = index(&place);
                         quote!(t.parameter(#place, #element))
                     }
-                    None => quote!(t.like(#element)),
+                    None => match self.run_time_places.get(name) {
+                        Some(first) => {
+                            let a = index(a);
+                            let place = match first.to_string().as_str() {
+                                "0" => quote!(#a),
+                                _ => quote!(#first + #a),
+                            };
+                            quote!(t.parameter(#place, #element))
+                        }
+                        None => quote!(t.like(#element)),
+                    },
                 }
             }
             // Entries of lists may be any numbers.

@@ -10,6 +10,7 @@ use crate::emit::{Body, Emitter};
 use crate::headings::Headings;
 use crate::indices;
 use crate::page::{self, Formulas};
+use crate::parameters::RunTimeParameters;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use std::collections::BTreeMap;
@@ -30,6 +31,7 @@ pub(crate) fn expand(
     let kernels = Kernels {
         declared,
         derivation,
+        parameters: RunTimeParameters::of(item),
         dof: length(&declared.dof),
     };
     let implementation = kernels.implementation(item, path);
@@ -40,6 +42,7 @@ pub(crate) fn expand(
 struct Kernels<'a> {
     declared: &'a Declared,
     derivation: &'a Derivation,
+    parameters: RunTimeParameters,
     /// The number of coordinates.
     dof: TokenStream,
 }
@@ -57,8 +60,18 @@ enum Given {
 impl Kernels<'_> {
     /// The body of a kernel, with its slices cut to the length of the model so that the compiler knows it.
     fn body(&self, program: &Program, given: Given) -> Body {
+        self.body_by(self.emitter(), program, given)
+    }
+
+    /// The same of a kernel that is differentiated by parameters.
+    fn sensitive_body(&self, program: &Program, given: Given) -> Body {
+        let places = self.parameters.places();
+        let emitter = self.emitter().with_run_time_parameters(places);
+        self.body_by(emitter, program, given)
+    }
+
+    fn body_by(&self, emitter: Emitter<'_>, program: &Program, given: Given) -> Body {
         let cut = self.cut(given);
-        let emitter = self.emitter();
         let emitter = match given {
             Given::Forces => {
                 let strides = self.strides(program);
@@ -158,7 +171,7 @@ impl Kernels<'_> {
         };
         (!observables.is_empty()).then(|| {
             let program = self.program(request);
-            let body = self.body(&program, Given::Nothing).statements;
+            let body = self.sensitive_body(&program, Given::Nothing).statements;
             observable::members(observables, &body)
         })
     }
@@ -192,7 +205,9 @@ impl Kernels<'_> {
         let mass_doc = page::kernel(&formulas.mass, &self.program(mass));
         let seconds = format!("{}, {}", formulas.first, formulas.second);
         let second_doc = page::kernel(&seconds, &self.program(second));
-        let first = self.body(&self.program(first), Given::First).statements;
+        let first = self
+            .sensitive_body(&self.program(first), Given::First)
+            .statements;
         let forces = self.derivation.forces();
         let assigns = self.strides(&forces).filter(|strides| strides.assigns);
         let assigns = assigns.map(|_| {
@@ -214,6 +229,7 @@ impl Kernels<'_> {
         let (dof, check) = (&self.dof, self.check());
         let coordinate_name = self.coordinate_name();
         let observables = self.observables();
+        let parameters = self.parameters.members();
         let constraints = constraint::members(self.declared, self.derivation, &self.dof);
         quote! {
             const _: () = {
@@ -298,6 +314,7 @@ impl Kernels<'_> {
                     #coordinate_name
                     #constraints
                     #observables
+                    #parameters
                 }
             };
         }

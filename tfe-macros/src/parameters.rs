@@ -1,8 +1,9 @@
 //! The parameters of a model by number: fields that are numbers, and the elements of fields that are arrays of numbers.
+//! Those of models of run-time length are numbered when they run.
 
 use crate::indices::{identifier, index};
 use crate::input;
-use proc_macro2::TokenStream;
+use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use std::collections::BTreeMap;
 use syn::ItemStruct;
@@ -157,6 +158,116 @@ impl Parameters {
             }
 
             #with_parameter
+        }
+    }
+}
+
+/// The parameters of a model of run-time length, in the order of the struct.
+pub(crate) struct RunTimeParameters {
+    /// Names, and how many there are; of single numbers nothing.
+    fields: Vec<(String, Option<TokenStream>)>,
+}
+
+impl RunTimeParameters {
+    pub(crate) fn of(item: &ItemStruct) -> Self {
+        let size = |field: Field| {
+            let name = identifier(&field.name);
+            let size = match field.kind {
+                FieldKind::Scalar => None,
+                FieldKind::Vector => Some(quote!(self.#name.len())),
+                FieldKind::Array(Length::Literal(length)) => {
+                    let length = Literal::usize_unsuffixed(length);
+                    Some(quote!(#length))
+                }
+                FieldKind::Array(Length::ConstParameter(length)) => {
+                    let length = identifier(&length);
+                    Some(quote!(#length))
+                }
+                _ => return None,
+            };
+            Some((field.name, size))
+        };
+        let context = input::context(item);
+        Self {
+            fields: context.fields.into_iter().filter_map(size).collect(),
+        }
+    }
+
+    /// The number of the first parameter of each field.
+    pub(crate) fn places(&self) -> BTreeMap<String, TokenStream> {
+        let (mut singles, mut sizes) = (0_usize, Vec::new());
+        let mut places = BTreeMap::new();
+        for (name, size) in &self.fields {
+            let count = Literal::usize_unsuffixed(singles);
+            let place = match (&sizes[..], singles) {
+                ([], _) => quote!(#count),
+                (sizes, 0) => quote!(#(#sizes)+*),
+                (sizes, _) => quote!(#(#sizes)+* + #count),
+            };
+            places.insert(name.clone(), place);
+            match size {
+                None => singles += 1,
+                Some(size) => sizes.push(size.clone()),
+            }
+        }
+        places
+    }
+
+    /// `parameters`, `parameter_name` and `parameter` of an implementation of `FamilyModel`.
+    pub(crate) fn members(&self) -> TokenStream {
+        if self.fields.is_empty() {
+            return TokenStream::new();
+        }
+        let one = quote!(1);
+        let sizes = (self.fields.iter()).map(|(_, size)| size.as_ref().unwrap_or(&one));
+        let count = quote!(#(#sizes)+*);
+        let arms = |single: &dyn Fn(&str) -> TokenStream, element: &dyn Fn(&str) -> TokenStream| {
+            let arm = |(name, size): &(String, Option<TokenStream>)| match size {
+                None => {
+                    let value = single(name);
+                    quote! {
+                        if index == 0 { return #value; }
+                        let index = index - 1;
+                    }
+                }
+                Some(size) => {
+                    let value = element(name);
+                    quote! {
+                        if index < #size { return #value; }
+                        let index = index - #size;
+                    }
+                }
+            };
+            self.fields.iter().map(arm).collect::<TokenStream>()
+        };
+        let names = arms(
+            &|name| quote!(__tfe::CoordinateName::single(#name)),
+            &|name| quote!(__tfe::CoordinateName::element(#name, index)),
+        );
+        let values = arms(
+            &|name| {
+                let name = identifier(name);
+                quote!(self.#name)
+            },
+            &|name| {
+                let name = identifier(name);
+                quote!(self.#name[index])
+            },
+        );
+        quote! {
+            fn parameters(&self) -> usize {
+                #count
+            }
+
+            fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+                #names
+                __tfe::CoordinateName::element("", index)
+            }
+
+            fn parameter(&self, index: usize) -> f64 {
+                #values
+                ::core::primitive::f64::NAN
+            }
         }
     }
 }

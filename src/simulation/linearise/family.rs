@@ -67,17 +67,27 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             return Ok(Linearised::free(motion, transitions));
         };
         let (time, step, _) = elements[number];
-        let kind = match error {
-            family::OperatorError::Family(error) => RunErrorKind::Family(error),
-            family::OperatorError::Step(source) => RunErrorKind::Solve {
-                element: number,
-                time,
-                step,
-                source,
-            },
-            _ => RunErrorKind::run_time_length("run_linearised"),
-        };
+        let kind = operator_failed(error, (number, time, step), "run_linearised");
         Err(RunError::new(kind, motion))
+    }
+}
+
+/// Why an element, given by its number, time and length, has no derivative.
+#[cfg(feature = "sparse")]
+pub(in crate::simulation) fn operator_failed(
+    error: family::OperatorError,
+    (element, time, step): (usize, f64, f64),
+    call: &'static str,
+) -> RunErrorKind {
+    match error {
+        family::OperatorError::Family(error) => RunErrorKind::Family(error),
+        family::OperatorError::Step(source) => RunErrorKind::Solve {
+            element,
+            time,
+            step,
+            source,
+        },
+        _ => RunErrorKind::run_time_length(call),
     }
 }
 

@@ -169,6 +169,23 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
     ) {
     }
 
+    /// The number of parameters: fields that are numbers, and the elements of fields that are arrays or vectors of numbers, in the order of the struct. Zero for models of
+    /// hand-written kernels that do not say. [`first`](Self::first) and [`observables`](Self::observables) of those that do make each parameter by [`Real::parameter`], so that
+    /// numbers may carry derivatives by it.
+    fn parameters(&self) -> usize {
+        0
+    }
+
+    /// The name of a parameter, `m` or `k[2]`.
+    fn parameter_name(&self, index: usize) -> CoordinateName {
+        CoordinateName::element("", index)
+    }
+
+    /// The value of a parameter; NaN beyond them.
+    fn parameter(&self, _index: usize) -> f64 {
+        f64::NAN
+    }
+
     /// The names of the observables as declared.
     const OBSERVABLES: &'static [&'static str] = &[];
 

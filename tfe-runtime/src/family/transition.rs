@@ -102,11 +102,13 @@ pub struct TransitionOperator {
     dense: DenseElement,
     by_length: Vec<f64>,
     by_damping: Vec<f64>,
+    by_parameters: Vec<Vec<f64>>,
 }
 
-/// What changes in an element, by point and coordinate: q_l and F_l before rates answer; by coordinate: p₀, and q₁ − h Σ β ν.
-struct Change<S, F, P, A> {
+/// What changes in an element, by point and coordinate: q_l, L_v,l and F_l before rates answer; by coordinate: p₀, and q₁ − h Σ β ν.
+struct Change<S, L, F, P, A> {
     shift: S,
+    lift: L,
     push: F,
     impulse: P,
     advance: A,
@@ -143,6 +145,24 @@ impl TransitionOperator {
         steps: impl IntoIterator<Item = (f64, f64, &'s FamilyState)>,
         mut each: impl FnMut(Self),
     ) -> Result<(), (usize, OperatorError)> {
+        let each = |transition| {
+            each(transition);
+            Ok(())
+        };
+        Self::of_steps_by(model, element, (damping, &[]), steps, each)
+    }
+
+    /// The same with the derivatives by some of the parameters, by their numbers; `each` may end it.
+    ///
+    /// # Errors
+    /// As [`of_steps`](Self::of_steps), and what `each` ends it with.
+    pub fn of_steps_by<'s, M: Model>(
+        model: &M,
+        element: Element,
+        (damping, parameters): (f64, &[usize]),
+        steps: impl IntoIterator<Item = (f64, f64, &'s FamilyState)>,
+        mut each: impl FnMut(Self) -> Result<(), OperatorError>,
+    ) -> Result<(), (usize, OperatorError)> {
         let refused = |error: OperatorError| (0, error);
         let table = Self::admitted::<M>(model, element).map_err(refused)?;
         let view = View::new(model, damping).map_err(|error| refused(error.into()))?;
@@ -151,7 +171,11 @@ impl TransitionOperator {
         let pattern = Arc::new(Pattern::of(&view));
         for (number, (t, h, state)) in steps.into_iter().enumerate() {
             let transition = Self::next(&view, &mut rates, (&table, &pattern), state, (t, h));
-            each(transition.map_err(|error| (number, error))?);
+            let done = transition.and_then(|mut transition| {
+                transition.answer(&view, &rates, (t, h), parameters);
+                each(transition)
+            });
+            done.map_err(|error| (number, error))?;
         }
         Ok(())
     }
@@ -218,6 +242,7 @@ impl TransitionOperator {
             dense: rates.dense(t, t + h),
             by_length: Vec::new(),
             by_damping: Vec::new(),
+            by_parameters: Vec::new(),
         };
         transition.differentiate(rates);
         Ok(transition)
@@ -234,17 +259,54 @@ impl TransitionOperator {
         let h = self.h;
         let by_length = self.respond(&Change {
             shift: |l: usize, a: usize| sum(&scheme.position[l * count..(l + 1) * count], a),
+            lift: |_, _| 0.0,
             push: |l: usize, a: usize| rates.points[l].force[a] / h,
             impulse: |_| 0.0,
             advance: |a| sum(scheme.advance, a),
         });
         let by_damping = self.respond(&Change {
             shift: |_, _| 0.0,
+            lift: |_, _| 0.0,
             push: |l: usize, a: usize| rates.points[l].v[a],
             impulse: |_| 0.0,
             advance: |_| 0.0,
         });
         (self.by_length, self.by_damping) = (by_length, by_damping);
+    }
+
+    /// The derivatives by parameters.
+    fn answer<M: Model>(
+        &mut self,
+        view: &View<'_, M>,
+        rates: &Rates<&View<'_, M>>,
+        (t, h): (f64, f64),
+        parameters: &[usize],
+    ) {
+        let n = self.end.q.len();
+        let (still, mut unused) = (vec![0.0; n], vec![0.0; n]);
+        for parameter in parameters {
+            let mut points = Vec::with_capacity(rates.points.len());
+            for (l, point) in rates.points.iter().enumerate() {
+                let time = t + h * self.table.view().nodes[l];
+                let mut by = view.by_parameter(time, &point.q, &point.v, *parameter);
+                self.bend(l, &still, &by.velocity, &mut unused, &mut by.force);
+                points.push(by);
+            }
+            let end = self.respond(&Change {
+                shift: |_, _| 0.0,
+                lift: |l: usize, a: usize| points[l].momentum[a],
+                push: |l: usize, a: usize| points[l].force[a],
+                impulse: |_| 0.0,
+                advance: |_| 0.0,
+            });
+            self.by_parameters.push(end);
+        }
+    }
+
+    /// ∂(p₁, q₁)/∂a, one for each parameter that was asked for.
+    #[must_use]
+    pub fn by_parameters(&self) -> &[Vec<f64>] {
+        &self.by_parameters
     }
 
     /// The numbers of the phase space, 2n.
@@ -291,6 +353,7 @@ impl TransitionOperator {
         let (p, q) = input.split_at(needed / 2);
         let end = self.respond(&Change {
             shift: |_, a: usize| q[a],
+            lift: |_, _| 0.0,
             push: |_, _| 0.0,
             impulse: |a: usize| p[a],
             advance: |a: usize| q[a],
@@ -308,6 +371,7 @@ impl TransitionOperator {
             let (from_p, a) = (column < size / 2, column % (size / 2).max(1));
             let end = self.respond(&Change {
                 shift: |_, b: usize| unit(!from_p && a == b),
+                lift: |_, _| 0.0,
                 push: |_, _| 0.0,
                 impulse: |b: usize| unit(from_p && a == b),
                 advance: |b: usize| unit(!from_p && a == b),
@@ -318,9 +382,10 @@ impl TransitionOperator {
     }
 
     /// The end of the step after a change.
-    fn respond<S, F, P, A>(&self, change: &Change<S, F, P, A>) -> Vec<f64>
+    fn respond<S, L, F, P, A>(&self, change: &Change<S, L, F, P, A>) -> Vec<f64>
     where
         S: Fn(usize, usize) -> f64,
+        L: Fn(usize, usize) -> f64,
         F: Fn(usize, usize) -> f64,
         P: Fn(usize) -> f64,
         A: Fn(usize) -> f64,
@@ -330,6 +395,7 @@ impl TransitionOperator {
         let (count, points) = (scheme.unknowns(), scheme.points());
         let Change {
             shift,
+            lift,
             push,
             impulse,
             advance,
@@ -339,7 +405,7 @@ impl TransitionOperator {
             [vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]];
         for l in 0..points {
             for a in 0..n {
-                (q[a], momentum[a], force[a]) = (shift(l, a), 0.0, push(l, a));
+                (q[a], momentum[a], force[a]) = (shift(l, a), lift(l, a), push(l, a));
             }
             self.bend(l, &q, &v, &mut momentum, &mut force);
             for (a, sides) in rates.chunks_exact_mut(count).enumerate() {

@@ -3,9 +3,11 @@
 use super::error::ModelError;
 use super::inertia::Inertia;
 use super::model::{Block, Entries, Gradient, Model};
+use crate::dual::Dual;
 use crate::length::{Declared, RunTimeLength};
 use crate::model::{CoordinateName, Facts, Form};
 use crate::real::Real;
+use alloc::vec;
 use alloc::vec::Vec;
 
 /// A model by its Lagrangian, with an additional force γ v.
@@ -50,6 +52,56 @@ impl<'m, M: Model> View<'m, M> {
         masses.map(|(mass, v)| *v * v.like(*mass)).collect()
     }
 
+    /// What a parameter does at a place.
+    pub(super) fn by_parameter(&self, t: f64, q: &[f64], v: &[f64], parameter: usize) -> Answer {
+        let still = |values: &[f64]| -> Vec<Dual> {
+            let duals = values.iter().map(|value| Dual::new(*value, 0.0));
+            duals.collect()
+        };
+        let n = self.model.len();
+        let (mut z, mut slope, mut force) = (
+            vec![Dual::ZERO; n],
+            vec![Dual::ZERO; n],
+            vec![Dual::ZERO; n],
+        );
+        let first = Gradient {
+            z: &mut z,
+            q: &mut slope,
+            force: &mut force,
+        };
+        let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
+        let momenta = self.momenta(v);
+        let (taken, sign) = match self.is_hamiltonian() {
+            true => (&momenta[..], -1.0),
+            false => (v, 1.0),
+        };
+        self.model.first(time, &still(q), &still(taken), first);
+        let force = slope.iter().zip(&force).map(|(slope, force)| {
+            let given = sign * slope.slope;
+            if M::FACTS.forced {
+                given + force.slope
+            } else {
+                given
+            }
+        });
+        let force = force.collect();
+        let by_z = z.iter().map(|one| sign * one.slope);
+        if !self.is_hamiltonian() {
+            return Answer {
+                velocity: vec![0.0; n],
+                momentum: by_z.collect(),
+                force,
+            };
+        }
+        // v = H_p(q, p) stays where the momentum answers: δp = −M ∂H_p/∂a.
+        let velocity: Vec<f64> = by_z.collect();
+        Answer {
+            momentum: self.momenta(&velocity),
+            velocity,
+            force,
+        }
+    }
+
     /// From derivatives of H to those of L, and the additional force.
     fn turn<R: Real>(&self, v: &[R], momenta: Vec<R>, first: Gradient<'_, R>) {
         if self.is_hamiltonian() {
@@ -63,6 +115,16 @@ impl<'m, M: Model> View<'m, M> {
             *force = if M::FACTS.forced { *force + push } else { push };
         }
     }
+}
+
+/// What a parameter does at fixed coordinates and velocities.
+pub(super) struct Answer {
+    /// ∂L_v/∂a
+    pub(super) momentum: Vec<f64>,
+    /// ∂F/∂a at fixed momenta for a Hamiltonian, else at fixed velocities; F = L_q + Q.
+    pub(super) force: Vec<f64>,
+    /// The velocity that M makes of the change of momenta of a Hamiltonian, else zero: by what F changes besides.
+    pub(super) velocity: Vec<f64>,
 }
 
 /// The parts of a gradient, for a while.

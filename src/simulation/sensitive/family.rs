@@ -1,0 +1,172 @@
+//! The same for models of run-time length.
+
+use super::super::setup::Simulation;
+use crate::error::{RunError, RunErrorKind};
+use crate::length::RunTimeLength;
+use crate::motion::Motion;
+use crate::sensitivity::Sensitive;
+use std::ops::Range;
+use tfe_runtime::family::{self, FamilyState};
+#[cfg(feature = "sparse")]
+use {
+    super::super::follow::{Follow, Passed},
+    super::super::linearise::family::operator_failed,
+    crate::motion::Node,
+    crate::sensitivity::Slopes,
+    crate::sensitivity::run_time::Along,
+    nalgebra::{DMatrix, DVector},
+    tfe_runtime::transition::TransitionError,
+};
+
+impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
+    /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node by all parameters of the model and by the start.
+    ///
+    /// Parameters are fields that are numbers and elements of fields that are vectors of numbers. Every element is solved once more, with sparse factors, and then once for each number
+    /// of the start and each parameter; what is kept of a node are 2n (2n + parameters) numbers and as many for velocities and outputs
+    /// ([`record_every`](Self::record_every) keeps fewer nodes).
+    ///
+    /// # Errors
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`] without the feature `sparse`, for models with constraints, and for events that change the state.
+    #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
+    pub fn run_sensitive(
+        &self,
+        start: FamilyState,
+        span: Range<f64>,
+    ) -> Result<Sensitive<0, RunTimeLength>, RunError<0, RunTimeLength>> {
+        let unsupported = |of: &'static str, motion: Motion<0, RunTimeLength>| {
+            let call = "run_sensitive";
+            RunError::new(RunErrorKind::Unsupported { call, of }, motion)
+        };
+        let unasked = || Motion::unasked(span.start, &start);
+        if !cfg!(feature = "sparse") {
+            let of = "models of run-time length without the feature `sparse`";
+            return Err(unsupported(of, unasked()));
+        }
+        if const { M::CONSTRAINED } {
+            let of = "models of run-time length with constraints";
+            return Err(unsupported(of, unasked()));
+        }
+        #[cfg(not(feature = "sparse"))]
+        return Ok(Sensitive::new(
+            unasked(),
+            Vec::new(),
+            Vec::new(),
+            Vec::new(),
+        ));
+        #[cfg(feature = "sparse")]
+        {
+            let mut trail = Trail::default();
+            let motion = self.drive(start.clone(), &span, std::convert::identity, &mut trail)?;
+            if motion.arcs().count() > 1 {
+                let of = "models of run-time length whose events change the state";
+                return Err(unsupported(of, motion));
+            }
+            self.differentiated(motion, &trail)
+        }
+    }
+
+    #[cfg(feature = "sparse")]
+    fn differentiated(
+        &self,
+        motion: Motion<0, RunTimeLength>,
+        trail: &Trail,
+    ) -> Result<Sensitive<0, RunTimeLength>, RunError<0, RunTimeLength>> {
+        let model = self.model;
+        let parameters: Vec<usize> = (0..model.parameters()).collect();
+        let size = 2 * model.len();
+        let mut current = DMatrix::identity(size, size + parameters.len());
+        let mut nodes = trail.nodes.iter().peekable();
+        let mut slopes = Vec::with_capacity(trail.nodes.len());
+        let mut record = |passed: usize, current: &DMatrix<f64>| {
+            while let Some((_, node)) = nodes.next_if(|(own, _)| *own == passed) {
+                slopes.push(slopes_at(model, node, current));
+            }
+        };
+        record(0, &current);
+        let mut passed = 0;
+        let each = |transition: family::TransitionOperator| {
+            let mut next = DMatrix::zeros(current.nrows(), current.ncols());
+            for (from, mut to) in current.column_iter().zip(next.column_iter_mut()) {
+                let from: Vec<f64> = from.iter().copied().collect();
+                let mut end = vec![0.0; size];
+                transition.apply(&from, &mut end)?;
+                to.copy_from_slice(&end);
+            }
+            for (by, mut to) in transition
+                .by_parameters()
+                .iter()
+                .zip(next.column_iter_mut().skip(size))
+            {
+                to += DVector::from_column_slice(by);
+            }
+            current = next;
+            passed += 1;
+            record(passed, &current);
+            Ok(())
+        };
+        let steps = trail.elements.iter();
+        let steps = steps.map(|(t, h, before)| (*t, *h, before));
+        let asked = (0.0, &parameters[..]);
+        let element = self.chosen_element();
+        let found = family::TransitionOperator::of_steps_by(model, element, asked, steps, each);
+        if let Err((number, error)) = found {
+            let (time, step, _) = trail.elements[number];
+            let kind = operator_failed(error, (number, time, step), "run_sensitive");
+            return Err(RunError::new(kind, motion));
+        }
+        let names = parameters.iter();
+        let names = names.map(|index| model.parameter_name(*index).to_string());
+        Ok(Sensitive::new(motion, names.collect(), slopes, Vec::new()))
+    }
+}
+
+/// The derivatives at a node, from those of its state.
+#[cfg(feature = "sparse")]
+fn slopes_at<M: family::Model>(
+    model: &M,
+    node: &Node<0, RunTimeLength>,
+    current: &DMatrix<f64>,
+) -> Slopes {
+    let along = Along::new(model, node);
+    let (n, columns) = (model.len(), current.ncols());
+    let mut slopes = Slopes {
+        state: current.clone(),
+        velocity: DMatrix::zeros(n, columns),
+        outputs: DMatrix::zeros(model.columns(), columns),
+    };
+    for (column, change) in current.column_iter().enumerate() {
+        let change: Vec<f64> = change.iter().copied().collect();
+        let (velocity, outputs) = along.slopes(&change, column.checked_sub(2 * n));
+        slopes
+            .velocity
+            .column_mut(column)
+            .copy_from_slice(&velocity);
+        slopes.outputs.column_mut(column).copy_from_slice(&outputs);
+    }
+    slopes
+}
+
+/// The elements passed so far (start, length, and the state before), and the recorded nodes with how many elements there were before them.
+#[cfg(feature = "sparse")]
+#[derive(Default)]
+struct Trail {
+    elements: Vec<(f64, f64, FamilyState)>,
+    nodes: Vec<(usize, Node<0, RunTimeLength>)>,
+}
+
+#[cfg(feature = "sparse")]
+impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail {
+    fn passed(
+        &mut self,
+        _: &mut family::Stepper<'m, M>,
+        passed: &Passed<'_, 0, RunTimeLength>,
+    ) -> Result<(), TransitionError> {
+        let element = (passed.start, passed.h, passed.before.clone());
+        self.elements.push(element);
+        Ok(())
+    }
+
+    fn recorded(&mut self, node: &Node<0, RunTimeLength>) {
+        self.nodes.push((self.elements.len(), node.clone()));
+    }
+}

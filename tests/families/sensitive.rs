@@ -1,0 +1,295 @@
+//! Derivatives of motions of models of run-time length: those of models of fixed size, and differences of runs.
+
+use tfe::RunErrorKind;
+use tfe::family::RunError;
+use tfe::prelude::*;
+use tfe::{Model, family};
+
+/// Masses that depend on coordinates, forces, outputs of velocities, a vector of parameters before and between numbers.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m[i]/2*(1 + q[i]^2)*dot(q[i])^2) + sum(i in 0..n-1, a*dot(q[i])*dot(q[i+1])*sin(q[i]))
+        - sum(i in 0..n-1, s[i]/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^4),
+    force(q[i]) = -c*dot(q[i]) + c*sin(t),
+    output(power) = c*dot(q[0])^2 + s[1]*q[1],
+)]
+struct Long {
+    n: usize,
+    m: Vec<f64>,
+    a: f64,
+    s: Vec<f64>,
+    c: f64,
+}
+
+#[dynamics(
+    coordinates(q[5]),
+    lagrangian = sum(i in 0..5, m[i]/2*(1 + q[i]^2)*dot(q[i])^2) + sum(i in 0..4, a*dot(q[i])*dot(q[i+1])*sin(q[i]))
+        - sum(i in 0..4, s[i]/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^4),
+    force(q[i]) = -c*dot(q[i]) + c*sin(t),
+    output(power) = c*dot(q[0])^2 + s[1]*q[1],
+)]
+struct Five {
+    m: [f64; 5],
+    a: f64,
+    s: [f64; 4],
+    c: f64,
+}
+
+/// In phase space, with friction by momenta.
+#[dynamics(
+    coordinates(q[n]), momenta(p[n]),
+    hamiltonian = sum(i in 0..n, p[i]^2/(2*m)) + sum(i in 0..n-1, k[i]*(1 - cos(q[i+1] - q[i]))) + sum(i in 0..n, b*q[i]^4),
+    force(q[i]) = -c*p[i],
+    output(energy) = p[0]^2/(2*m) + b*q[0]^4,
+)]
+struct LongPendula {
+    n: usize,
+    m: f64,
+    k: Vec<f64>,
+    b: f64,
+    c: f64,
+}
+
+#[dynamics(
+    coordinates(q[3]), momenta(p[3]),
+    hamiltonian = sum(i in 0..3, p[i]^2/(2*m)) + sum(i in 0..2, k[i]*(1 - cos(q[i+1] - q[i]))) + sum(i in 0..3, b*q[i]^4),
+    force(q[i]) = -c*p[i],
+    output(energy) = p[0]^2/(2*m) + b*q[0]^4,
+)]
+struct ThreePendula {
+    m: f64,
+    k: [f64; 2],
+    b: f64,
+    c: f64,
+}
+
+/// The largest difference of all derivatives of two runs, over the largest derivative; and that there are as many.
+fn compare<M: family::Model, F: Model<N>, const N: usize>(
+    (long, long_run): (&M, Simulation<'_, M, 0, tfe::length::RunTimeLength>),
+    fixed_run: &Simulation<'_, F, N>,
+    start: State<N>,
+    output: &str,
+) -> f64 {
+    let span = 0.0..1.5;
+    let long_start = family::FamilyState {
+        q: start.q.to_vec(),
+        p: start.p.to_vec(),
+    };
+    let ours = long_run
+        .run_sensitive(long_start, span.clone())
+        .expect("a good run");
+    let theirs = fixed_run.run_sensitive(start, span).expect("a good run");
+    assert_eq!(ours.parameters(), theirs.parameters());
+    assert_eq!(ours.parameters().len(), long.parameters());
+    let (mut off, mut size) = (0.0_f64, 0.0_f64);
+    let mut see = |a: f64, b: f64| {
+        assert!(a.is_finite() && b.is_finite());
+        (off, size) = (off.max((a - b).abs()), size.max(b.abs()));
+    };
+    for name in theirs.parameters() {
+        let (ours, theirs) = (ours.by(name), theirs.by(name));
+        let (a, b) = (ours.states(), theirs.states());
+        assert_eq!(a.len(), b.len());
+        for (a, b) in a.iter().zip(&b) {
+            assert_eq!(a.t, b.t);
+            for k in 0..N {
+                see(a.q[k], b.q[k]);
+                see(a.p[k], b.p[k]);
+                see(a.v[k], b.v[k]);
+            }
+        }
+        let outputs =
+            [ours.output(output), theirs.output(output)].map(|one| one.expect("declared"));
+        for (a, b) in outputs[0].iter().zip(&outputs[1]) {
+            see(*a, *b);
+        }
+    }
+    let (a, b) = (ours.by_start().matrices(), theirs.by_start().matrices());
+    for (a, b) in a.iter().zip(&b) {
+        assert_eq!(a.shape(), b.shape());
+        for (a, b) in a.iter().zip(b.iter()) {
+            see(*a, *b);
+        }
+    }
+    let gradients = (
+        ours.by_start().output(output).expect("declared"),
+        theirs.by_start().output(output).expect("declared"),
+    );
+    for (a, b) in gradients.0.iter().zip(&gradients.1) {
+        for k in 0..N {
+            see(a.q[k], b.q[k]);
+            see(a.p[k], b.p[k]);
+        }
+    }
+    off / size
+}
+
+#[test]
+fn derivatives_are_those_of_models_of_fixed_size() {
+    let (m, s) = ([1.0, 1.5, 0.7, 2.0, 0.4], [1.0, 2.0, 0.5, 3.0]);
+    let (a, c) = (0.3, 0.2);
+    let long = Long {
+        n: 5,
+        m: m.to_vec(),
+        a,
+        s: s.to_vec(),
+        c,
+    };
+    let five = Five { m, a, s, c };
+    let start = five.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
+    for element in [
+        Element::mixed(4),
+        Element::mixed(3),
+        Element::radau(3),
+        Element::primal(3),
+    ] {
+        // Nodes that are not recorded, and an element that ends at a break.
+        let ours = Simulation::new(&long)
+            .element(element)
+            .step(0.1)
+            .break_at(0.55)
+            .record_every(2);
+        let theirs = Simulation::new(&five)
+            .element(element)
+            .step(0.1)
+            .break_at(0.55)
+            .record_every(2);
+        let off = compare((&long, ours), &theirs, start, "power");
+        // Roundings of fifteen steps and of both solutions.
+        assert!(off < 1e-12, "{element}: {off:.1e}");
+    }
+    let (m, k, b, c) = (0.7, [1.3, 2.1], 0.2, 0.15);
+    let long = LongPendula {
+        n: 3,
+        m,
+        k: k.to_vec(),
+        b,
+        c,
+    };
+    let three = ThreePendula { m, k, b, c };
+    let start = State {
+        q: [0.4, -0.3, 0.9],
+        p: [0.2, 0.5, -0.1],
+    };
+    for element in [Element::mixed(4), Element::radau(4)] {
+        let ours = Simulation::new(&long).element(element).step(0.1);
+        let theirs = Simulation::new(&three).element(element).step(0.1);
+        let off = compare((&long, ours), &theirs, start, "energy");
+        assert!(off < 1e-12, "{element}: {off:.1e}");
+    }
+}
+
+/// A hundred sites, of which each spring is a parameter, with a kick on the way: beside differences of runs.
+#[test]
+fn derivatives_of_a_hundred_sites_are_differences_of_runs() {
+    #[dynamics(
+        coordinates(q[n]),
+        lagrangian = sum(i in 0..n, m*dot(q[i])^2/2) - sum(i in 0..n-1, k[i]*((q[i+1] - q[i])^2/2 + (q[i+1] - q[i])^4/4)),
+    )]
+    struct Chain {
+        n: usize,
+        m: f64,
+        k: Vec<f64>,
+    }
+    const N: usize = 100;
+    let with = |site: usize, by: f64| {
+        let mut k: Vec<f64> = (0..N - 1).map(|i| 1.0 + 0.3 * (i as f64).sin()).collect();
+        k[site] += by;
+        Chain { n: N, m: 0.8, k }
+    };
+    let chain = with(0, 0.0);
+    let q: Vec<f64> = (0..N).map(|i| (0.4 * i as f64).cos()).collect();
+    let start = chain.state(q, vec![0.0; N]);
+    let mut kick = vec![0.0; N];
+    kick[50] = 0.7;
+    let run = |chain: &Chain| {
+        let motion = Simulation::new(chain)
+            .step(0.1)
+            .impulse(0.65, kick.clone())
+            .run(start.clone(), 0.0..2.0);
+        motion.expect("a good run").last().clone()
+    };
+    let sensitive = Simulation::new(&chain)
+        .step(0.1)
+        .impulse(0.65, kick.clone())
+        .record_every(100)
+        .run_sensitive(start.clone(), 0.0..2.0)
+        .expect("a good run");
+    assert_eq!(sensitive.parameters().len(), N);
+    for site in [0, 37, 50, 98] {
+        let found = sensitive.by(&format!("k[{site}]")).last();
+        // Of sixth order over a distance at which roundings leave 1e-13.
+        let d = 0.008;
+        let ends = [1.0, 2.0, 3.0].map(|k| [k, -k].map(|k| run(&with(site, k * d))));
+        for a in 0..N {
+            let slope = |of: &dyn Fn(&tfe::family::Node) -> f64| {
+                let half = |k: usize| of(&ends[k][0]) - of(&ends[k][1]);
+                (45.0 * half(0) - 9.0 * half(1) + half(2)) / (60.0 * d)
+            };
+            for (found, expected) in [
+                (found.q[a], slope(&|node| node.q[a])),
+                (found.p[a], slope(&|node| node.p[a])),
+                (found.v[a], slope(&|node| node.v[a])),
+            ] {
+                assert!(
+                    (found - expected).abs() < 2e-11,
+                    "{site} {a}: {found} {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_has_no_derivatives_is_told() {
+    #[dynamics(
+        coordinates(x[n], y[n]),
+        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
+        constraint(rod[i in 0..n]) = x[i]^2 + y[i]^2 - 1,
+    )]
+    struct Rods {
+        n: usize,
+    }
+    let rods = Rods { n: 2 };
+    let start = rods.state([1.0, 1.0, 0.0, 0.0], [0.0; 4]);
+    let told = |error: RunError| match error.kind() {
+        RunErrorKind::Unsupported { call, of } => format!("{call} {of}"),
+        other => panic!("{other}"),
+    };
+    let error = Simulation::new(&rods)
+        .step(0.1)
+        .run_sensitive(start, 0.0..1.0);
+    let text = told(error.expect_err("constraints"));
+    assert_eq!(
+        text,
+        "run_sensitive models of run-time length with constraints"
+    );
+
+    #[dynamics(
+        coordinates(q[n]),
+        lagrangian = sum(i in 0..n, dot(q[i])^2/2 - q[i]^2/2),
+        event(wall) = q[0],
+    )]
+    struct Masses {
+        n: usize,
+    }
+    let masses = Masses { n: 2 };
+    let start = masses.state([1.0, 0.5], [0.0; 2]);
+    let run = Simulation::new(&masses).step(0.1);
+    let bounced = run.clone().on("wall", Crossing::Falling, |event| {
+        let v: Vec<f64> = event.v.iter().map(|v| -v).collect();
+        Act::Restart(event.state_with_velocity(v))
+    });
+    let error = bounced.run_sensitive(start.clone(), 0.0..3.0);
+    let text = told(error.expect_err("an event that changes the state"));
+    assert!(text.ends_with("whose events change the state"), "{text}");
+    // Events that are only recorded change nothing.
+    let recorded = run.clone().on("wall", Crossing::Either, |_| Act::Record);
+    let with = recorded
+        .run_sensitive(start.clone(), 0.0..3.0)
+        .expect("a run");
+    let without = run.run_sensitive(start, 0.0..3.0).expect("a run");
+    assert_eq!(with.by_start().last(), without.by_start().last());
+    assert_eq!(with.motion().events().len(), 1);
+    assert!(with.get("k").is_none() && with.parameters().is_empty());
+}
