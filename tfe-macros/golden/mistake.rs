@@ -96,7 +96,7 @@ impl Oscillator {
         ::tfe::__private::State { q, p: q }
     }
     fn structure() -> ::tfe::__private::Structure {
-        ::core::unimplemented!()
+        ::tfe::__private::Structure::UNKNOWN
     }
     fn pull(&self, _: f64, _: [f64; 1], _: [f64; 1]) -> f64 {
         0.0

@@ -18,6 +18,17 @@ pub struct Operations {
     pub functions: u32,
 }
 
+impl Operations {
+    /// None at all.
+    pub const NONE: Self = Self {
+        additions: 0,
+        multiplications: 0,
+        divisions: 0,
+        sines: 0,
+        functions: 0,
+    };
+}
+
 /// The structure of a model: the result of `Name::structure()`. `Display` prints a page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Structure {
@@ -41,6 +52,22 @@ pub struct Structure {
     pub second: Operations,
     /// All of this, and the pattern of the tangent, in words.
     pub page: &'static str,
+}
+
+impl Structure {
+    /// Nothing is known: that of a declaration with mistakes.
+    pub const UNKNOWN: Self = Self {
+        name: "",
+        form: Form::Lagrangian,
+        facts: Facts::UNKNOWN,
+        cyclic: &[],
+        conserved: &[],
+        diagonal_mass: false,
+        value: Operations::NONE,
+        first: Operations::NONE,
+        second: Operations::NONE,
+        page: "",
+    };
 }
 
 impl fmt::Display for Operations {
