@@ -22,6 +22,7 @@ mod section;
 mod sensitive;
 mod setup;
 mod steps;
+mod trail;
 mod watch;
 
 pub use crate::motion::Checkpoint;

@@ -124,8 +124,8 @@ fn compare<M: family::Model, F: Model<N>, const N: usize>(
     off / size
 }
 
-#[test]
-fn derivatives_are_those_of_models_of_fixed_size() {
+/// The same model in both kinds of length.
+fn pair() -> (Long, Five) {
     let (m, s) = ([1.0, 1.5, 0.7, 2.0, 0.4], [1.0, 2.0, 0.5, 3.0]);
     let (a, c) = (0.3, 0.2);
     let long = Long {
@@ -135,7 +135,12 @@ fn derivatives_are_those_of_models_of_fixed_size() {
         s: s.to_vec(),
         c,
     };
-    let five = Five { m, a, s, c };
+    (long, Five { m, a, s, c })
+}
+
+#[test]
+fn derivatives_are_those_of_models_of_fixed_size() {
+    let (long, five) = pair();
     let start = five.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
     for element in [
         Element::mixed(4),
@@ -282,7 +287,20 @@ fn what_has_no_derivatives_is_told() {
     });
     let error = bounced.run_sensitive(start.clone(), 0.0..3.0);
     let text = told(error.expect_err("an event that changes the state"));
-    assert!(text.ends_with("whose events change the state"), "{text}");
+    assert!(
+        text.ends_with("whose events change the state or end the run"),
+        "{text}"
+    );
+    let stopped = run.clone().on("wall", Crossing::Falling, |_| Act::Stop);
+    let error = stopped.run_sensitive(start.clone(), 0.0..3.0);
+    let text = told(error.expect_err("an event inside an element that ends the run"));
+    assert!(text.ends_with("or end the run"), "{text}");
+    let error = stopped.run_linearised(start.clone(), 0.0..3.0);
+    let text = told(error.expect_err("the same for matrices"));
+    assert!(
+        text.starts_with("run_linearised") && text.ends_with("or end the run"),
+        "{text}"
+    );
     // Events that are only recorded change nothing.
     let recorded = run.clone().on("wall", Crossing::Either, |_| Act::Record);
     let with = recorded
@@ -292,4 +310,22 @@ fn what_has_no_derivatives_is_told() {
     assert_eq!(with.by_start().last(), without.by_start().last());
     assert_eq!(with.motion().events().len(), 1);
     assert!(with.get("k").is_none() && with.parameters().is_empty());
+
+    // Steps so long that the run has cut them.
+    let (long, five) = pair();
+    let start = five.state([2.0, -1.0, 0.8, 1.5, -0.6], [3.0, 0.5, -4.0, 2.0, 0.9]);
+    let start = family::FamilyState {
+        q: start.q.to_vec(),
+        p: start.p.to_vec(),
+    };
+    let run = Simulation::new(&long).step(0.7);
+    let cuts = run
+        .run(start.clone(), 0.0..2.1)
+        .map(|motion| motion.statistics().cuts);
+    assert!(cuts.is_ok_and(|cuts| cuts > 0));
+    let text = told(
+        run.run_sensitive(start, 0.0..2.1)
+            .expect_err("steps in halves"),
+    );
+    assert!(text.ends_with("they were cut"), "{text}");
 }

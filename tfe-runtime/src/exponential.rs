@@ -218,7 +218,7 @@ mod tests {
         5.707_708_438_416_212e-34,
     ];
 
-    /// eˣ − 1 by a series in double-double arithmetic, of x = n ln 2 + r; 2ⁿ (e^r − 1), and 2ⁿ − 1.
+    /// n and e^r − 1 of x = n ln 2 + r, by a series in double-double arithmetic.
     fn exact_parts(x: f64) -> (f64, DoubleDouble) {
         let n = (x * core::f64::consts::LOG2_E).round();
         let mut r = DoubleDouble::new(x);
@@ -264,7 +264,7 @@ mod tests {
         ((result - exact.high) - exact.low).abs() / (size.next_up() - size)
     }
 
-    /// The worst of many numbers between two, crowded at `dense` powers of ten around the first.
+    /// The worst at many numbers, and at some fractions of each.
     fn worst(
         numbers: impl Iterator<Item = f64>,
         function: impl Fn(Lanes<4>) -> Lanes<4>,

@@ -1,14 +1,13 @@
 //! The same for models of run-time length.
 
-use super::super::follow::{Follow, Passed};
 use super::super::setup::Simulation;
+use super::super::trail::Trail;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::RunTimeLength;
 use crate::linearised::Linearised;
 use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
-use tfe_runtime::transition::TransitionError;
 
 impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion: 2n × 2n, ordered (p, q).
@@ -16,7 +15,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Elements are solved once more for their matrices, which are dense: 4n² numbers an element, and 2n solutions with sparse factors.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`] without the feature `sparse`, for models with constraints, and for events that change the state.
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`] without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where steps were
+    /// so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_linearised(
         &self,
@@ -36,17 +36,13 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         if const { M::CONSTRAINED } {
             return Err(refused("models of run-time length with constraints"));
         }
-        let mut elements = Elements::default();
-        let motion = self.drive(start.clone(), &span, identity, &mut elements)?;
-        if motion.arcs().count() > 1 {
-            let of = "models of run-time length whose events change the state";
-            return Err(RunError::new(
-                RunErrorKind::Unsupported { call, of },
-                motion,
-            ));
+        let mut trail = Trail::default();
+        let motion = self.drive(start.clone(), &span, identity, &mut trail)?;
+        if let Some(kind) = trail.refusal(&motion, call) {
+            return Err(RunError::new(kind, motion));
         }
         #[cfg(feature = "sparse")]
-        return self.linearised(motion, &elements.passed);
+        return self.linearised(motion, &trail.elements);
         #[cfg(not(feature = "sparse"))]
         Ok(Linearised::free(motion, Vec::new()))
     }
@@ -88,23 +84,5 @@ pub(in crate::simulation) fn operator_failed(
             source,
         },
         _ => RunErrorKind::run_time_length(call),
-    }
-}
-
-/// The elements passed so far: start, length, and the state before.
-#[derive(Default)]
-struct Elements {
-    passed: Vec<(f64, f64, FamilyState)>,
-}
-
-impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Elements {
-    fn passed(
-        &mut self,
-        _: &mut family::Stepper<'m, M>,
-        passed: &Passed<'_, 0, RunTimeLength>,
-    ) -> Result<(), TransitionError> {
-        let element = (passed.start, passed.h, passed.before.clone());
-        self.passed.push(element);
-        Ok(())
     }
 }

@@ -9,13 +9,12 @@ use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use {
-    super::super::follow::{Follow, Passed},
     super::super::linearise::family::operator_failed,
+    super::super::trail::Trail,
     crate::motion::Node,
     crate::sensitivity::Slopes,
     crate::sensitivity::run_time::Along,
     nalgebra::{DMatrix, DVector},
-    tfe_runtime::transition::TransitionError,
 };
 
 impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
@@ -26,7 +25,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// ([`record_every`](Self::record_every) keeps fewer nodes).
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`] without the feature `sparse`, for models with constraints, and for events that change the state.
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`] without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where steps were
+    /// so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_sensitive(
         &self,
@@ -55,11 +55,10 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         ));
         #[cfg(feature = "sparse")]
         {
-            let mut trail = Trail::default();
+            let mut trail = Trail::with_nodes();
             let motion = self.drive(start.clone(), &span, std::convert::identity, &mut trail)?;
-            if motion.arcs().count() > 1 {
-                let of = "models of run-time length whose events change the state";
-                return Err(unsupported(of, motion));
+            if let Some(kind) = trail.refusal(&motion, "run_sensitive") {
+                return Err(RunError::new(kind, motion));
             }
             self.differentiated(motion, &trail)
         }
@@ -144,29 +143,4 @@ fn slopes_at<M: family::Model>(
         slopes.outputs.column_mut(column).copy_from_slice(&outputs);
     }
     slopes
-}
-
-/// The elements passed so far (start, length, and the state before), and the recorded nodes with how many elements there were before them.
-#[cfg(feature = "sparse")]
-#[derive(Default)]
-struct Trail {
-    elements: Vec<(f64, f64, FamilyState)>,
-    nodes: Vec<(usize, Node<0, RunTimeLength>)>,
-}
-
-#[cfg(feature = "sparse")]
-impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail {
-    fn passed(
-        &mut self,
-        _: &mut family::Stepper<'m, M>,
-        passed: &Passed<'_, 0, RunTimeLength>,
-    ) -> Result<(), TransitionError> {
-        let element = (passed.start, passed.h, passed.before.clone());
-        self.elements.push(element);
-        Ok(())
-    }
-
-    fn recorded(&mut self, node: &Node<0, RunTimeLength>) {
-        self.nodes.push((self.elements.len(), node.clone()));
-    }
 }
