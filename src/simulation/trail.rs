@@ -2,9 +2,12 @@
 
 use super::events::Severed;
 use super::follow::{Follow, Passed};
-use crate::error::RunErrorKind;
+use super::setup::Simulation;
+use crate::error::{RunError, RunErrorKind};
 use crate::length::RunTimeLength;
 use crate::motion::{Motion, Node};
+use std::convert::identity;
+use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::transition::TransitionError;
 
@@ -22,7 +25,6 @@ pub(super) struct Trail {
 
 impl Trail {
     /// One that keeps recorded nodes.
-    #[cfg(feature = "sparse")]
     pub(super) fn with_nodes() -> Self {
         Self {
             keeps_nodes: true,
@@ -31,7 +33,7 @@ impl Trail {
     }
 
     /// Why a call has no derivatives of this motion: its elements are not those that are solved once more.
-    pub(super) fn refusal(
+    fn refusal(
         &self,
         motion: &Motion<0, RunTimeLength>,
         call: &'static str,
@@ -44,6 +46,37 @@ impl Trail {
             return None;
         };
         Some(RunErrorKind::Unsupported { call, of })
+    }
+}
+
+impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
+    /// Runs over the span and leaves a trail, for a call that solves the elements once more.
+    ///
+    /// # Errors
+    /// Those of the run, and [`RunErrorKind::Unsupported`] where that call has no derivatives.
+    pub(super) fn trailed(
+        &self,
+        call: &'static str,
+        start: FamilyState,
+        span: &Range<f64>,
+        mut trail: Trail,
+    ) -> Result<(Motion<0, RunTimeLength>, Trail), RunError<0, RunTimeLength>> {
+        let refused = |of: &'static str| {
+            let motion = Motion::unasked(span.start, &start);
+            RunError::new(RunErrorKind::Unsupported { call, of }, motion)
+        };
+        if !cfg!(feature = "sparse") {
+            let of = "models of run-time length without the feature `sparse`";
+            return Err(refused(of));
+        }
+        if const { M::CONSTRAINED } {
+            return Err(refused("models of run-time length with constraints"));
+        }
+        let motion = self.drive(start, span, identity, &mut trail)?;
+        match trail.refusal(&motion, call) {
+            Some(kind) => Err(RunError::new(kind, motion)),
+            None => Ok((motion, trail)),
+        }
     }
 }
 

@@ -142,22 +142,29 @@ impl Parameters {
                 }
             }
         });
+        let numbered = numbered(&count, &names, &values);
         quote! {
-            fn parameters(&self) -> usize {
-                #count
-            }
-
-            fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
-                #names
-                __tfe::CoordinateName::element("", index)
-            }
-
-            fn parameter(&self, index: usize) -> f64 {
-                #values
-                ::core::primitive::f64::NAN
-            }
-
+            #numbered
             #with_parameter
+        }
+    }
+}
+
+/// `parameters`, `parameter_name` and `parameter`, by statements that return names and values of those that there are.
+fn numbered(count: &TokenStream, names: &TokenStream, values: &TokenStream) -> TokenStream {
+    quote! {
+        fn parameters(&self) -> usize {
+            #count
+        }
+
+        fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
+            #names
+            __tfe::CoordinateName::element("", index)
+        }
+
+        fn parameter(&self, index: usize) -> f64 {
+            #values
+            ::core::primitive::f64::NAN
         }
     }
 }
@@ -254,20 +261,6 @@ impl RunTimeParameters {
                 quote!(self.#name[index])
             },
         );
-        quote! {
-            fn parameters(&self) -> usize {
-                #count
-            }
-
-            fn parameter_name(&self, index: usize) -> __tfe::CoordinateName {
-                #names
-                __tfe::CoordinateName::element("", index)
-            }
-
-            fn parameter(&self, index: usize) -> f64 {
-                #values
-                ::core::primitive::f64::NAN
-            }
-        }
+        numbered(&count, &names, &values)
     }
 }

@@ -9,6 +9,7 @@ use crate::legendre::velocity;
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
 use crate::newton::Preference;
+use crate::quadrature::MAX_POINTS;
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 
@@ -211,10 +212,11 @@ pub(crate) const fn set_extrapolation_at_points(
     if points == degrees {
         return;
     }
-    let (mut norm, mut l) = (0.0, 0);
+    let (mut values, mut norm, mut l) = ([0.0; MAX_POINTS], 0.0, 0);
     while l < points {
         let value = legendre_of(degrees, scheme.nodes[l]);
-        norm += scheme.weights[l] * value * value;
+        values[l] = scheme.weights[l] * value;
+        norm += values[l] * value;
         l += 1;
     }
     let mut i = 0;
@@ -222,8 +224,7 @@ pub(crate) const fn set_extrapolation_at_points(
         let ahead = legendre_of(degrees, 1.0 + scheme.nodes[i] * ratio) / norm;
         let mut j = 0;
         while j < points {
-            let value = scheme.weights[j] * legendre_of(degrees, scheme.nodes[j]);
-            matrix[i * points + j] += ahead * value;
+            matrix[i * points + j] += ahead * values[j];
             j += 1;
         }
         i += 1;

@@ -2,10 +2,11 @@
 
 use super::super::setup::Simulation;
 use super::super::trail::Trail;
-use crate::error::{RunError, RunErrorKind};
+use crate::error::RunError;
+#[cfg(feature = "sparse")]
+use crate::error::RunErrorKind;
 use crate::length::RunTimeLength;
 use crate::linearised::Linearised;
-use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 
@@ -15,7 +16,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Elements are solved once more for their matrices, which are dense: 4n² numbers an element, and 2n solutions with sparse factors.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`] without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where steps were
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where steps were
     /// so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_linearised(
@@ -23,28 +24,15 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         start: FamilyState,
         span: Range<f64>,
     ) -> Result<Linearised<0, RunTimeLength>, RunError<0, RunTimeLength>> {
-        let call = "run_linearised";
-        let refused = |of: &'static str| {
-            let motion = crate::Motion::unasked(span.start, &start);
-            RunError::new(RunErrorKind::Unsupported { call, of }, motion)
-        };
-        if !cfg!(feature = "sparse") {
-            return Err(refused(
-                "models of run-time length without the feature `sparse`",
-            ));
-        }
-        if const { M::CONSTRAINED } {
-            return Err(refused("models of run-time length with constraints"));
-        }
-        let mut trail = Trail::default();
-        let motion = self.drive(start.clone(), &span, identity, &mut trail)?;
-        if let Some(kind) = trail.refusal(&motion, call) {
-            return Err(RunError::new(kind, motion));
-        }
+        let (motion, trail) = self.trailed("run_linearised", start, &span, Trail::default())?;
         #[cfg(feature = "sparse")]
         return self.linearised(motion, &trail.elements);
+        // Refused before.
         #[cfg(not(feature = "sparse"))]
-        Ok(Linearised::free(motion, Vec::new()))
+        {
+            drop(trail);
+            Ok(Linearised::free(motion, Vec::new()))
+        }
     }
 
     #[cfg(feature = "sparse")]

@@ -1,17 +1,16 @@
 //! The same for models of run-time length.
 
 use super::super::setup::Simulation;
-use crate::error::{RunError, RunErrorKind};
+use super::super::trail::Trail;
+use crate::error::RunError;
 use crate::length::RunTimeLength;
-use crate::motion::Motion;
 use crate::sensitivity::Sensitive;
 use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use {
     super::super::linearise::family::operator_failed,
-    super::super::trail::Trail,
-    crate::motion::Node,
+    crate::motion::{Motion, Node},
     crate::sensitivity::Slopes,
     crate::sensitivity::run_time::Along,
     nalgebra::{DMatrix, DVector},
@@ -25,7 +24,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// ([`record_every`](Self::record_every) keeps fewer nodes).
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`] without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where steps were
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where steps were
     /// so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_sensitive(
@@ -33,34 +32,15 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         start: FamilyState,
         span: Range<f64>,
     ) -> Result<Sensitive<0, RunTimeLength>, RunError<0, RunTimeLength>> {
-        let unsupported = |of: &'static str, motion: Motion<0, RunTimeLength>| {
-            let call = "run_sensitive";
-            RunError::new(RunErrorKind::Unsupported { call, of }, motion)
-        };
-        let unasked = || Motion::unasked(span.start, &start);
-        if !cfg!(feature = "sparse") {
-            let of = "models of run-time length without the feature `sparse`";
-            return Err(unsupported(of, unasked()));
-        }
-        if const { M::CONSTRAINED } {
-            let of = "models of run-time length with constraints";
-            return Err(unsupported(of, unasked()));
-        }
-        #[cfg(not(feature = "sparse"))]
-        return Ok(Sensitive::new(
-            unasked(),
-            Vec::new(),
-            Vec::new(),
-            Vec::new(),
-        ));
+        let trail = Trail::with_nodes();
+        let (motion, trail) = self.trailed("run_sensitive", start, &span, trail)?;
         #[cfg(feature = "sparse")]
+        return self.differentiated(motion, &trail);
+        // Refused before.
+        #[cfg(not(feature = "sparse"))]
         {
-            let mut trail = Trail::with_nodes();
-            let motion = self.drive(start.clone(), &span, std::convert::identity, &mut trail)?;
-            if let Some(kind) = trail.refusal(&motion, "run_sensitive") {
-                return Err(RunError::new(kind, motion));
-            }
-            self.differentiated(motion, &trail)
+            drop(trail);
+            Ok(Sensitive::new(motion, Vec::new(), Vec::new(), Vec::new()))
         }
     }
 

@@ -157,20 +157,22 @@ impl Integration {
         product
     }
 
-    /// Writes a matrix, and what rounding takes from it.
-    const fn write(&self, matrix: &Square, high: &mut [[f64; 4]], low: &mut [[f64; 4]]) {
-        let groups = self.points.div_ceil(4);
-        let mut j = 0;
-        while j < self.points {
-            let mut i = 0;
-            while i < 4 * groups {
-                let row = if i < self.points { i } else { self.points - 1 };
-                let entry = matrix[row][j];
-                high[j * groups + i / 4][i % 4] = entry.high;
-                low[j * groups + i / 4][i % 4] = entry.low;
-                i += 1;
+    /// Writes a matrix, and what rounding takes from it where that is wanted.
+    const fn write(&self, matrix: &Square, high: &mut [[f64; 4]], low: Option<&mut [[f64; 4]]>) {
+        let mut rows = [[0.0; MAX_POINTS * MAX_POINTS]; 2];
+        let mut i = 0;
+        while i < self.points {
+            let mut j = 0;
+            while j < self.points {
+                rows[0][i * self.points + j] = matrix[i][j].high;
+                rows[1][i * self.points + j] = matrix[i][j].low;
+                j += 1;
             }
-            j += 1;
+            i += 1;
+        }
+        set_columns(self.points, &rows[0], high);
+        if let Some(low) = low {
+            set_columns(self.points, &rows[1], low);
         }
     }
 }
@@ -179,12 +181,12 @@ impl Target<'_> {
     pub(super) const fn fill(&mut self, scheme: &SchemeRef<'_>) {
         let points = scheme.nodes.len();
         let integration = Integration::of(scheme);
-        integration.write(&integration.twice(), self.twice, self.twice_low);
-        integration.write(&integration.momentum, self.once, self.once_low);
+        integration.write(&integration.twice(), self.twice, Some(&mut *self.twice_low));
+        integration.write(&integration.momentum, self.once, Some(&mut *self.once_low));
         if let Some(to) = &mut self.projection {
-            // What rounding takes from a projection is left out.
-            integration.write(&integration.onto_rates, to.onto_rates, to.position_low);
-            integration.write(&integration.position, to.position, to.position_low);
+            let low = Some(&mut *to.position_low);
+            integration.write(&integration.position, to.position, low);
+            integration.write(&integration.onto_rates, to.onto_rates, None);
         }
         let mut matrix = [0.0; MAX_POINTS * MAX_POINTS];
         // Most steps are as long as the one before.
