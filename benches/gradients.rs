@@ -1,9 +1,12 @@
-//! Gradients by many parameters over the runs that they are of: `cargo bench --bench gradients`.
+//! Gradients by many parameters over the runs that they are of: `cargo bench --features sparse --bench gradients`.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use tfe::prelude::*;
 use tfe::sensitivity::Loss;
+
+const STEPS: u32 = 200;
+const STEP: f64 = 0.1;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -30,6 +33,19 @@ struct Net {
     k: [f64; 1024],
 }
 
+/// The stiffnesses of the springs between masses in a row, as many as one likes.
+#[cfg(feature = "sparse")]
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k[i]*((q[i+1] - q[i])^2/2 + b*(q[i+1] - q[i])^4/4)),
+)]
+struct Row {
+    n: usize,
+    m: f64,
+    b: f64,
+    k: Vec<f64>,
+}
+
 /// The least time of several calls of both, one after the other so that both see the same machine.
 fn least(
     mut calls: [&mut dyn FnMut() -> Result<(), Failure>; 2],
@@ -51,8 +67,6 @@ where
     M: tfe::runtime::Model<N>
         + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
 {
-    const STEPS: u32 = 200;
-    const STEP: f64 = 0.1;
     let simulation = Simulation::new(model).step(STEP);
     let span = || 0.0..STEP * f64::from(STEPS);
     let loss = Loss::at_end(|node| 0.5 * node.q[0] * node.q[0]);
@@ -64,15 +78,43 @@ where
         black_box(simulation.gradient(start, span(), &loss)?);
         Ok(())
     };
-    let [of_run, of_gradient] = least([&mut run, &mut gradient])?;
+    tell(name, model.parameters(), least([&mut run, &mut gradient])?);
+    Ok(())
+}
+
+fn tell(name: &str, parameters: usize, [of_run, of_gradient]: [Duration; 2]) {
     let micros = |time: Duration| time.as_secs_f64() * 1e6 / f64::from(STEPS);
     println!(
-        "{name:6} {:4} parameters: {:6.2} µs a step of a run, {:6.2} of a gradient, {:.1} times as long",
-        model.parameters(),
+        "{name:6} {parameters:5} parameters: {:7.2} µs a step of a run, {:7.2} of a gradient, {:.1} times as long",
         micros(of_run),
         micros(of_gradient),
         micros(of_gradient) / micros(of_run)
     );
+}
+
+#[cfg(feature = "sparse")]
+fn compare_row(n: usize) -> Result<(), Failure> {
+    use tfe::family::{Loss, Model as _};
+    let row = Row {
+        n,
+        m: 1.0,
+        b: 0.5,
+        k: (0..n - 1).map(|a| 1.0 + 0.1 * (a as f64).sin()).collect(),
+    };
+    let q: Vec<f64> = (0..n).map(|a| (a as f64).sin()).collect();
+    let start = row.state(q, vec![0.0; n]);
+    let simulation = Simulation::new(&row).step(STEP);
+    let span = || 0.0..STEP * f64::from(STEPS);
+    let loss: Loss = Loss::of_end(|q, _, _| 0.5 * q[0] * q[0]);
+    let mut run = || {
+        black_box(simulation.run(start.clone(), span())?);
+        Ok(())
+    };
+    let mut gradient = || {
+        black_box(simulation.gradient(start.clone(), span(), &loss)?);
+        Ok(())
+    };
+    tell("row", row.parameters(), least([&mut run, &mut gradient])?);
     Ok(())
 }
 
@@ -94,5 +136,10 @@ fn main() -> Result<(), Failure> {
         k: std::array::from_fn(|pair| 0.01 + 0.001 * swing(pair)),
     };
     let still = [0.0; 32];
-    compare("net", &net, net.state(std::array::from_fn(swing), still))
+    compare("net", &net, net.state(std::array::from_fn(swing), still))?;
+    #[cfg(feature = "sparse")]
+    for sites in [100, 1001, 10_001] {
+        compare_row(sites)?;
+    }
+    Ok(())
 }

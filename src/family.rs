@@ -51,6 +51,10 @@ pub type Node = crate::Node<0, RunTimeLength>;
 pub type RunError = crate::RunError<0, RunTimeLength>;
 /// [`Sensitive`](crate::Sensitive) of a model of run-time length.
 pub type Sensitive = crate::Sensitive<0, RunTimeLength>;
+/// [`Loss`](crate::sensitivity::Loss) of a model of run-time length.
+pub type Loss<'l> = crate::sensitivity::Loss<'l, 0, RunTimeLength>;
+/// [`LossGradient`](crate::sensitivity::LossGradient) of a model of run-time length.
+pub type LossGradient = crate::sensitivity::LossGradient<0, RunTimeLength>;
 /// [`Steps`](crate::Steps) of a model of run-time length.
 pub type Steps<'m, M> = crate::Steps<'m, M, 0, RunTimeLength>;
 /// [`Checkpoint`](crate::Checkpoint) of a model of run-time length.

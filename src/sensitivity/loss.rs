@@ -2,10 +2,11 @@
 
 use super::slopes::{Along, Change};
 use crate::error::RunErrorKind;
+use crate::length::{FixedLength, Length};
 use crate::motion::{Motion, Node};
 use std::fmt;
 use std::sync::Arc;
-use tfe_runtime::{Model, State};
+use tfe_runtime::{CoordinateName, Model};
 
 /// A number of a motion whose gradient is asked for: a sum of functions of its end, of outputs at the end, and of squares of what outputs are off from values given. For
 /// [`Simulation::gradient`](crate::Simulation::gradient).
@@ -22,24 +23,47 @@ use tfe_runtime::{Model, State};
 /// # let _ = loss;
 /// ```
 #[derive(Clone)]
-pub struct Loss<'l, const N: usize> {
-    terms: Vec<Term<'l, N>>,
+pub struct Loss<'l, const N: usize, L: Length<N> = FixedLength> {
+    terms: Vec<Term<'l, N, L>>,
 }
 
-type OfNode<'l, const N: usize> = Arc<dyn Fn(&Node<N>) -> f64 + Send + Sync + 'l>;
+type OfNode<'l, const N: usize, L> = Arc<dyn Fn(&Node<N, L>) -> f64 + Send + Sync + 'l>;
 
 #[derive(Clone)]
-enum Term<'l, const N: usize> {
-    End(OfNode<'l, N>),
+enum Term<'l, const N: usize, L: Length<N>> {
+    End(OfNode<'l, N, L>),
     Output(String),
     Squares(String, Vec<f64>, Vec<f64>),
 }
 
 impl<'l, const N: usize> Loss<'l, N> {
-    /// A function of the last node. It is differentiated by differences of sixth order; what is an output of the model is differentiated exactly.
+    /// A function of the last node of a model of fixed size; of a model of any length [`of_end`](Self::of_end) is. It is differentiated by differences of sixth order; what is an output of
+    /// the model is differentiated exactly.
     pub fn at_end(function: impl Fn(&Node<N>) -> f64 + Send + Sync + 'l) -> Self {
         Self {
             terms: vec![Term::End(Arc::new(function))],
+        }
+    }
+}
+
+impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
+    /// A function of coordinates, momenta and velocities at the end, of a model of any length. It is differentiated by differences of sixth order; what is an output of the model is
+    /// differentiated exactly.
+    ///
+    /// ```
+    /// use tfe::family::Loss;
+    ///
+    /// let loss: Loss = Loss::of_end(|q, _p, v| 0.5 * q[0] * q[0] + v[1]);
+    /// # let _ = loss;
+    /// ```
+    pub fn of_end(function: impl Fn(&[f64], &[f64], &[f64]) -> f64 + Send + Sync + 'l) -> Self {
+        let of_node = move |node: &Node<N, L>| {
+            let parts = [&node.q, &node.p, &node.v];
+            let [q, p, v] = parts.map(AsRef::as_ref);
+            function(q, p, v)
+        };
+        Self {
+            terms: vec![Term::End(Arc::new(of_node))],
         }
     }
 
@@ -81,21 +105,20 @@ impl<'l, const N: usize> Loss<'l, N> {
         })
     }
 
-    /// What is wrong with it for a model and a span.
-    pub(crate) fn check<M: Model<N>>(
+    /// What is wrong with it for a model with these outputs and a span.
+    pub(crate) fn check(
         &self,
-        model: &M,
+        outputs: &[CoordinateName],
         (start, end): (f64, f64),
     ) -> Result<(), RunErrorKind> {
         for term in &self.terms {
             let (Term::Output(name) | Term::Squares(name, ..)) = term else {
                 continue;
             };
-            let known = || (0..model.columns()).map(|at| model.column_name(at).to_string());
-            if !known().any(|own| own == *name) {
+            if !outputs.iter().any(|own| own.is(name)) {
                 return Err(RunErrorKind::NoOutput {
                     name: name.clone(),
-                    known: known().collect(),
+                    known: outputs.iter().map(ToString::to_string).collect(),
                 });
             }
             let Term::Squares(_, times, values) = term else {
@@ -120,12 +143,13 @@ impl<'l, const N: usize> Loss<'l, N> {
     }
 
     /// Its value, and where and how it depends on the motion.
-    pub(crate) fn looks<M: Model<N>>(&self, model: &M, motion: &Motion<N>) -> (f64, Vec<Look<N>>) {
+    pub(crate) fn looks(&self, motion: &Motion<N, L>) -> (f64, Vec<Look>) {
         let nodes = motion.states();
         let last = nodes.len() - 1;
         let mut value = 0.0;
         let mut looks = Vec::new();
-        let column = |name: &str| (0..model.columns()).find(|at| model.column_name(*at).is(name));
+        let names = motion.outputs().names();
+        let column = |name: &str| names.iter().position(|own| own.is(name));
         let output = |node: usize, column: usize| motion.outputs().row(node).map(|row| row[column]);
         for term in &self.terms {
             match term {
@@ -158,33 +182,43 @@ impl<'l, const N: usize> Loss<'l, N> {
     }
 }
 
-impl<const N: usize> fmt::Debug for Loss<'_, N> {
+impl<const N: usize, L: Length<N>> fmt::Debug for Loss<'_, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Loss of {} terms", self.terms.len())
     }
 }
 
 /// A look of a loss at a node.
-pub(crate) struct Look<const N: usize> {
+pub(crate) struct Look {
     pub(crate) node: usize,
-    by: By<N>,
+    by: By,
 }
 
 /// The derivative of what is seen.
-enum By<const N: usize> {
+pub(crate) enum By {
     /// By an output, times a factor.
     Output(usize, f64),
     /// By coordinates, momenta and velocities.
     Node {
-        q: [f64; N],
-        p: [f64; N],
-        v: [f64; N],
+        q: Vec<f64>,
+        p: Vec<f64>,
+        v: Vec<f64>,
     },
 }
 
-impl<const N: usize> Look<N> {
+impl Look {
+    /// The derivative of what is seen.
+    #[cfg(feature = "sparse")]
+    pub(crate) fn by(&self) -> &By {
+        &self.by
+    }
+
     /// What a change of the node does to the loss.
-    pub(crate) fn slope<M: Model<N>>(&self, along: &Along<'_, M, N>, change: &Change<N>) -> f64 {
+    pub(crate) fn slope<M: Model<N>, const N: usize>(
+        &self,
+        along: &Along<'_, M, N>,
+        change: &Change<N>,
+    ) -> f64 {
         let velocity = along.velocity(change);
         match &self.by {
             By::Output(column, factor) => factor * along.outputs(change, &velocity)[*column],
@@ -196,40 +230,67 @@ impl<const N: usize> Look<N> {
 }
 
 /// The derivative of a function of a node, by differences of sixth order.
-fn partial<const N: usize>(node: &Node<N>, function: &dyn Fn(&Node<N>) -> f64) -> By<N> {
+fn partial<const N: usize, L: Length<N>>(
+    node: &Node<N, L>,
+    function: &dyn Fn(&Node<N, L>) -> f64,
+) -> By {
     const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
     const DISTANCE: f64 = 2e-3;
 
-    let by = |value: f64, part: &dyn Fn(&mut Node<N>, f64)| {
-        let distance = DISTANCE * value.abs().max(1.0);
-        let at = |step: f64| {
-            let mut moved = *node;
-            part(&mut moved, value + step);
-            function(&moved)
+    type Part<const N: usize, L> = fn(&mut Node<N, L>) -> &mut <L as Length<N>>::Vector;
+    let by = |part: Part<N, L>| -> Vec<f64> {
+        let mut moved = node.clone();
+        let still = part(&mut moved).clone();
+        let slope = |(a, value): (usize, &f64)| {
+            let distance = DISTANCE * value.abs().max(1.0);
+            let mut at = |step: f64| {
+                let with = |b: usize| still.as_ref()[b] + if a == b { step } else { 0.0 };
+                *part(&mut moved) = L::from_fn(&still, with);
+                function(&moved)
+            };
+            let differences = (1..).zip(WEIGHTS).map(|(k, weight)| {
+                let step = f64::from(k) * distance;
+                weight * (at(step) - at(-step)) / distance
+            });
+            differences.sum::<f64>()
         };
-        let differences = (1..).zip(WEIGHTS).map(|(k, weight)| {
-            let step = f64::from(k) * distance;
-            weight * (at(step) - at(-step)) / distance
-        });
-        differences.sum::<f64>()
+        still.as_ref().iter().enumerate().map(slope).collect()
     };
     By::Node {
-        q: std::array::from_fn(|a| by(node.q[a], &|moved, x| moved.q[a] = x)),
-        p: std::array::from_fn(|a| by(node.p[a], &|moved, x| moved.p[a] = x)),
-        v: std::array::from_fn(|a| by(node.v[a], &|moved, x| moved.v[a] = x)),
+        q: by(|node| &mut node.q),
+        p: by(|node| &mut node.p),
+        v: by(|node| &mut node.v),
     }
 }
 
 /// The gradient of a loss, from [`Simulation::gradient`](crate::Simulation::gradient).
 #[derive(Clone, Debug)]
-pub struct LossGradient<const N: usize> {
-    pub(crate) motion: Motion<N>,
-    pub(crate) names: Vec<String>,
-    pub(crate) by_parameters: Vec<f64>,
-    pub(crate) by_start: State<N>,
+pub struct LossGradient<const N: usize, L: Length<N> = FixedLength> {
+    motion: Motion<N, L>,
+    names: Vec<String>,
+    by_parameters: Vec<f64>,
+    by_start: L::State,
 }
 
-impl<const N: usize> LossGradient<N> {
+impl<const N: usize, L: Length<N>> LossGradient<N, L> {
+    /// From the derivatives by the start, ordered (p, q).
+    pub(crate) fn new(
+        motion: Motion<N, L>,
+        names: Vec<String>,
+        by_parameters: Vec<f64>,
+        by_start: &[f64],
+    ) -> Self {
+        let like = &motion.last().q;
+        let (of_p, of_q) = by_start.split_at(like.as_ref().len());
+        let by_start = L::state(L::from_fn(like, |a| of_q[a]), L::from_fn(like, |a| of_p[a]));
+        Self {
+            motion,
+            names,
+            by_parameters,
+            by_start,
+        }
+    }
+
     /// The derivative by a parameter.
     ///
     /// # Panics
@@ -259,12 +320,12 @@ impl<const N: usize> LossGradient<N> {
     }
 
     /// The derivatives by q and p of the start.
-    pub fn by_start(&self) -> State<N> {
-        self.by_start
+    pub fn by_start(&self) -> L::State {
+        self.by_start.clone()
     }
 
     /// The motion.
-    pub fn motion(&self) -> &Motion<N> {
+    pub fn motion(&self) -> &Motion<N, L> {
         &self.motion
     }
 }

@@ -7,11 +7,15 @@ use crate::motion::Node;
 use std::ops::ControlFlow;
 use tfe_runtime::transition::TransitionError;
 
-/// Where an element begins that a run has passed.
+/// An element that a run has passed.
 pub struct Passed<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) start: f64,
+    /// Where it was begun: at its start, or beyond it by roundings where that is a break.
+    pub(super) begin: f64,
     pub(super) h: f64,
     pub(super) before: &'a L::State,
+    /// Where it ends, before impulses there.
+    pub(super) after: &'a L::State,
 }
 
 /// Is shown what a run does.

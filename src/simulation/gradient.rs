@@ -1,9 +1,13 @@
 //! Gradients of losses, backwards along a run (T-127).
 
+mod family;
+
 use super::follow::Nobody;
 use super::sensitive::directions;
 use super::setup::Simulation;
+use super::trail::is_same;
 use crate::error::{RunError, RunErrorKind};
+use crate::length::FixedLength;
 use crate::motion::Motion;
 use crate::sensitivity::Sensitive;
 use crate::sensitivity::loss::{Look, Loss, LossGradient};
@@ -12,17 +16,6 @@ use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::step::Stepper;
 use tfe_runtime::{Model, Parameter, State};
-
-/// Whether an element that is solved once more ends where it did, to many more digits than two roots of its equations have in common.
-fn is_same<const N: usize>(again: &State<N>, before: &State<N>) -> bool {
-    const SAME: f64 = 1e-9;
-    let near = |again: &[f64; N], before: &[f64; N]| {
-        let largest = before.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let pairs = again.iter().zip(before);
-        pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) <= SAME * largest.max(1e-6)
-    };
-    near(&again.q, &before.q) && near(&again.p, &before.p)
-}
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and gives a loss of the motion with its gradient by all parameters of the model and by the start.
@@ -62,7 +55,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
         loss: &Loss<'_, N>,
     ) -> Result<(f64, LossGradient<N>), RunError<N>> {
-        if let Err(kind) = loss.check(&*self.model, (span.start, span.end)) {
+        let outputs = (0..self.model.columns()).map(|at| self.model.column_name(at));
+        let outputs: Vec<_> = outputs.collect();
+        if let Err(kind) = loss.check(&outputs, (span.start, span.end)) {
             let motion = Motion::from_start(&*self.model, span.start, &start);
             return Err(RunError::new(kind, motion));
         }
@@ -83,7 +78,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         loss: &Loss<'_, N>,
     ) -> Result<(f64, LossGradient<N>), RunError<N>> {
         let model = &*self.model;
-        let (value, looks) = loss.looks(model, &motion);
+        let (value, looks) = loss.looks(&motion);
         let indices: Vec<usize> = (0..model.parameters()).collect();
         let mut parameters = directions(model, &indices);
         if M::CONSTRAINTS.is_empty() {
@@ -119,7 +114,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 step: h,
                 source,
             });
-            if step.is_ok() && !is_same(&state, &motion.states()[element + 1].state()) {
+            if step.is_ok()
+                && !is_same::<N, FixedLength>(&state, &motion.states()[element + 1].state())
+            {
                 // A long step that was cut, or not, where it now is not, or is.
                 let start = motion.states()[0].state();
                 let sensitive = self.run_sensitive(start, span.clone())?;
@@ -146,7 +143,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     fn look(
         &self,
         motion: &Motion<N>,
-        looks: &[Look<N>],
+        looks: &[Look],
         number: usize,
         (lambda, by_parameters): (&mut [f64], &mut [f64]),
     ) {
@@ -183,7 +180,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 
     fn forwards(&self, sensitive: &Sensitive<N>, loss: &Loss<'_, N>) -> (f64, LossGradient<N>) {
         let motion = sensitive.motion().clone();
-        let (value, looks) = loss.looks(&*self.model, &motion);
+        let (value, looks) = loss.looks(&motion);
         let count = self.model.parameters();
         let mut all = vec![0.0; 2 * N + count];
         for number in 0..motion.states().len() {
@@ -213,14 +210,6 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ) -> LossGradient<N> {
         let names =
             (0..self.model.parameters()).map(|at| self.model.parameter_name(at).to_string());
-        LossGradient {
-            motion,
-            names: names.collect(),
-            by_parameters,
-            by_start: State {
-                q: std::array::from_fn(|a| lambda[N + a]),
-                p: std::array::from_fn(|a| lambda[a]),
-            },
-        }
+        LossGradient::new(motion, names.collect(), by_parameters, lambda)
     }
 }

@@ -236,8 +236,10 @@ where
         }
         let passed = Passed {
             start: t,
+            begin,
             h,
             before: &before,
+            after: state,
         };
         observer.passed(stepper, &passed).map_err(no_matrix)?;
         observer.whole(

@@ -2,22 +2,12 @@
 
 use super::setup::Simulation;
 use crate::driven::Interpolation;
-use crate::error::{RunError, RunErrorKind};
+use crate::error::RunErrorKind;
 use crate::length::RunTimeLength;
-use crate::motion::Motion;
 use std::convert::Infallible;
-use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 
-/// What a refused run gives.
-type Refused = Result<Infallible, RunError<0, RunTimeLength>>;
-
 impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
-    fn refuse(&self, call: &'static str, start: &FamilyState, span: &Range<f64>) -> Refused {
-        let motion = Motion::unasked(span.start, start);
-        Err(RunError::new(RunErrorKind::run_time_length(call), motion))
-    }
-
     /// Refused: models of run-time length have no inputs. The run that is asked for then is an error.
     #[must_use]
     pub fn input(mut self, _: &str, _: impl Fn(f64) -> f64) -> Self {
@@ -44,13 +34,5 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
     /// [`RunErrorKind::Unsupported`], in any case.
     pub fn hold(self, _: FamilyState, _: f64) -> Result<Infallible, RunErrorKind> {
         Err(RunErrorKind::run_time_length("hold"))
-    }
-
-    /// Refused: losses of models of run-time length have no gradients backwards. [`run_sensitive`](Self::run_sensitive) gives derivatives.
-    ///
-    /// # Errors
-    /// [`RunErrorKind::Unsupported`], in any case.
-    pub fn gradient<T>(&self, start: FamilyState, span: Range<f64>, _: &T) -> Refused {
-        self.refuse("gradient", &start, &span)
     }
 }

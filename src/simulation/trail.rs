@@ -4,18 +4,55 @@ use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
-use crate::length::RunTimeLength;
+use crate::length::{Length, RunTimeLength};
 use crate::motion::{Motion, Node};
 use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::transition::TransitionError;
 
+/// What has no derivatives.
+pub(super) const LONG_STEPS: &str =
+    "models of run-time length where steps were so long that they were cut";
+
+/// An element that was passed; whoever solves it once more needs the feature `sparse`.
+#[cfg_attr(not(feature = "sparse"), expect(dead_code))]
+pub(super) struct Element {
+    /// Where it was begun.
+    pub(super) t: f64,
+    pub(super) h: f64,
+    pub(super) before: FamilyState,
+    after: FamilyState,
+}
+
+impl Element {
+    /// Whether it ends where it did, now that it is solved once more.
+    #[cfg(feature = "sparse")]
+    pub(super) fn check(&self, again: &FamilyState) -> Result<(), family::OperatorError> {
+        match is_same::<0, RunTimeLength>(again, &self.after) {
+            true => Ok(()),
+            false => Err(family::OperatorError::Cut),
+        }
+    }
+}
+
+/// Whether an element that is solved once more ends where it did, to many more digits than two roots of its equations have in common.
+pub(super) fn is_same<const N: usize, L: Length<N>>(again: &L::State, before: &L::State) -> bool {
+    const SAME: f64 = 1e-9;
+    let near = |again: &L::Vector, before: &L::Vector| {
+        let (again, before) = (again.as_ref(), before.as_ref());
+        let largest = before.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let mut pairs = again.iter().zip(before);
+        pairs.all(|(a, b)| (a - b).abs() <= SAME * largest.max(1e-6))
+    };
+    let (again, before) = (L::parts(again), L::parts(before));
+    near(again.0, before.0) && near(again.1, before.1)
+}
+
 /// The elements passed so far, and the recorded nodes.
 #[derive(Default)]
 pub(super) struct Trail {
-    /// Start, length, and the state before.
-    pub(super) elements: Vec<(f64, f64, FamilyState)>,
+    pub(super) elements: Vec<Element>,
     /// With how many elements there were before them; kept where they are asked for.
     pub(super) nodes: Vec<(usize, Node<0, RunTimeLength>)>,
     keeps_nodes: bool,
@@ -41,7 +78,7 @@ impl Trail {
         let of = if self.is_cut || motion.arcs().count() > 1 {
             "models of run-time length whose events change the state or end the run"
         } else if motion.statistics().cuts > 0 {
-            "models of run-time length where steps were so long that they were cut"
+            LONG_STEPS
         } else {
             return None;
         };
@@ -86,8 +123,12 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail {
         _: &mut family::Stepper<'m, M>,
         passed: &Passed<'_, 0, RunTimeLength>,
     ) -> Result<(), TransitionError> {
-        let element = (passed.start, passed.h, passed.before.clone());
-        self.elements.push(element);
+        self.elements.push(Element {
+            t: passed.begin,
+            h: passed.h,
+            before: passed.before.clone(),
+            after: passed.after.clone(),
+        });
         Ok(())
     }
 

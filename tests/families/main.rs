@@ -10,6 +10,8 @@ mod constrained;
 mod constraints;
 mod errors;
 mod events;
+#[cfg(feature = "sparse")]
+mod gradient;
 mod impulses;
 mod kernels;
 mod lists;

@@ -13,12 +13,12 @@ use tfe::{Model, family};
     force(q[i]) = -c*dot(q[i]) + c*sin(t),
     output(power) = c*dot(q[0])^2 + s[1]*q[1],
 )]
-struct Long {
-    n: usize,
-    m: Vec<f64>,
-    a: f64,
-    s: Vec<f64>,
-    c: f64,
+pub(super) struct Long {
+    pub(super) n: usize,
+    pub(super) m: Vec<f64>,
+    pub(super) a: f64,
+    pub(super) s: Vec<f64>,
+    pub(super) c: f64,
 }
 
 #[dynamics(
@@ -42,12 +42,12 @@ struct Five {
     force(q[i]) = -c*p[i],
     output(energy) = p[0]^2/(2*m) + b*q[0]^4,
 )]
-struct LongPendula {
-    n: usize,
-    m: f64,
-    k: Vec<f64>,
-    b: f64,
-    c: f64,
+pub(super) struct LongPendula {
+    pub(super) n: usize,
+    pub(super) m: f64,
+    pub(super) k: Vec<f64>,
+    pub(super) b: f64,
+    pub(super) c: f64,
 }
 
 #[dynamics(

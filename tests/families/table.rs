@@ -312,7 +312,7 @@ fn the_table() {
         vec![0.1; 3],
         LongBent { n: 3 },
         |model: &LongBent| model.state([-0.5; 3], [1.0; 3]),
-        ()
+        Loss::of_end(|q, _, _| q[0])
     );
     let on_rods = calls!(
         LongOnRods { n: 1, m: 1.0 },
@@ -321,7 +321,7 @@ fn the_table() {
         vec![0.1, 0.2],
         LongBentOnRods { n: 1 },
         |model: &LongBentOnRods| model.state([-0.6, -0.8], [0.8, -0.6]),
-        ()
+        Loss::of_end(|q, _, _| q[0])
     );
     let mut table = String::new();
     table.push_str("| call | fixed size | fixed size, constraints | run-time length | run-time length, constraints |\n|---|---|---|---|---|\n");

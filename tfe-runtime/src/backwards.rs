@@ -267,6 +267,41 @@ impl<const N: usize> Points<N> {
     }
 }
 
+/// Whether the iteration of (T-150) goes on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Judge {
+    before: f64,
+}
+
+impl Default for Judge {
+    fn default() -> Self {
+        Self {
+            before: f64::INFINITY,
+        }
+    }
+}
+
+impl Judge {
+    /// Sees the largest increment of μ and the largest μ; whether it has converged, once that is known.
+    #[inline(always)]
+    pub(crate) fn see(&mut self, increment: f64, size: f64) -> Option<bool> {
+        /// Each increment is at most this part of the one before, or factors cost less.
+        const CONTRACTION: f64 = 0.2;
+        /// Increments beside μ that are roundings.
+        const ROUNDING: f64 = 1e-16;
+
+        if increment <= ROUNDING * size {
+            return Some(true);
+        }
+        if !(increment <= CONTRACTION * self.before) {
+            // Roundings do not shrink.
+            return Some(increment <= 64.0 * ROUNDING * size);
+        }
+        self.before = increment;
+        None
+    }
+}
+
 /// The iteration of (T-150).
 struct Iteration<'a, 'e, M, const N: usize> {
     points: &'a mut Points<N>,
@@ -288,11 +323,6 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
     // Loops and no closures, which would be compiled for the instruction set of the crate.
     #[inline(always)]
     fn run(self) -> bool {
-        /// Each increment is at most this part of the one before, or factors cost less.
-        const CONTRACTION: f64 = 0.2;
-        /// Increments beside μ that are roundings.
-        const ROUNDING: f64 = 1e-16;
-
         let Points {
             force_q,
             force_v,
@@ -305,7 +335,7 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
         let (scheme, h) = (&self.equations.scheme, self.equations.span.h);
         let points = scheme.points();
         let (of_p, of_q) = self.lambda.split_at(N);
-        let mut before = f64::INFINITY;
+        let mut judge = Judge::default();
         loop {
             for l in 0..points {
                 let mut seed = [0.0; N];
@@ -348,14 +378,9 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
                     mu[j][a] = row[a];
                 }
             }
-            if increment <= ROUNDING * size {
-                return true;
+            if let Some(verdict) = judge.see(increment, size) {
+                return verdict;
             }
-            if !(increment <= CONTRACTION * before) {
-                // Roundings do not shrink.
-                return increment <= 64.0 * ROUNDING * size;
-            }
-            before = increment;
         }
     }
 }

@@ -6,6 +6,8 @@
 //! other kinetic energies and constraints with one sparse matrix for the rates at all points.
 
 #[cfg(feature = "sparse")]
+mod backwards;
+#[cfg(feature = "sparse")]
 mod blocked;
 mod dense;
 mod error;
@@ -39,6 +41,8 @@ mod transition;
 #[cfg(feature = "sparse")]
 mod view;
 
+#[cfg(feature = "sparse")]
+pub use backwards::{Backwards, Partials};
 pub use dense::DenseElement;
 pub use error::ModelError;
 pub use model::{Block, Entries, FamilyState, Gradient, Model, STRIDE, Sweep};

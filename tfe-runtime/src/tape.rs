@@ -17,10 +17,10 @@ use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Points side by side. With more, what is written down is more than the fast memory of a processor holds: eight take half as long again.
-const LANES: usize = 4;
+pub(crate) const LANES: usize = 4;
 
 /// A number for each point.
-type Row = [f64; LANES];
+pub(crate) type Row = [f64; LANES];
 
 const ZERO: Row = [0.0; LANES];
 
@@ -53,7 +53,7 @@ impl Operand {
 
 /// The operations of one kernel call; parameters have the places before them.
 #[derive(Clone, Debug, Default)]
-struct Operations {
+pub(crate) struct Operations {
     parameters: usize,
     list: Vec<[Operand; 2]>,
     slopes: Vec<Row>,
@@ -156,15 +156,8 @@ impl Tape {
         model: &M,
         places: &mut Places<N>,
     ) {
-        self.operations.list.clear();
-        self.operations.slopes.clear();
-        // Numbers share what they write to for as long as the kernel runs.
-        let operations = RefCell::new(core::mem::take(&mut self.operations));
-        let ends = {
-            let time = Taped {
-                tape: Some(&operations),
-                ..Taped::of(places.t)
-            };
+        let ends = self.record(|operations| {
+            let time = Taped::time(places.t, operations);
             let mut first = First::zero();
             model.first(
                 time,
@@ -174,26 +167,46 @@ impl Tape {
             );
             let parts = [first.z, first.q, first.force];
             parts.map(|part| part.map(|result| result.place))
-        };
+        });
+        let weights = places.weights.as_flattened();
+        self.read(ends.as_flattened().iter().copied().zip(weights));
+        *places = Places::NONE;
+    }
+
+    /// A sum, which is zero then.
+    #[cfg(feature = "sparse")]
+    pub(crate) fn take(&mut self, place: usize) -> f64 {
+        let sum = self.sum(place);
+        self.adjoints[place] = ZERO;
+        sum
+    }
+
+    /// Runs a kernel whose numbers write down their operations.
+    pub(crate) fn record<P>(&mut self, kernel: impl FnOnce(&RefCell<Operations>) -> P) -> P {
+        self.operations.list.clear();
+        self.operations.slopes.clear();
+        // Numbers share what they write to for as long as the kernel runs.
+        let operations = RefCell::new(core::mem::take(&mut self.operations));
+        let ends = kernel(&operations);
         self.operations = operations.into_inner();
+        ends
+    }
+
+    /// Reads backwards what was written down, from the places of results with their weights.
+    pub(crate) fn read<'w>(&mut self, ends: impl Iterator<Item = (u32, &'w Row)>) {
         let operations = &self.operations;
         let count = operations.parameters + operations.list.len();
         if self.adjoints.len() < count {
             self.adjoints.resize(count, ZERO);
         }
-        for (place, weights) in ends
-            .as_flattened()
-            .iter()
-            .zip(places.weights.as_flattened())
-        {
-            if let Some(adjoint) = self.adjoints.get_mut(*place as usize) {
+        for (place, weights) in ends {
+            if let Some(adjoint) = self.adjoints.get_mut(place as usize) {
                 for lane in 0..LANES {
                     adjoint[lane] += weights[lane];
                 }
             }
         }
         read_backwards(operations, &mut self.adjoints);
-        *places = Places::NONE;
     }
 }
 
@@ -243,10 +256,34 @@ impl fmt::Debug for Taped<'_> {
     }
 }
 
-impl Taped<'_> {
+impl<'t> Taped<'t> {
+    /// The time, where the operations of parameters are to stand.
+    #[inline]
+    pub(crate) fn time(value: Row, tape: &'t RefCell<Operations>) -> Self {
+        Self {
+            tape: Some(tape),
+            ..Self::of(value)
+        }
+    }
+
+    /// A number that derivatives are asked by, as if it were the parameter of this place.
+    #[cfg(feature = "sparse")]
+    pub(crate) fn variable(value: f64, place: usize, tape: &'t RefCell<Operations>) -> Self {
+        Self {
+            place: place as u32,
+            ..Self::time([value; LANES], tape)
+        }
+    }
+
+    /// Where its operation stands.
+    #[cfg(feature = "sparse")]
+    pub(crate) fn place(&self) -> u32 {
+        self.place
+    }
+
     /// Mere numbers.
     #[inline]
-    fn of(value: Row) -> Self {
+    pub(crate) fn of(value: Row) -> Self {
         Self {
             value,
             place: NONE,

@@ -2,6 +2,8 @@
 
 use super::super::setup::Simulation;
 use super::super::trail::Trail;
+#[cfg(feature = "sparse")]
+use super::super::trail::{Element, LONG_STEPS};
 use crate::error::RunError;
 #[cfg(feature = "sparse")]
 use crate::error::RunErrorKind;
@@ -39,37 +41,55 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     fn linearised(
         &self,
         motion: crate::Motion<0, RunTimeLength>,
-        elements: &[(f64, f64, FamilyState)],
+        elements: &[Element],
     ) -> Result<Linearised<0, RunTimeLength>, RunError<0, RunTimeLength>> {
         use tfe_runtime::family;
         let mut transitions = Vec::with_capacity(elements.len());
-        let steps = elements.iter().map(|(t, h, before)| (*t, *h, before));
-        let each = |transition: family::TransitionOperator| transitions.push(transition.matrix());
+        let steps = elements.iter();
+        let steps = steps.map(|element| (element.t, element.h, &element.before));
+        let mut passed = elements.iter();
+        let each = |transition: family::TransitionOperator| {
+            passed
+                .next()
+                .map_or(Ok(()), |element| element.check(transition.end()))?;
+            transitions.push(transition.matrix());
+            Ok(())
+        };
         let element = self.chosen_element();
-        let found = family::TransitionOperator::of_steps(self.model, element, 0.0, steps, each);
+        let asked = (0.0, &[][..]);
+        let found =
+            family::TransitionOperator::of_steps_by(self.model, element, asked, steps, each);
         let Err((number, error)) = found else {
             return Ok(Linearised::free(motion, transitions));
         };
-        let (time, step, _) = elements[number];
-        let kind = operator_failed(error, (number, time, step), "run_linearised");
+        let kind = operator_failed(error, Some((number, &elements[number])), "run_linearised");
         Err(RunError::new(kind, motion))
     }
 }
 
-/// Why an element, given by its number, time and length, has no derivative.
+/// Why an element has no derivative.
 #[cfg(feature = "sparse")]
 pub(in crate::simulation) fn operator_failed(
     error: family::OperatorError,
-    (element, time, step): (usize, f64, f64),
+    at: Option<(usize, &Element)>,
     call: &'static str,
 ) -> RunErrorKind {
     match error {
         family::OperatorError::Family(error) => RunErrorKind::Family(error),
-        family::OperatorError::Step(source) => RunErrorKind::Solve {
-            element,
-            time,
-            step,
-            source,
+        family::OperatorError::Step(source) => {
+            let (element, time, step) = at.map_or((0, f64::NAN, f64::NAN), |(number, element)| {
+                (number, element.t, element.h)
+            });
+            RunErrorKind::Solve {
+                element,
+                time,
+                step,
+                source,
+            }
+        }
+        family::OperatorError::Cut => RunErrorKind::Unsupported {
+            call,
+            of: LONG_STEPS,
         },
         _ => RunErrorKind::run_time_length(call),
     }

@@ -78,19 +78,20 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             {
                 to += DVector::from_column_slice(by);
             }
+            trail.elements[passed].check(transition.end())?;
             current = next;
             passed += 1;
             record(passed, &current);
             Ok(())
         };
         let steps = trail.elements.iter();
-        let steps = steps.map(|(t, h, before)| (*t, *h, before));
+        let steps = steps.map(|element| (element.t, element.h, &element.before));
         let asked = (0.0, &parameters[..]);
         let element = self.chosen_element();
         let found = family::TransitionOperator::of_steps_by(model, element, asked, steps, each);
         if let Err((number, error)) = found {
-            let (time, step, _) = trail.elements[number];
-            let kind = operator_failed(error, (number, time, step), "run_sensitive");
+            let element = Some((number, &trail.elements[number]));
+            let kind = operator_failed(error, element, "run_sensitive");
             return Err(RunError::new(kind, motion));
         }
         let names = parameters.iter();

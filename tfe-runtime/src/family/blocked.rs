@@ -120,4 +120,11 @@ impl Blocked {
             factors.solve_in_place(faer::ColMut::from_slice_mut(vector).as_mat_mut());
         }
     }
+
+    /// The same with the transposed matrix.
+    pub(super) fn solve_transposed(&self, vector: &mut [f64]) {
+        if let Some(factors) = &self.factors {
+            factors.solve_transpose_in_place(faer::ColMut::from_slice_mut(vector).as_mat_mut());
+        }
+    }
 }

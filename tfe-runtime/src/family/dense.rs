@@ -223,6 +223,21 @@ impl DenseElement {
         state
     }
 
+    /// Coordinates and velocities at a place τ of an element that was not cut, h long.
+    #[cfg(feature = "sparse")]
+    pub(super) fn motion_at(&self, tau: f64, h: f64) -> (Vec<f64>, Vec<f64>) {
+        let (mut values, mut integrals) = ([0.0; MAX_NODES], [0.0; MAX_NODES]);
+        legendre(tau, &mut values);
+        legendre_integrals(tau, &mut integrals);
+        let (mut q, mut v) = (self.start.q.clone(), vec![0.0; self.start.q.len()]);
+        add(&self.rates, &integrals, &mut q);
+        add(&self.rates, &values, &mut v);
+        for rate in &mut v {
+            *rate /= h;
+        }
+        (q, v)
+    }
+
     /// dq/dt at a time between start and end: the derivative of the polynomial.
     #[must_use]
     pub fn velocity_at_time(&self, time: f64) -> Vec<f64> {

@@ -3,6 +3,7 @@
 use super::model::{Block, Entries, Gradient, Model};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::AddAssign;
 
 /// The places of second derivatives that can be other than zero, sorted by block, column and row.
 ///
@@ -29,14 +30,14 @@ impl Entries<f64> for Recorder {
 
 /// Adds values to the places of a [`Pattern`].
 #[derive(Debug)]
-pub struct Values<'a> {
+pub struct Values<'a, R = f64> {
     contributions: core::slice::Iter<'a, usize>,
-    values: &'a mut [f64],
+    values: &'a mut [R],
 }
 
-impl Entries<f64> for Values<'_> {
+impl<R: AddAssign> Entries<R> for Values<'_, R> {
     #[inline]
-    fn add(&mut self, _: Block, _: usize, _: usize, value: f64) {
+    fn add(&mut self, _: Block, _: usize, _: usize, value: R) {
         // A model whose lengths have changed since brings more or other contributions than were recorded: those are dropped.
         if let Some(place) = self.contributions.next()
             && let Some(entry) = self.values.get_mut(*place)
@@ -112,6 +113,11 @@ impl Pattern {
     /// What a kernel adds to, one value a place: `values` is set to zero first.
     pub fn scatter<'a>(&'a self, values: &'a mut [f64]) -> Values<'a> {
         values.fill(0.0);
+        self.add_to(values)
+    }
+
+    /// The same in any numbers, added to what is there.
+    pub(super) fn add_to<'a, R>(&'a self, values: &'a mut [R]) -> Values<'a, R> {
         Values {
             contributions: self.contributions.iter(),
             values,

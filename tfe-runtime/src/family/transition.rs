@@ -29,6 +29,8 @@ pub enum OperatorError {
     Step(StepError),
     /// The model has constraints: not supported yet.
     Constrained,
+    /// The step is so long that it was made in pieces.
+    Cut,
     /// A vector is not as long as the phase space.
     Shape {
         /// Numbers that are needed.
@@ -58,6 +60,7 @@ impl fmt::Display for OperatorError {
             Self::Constrained => f.write_str(
                 "transition matrices of models of run-time length with constraints are not supported",
             ),
+            Self::Cut => f.write_str("the step is so long that it was made in pieces"),
             Self::Shape { needed, given } => {
                 write!(f, "the vector needs {needed} numbers, not {given}")
             }
@@ -103,6 +106,15 @@ pub struct TransitionOperator {
     by_length: Vec<f64>,
     by_damping: Vec<f64>,
     by_parameters: Vec<Vec<f64>>,
+}
+
+/// What a row of phase space weighs at the points of an element, a row of n for each point.
+pub(super) struct Seeds {
+    /// Of L_v and of F.
+    pub(super) momenta: Vec<f64>,
+    pub(super) forces: Vec<f64>,
+    /// What these make of velocities.
+    pub(super) by_velocities: Vec<f64>,
 }
 
 /// What changes in an element, by point and coordinate: q_l, L_v,l and F_l before rates answer; by coordinate: p₀, and q₁ − h Σ β ν.
@@ -181,7 +193,10 @@ impl TransitionOperator {
     }
 
     /// The tables of an element that this model can step with.
-    fn admitted<M: Model>(model: &M, element: Element) -> Result<SchemeTable, OperatorError> {
+    pub(super) fn admitted<M: Model>(
+        model: &M,
+        element: Element,
+    ) -> Result<SchemeTable, OperatorError> {
         model.check()?;
         if M::CONSTRAINED {
             return Err(OperatorError::Constrained);
@@ -194,7 +209,7 @@ impl TransitionOperator {
         Ok(table)
     }
 
-    fn next<V: Model>(
+    pub(super) fn next<V: Model>(
         view: &V,
         rates: &mut Rates<&V>,
         (table, pattern): (&SchemeTable, &Arc<Pattern>),
@@ -360,6 +375,85 @@ impl TransitionOperator {
         });
         output.copy_from_slice(&end);
         Ok(())
+    }
+
+    /// Writes the row λ of phase space times the derivative for λ, and gives what λ weighs at the points (T-127).
+    pub(super) fn pull(&self, lambda: &mut [f64]) -> Seeds {
+        let scheme = self.table.view();
+        let (n, h) = (self.end.q.len(), self.h);
+        let (count, points) = (scheme.unknowns(), scheme.points());
+        let (of_p, of_q) = lambda.split_at_mut(n);
+        let mut mu = vec![0.0; n * count];
+        let (mut by_q, mut by_v, still) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        for (rates, of_q) in mu.chunks_exact_mut(count).zip(&*of_q) {
+            for (rate, advance) in rates.iter_mut().zip(scheme.advance) {
+                *rate = h * advance * of_q;
+            }
+        }
+        for l in 0..points {
+            by_q.fill(0.0);
+            by_v.fill(0.0);
+            let force: Vec<f64> = of_p.iter().map(|p| h * scheme.weights[l] * p).collect();
+            self.bend_back(l, (&still, &force), &mut by_q, &mut by_v);
+            let row = l * count..(l + 1) * count;
+            let (position, velocity) = (&scheme.position[row.clone()], &scheme.velocity[row]);
+            for (a, rates) in mu.chunks_exact_mut(count).enumerate() {
+                for (j, rate) in rates.iter_mut().enumerate() {
+                    *rate += velocity[j] * by_v[a] + h * position[j] * by_q[a];
+                }
+            }
+        }
+        self.matrix.solve_transposed(&mut mu);
+        by_q.fill(0.0);
+        let zeros = || vec![0.0; points * n];
+        let mut seeds = Seeds {
+            momenta: zeros(),
+            forces: zeros(),
+            by_velocities: zeros(),
+        };
+        for l in 0..points {
+            let own = l * n..(l + 1) * n;
+            let momentum = &mut seeds.momenta[own.clone()];
+            let force = &mut seeds.forces[own.clone()];
+            for (a, mu) in mu.chunks_exact(count).enumerate() {
+                momentum[a] = 0.0;
+                force[a] = h * scheme.weights[l] * of_p[a];
+                for (i, mu) in mu.iter().enumerate() {
+                    momentum[a] -= scheme.momentum[i * points + l] * mu;
+                    force[a] += h * scheme.force[i * points + l] * mu;
+                }
+            }
+            let by_v = &mut seeds.by_velocities[own];
+            self.bend_back(l, (momentum, force), &mut by_q, by_v);
+        }
+        for (a, mu) in mu.chunks_exact(count).enumerate() {
+            of_p[a] += mu.iter().sum::<f64>();
+            of_q[a] += by_q[a];
+        }
+        seeds
+    }
+
+    /// Adds what weights of L_v and F at one point are of coordinates and of velocities.
+    fn bend_back(
+        &self,
+        l: usize,
+        (momentum, force): (&[f64], &[f64]),
+        by_q: &mut [f64],
+        by_v: &mut [f64],
+    ) {
+        let places = self.pattern.places();
+        let values = &self.values[l * places.len()..(l + 1) * places.len()];
+        for ((block, row, column), value) in places.iter().zip(values) {
+            match block {
+                Block::ZZ => {}
+                Block::ZQ => {
+                    by_q[*column] += value * momentum[*row];
+                    by_v[*row] += value * force[*column];
+                }
+                Block::ForceZ => by_v[*column] += value * force[*row],
+                _ => by_q[*column] += value * force[*row],
+            }
+        }
     }
 
     /// All of it: 2n × 2n, ordered (p, q); 2n applications and 4n² numbers.

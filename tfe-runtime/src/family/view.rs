@@ -46,8 +46,18 @@ impl<'m, M: Model> View<'m, M> {
         M::FORM == Form::Hamiltonian
     }
 
+    /// The model itself.
+    pub(super) fn model(&self) -> &'m M {
+        self.model
+    }
+
+    /// The constant masses of a Hamiltonian; of a Lagrangian none.
+    pub(super) fn masses(&self) -> Option<&[f64]> {
+        self.is_hamiltonian().then_some(&self.mass)
+    }
+
     /// What the kernels take beside coordinates, if it is not the velocities.
-    fn momenta<R: Real>(&self, v: &[R]) -> Vec<R> {
+    pub(super) fn momenta<R: Real>(&self, v: &[R]) -> Vec<R> {
         let masses = self.mass.iter().zip(v);
         masses.map(|(mass, v)| *v * v.like(*mass)).collect()
     }

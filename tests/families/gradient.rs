@@ -1,0 +1,292 @@
+//! Gradients of losses of models of run-time length, backwards: what derivatives forwards make of them.
+
+use super::sensitive::{Long, LongPendula};
+use tfe::RunErrorKind;
+use tfe::family::{FamilyState, Loss, Model, RunError};
+use tfe::length::RunTimeLength;
+use tfe::prelude::*;
+
+/// The largest difference of a gradient backwards and of that made of derivatives forwards, over the largest derivative. The loss looks at the end by coordinates, momenta and velocities, at an output there, and at
+/// an output at four times, of which one is the start.
+fn off<M: Model>(
+    run: &Simulation<'_, M, 0, RunTimeLength>,
+    start: &FamilyState,
+    output: &str,
+) -> f64 {
+    let times = [0.0, 0.31, 0.5, 1.0];
+    let values = [0.2, -0.1, 0.4, 0.3];
+    let loss = Loss::of_end(|q, p, v| {
+        let last = q.len() - 1;
+        q[0].sin() + 0.5 * p[last].powi(2) + q[last] * v[0] + v[1].powi(2)
+    })
+    .and(Loss::squares(output, times, values))
+    .and(Loss::output_at_end(output));
+    let (value, gradient) = run
+        .gradient(start.clone(), 0.0..1.0, &loss)
+        .expect("a gradient");
+    let forwards = times.iter().fold(run.clone(), |run, t| run.break_at(*t));
+    let forwards = forwards.run_sensitive(start.clone(), 0.0..1.0);
+    let s = forwards.expect("derivatives");
+    assert_eq!(gradient.motion().states(), s.motion().states());
+    let nodes = s.motion().states();
+    let at = times.map(|t| nodes.iter().position(|node| node.t == t).expect("a node"));
+    let outputs = s.motion().outputs().column(output).expect("declared");
+    let node = s.motion().last();
+    let last = node.q.len() - 1;
+    let squares: f64 = (at.iter().zip(values))
+        .map(|(at, m)| 0.5 * (outputs[*at] - m).powi(2))
+        .sum();
+    let direct = node.q[0].sin()
+        + 0.5 * node.p[last].powi(2)
+        + node.q[last] * node.v[0]
+        + node.v[1].powi(2)
+        + outputs[at[3]];
+    assert!((value - squares - direct).abs() < 1e-13 * value.abs().max(1.0));
+    let slope = |by: &tfe::family::Node, slopes: &dyn Fn(usize) -> f64| {
+        let squares: f64 = (at.iter().zip(values))
+            .map(|(at, m)| (outputs[*at] - m) * slopes(*at))
+            .sum();
+        squares
+            + node.q[0].cos() * by.q[0]
+            + node.p[last] * by.p[last]
+            + by.q[last] * node.v[0]
+            + node.q[last] * by.v[0]
+            + 2.0 * node.v[1] * by.v[1]
+            + slopes(at[3])
+    };
+    let (mut off, mut size) = (0.0_f64, 0.0_f64);
+    let mut see = |found: f64, expected: f64| {
+        assert!(found.is_finite() && expected.is_finite());
+        (off, size) = (off.max((found - expected).abs()), size.max(expected.abs()));
+    };
+    assert_eq!(gradient.parameters(), s.parameters());
+    for name in s.parameters() {
+        let slopes = s.by(name).output(output).expect("declared");
+        see(
+            gradient.by(name),
+            slope(&s.by(name).last(), &|at| slopes[at]),
+        );
+    }
+    // By the start there are no velocities forwards: a loss without them.
+    let loss = Loss::of_end(|q, p, _| q[0].sin() + 0.5 * p[q.len() - 1].powi(2))
+        .and(Loss::squares(output, times, values));
+    let (_, gradient) = run
+        .gradient(start.clone(), 0.0..1.0, &loss)
+        .expect("a gradient");
+    let by_start = s.by_start().output(output).expect("declared");
+    let matrix = s.by_start().last();
+    let n = node.q.len();
+    for a in 0..n {
+        let found = [gradient.by_start().p[a], gradient.by_start().q[a]];
+        for (found, column) in found.into_iter().zip([a, n + a]) {
+            let of = |state: &FamilyState| if column < n { state.p[a] } else { state.q[a] };
+            let squares: f64 = (at.iter().zip(values))
+                .map(|(at, m)| (outputs[*at] - m) * of(&by_start[*at]))
+                .sum();
+            let (by_q, by_p) = (matrix[(n, column)], matrix[(n - 1, column)]);
+            see(
+                found,
+                squares + node.q[0].cos() * by_q + node.p[last] * by_p,
+            );
+        }
+    }
+    off / size
+}
+
+/// Springs of which each is a parameter, and a friction of its own: M q̈ = f with a constant diagonal M.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2) - sum(i in 0..n-1, k[i]*((q[i+1] - q[i])^2/2 + b*(q[i+1] - q[i])^4/4)),
+    dissipation = sum(i in 0..n-1, c*q[i]^2*(dot(q[i+1]) - dot(q[i]))^2/2),
+    force(q[0]) = f*sin(omega*t)*k[1],
+    output(middle) = q[2]*k[1] + c*dot(q[3])^2,
+)]
+struct Chain {
+    n: usize,
+    m: Vec<f64>,
+    k: Vec<f64>,
+    b: f64,
+    c: f64,
+    f: f64,
+    omega: f64,
+}
+
+fn chain(n: usize) -> (Chain, FamilyState) {
+    let swing = |a: usize| (a as f64).sin();
+    let chain = Chain {
+        n,
+        m: (0..n).map(|a| 1.0 + 0.3 * swing(a)).collect(),
+        k: (0..n - 1).map(|a| 1.5 + 0.5 * swing(2 * a)).collect(),
+        b: 0.3,
+        c: 0.2,
+        f: 0.7,
+        omega: 1.3,
+    };
+    let q: Vec<f64> = (0..n).map(|a| 0.5 * swing(3 * a)).collect();
+    let v: Vec<f64> = (0..n).map(|a| 0.2 * swing(5 * a)).collect();
+    let start = chain.state(q, v);
+    (chain, start)
+}
+
+fn needs_newton<M: Model>(run: &Simulation<'_, M, 0, RunTimeLength>, start: &FamilyState) -> bool {
+    let motion = run.run(start.clone(), 0.0..1.0).expect("a good run");
+    motion.statistics().newton_iterations > 0
+}
+
+#[test]
+fn gradients_backwards_are_derivatives_forwards() {
+    // Roundings of twenty steps and of both solutions.
+    const ROUNDING: f64 = 1e-12;
+    let elements = [
+        Element::mixed(2),
+        Element::mixed(4),
+        Element::mixed(9),
+        Element::radau(3),
+        Element::primal(4).lobatto(),
+        Element::primal(3),
+        Element::primal(4).reduced(),
+    ];
+    let (model, start) = chain(12);
+    let mut kick = vec![0.0; 12];
+    kick[3] = 0.4;
+    for element in elements {
+        let run = Simulation::new(&model).element(element).step(0.05);
+        let off = off(&run.impulse(0.42, kick.clone()), &start, "middle");
+        assert!(off < ROUNDING, "{element}: {off:.1e}");
+    }
+    // So stiff that the iteration contracts slowly, and the matrix is factored.
+    let stiff = Chain {
+        k: vec![700.0; 11],
+        b: 0.0,
+        c: 1e-3,
+        f: 1e-3,
+        ..chain(12).0
+    };
+    let run = Simulation::new(&stiff).step(0.05);
+    assert!(needs_newton(&run, &start));
+    let off_stiff = off(&run, &start, "middle");
+    assert!(off_stiff < 10.0 * ROUNDING, "{off_stiff:.1e}");
+    // Masses that depend on coordinates, and products of velocities.
+    let long = Long {
+        n: 5,
+        m: vec![1.0, 1.5, 0.7, 2.0, 0.4],
+        a: 0.3,
+        s: vec![1.0, 2.0, 0.5, 3.0],
+        c: 0.2,
+    };
+    let start = long.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
+    for element in elements {
+        let run = Simulation::new(&long).element(element).step(0.05);
+        let off = off(&run, &start, "power");
+        assert!(off < ROUNDING, "{element}: {off:.1e}");
+    }
+    // In phase space, with friction by momenta.
+    let pendula = LongPendula {
+        n: 3,
+        m: 0.7,
+        k: vec![1.3, 2.1],
+        b: 0.2,
+        c: 0.15,
+    };
+    let start = FamilyState {
+        q: vec![0.4, -0.3, 0.9],
+        p: vec![0.2, 0.5, -0.1],
+    };
+    for element in [Element::mixed(4), Element::mixed(9), Element::radau(4)] {
+        let run = Simulation::new(&pendula).element(element).step(0.05);
+        let off = off(&run, &start, "energy");
+        assert!(off < ROUNDING, "{element}: {off:.1e}");
+    }
+    let stiff = LongPendula {
+        k: vec![500.0; 2],
+        ..pendula
+    };
+    let start = FamilyState {
+        q: vec![4e-3, -3e-3, 9e-3],
+        ..start
+    };
+    let run = Simulation::new(&stiff).step(0.05);
+    assert!(needs_newton(&run, &start));
+    let off_stiff = off(&run, &start, "energy");
+    assert!(off_stiff < 10.0 * ROUNDING, "{off_stiff:.1e}");
+}
+
+/// A hundred sites and two hundred parameters.
+#[test]
+fn a_hundred_sites_backwards_and_forwards() {
+    let (model, start) = chain(100);
+    let run = Simulation::new(&model).step(0.1).element(Element::mixed(4));
+    let off = off(&run, &start, "middle");
+    assert!(off < 1e-12, "{off:.1e}");
+}
+
+/// A force that jumps at a break where the element has a point: it is that after the break, also where elements are solved once more.
+#[test]
+fn forces_that_jump_at_breaks() {
+    #[dynamics(
+        coordinates(q[n]),
+        lagrangian = sum(i in 0..n, dot(q[i])^2/2 - q[i]^2/2),
+        force(q[0]) = f*select(t <= 0.55, 1, -2),
+    )]
+    struct Pushed {
+        n: usize,
+        f: f64,
+    }
+    let start = FamilyState {
+        q: vec![0.3, 0.2],
+        p: vec![0.1, -0.4],
+    };
+    let element = Element::primal(3).lobatto();
+    let simulation = |pushed: &'static Pushed| {
+        let run = Simulation::new(pushed).element(element);
+        run.step(0.1).break_at(0.55)
+    };
+    static PUSHED: [Pushed; 2] = [Pushed { n: 2, f: 1.5 }, Pushed { n: 2, f: 0.5 }];
+    let ends = PUSHED.each_ref().map(|pushed| {
+        let motion = simulation(pushed).run(start.clone(), 0.0..1.0);
+        motion.expect("a good run").last().q[0]
+    });
+    // The equations are linear.
+    let expected = ends[0] - ends[1];
+    let run = simulation(&PUSHED[0]);
+    let forwards = run.run_sensitive(start.clone(), 0.0..1.0).expect("a run");
+    let loss = Loss::of_end(|q, _, _| q[0]);
+    let backwards = run.gradient(start, 0.0..1.0, &loss).expect("a run").1;
+    for found in [forwards.by("f").last().q[0], backwards.by("f")] {
+        assert!((found - expected).abs() < 1e-14, "{found} {expected}");
+    }
+}
+
+#[test]
+fn losses_that_do_not_belong_are_told() {
+    let (model, start) = chain(5);
+    let run = Simulation::new(&model).step(0.1);
+    let error = |loss: Loss<'_>| -> RunErrorKind {
+        let error: RunError = run
+            .gradient(start.clone(), 0.0..1.0, &loss)
+            .expect_err("a loss that does not belong");
+        error.kind().clone()
+    };
+    let unknown = error(Loss::output_at_end("midle"));
+    assert!(
+        matches!(&unknown, RunErrorKind::NoOutput { name, known } if name == "midle" && known == &["middle"]),
+        "{unknown}"
+    );
+    for (times, values) in [
+        (&[0.5, 2.0][..], &[0.0, 0.0][..]),
+        (&[0.5], &[]),
+        (&[0.5], &[f64::NAN]),
+    ] {
+        let kind = error(Loss::squares("middle", times, values));
+        assert!(matches!(kind, RunErrorKind::Loss { .. }), "{kind}");
+    }
+    // Models that do not fit together, steps that are cut, constraints.
+    let short = Chain {
+        k: vec![1.0],
+        ..chain(5).0
+    };
+    let broken = Simulation::new(&short).step(0.1);
+    let kind = broken.gradient(start.clone(), 0.0..1.0, &Loss::output_at_end("middle"));
+    let kind = kind.expect_err("too few springs").kind().clone();
+    assert!(matches!(kind, RunErrorKind::Family(_)), "{kind}");
+}

@@ -1,0 +1,382 @@
+//! Gradients of losses backwards along elements of run-time length: one row times their derivatives, and derivatives by all parameters at once (T-127, T-149).
+
+mod iteration;
+mod written;
+
+use super::blocked::Blocked;
+use super::error::ModelError;
+use super::inertia::Inertia;
+use super::model::{FamilyState, Model};
+use super::pattern::Pattern;
+use super::rates::Rates;
+use super::stepper::Stepper;
+use super::transition::{OperatorError, Seeds, TransitionOperator};
+use super::view::View;
+use crate::element::Element;
+use crate::error::StepError;
+use crate::lanes::Lanes;
+use crate::model::Form;
+use crate::newton::Control;
+use crate::scheme::{SchemeTable, Tables as _};
+use crate::tape::Tape;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+use iteration::Iteration;
+use written::{Points, Results, add_of_place, add_of_points};
+
+/// The derivatives of a loss by what a node consists of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Partials {
+    /// By coordinates; as many as the model has, as of the next two.
+    pub q: Vec<f64>,
+    /// By momenta.
+    pub p: Vec<f64>,
+    /// By velocities.
+    pub v: Vec<f64>,
+    /// By outputs, one for each column.
+    pub outputs: Vec<f64>,
+}
+
+/// Goes backwards along a run, from its last node: carries the row λ = ∂ℓ/∂(p, q) of a loss ℓ, and adds up its derivatives by all parameters.
+///
+/// ```text
+/// λ_e = (∂y_{e+1}/∂y_e)ᵀ λ_{e+1} ,     dℓ/da += (∂y_{e+1}/∂a)ᵀ λ_{e+1}                                      (T-127)
+/// ```
+///
+/// Elements are solved once more. Where the equations are M q̈ = f with a constant diagonal M and the iteration contracts, memory and time are linear in the number of coordinates; else a sparse matrix of all points is factored.
+pub struct Backwards<'m, M> {
+    view: View<'m, M>,
+    table: SchemeTable,
+    pattern: Arc<Pattern>,
+    stepper: Stepper<'m, M>,
+    iteration: Option<Iteration>,
+    /// Made when it is needed.
+    rates: Option<Rates<()>>,
+    /// L_vv of a Lagrangian, at nodes.
+    mass: Option<(Pattern, Blocked)>,
+    tape: Tape,
+    lambda: Vec<f64>,
+    places: Places,
+}
+
+/// The points of an element and what λ weighs there, a row of n for each group of four points.
+#[derive(Clone, Debug, Default)]
+struct Places {
+    times: Vec<Points>,
+    q: Vec<Points>,
+    v: Vec<Points>,
+    momenta: Vec<Points>,
+    forces: Vec<Points>,
+    /// What these weights make of velocities.
+    by_velocities: Vec<Points>,
+}
+
+impl<M> fmt::Debug for Backwards<'_, M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Backwards")
+            .field("lambda", &self.lambda)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'m, M: Model> Backwards<'m, M> {
+    /// At the end of a run with an element, with λ = 0.
+    ///
+    /// # Errors
+    /// [`OperatorError`] where steps of this model are impossible, and for constraints.
+    pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, OperatorError> {
+        let table = TransitionOperator::admitted::<M>(model, element)?;
+        let view = View::new(model, 0.0)?;
+        let pattern = Arc::new(Pattern::of(&view));
+        let scheme = table.view();
+        let inertia = Inertia::of(model).ok().filter(|_| scheme.collocated);
+        let iteration = inertia.map(|inertia| Iteration::new(&scheme, &pattern, inertia));
+        let (n, groups) = (model.len(), scheme.points().div_ceil(4));
+        let rows = || vec![Lanes([0.0; 4]); groups * n];
+        let mut tape = Tape::default();
+        tape.begin(model.parameters() + 2 * n);
+        Ok(Self {
+            places: Places {
+                times: vec![Lanes([0.0; 4]); groups],
+                q: rows(),
+                v: rows(),
+                momenta: rows(),
+                forces: rows(),
+                by_velocities: rows(),
+            },
+            stepper: Stepper::new(model, element, control)?,
+            view,
+            table,
+            pattern,
+            iteration,
+            rates: None,
+            mass: None,
+            tape,
+            lambda: vec![0.0; 2 * n],
+        })
+    }
+
+    /// λ, ordered (p, q).
+    #[must_use]
+    pub fn by_state(&self) -> &[f64] {
+        &self.lambda
+    }
+
+    /// The derivatives by all parameters so far.
+    #[must_use]
+    pub fn by_parameters(&self) -> Vec<f64> {
+        let all = 0..self.view.model().parameters();
+        all.map(|index| self.tape.sum(index)).collect()
+    }
+
+    /// Adds what the loss has directly of a node.
+    ///
+    /// # Errors
+    /// [`OperatorError`]: vectors of other lengths, velocities that no momenta belong to.
+    pub fn see(
+        &mut self,
+        t: f64,
+        (state, v): (&FamilyState, &[f64]),
+        partials: &Partials,
+    ) -> Result<(), OperatorError> {
+        let model = self.view.model();
+        let n = model.len();
+        for (given, needed) in [
+            (state.q.len(), n),
+            (state.p.len(), n),
+            (v.len(), n),
+            (partials.q.len(), n),
+            (partials.p.len(), n),
+            (partials.v.len(), n),
+            (partials.outputs.len(), model.columns()),
+        ] {
+            if given != needed {
+                return Err(OperatorError::Shape { needed, given });
+            }
+        }
+        let parameters = model.parameters();
+        let (of_p, of_q) = self.lambda.split_at_mut(n);
+        for a in 0..n {
+            of_p[a] += partials.p[a];
+            of_q[a] += partials.q[a];
+        }
+        let z = match M::FORM {
+            Form::Lagrangian => v,
+            Form::Hamiltonian => &state.p,
+        };
+        let place = (t, &state.q[..], z);
+        let mut by_v = partials.v.clone();
+        if !is_zero(&partials.outputs) {
+            let weights = &partials.outputs;
+            add_of_place(&mut self.tape, model, place, Results::Observables, weights);
+            for a in 0..n {
+                of_q[a] += self.tape.take(parameters + a);
+                let by_z = self.tape.take(parameters + n + a);
+                match M::FORM {
+                    Form::Lagrangian => by_v[a] += by_z,
+                    Form::Hamiltonian => of_p[a] += by_z,
+                }
+            }
+        }
+        if is_zero(&by_v) {
+            return Ok(());
+        }
+        if M::FORM == Form::Lagrangian {
+            // p = L_v(q, v): δv = L_vv⁻¹ (δp − ∂L_v/∂(q, a)).
+            Self::divide_by_mass(&mut self.mass, model, place, &mut by_v)?;
+            for a in 0..n {
+                of_p[a] += by_v[a];
+                by_v[a] = -by_v[a];
+            }
+        }
+        add_of_place(&mut self.tape, model, place, Results::Slopes, &by_v);
+        for a in 0..n {
+            of_q[a] += self.tape.take(parameters + a);
+            let by_z = self.tape.take(parameters + n + a);
+            if M::FORM == Form::Hamiltonian {
+                of_p[a] += by_z;
+            }
+        }
+        Ok(())
+    }
+
+    fn divide_by_mass(
+        memory: &mut Option<(Pattern, Blocked)>,
+        model: &M,
+        (t, q, v): (f64, &[f64], &[f64]),
+        values: &mut [f64],
+    ) -> Result<(), OperatorError> {
+        let (pattern, mass) = match memory {
+            Some(made) => made,
+            empty => {
+                let pattern = Pattern::of_mass(model);
+                let places = pattern.places().iter();
+                let places: Vec<_> = places.map(|(_, row, column)| (*row, *column)).collect();
+                let mass = Blocked::new(model.len(), 1, &places);
+                let mass = mass.ok_or(ModelError::TooLarge)?;
+                empty.insert((pattern, mass))
+            }
+        };
+        // Blocks of one number are sorted by column and row, as the places of the pattern are.
+        let mut entries = pattern.scatter(&mut mass.values);
+        model.mass(t, q, v, &mut entries);
+        mass.factor()?;
+        mass.solve(values);
+        if values.iter().all(|value| value.is_finite()) {
+            Ok(())
+        } else {
+            Err(StepError::SingularTangent { unknown: 0 }.into())
+        }
+    }
+
+    /// Goes back over the element from t to t + h, from where it ends to `before`; where it has ended, solved once more.
+    ///
+    /// # Errors
+    /// [`OperatorError`], of the step and of its tangent; [`OperatorError::Cut`] where it was too long to be made at once.
+    pub fn pass(
+        &mut self,
+        (t, h): (f64, f64),
+        before: &FamilyState,
+    ) -> Result<FamilyState, OperatorError> {
+        let mut end = before.clone();
+        if self.iteration.is_some() {
+            let cuts = self.stepper.statistics().cuts;
+            self.stepper.advance(t, h, &mut end)?;
+            if self.stepper.statistics().cuts > cuts {
+                return Err(OperatorError::Cut);
+            }
+            if self.iterate(t, h) {
+                self.take_derivatives();
+                return Ok(end);
+            }
+        }
+        let transition = self.transition((t, h), before)?;
+        end.clone_from(transition.end());
+        let seeds = transition.pull(&mut self.lambda);
+        if !self.lambda.iter().all(|one| one.is_finite()) {
+            return Err(StepError::SingularTangent { unknown: 0 }.into());
+        }
+        self.places.weigh(&seeds);
+        self.take_derivatives();
+        Ok(end)
+    }
+
+    /// The derivative of an element by its start, factored, with its points.
+    fn transition(
+        &mut self,
+        (t, h): (f64, f64),
+        before: &FamilyState,
+    ) -> Result<TransitionOperator, OperatorError> {
+        let (view, table) = (&self.view, &self.table);
+        let mut rates = match self.rates.take() {
+            Some(rates) => rates.hand_over(view),
+            None => Rates::new(view, table.clone(), Control::default())?,
+        };
+        let ground = (table, &self.pattern);
+        let transition = TransitionOperator::next(view, &mut rates, ground, before, (t, h));
+        for (l, point) in rates.points.iter().enumerate() {
+            let time = t + h * table.view().nodes[l];
+            self.places.set(l, time, &point.q, &point.v);
+        }
+        self.rates = Some(rates.hand_over(()));
+        transition
+    }
+
+    /// By iteration, with the points of the step that the stepper has made; false where that does not contract.
+    fn iterate(&mut self, t: f64, h: f64) -> bool {
+        let Some(iteration) = &mut self.iteration else {
+            return false;
+        };
+        let scheme = self.table.view();
+        let dense = self.stepper.dense(t, t + h);
+        for (l, node) in scheme.nodes.iter().enumerate() {
+            let (q, v) = dense.motion_at(*node, h);
+            self.places.set(l, t + h * node, &q, &v);
+        }
+        let places = &mut self.places;
+        iteration.linearise(
+            &self.view,
+            &self.pattern,
+            (&places.times, &places.q, &places.v),
+        );
+        if !iteration.pull(h, &mut self.lambda) {
+            return false;
+        }
+        for (momentum, mu) in places.momenta.iter_mut().zip(&iteration.mu) {
+            *momentum = -*mu;
+        }
+        places.forces.copy_from_slice(&iteration.seeds);
+        if M::FORM == Form::Hamiltonian {
+            iteration.set_by_velocities(&mut places.by_velocities);
+        }
+        true
+    }
+
+    /// Adds what momenta and forces at the points have of parameters.
+    fn take_derivatives(&mut self) {
+        let model = self.view.model();
+        if model.parameters() == 0 {
+            return;
+        }
+        let (n, places) = (model.len(), &mut self.places);
+        let (mut by_z, mut by_q) = (places.momenta.clone(), places.forces.clone());
+        if let Some(masses) = self.view.masses() {
+            // At fixed v the momentum moves: δp = −M ∂H_p/∂a, and with it the forces.
+            for (place, by_z) in by_z.iter_mut().enumerate() {
+                let mass = Lanes([masses[place % n]; 4]);
+                *by_z = -(mass * *by_z + places.by_velocities[place]);
+                by_q[place] = -by_q[place];
+                places.v[place] = mass * places.v[place];
+            }
+        }
+        for (group, t) in places.times.iter().enumerate() {
+            let own = group * n..(group + 1) * n;
+            let weights = [
+                &by_z[own.clone()],
+                &by_q[own.clone()],
+                &places.forces[own.clone()],
+            ];
+            let place = (*t, &places.q[own.clone()], &places.v[own]);
+            add_of_points(&mut self.tape, model, place, weights);
+        }
+    }
+}
+
+impl Places {
+    /// The place of a point; where there are no more points the first of its group stands.
+    fn set(&mut self, l: usize, t: f64, q: &[f64], v: &[f64]) {
+        let (group, n) = (l / 4, q.len());
+        let lanes = match l % 4 {
+            0 => 0..4,
+            lane => lane..lane + 1,
+        };
+        self.times[group].0[lanes.clone()].fill(t);
+        for a in 0..n {
+            self.q[group * n + a].0[lanes.clone()].fill(q[a]);
+            self.v[group * n + a].0[lanes.clone()].fill(v[a]);
+        }
+    }
+
+    /// What is weighed at the points.
+    fn weigh(&mut self, seeds: &Seeds) {
+        let n = self.q.len() / self.times.len().max(1);
+        for (rows, seeds) in [
+            (&mut self.momenta, &seeds.momenta),
+            (&mut self.forces, &seeds.forces),
+            (&mut self.by_velocities, &seeds.by_velocities),
+        ] {
+            rows.fill(Lanes([0.0; 4]));
+            for (l, seeds) in seeds.chunks_exact(n.max(1)).enumerate() {
+                for (a, seed) in seeds.iter().enumerate() {
+                    rows[l / 4 * n + a].0[l % 4] = *seed;
+                }
+            }
+        }
+    }
+}
+
+fn is_zero(values: &[f64]) -> bool {
+    values.iter().all(|value| *value == 0.0)
+}

@@ -1,0 +1,265 @@
+//! The transposed equations of an element M q̈ = f, iterated as the element itself is (T-150).
+
+use super::written::Points;
+use crate::backwards::Judge;
+use crate::family::inertia::Inertia;
+use crate::family::model::{Block, Gradient, Model};
+use crate::family::pattern::Pattern;
+use crate::lanes::Lanes;
+use crate::scheme::SchemeRef;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+const ZERO: Points = Lanes([0.0; 4]);
+
+/// Numbers at all points of an element, four to a group: a row of n for each group. Numbers beyond the last point are zeros.
+#[derive(Clone, Debug)]
+pub(super) struct Iteration {
+    /// b_l and β_j, one a group.
+    weights: Vec<Points>,
+    advance: Vec<Points>,
+    /// G_il and C_lj, for each i (l) as many as groups.
+    force: Vec<Points>,
+    position: Vec<Points>,
+    points: usize,
+    inverse_mass: Vec<f64>,
+    /// Places of second derivatives by coordinates, of forces by velocities, and of forces by coordinates.
+    parts: [Part; 3],
+    /// Second derivatives, a row for each group.
+    values: Vec<Points>,
+    gradient: [Vec<Points>; 3],
+    pub(super) mu: Vec<Points>,
+    pub(super) seeds: Vec<Points>,
+    pulled: Vec<Points>,
+    pushed: Vec<Points>,
+}
+
+/// Which places of a pattern belong to one block, with their rows and columns.
+#[derive(Clone, Debug)]
+struct Part {
+    range: Range<usize>,
+    places: Vec<(u32, u32)>,
+}
+
+impl Part {
+    fn of(pattern: &Pattern, block: Block) -> Self {
+        let places = pattern.places();
+        let first = places.partition_point(|(own, ..)| *own < block);
+        let last = places.partition_point(|(own, ..)| *own <= block);
+        let pair = |(_, row, column): &(Block, usize, usize)| (*row as u32, *column as u32);
+        Self {
+            range: first..last,
+            places: places[first..last].iter().map(pair).collect(),
+        }
+    }
+
+    /// sum += valuesᵀ row
+    #[inline(always)]
+    fn add_transposed(&self, values: &[Points], row: &[Points], sum: &mut [Points]) {
+        for ((from, to), value) in self.places.iter().zip(&values[self.range.clone()]) {
+            sum[*to as usize] += *value * row[*from as usize];
+        }
+    }
+}
+
+/// The rows of a matrix in groups of four columns.
+fn grouped(matrix: &[f64], columns: usize) -> Vec<Points> {
+    let four = |part: &[f64]| {
+        let mut four = ZERO;
+        four.0[..part.len()].copy_from_slice(part);
+        four
+    };
+    let rows = matrix.chunks_exact(columns);
+    rows.flat_map(|row| row.chunks(4).map(four)).collect()
+}
+
+impl Iteration {
+    /// Of a collocated element.
+    pub(super) fn new(scheme: &SchemeRef<'_>, pattern: &Pattern, inertia: Inertia) -> Self {
+        let (points, n) = (scheme.points(), inertia.inverse.len());
+        let all = || vec![ZERO; points.div_ceil(4) * n];
+        Self {
+            weights: grouped(scheme.weights, points),
+            advance: grouped(scheme.advance, points),
+            force: grouped(scheme.force, points),
+            position: grouped(scheme.position, points),
+            points,
+            inverse_mass: inertia.inverse,
+            parts: [Block::QQ, Block::ForceZ, Block::ForceQ].map(|one| Part::of(pattern, one)),
+            values: vec![ZERO; points.div_ceil(4) * pattern.places().len()],
+            gradient: [vec![ZERO; n], vec![ZERO; n], vec![ZERO; n]],
+            mu: all(),
+            seeds: all(),
+            pulled: all(),
+            pushed: all(),
+        }
+    }
+
+    /// Second derivatives at the places of the element.
+    pub(super) fn linearise<M: Model>(
+        &mut self,
+        model: &M,
+        pattern: &Pattern,
+        (times, q, v): (&[Points], &[Points], &[Points]),
+    ) {
+        self.values.fill(ZERO);
+        let n = self.inverse_mass.len();
+        let groups = self.values.chunks_exact_mut(pattern.places().len().max(1));
+        for (group, values) in groups.enumerate() {
+            let own = group * n..(group + 1) * n;
+            let [by_z, by_q, force] = &mut self.gradient;
+            let first = Gradient {
+                z: by_z,
+                q: by_q,
+                force,
+            };
+            let mut entries = pattern.add_to(values);
+            model.second(times[group], &q[own.clone()], &v[own], first, &mut entries);
+        }
+    }
+
+    /// What the seeds of forces make of velocities.
+    pub(super) fn set_by_velocities(&self, sums: &mut [Points]) {
+        sums.fill(ZERO);
+        let n = self.inverse_mass.len();
+        let values = self.values.len() / self.weights.len();
+        for g in 0..self.weights.len() {
+            let own = g * n..(g + 1) * n;
+            let values = &self.values[g * values..(g + 1) * values];
+            let sums = &mut sums[own.clone()];
+            self.parts[1].add_transposed(values, &self.seeds[own], sums);
+        }
+    }
+
+    /// Moves λ over the element, and leaves μ and the seeds of forces; false where the iteration does not contract, and λ stays.
+    pub(super) fn pull(&mut self, h: f64, lambda: &mut [f64]) -> bool {
+        let solve = Solve {
+            of: self,
+            h,
+            lambda: &*lambda,
+        };
+        #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+        let solved = match pulp::x86::V3::try_new() {
+            Some(isa) => isa.vectorize(solve),
+            None => solve.run(),
+        };
+        #[cfg(not(all(feature = "simd", target_arch = "x86_64")))]
+        let solved = solve.run();
+        if !solved {
+            return false;
+        }
+        let (of_p, of_q) = lambda.split_at_mut(self.inverse_mass.len());
+        let add = |sums: &mut [f64], rows: &[Points]| {
+            for group in rows.chunks_exact(sums.len().max(1)) {
+                for (sum, four) in sums.iter_mut().zip(group) {
+                    *sum += four.0.iter().sum::<f64>();
+                }
+            }
+        };
+        add(of_p, &self.mu);
+        add(of_q, &self.pulled);
+        true
+    }
+}
+
+/// The iteration.
+struct Solve<'a> {
+    of: &'a mut Iteration,
+    h: f64,
+    lambda: &'a [f64],
+}
+
+/// In wide registers, with the same roundings.
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+impl pulp::NullaryFnOnce for Solve<'_> {
+    type Output = bool;
+    #[inline(always)]
+    fn call(self) -> bool {
+        self.run()
+    }
+}
+
+impl Solve<'_> {
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Iteration {
+            weights,
+            advance,
+            force,
+            position,
+            points,
+            inverse_mass,
+            parts,
+            values,
+            gradient: _,
+            mu,
+            seeds,
+            pulled,
+            pushed,
+        } = self.of;
+        let (n, groups) = (inverse_mass.len(), weights.len());
+        let (of_p, of_q) = self.lambda.split_at(n);
+        let h = splat(self.h);
+        let [stiffness, damping, force_q] = parts;
+        let count = values.len() / groups;
+        mu.fill(ZERO);
+        let mut judge = Judge::default();
+        loop {
+            for g in 0..groups {
+                for a in 0..n {
+                    let mut seed = weights[g] * splat(of_p[a]);
+                    for i in 0..*points {
+                        let mu = mu[i / 4 * n + a].0[i % 4];
+                        seed += force[i * groups + g] * splat(mu);
+                    }
+                    seeds[g * n + a] = h * seed;
+                    pushed[g * n + a] = h * advance[g] * splat(of_q[a]);
+                }
+                let own = g * n..(g + 1) * n;
+                let values = &values[g * count..(g + 1) * count];
+                let seeds = &seeds[own.clone()];
+                let pulled = &mut pulled[own.clone()];
+                pulled.fill(ZERO);
+                stiffness.add_transposed(values, seeds, pulled);
+                force_q.add_transposed(values, seeds, pulled);
+                damping.add_transposed(values, seeds, &mut pushed[own]);
+            }
+            let (mut increment, mut size) = (ZERO, ZERO);
+            for g in 0..groups {
+                for a in 0..n {
+                    let mut row = ZERO;
+                    for l in 0..*points {
+                        let pulled = pulled[l / 4 * n + a].0[l % 4];
+                        row += position[l * groups + g] * splat(pulled);
+                    }
+                    row = (pushed[g * n + a] + h * row) * splat(inverse_mass[a]);
+                    let old = &mut mu[g * n + a];
+                    for lane in 0..4 {
+                        let change = (row.0[lane] - old.0[lane]).abs();
+                        // A maximum would ignore what is not a number.
+                        let largest = increment.0[lane];
+                        let is_larger = change > largest || change.is_nan();
+                        increment.0[lane] = if is_larger { change } else { largest };
+                        size.0[lane] = size.0[lane].max(row.0[lane].abs());
+                    }
+                    *old = row;
+                }
+            }
+            if let Some(verdict) = judge.see(largest(increment), largest(size)) {
+                return verdict;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn splat(value: f64) -> Points {
+    Lanes([value; 4])
+}
+
+#[inline(always)]
+fn largest(four: Points) -> f64 {
+    let both = |x: f64, y: f64| if x > y || x.is_nan() { x } else { y };
+    both(both(four.0[0], four.0[1]), both(four.0[2], four.0[3]))
+}

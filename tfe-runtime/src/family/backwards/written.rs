@@ -1,0 +1,87 @@
+//! Kernels of run-time length in numbers that write down their operations (T-149).
+
+use crate::family::model::{Gradient, Model};
+use crate::lanes::Lanes;
+use crate::tape::{LANES, Operations, Row, Tape, Taped};
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+
+/// Numbers at some points.
+pub(super) type Points = Lanes<LANES>;
+
+/// Which results of a kernel.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Results {
+    /// L_v, or H_p.
+    Slopes,
+    Observables,
+}
+
+/// Adds Σ weights · ∂(first derivatives and forces)/∂a at some points to the sum of every parameter a. Weights are those of the derivatives by z, by q, and of forces.
+pub(super) fn add_of_points<M: Model>(
+    tape: &mut Tape,
+    model: &M,
+    (t, q, z): (Points, &[Points], &[Points]),
+    weights: [&[Points]; 3],
+) {
+    let ends = tape.record(|operations| {
+        let still = |values: &[Points]| -> Vec<Taped> {
+            values.iter().map(|value| Taped::of(value.0)).collect()
+        };
+        first(model, Taped::time(t.0, operations), &still(q), &still(z))
+    });
+    let weights = weights.into_iter().flatten().map(|weights| &weights.0);
+    tape.read(ends.into_iter().zip(weights));
+}
+
+/// Adds Σ weights · ∂y/∂(a, q, z) of results y at one place to the sums of parameters and of what follows them: coordinates, then velocities (momenta).
+pub(super) fn add_of_place<M: Model>(
+    tape: &mut Tape,
+    model: &M,
+    (t, q, z): (f64, &[f64], &[f64]),
+    results: Results,
+    weights: &[f64],
+) {
+    let parameters = model.parameters();
+    let ends = tape.record(|operations| {
+        let q = variables(q, parameters, operations);
+        let z = variables(z, parameters + q.len(), operations);
+        let time = Taped::time([t; LANES], operations);
+        match results {
+            Results::Slopes => first(model, time, &q, &z),
+            Results::Observables => {
+                let mut values = vec![Taped::of([0.0; LANES]); model.columns()];
+                model.observables(time, &q, &z, &mut values);
+                values.iter().map(Taped::place).collect()
+            }
+        }
+    });
+    let weights = weights.iter().map(|weight| [*weight, 0.0, 0.0, 0.0]);
+    let weights: Vec<Row> = weights.collect();
+    tape.read(ends.into_iter().zip(&weights));
+}
+
+fn variables<'t>(
+    values: &[f64],
+    first: usize,
+    operations: &'t RefCell<Operations>,
+) -> Vec<Taped<'t>> {
+    let all = values.iter().enumerate();
+    all.map(|(a, value)| Taped::variable(*value, first + a, operations))
+        .collect()
+}
+
+/// Where the operations of first derivatives and forces stand.
+fn first<M: Model>(model: &M, time: Taped<'_>, q: &[Taped<'_>], z: &[Taped<'_>]) -> Vec<u32> {
+    let mut results = vec![Taped::of([0.0; LANES]); 3 * q.len()];
+    let (by_z, others) = results.split_at_mut(q.len());
+    let (by_q, force) = others.split_at_mut(q.len());
+    let first = Gradient {
+        z: by_z,
+        q: by_q,
+        force,
+    };
+    model.first(time, q, z, first);
+    results.iter().map(Taped::place).collect()
+}
