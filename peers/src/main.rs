@@ -4,10 +4,12 @@
 //! ```sh
 //! cargo run --release -p tfe-peers             # pictures, tables and a page in target/speed_accuracy
 //! cargo run --release -p tfe-peers -- folder
-//! cargo run --release -p tfe-peers -- folder stiff     # the stiff scenes alone
+//! cargo run --release -p tfe-peers -- folder stiff         # the stiff scenes alone
+//! cargo run --release -p tfe-peers -- folder derivatives   # derivatives by parameters alone
 //! ```
 
 mod contest;
+mod derivatives;
 mod ensembles;
 mod equations;
 mod long;
@@ -120,12 +122,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1);
     let folder = folder.map_or_else(|| PathBuf::from("target/speed_accuracy"), PathBuf::from);
     fs::create_dir_all(&folder)?;
-    if std::env::args_os()
-        .nth(2)
-        .is_some_and(|part| part == "stiff")
-    {
-        stiff_section(&folder)?;
-        return Ok(());
+    match std::env::args_os().nth(2) {
+        Some(part) if part == "stiff" => return stiff_section(&folder).map(drop),
+        Some(part) if part == "derivatives" => return derivatives_section(&folder).map(drop),
+        _ => {}
     }
     let clock = Instant::now();
     let (mut rows, mut sections, mut scenes) = (Vec::new(), Vec::new(), Vec::new());
@@ -161,6 +161,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let ensembles = Section::new("Thousands of starts")
         .paragraph(ensembles::explanation())
         .table(ensembles::HEADER, crowds);
+    let derivatives = derivatives_section(&folder)?;
     let overview = overview::overview(&scenes);
     fs::write(folder.join("overview.svg"), &overview)?;
     fs::write(folder.join("peers.csv"), table::csv(table::HEADER, &rows))?;
@@ -172,12 +173,28 @@ fn main() -> Result<(), Box<dyn Error>> {
         .section(summary)
         .section(stiff)
         .section(lattices)
-        .section(ensembles);
+        .section(ensembles)
+        .section(derivatives);
     let path = folder.join("speed_accuracy.html");
     sections.into_iter().fold(page, Page::section).save(&path)?;
     let seconds = clock.elapsed().as_secs_f64();
     println!("\n{seconds:.1} s   {}", path.display());
     Ok(())
+}
+
+fn derivatives_section(folder: &Path) -> Result<Section, Box<dyn Error>> {
+    println!("\n{}", long::line(&derivatives::HEADER));
+    let rows = derivatives::table()?;
+    for row in &rows {
+        println!("{}", long::line(row));
+    }
+    fs::write(
+        folder.join("derivatives.csv"),
+        table::csv(derivatives::HEADER, &rows),
+    )?;
+    Ok(Section::new("Derivatives by parameters")
+        .paragraph(derivatives::EXPLANATION)
+        .table(derivatives::HEADER, rows))
 }
 
 fn stiff_section(folder: &Path) -> Result<Section, Box<dyn Error>> {
