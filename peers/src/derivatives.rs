@@ -304,7 +304,7 @@ fn ours(is_backwards: bool) -> Vec<Way> {
                 Ok((clock.elapsed().as_secs_f64(), gradient))
             };
             ways.push(Way {
-                name: format!("Mixed {nodes}, {} steps", steps),
+                name: format!("Mixed {nodes}, {steps} steps"),
                 run: Box::new(run),
             });
         }

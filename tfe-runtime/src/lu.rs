@@ -1,6 +1,16 @@
 //! Dense LU factorisation with partial pivoting, on the caller's memory.
 //!
-//! Matrices are flat, row by row. Sizes are small (rates times coordinates), so the loops are plain.
+//! Matrices are flat, row by row. Sizes are small (rates times coordinates): the loops are plain, and of larger ones in the widest registers that the processor has, with the same roundings.
+
+mod substitution;
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+mod wide;
+
+use substitution::LARGE;
+
+/// Matrices of fewer rows are factored before wide registers pay.
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+const WIDE: usize = 24;
 
 /// A pivot vanished, or was not a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +26,17 @@ pub struct Singular {
 #[cfg_attr(feature = "alloc", inline)]
 #[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
 pub fn factor(size: usize, matrix: &mut [f64], pivots: &mut [usize]) -> Result<(), Singular> {
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    if size >= WIDE
+        && let Some(isa) = pulp::x86::V3::try_new()
+    {
+        return wide::factor(isa, size, matrix, pivots).map_err(|column| Singular { column });
+    }
+    factor_plainly(size, matrix, pivots)
+}
+
+#[inline(always)]
+fn factor_plainly(size: usize, matrix: &mut [f64], pivots: &mut [usize]) -> Result<(), Singular> {
     for column in 0..size {
         let mut pivot = column;
         for row in column + 1..size {
@@ -56,6 +77,10 @@ pub fn solve(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64])
     for k in 0..size {
         vector.swap(k, pivots[k]);
     }
+    // Small programs have one text for all sizes.
+    if size >= LARGE || cfg!(not(feature = "alloc")) {
+        return solve_large(size, factors, vector);
+    }
     for row in 1..size {
         let mut sum = vector[row];
         for j in 0..row {
@@ -72,25 +97,29 @@ pub fn solve(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64])
     }
 }
 
+#[inline(never)]
+fn solve_large(size: usize, factors: &[f64], vector: &mut [f64]) {
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    if let Some(isa) = pulp::x86::V3::try_new() {
+        return wide::solve(isa, size, factors, vector);
+    }
+    substitution::solve(size, factors, vector);
+}
+
 /// Solves Aᵀ x = b in place with the factors of A.
 pub(crate) fn solve_transposed(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64]) {
-    for row in 0..size {
-        let mut sum = vector[row];
-        for j in 0..row {
-            sum -= factors[j * size + row] * vector[j];
-        }
-        vector[row] = sum / factors[row * size + row];
-    }
-    for row in (0..size).rev() {
-        let mut sum = vector[row];
-        for j in row + 1..size {
-            sum -= factors[j * size + row] * vector[j];
-        }
-        vector[row] = sum;
-    }
+    transposed(size, factors, vector);
     for k in (0..size).rev() {
         vector.swap(k, pivots[k]);
     }
+}
+
+fn transposed(size: usize, factors: &[f64], vector: &mut [f64]) {
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    if let Some(isa) = pulp::x86::V3::try_new() {
+        return wide::solve_transposed(isa, size, factors, vector);
+    }
+    substitution::solve_transposed(size, factors, vector);
 }
 
 /// Solves A X = B in place with the factors of A, `columns` right sides at once, B row by row.
@@ -103,6 +132,16 @@ pub(crate) fn solve_columns(factors: &[f64], pivots: &[usize], columns: usize, s
             }
         }
     }
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    if size >= LARGE
+        && let Some(isa) = pulp::x86::V3::try_new()
+    {
+        return wide::substitute(isa, size, factors, columns, sides);
+    }
+    substitute_plainly(factors, size, columns, sides);
+}
+
+fn substitute_plainly(factors: &[f64], size: usize, columns: usize, sides: &mut [f64]) {
     let subtract = |row: &mut [f64], factor: f64, other: &[f64]| {
         for (entry, other) in row.iter_mut().zip(other) {
             *entry -= factor * other;
@@ -227,5 +266,121 @@ mod tests {
         assert!(Block::of(&matrix).is_err());
         // Badly scaled, but regular.
         assert!(Block::of(&[[1e12, 1e-6], [1e12, 2e-6]]).is_ok());
+    }
+}
+
+#[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
+mod wide_tests {
+    use super::*;
+    use alloc::vec;
+    use alloc::vec::Vec;
+
+    /// Numbers in (−1, 1), the same every time.
+    fn numbers(count: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    /// Every bit as with one pivot after the other, in all sizes.
+    #[test]
+    fn the_same_bits_as_one_after_the_other() {
+        let Some(isa) = pulp::x86::V3::try_new() else {
+            return;
+        };
+        for size in 1..40 {
+            let mut matrix = numbers(size * size, size as u64);
+            // Zero blocks, and ties of pivots.
+            for (at, entry) in matrix.iter_mut().enumerate() {
+                if (at / 3 + at / size).is_multiple_of(4) {
+                    *entry = 0.0;
+                }
+            }
+            for row in 0..size {
+                matrix[row * size + row] += 0.5;
+            }
+            let (mut one, mut pivots) = (matrix.clone(), vec![0; size]);
+            let (mut other, mut exchanged) = (matrix, vec![0; size]);
+            let plain = factor_plainly(size, &mut one, &mut pivots);
+            let wide = wide::factor(isa, size, &mut other, &mut exchanged);
+            assert_eq!(plain, wide.map_err(|column| Singular { column }));
+            if plain.is_err() {
+                continue;
+            }
+            assert_eq!((&one, &pivots), (&other, &exchanged), "{size}");
+            for columns in [1, 2, 5, 24] {
+                let sides = numbers(size * columns, 7);
+                let (mut a, mut b) = (sides.clone(), sides);
+                substitute_plainly(&one, size, columns, &mut a);
+                wide::substitute(isa, size, &one, columns, &mut b);
+                assert_eq!(a, b, "{size} {columns}");
+            }
+        }
+    }
+
+    /// Every bit of one right side as with plain numbers, and a solution.
+    #[test]
+    fn one_right_side_has_the_same_bits() {
+        let Some(isa) = pulp::x86::V3::try_new() else {
+            return;
+        };
+        for size in 1..40 {
+            let mut matrix = numbers(size * size, 5 + size as u64);
+            for row in 0..size {
+                matrix[row * size + row] += 3.0;
+            }
+            let wanted = numbers(size, 11);
+            let rows = matrix.chunks_exact(size);
+            let product = |row: &[f64]| row.iter().zip(&wanted).map(|(a, x)| a * x).sum();
+            let side: Vec<f64> = rows.map(product).collect();
+            let mut by_transposed = vec![0.0; size];
+            for (row, x) in matrix.chunks_exact(size).zip(&wanted) {
+                for (sum, entry) in by_transposed.iter_mut().zip(row) {
+                    *sum += entry * x;
+                }
+            }
+            let mut pivots = vec![0; size];
+            factor(size, &mut matrix, &mut pivots).expect("regular");
+            let mut exchanged = side.clone();
+            for (k, pivot) in pivots.iter().enumerate() {
+                exchanged.swap(k, *pivot);
+            }
+            let mut found = side;
+            solve(size, &matrix, &pivots, &mut found);
+            if size >= LARGE {
+                let mut wide = exchanged.clone();
+                wide::solve(isa, size, &matrix, &mut wide);
+                assert_eq!(wide, found, "{size}");
+            }
+            substitution::solve(size, &matrix, &mut exchanged);
+            assert_eq!(exchanged, found, "{size}");
+            solve_transposed(size, &matrix, &pivots, &mut by_transposed);
+            for found in [&found, &by_transposed] {
+                for (found, wanted) in found.iter().zip(&wanted) {
+                    assert!((found - wanted).abs() < 1e-12, "{size}: {found} {wanted}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn singular_ones_are_told() {
+        let Some(isa) = pulp::x86::V3::try_new() else {
+            return;
+        };
+        let mut pivots = [0; 9];
+        let mut matrix = numbers(81, 3);
+        for row in 0..9 {
+            matrix[row * 9 + 6] = 0.0;
+        }
+        let told = wide::factor(isa, 9, &mut matrix, &mut pivots);
+        assert_eq!(told, Err(6));
+        matrix[0] = f64::NAN;
+        assert!(wide::factor(isa, 9, &mut matrix, &mut pivots).is_err());
     }
 }

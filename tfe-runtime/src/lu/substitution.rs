@@ -1,0 +1,76 @@
+//! Substitution of one right side in larger systems: four sums of a row side by side, so that none waits for the one before it.
+
+/// Sums side by side.
+pub(super) const FOUR: usize = 4;
+
+/// Systems of fewer rows are solved before several sums side by side pay.
+pub(super) const LARGE: usize = 16;
+
+/// Solves L U x = b in place, row by row; b with its rows exchanged.
+///
+/// Rows of large systems belong to blocks of four. What lies beyond the own block enters by four sums, of every fourth factor each.
+pub(super) fn solve(size: usize, factors: &[f64], vector: &mut [f64]) {
+    let whole = if size < LARGE { 0 } else { size / FOUR * FOUR };
+    for row in 0..size {
+        let own = &factors[row * size..(row + 1) * size];
+        let block = if row < whole { row / FOUR * FOUR } else { 0 };
+        vector[row] -= product(&own[..block], &vector[..block]);
+        for j in block..row {
+            vector[row] -= own[j] * vector[j];
+        }
+    }
+    for row in (0..size).rev() {
+        let own = &factors[row * size..(row + 1) * size];
+        let end = if row < whole {
+            row / FOUR * FOUR + FOUR
+        } else {
+            size
+        };
+        vector[row] -= product(&own[end..], &vector[end..]);
+        for j in row + 1..end {
+            vector[row] -= own[j] * vector[j];
+        }
+        vector[row] /= own[row];
+    }
+}
+
+/// A row times a vector.
+#[inline(never)] // small programs
+fn product(row: &[f64], vector: &[f64]) -> f64 {
+    let (rows, rest) = row.as_chunks::<FOUR>();
+    let (vectors, others) = vector.as_chunks::<FOUR>();
+    let mut sums = [0.0; FOUR];
+    for (row, vector) in rows.iter().zip(vectors) {
+        for lane in 0..FOUR {
+            sums[lane] += row[lane] * vector[lane];
+        }
+    }
+    let rest = rest.iter().zip(others);
+    rest.fold(total(sums), |sum, (factor, other)| sum + factor * other)
+}
+
+/// The sum of four.
+#[inline(always)]
+pub(super) fn total([a, b, c, d]: [f64; FOUR]) -> f64 {
+    (a + b) + (c + d)
+}
+
+/// Solves Uᵀ Lᵀ x = b in place, with one row of factors after the other.
+#[inline(always)]
+pub(super) fn solve_transposed(size: usize, factors: &[f64], vector: &mut [f64]) {
+    for (j, row) in factors.chunks_exact(size).enumerate() {
+        let (done, rest) = vector.split_at_mut(j + 1);
+        let value = done[j] / row[j];
+        done[j] = value;
+        for (entry, factor) in rest.iter_mut().zip(&row[j + 1..]) {
+            *entry -= factor * value;
+        }
+    }
+    for (j, row) in factors.chunks_exact(size).enumerate().rev() {
+        let (rest, done) = vector.split_at_mut(j);
+        let value = done[0];
+        for (entry, factor) in rest.iter_mut().zip(row) {
+            *entry -= factor * value;
+        }
+    }
+}
