@@ -48,6 +48,8 @@ pub use fit::Fit;
 pub use linearised::Linearised;
 pub use modal::Modal;
 pub use motion::{Motion, MotionArc, Node, Outputs, Setting};
+/// The crate of the matrices that calls give and take, in their version.
+pub use nalgebra;
 pub use optimal_control::{OptimalControl, Optimum};
 pub use periodic::{HybridOrbit, Orbit, PeriodicOrbit};
 pub use sensitivity::Sensitive;

@@ -7,7 +7,6 @@ use super::setup::Fit;
 use crate::sensitivity::Sensitive;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::DMatrix;
-use nalgebra_of_lm as of_lm;
 use std::cell::RefCell;
 use std::ops::Range;
 use tfe_runtime::{Model, State};
@@ -216,7 +215,7 @@ pub(super) struct Least<'f, M, const N: usize> {
     unknowns: Unknowns<N>,
     span: Range<f64>,
     times: Vec<f64>,
-    numbers: of_lm::DVector<f64>,
+    numbers: nalgebra::DVector<f64>,
     here: RefCell<Option<Evaluated<N>>>,
     trials: RefCell<Vec<Trial>>,
     /// The sum of squares at the beginning.
@@ -243,7 +242,7 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
         times.sort_by(f64::total_cmp);
         times.dedup();
         let last = times.last().copied().unwrap_or(t0);
-        let numbers = of_lm::DVector::from_vec(unknowns.numbers());
+        let numbers = nalgebra::DVector::from_vec(unknowns.numbers());
         let mut least = Self {
             fit,
             columns,
@@ -404,14 +403,14 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
     }
 }
 
-impl<M: Model<N>, const N: usize> LeastSquaresProblem<f64, of_lm::Dyn, of_lm::Dyn>
+impl<M: Model<N>, const N: usize> LeastSquaresProblem<f64, nalgebra::Dyn, nalgebra::Dyn>
     for Least<'_, M, N>
 {
-    type ResidualStorage = of_lm::VecStorage<f64, of_lm::Dyn, of_lm::U1>;
-    type JacobianStorage = of_lm::VecStorage<f64, of_lm::Dyn, of_lm::Dyn>;
-    type ParameterStorage = of_lm::VecStorage<f64, of_lm::Dyn, of_lm::U1>;
+    type ResidualStorage = nalgebra::VecStorage<f64, nalgebra::Dyn, nalgebra::U1>;
+    type JacobianStorage = nalgebra::VecStorage<f64, nalgebra::Dyn, nalgebra::Dyn>;
+    type ParameterStorage = nalgebra::VecStorage<f64, nalgebra::Dyn, nalgebra::U1>;
 
-    fn set_params(&mut self, numbers: &of_lm::DVector<f64>) {
+    fn set_params(&mut self, numbers: &nalgebra::DVector<f64>) {
         if self.numbers == *numbers && self.here.borrow().is_some() {
             return;
         }
@@ -421,25 +420,25 @@ impl<M: Model<N>, const N: usize> LeastSquaresProblem<f64, of_lm::Dyn, of_lm::Dy
         *self.here.borrow_mut() = evaluated;
     }
 
-    fn params(&self) -> of_lm::DVector<f64> {
+    fn params(&self) -> nalgebra::DVector<f64> {
         self.numbers.clone()
     }
 
     /// Where the run fails they are so large that the trial is refused.
-    fn residuals(&self) -> Option<of_lm::DVector<f64>> {
+    fn residuals(&self) -> Option<nalgebra::DVector<f64>> {
         let count = self.columns.iter().map(|one| one.times.len()).sum();
         Some(match &*self.here.borrow() {
-            Some(here) => of_lm::DVector::from_column_slice(&here.residuals),
-            None => of_lm::DVector::from_element(count, 1e6 * (1.0 + self.first)),
+            Some(here) => nalgebra::DVector::from_column_slice(&here.residuals),
+            None => nalgebra::DVector::from_element(count, 1e6 * (1.0 + self.first)),
         })
     }
 
-    fn jacobian(&self) -> Option<of_lm::DMatrix<f64>> {
+    fn jacobian(&self) -> Option<nalgebra::DMatrix<f64>> {
         let here = self.here.borrow();
         let here = here.as_ref()?;
         let (_, rates) = self.unknowns.values(self.numbers.as_slice());
         let (rows, columns) = here.slopes.shape();
-        Some(of_lm::DMatrix::from_fn(rows, columns, |row, column| {
+        Some(nalgebra::DMatrix::from_fn(rows, columns, |row, column| {
             here.slopes[(row, column)] * rates[column]
         }))
     }

@@ -55,7 +55,7 @@ pub(super) enum Guess<'m, const N: usize, L: Length<N>> {
 ///
 /// # Models of run-time length
 /// With the feature `sparse` elements are stepped from all nodes, with their derivatives by implicit differentiation of the step
-/// ([`TransitionOperator`](crate::stability::TransitionOperator)): multiple shooting.
+/// (`stability::TransitionOperator`): multiple shooting.
 ///
 /// ```text
 /// δy_{e+1} − A_e δy_e − C_e δγ = Y_e(y_e, γ) − y_{e+1} ,   e = 0 … E − 1 ;      y_E = y_0                    (theory.md, (T-81), (T-82))
