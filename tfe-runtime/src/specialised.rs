@@ -37,7 +37,9 @@ where
     } else {
         (groups, 0)
     };
-    let kept = if N * groups > MOST_IN_REGISTERS { 1 } else { 0 };
+    // Matrices of several registers of points are memory in any case.
+    let is_much = N * groups > MOST_IN_REGISTERS || !M::FACTS.constant_mass && groups > 1;
+    let kept = if is_much { 1 } else { 0 };
     let projected = if is_projected::<M, N>(&element) { 1 } else { 0 };
     [points, groups, first, varying, square, kept, projected]
 }
