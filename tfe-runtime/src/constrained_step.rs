@@ -13,7 +13,7 @@ use crate::evidence::{Energy, conserves_energy};
 use crate::legendre::largest;
 use crate::method::{Interval, Last, Memory, Method, set_kicks, total};
 use crate::model::{CoordinateName, Model, State};
-use crate::newton::{Solve, newton};
+use crate::newton::{Beginning, Solve, newton};
 use crate::scheme::{SchemeRef, Tables};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Scratch, Workspace};
@@ -148,7 +148,12 @@ where
         impulse: total(impulses),
     };
     let control = method.control.with_constraints();
-    let first = newton(&mut form, &control, &mut scratch, false, false);
+    let beginning = if warm {
+        Beginning::Near
+    } else {
+        Beginning::Far
+    };
+    let first = newton(&mut form, &control, &mut scratch, beginning, false);
     let evidence = match first {
         Ok(evidence) => evidence,
         Err(error) if !warm => return Err(error),
@@ -163,7 +168,7 @@ where
                 &form.rows,
                 form.active,
             )?;
-            newton(&mut form, &control, &mut scratch, false, false)?
+            newton(&mut form, &control, &mut scratch, Beginning::Far, false)?
         }
     };
     let (end, end_low) = form.end_state(scratch.unknowns)?;

@@ -6,6 +6,9 @@ use crate::statistics::Statistics;
 
 /// The equations of one element for its unknown rates x.
 pub(crate) trait Equations {
+    /// Whether Newton's method alone solves them: where it begins is then a continued polynomial, not one that a fixed point has failed from.
+    const BY_NEWTON_ALONE: bool = false;
+
     /// The step of the fixed-point iteration at x, not yet applied: x + `step` is the improvement.
     ///
     /// With `refresh`, mass matrices are evaluated anew.

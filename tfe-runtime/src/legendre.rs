@@ -281,6 +281,7 @@ where
 }
 
 /// The z with ∂/∂z = `target`: the momentum of a velocity, or the velocity of a momentum.
+#[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
 pub(crate) fn conjugate<M, const N: usize>(
     model: &M,
     t: f64,

@@ -352,6 +352,7 @@ pub(crate) fn end_of<const N: usize>(
 }
 
 /// Σ (high + low) · row of one coordinate.
+#[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
 fn integral<const N: usize>(
     high: &[f64],
     low: &[f64],

@@ -351,14 +351,26 @@ where
     Err(monitor.stalled(iterations, control))
 }
 
+/// Where Newton's method begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Beginning {
+    /// Where a matrix may be far from that at the root: it is made anew as long as increments do not shrink well.
+    Far,
+    /// Near the root: the first increment with a new matrix tells nothing of it, and a large one is tried once more.
+    Near,
+    /// The scratch holds the factors of the last step.
+    Known,
+}
+
 /// Newton's method; the matrix is kept while it serves, also from step to step.
 ///
-/// Says what speaks for the root. `known` says that the scratch holds the factors of the last step; those of linear equations are kept throughout.
+/// Says what speaks for the root. The factors of linear equations are kept throughout.
+#[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
 pub(crate) fn newton<E>(
     equations: &mut E,
     control: &Control,
     scratch: &mut Scratch<'_>,
-    known: bool,
+    beginning: Beginning,
     linear: bool,
 ) -> Result<Evidence, StepError>
 where
@@ -366,15 +378,14 @@ where
 {
     let mut monitor = Monitor::new(control.tolerance);
     // A small matrix is cheaper than the iterations that an old one would take more.
-    let known = known && (linear || scratch.unknowns.len() >= SMALL);
+    let known = beginning == Beginning::Known && (linear || scratch.unknowns.len() >= SMALL);
     let mut fresh = !known;
     let (mut evidence, mut own) = (Evidence::of_newton(), false);
     // A large matrix costs as much as many iterations with an old one.
-    let good_enough = if scratch.unknowns.len() < LARGE {
-        0.05
-    } else {
-        0.3
-    };
+    let is_large = scratch.unknowns.len() >= LARGE;
+    let good_enough = if is_large { 0.3 } else { 0.05 };
+    let is_near = E::BY_NEWTON_ALONE && is_large && beginning == Beginning::Near;
+    let mut uses = 0;
     let mut iterations = control.max_iterations;
     for iteration in 0..control.max_iterations {
         let Scratch {
@@ -396,9 +407,11 @@ where
                 }
             })?;
             equations.statistics().factorizations += 1;
+            uses = 0;
         } else {
             equations.residual(unknowns, step)?;
         }
+        uses += 1;
         lu::solve(unknowns.len(), tangent, pivots, step);
         for (unknown, step) in unknowns.iter_mut().zip(step.iter()) {
             *unknown -= step;
@@ -416,9 +429,13 @@ where
             equations.finish(unknowns, step)?;
             return Ok(evidence);
         }
-        // The first increment alone tells no rate: an old matrix may show a second one.
-        let untried = known && iteration == 0;
-        fresh = !linear && !untried && monitor.rate() > good_enough;
+        // The first increment alone tells no rate: an old matrix may show a second one, and so may a large new one.
+        let is_tried = if is_near {
+            uses > 1
+        } else {
+            iteration > 0 || !known
+        };
+        fresh = !linear && is_tried && monitor.rate() > good_enough;
         if monitor.is_stuck() {
             iterations = iteration + 1;
             break;

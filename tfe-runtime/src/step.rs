@@ -9,7 +9,7 @@ use crate::method::{
     set_kicks,
 };
 use crate::model::{Model, State};
-use crate::newton::{Preference, fixed_point, newton};
+use crate::newton::{Beginning, Preference, fixed_point, newton};
 use crate::phase_form::PhaseForm;
 use crate::scheme::Tables;
 use crate::velocity_form::VelocityForm;
@@ -256,7 +256,11 @@ impl Driver<'_> {
             equations,
             self.control,
             &mut scratch,
-            self.known,
+            if self.known {
+                Beginning::Known
+            } else {
+                Beginning::Far
+            },
             self.linear,
         );
         let proves =
@@ -267,7 +271,13 @@ impl Driver<'_> {
             Ok(_) | Err(_) => {
                 // The continued polynomial may be a worse start than none.
                 cold(scratch.unknowns);
-                newton(equations, self.control, &mut scratch, false, self.linear)?
+                newton(
+                    equations,
+                    self.control,
+                    &mut scratch,
+                    Beginning::Far,
+                    self.linear,
+                )?
             }
         });
         Ok(scratch)

@@ -25,7 +25,7 @@ const LOST: f64 = 1e-4;
 const LOST_HERE: f64 = 0.125;
 
 /// A row that has become so much shorter is about to vanish.
-const VANISHING: f64 = 1e-3;
+const VANISHING: f64 = 1e-2;
 
 /// Whether much of the constraints' independence is lost from the start of a step to its end.
 fn is_lost(start: &Independence, end: &Independence) -> bool {
