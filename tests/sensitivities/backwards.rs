@@ -132,6 +132,24 @@ fn gradients_backwards_are_derivatives_forwards() {
     check_gradient(&Simulation::new(&rod).step(0.02), start, "height");
 }
 
+/// A function of slices, of models of any length, is that of nodes.
+#[test]
+fn losses_of_slices_are_those_of_nodes() {
+    let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
+    let simulation = Simulation::new(&PENDULUMS).step(0.05);
+    let of_node = Loss::at_end(|node: &Node<2>| node.q[0].sin() + node.p[1] * node.v[0]);
+    let of_slices = Loss::of_end(|q, p, v| q[0].sin() + p[1] * v[0]);
+    let (one, by_node) = simulation
+        .gradient(start, 0.0..1.0, &of_node)
+        .expect("a gradient");
+    let (other, by_slices) = simulation
+        .gradient(start, 0.0..1.0, &of_slices)
+        .expect("a gradient");
+    assert_eq!(one, other);
+    assert_eq!(by_node.by_parameters(), by_slices.by_parameters());
+    assert_eq!(by_node.by_start(), by_slices.by_start());
+}
+
 /// Masses in a row, with a friction between neighbours that depends on where they are, and springs that are all different.
 #[dynamics(
     coordinates(q[5]),

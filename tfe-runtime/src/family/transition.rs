@@ -441,17 +441,15 @@ impl TransitionOperator {
         by_q: &mut [f64],
         by_v: &mut [f64],
     ) {
-        let places = self.pattern.places();
-        let values = &self.values[l * places.len()..(l + 1) * places.len()];
-        for ((block, row, column), value) in places.iter().zip(values) {
+        for (block, row, column, value) in self.second(l) {
             match block {
                 Block::ZZ => {}
                 Block::ZQ => {
-                    by_q[*column] += value * momentum[*row];
-                    by_v[*row] += value * force[*column];
+                    by_q[column] += value * momentum[row];
+                    by_v[row] += value * force[column];
                 }
-                Block::ForceZ => by_v[*column] += value * force[*row],
-                _ => by_q[*column] += value * force[*row],
+                Block::ForceZ => by_v[column] += value * force[row],
+                _ => by_q[column] += value * force[row],
             }
         }
     }
@@ -540,20 +538,26 @@ impl TransitionOperator {
 
     /// Adds L_vq δq to `momentum`, F_v δv + F_q δq to `force`, at one point.
     fn bend(&self, l: usize, q: &[f64], v: &[f64], momentum: &mut [f64], force: &mut [f64]) {
-        let places = self.pattern.places();
-        let values = &self.values[l * places.len()..(l + 1) * places.len()];
-        for ((block, row, column), value) in places.iter().zip(values) {
+        for (block, row, column, value) in self.second(l) {
             match block {
                 Block::ZZ => {}
                 Block::ZQ => {
-                    momentum[*row] += value * q[*column];
-                    force[*column] += value * v[*row];
+                    momentum[row] += value * q[column];
+                    force[column] += value * v[row];
                 }
-                Block::ForceZ => force[*row] += value * v[*column],
+                Block::ForceZ => force[row] += value * v[column],
                 // Of L_q and of forces by coordinates.
-                _ => force[*row] += value * q[*column],
+                _ => force[row] += value * q[column],
             }
         }
+    }
+
+    /// The second derivatives at one point.
+    fn second(&self, l: usize) -> impl Iterator<Item = (Block, usize, usize, f64)> {
+        let places = self.pattern.places();
+        let values = &self.values[l * places.len()..];
+        let both = places.iter().zip(values);
+        both.map(|((block, row, column), value)| (*block, *row, *column, *value))
     }
 }
 
