@@ -36,6 +36,15 @@ enum Term<'l, const N: usize, L: Length<N>> {
     Squares(String, Vec<f64>, Vec<f64>),
 }
 
+impl<const N: usize, L: Length<N>> Term<'_, N, L> {
+    fn name(&self) -> &str {
+        match self {
+            Self::End(_) => "a function of the end",
+            Self::Output(name) | Self::Squares(name, ..) => name,
+        }
+    }
+}
+
 impl<'l, const N: usize> Loss<'l, N> {
     /// A function of the last node of a model of fixed size; of a model of any length [`of_end`](Self::of_end) is. It is differentiated by differences of sixth order; what is an output of
     /// the model is differentiated exactly.
@@ -142,8 +151,8 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         Ok(())
     }
 
-    /// Its value, and where and how it depends on the motion.
-    pub(crate) fn looks(&self, motion: &Motion<N, L>) -> (f64, Vec<Look>) {
+    /// Its value, and where and how it depends on the motion; an error where that is not finite.
+    pub(crate) fn looks(&self, motion: &Motion<N, L>) -> Result<(f64, Vec<Look>), RunErrorKind> {
         let nodes = motion.states();
         let last = nodes.len() - 1;
         let mut value = 0.0;
@@ -152,6 +161,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         let column = |name: &str| names.iter().position(|own| own.is(name));
         let output = |node: usize, column: usize| motion.outputs().row(node).map(|row| row[column]);
         for term in &self.terms {
+            let (before, first) = (value, looks.len());
             match term {
                 Term::End(function) => {
                     value += function(&nodes[last]);
@@ -177,8 +187,21 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
                     }
                 }
             }
+            let is_finite = |look: &Look| match &look.by {
+                By::Output(_, factor) => factor.is_finite(),
+                By::Node { q, p, v } => {
+                    let mut all = q.iter().chain(p).chain(v);
+                    all.all(|one| one.is_finite())
+                }
+            };
+            if !((value - before).is_finite() && looks[first..].iter().all(is_finite)) {
+                return Err(RunErrorKind::Loss {
+                    name: term.name().to_owned(),
+                    why: "they or their derivatives are not finite",
+                });
+            }
         }
-        (value, looks)
+        Ok((value, looks))
     }
 }
 

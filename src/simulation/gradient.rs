@@ -65,7 +65,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         run.breaks.extend(loss.times());
         if !run.events.is_empty() {
             let sensitive = run.run_sensitive(start, span)?;
-            return Ok(run.forwards(&sensitive, loss));
+            return run.forwards(&sensitive, loss);
         }
         let motion = run.drive(start, &span, identity, Nobody)?;
         run.backwards(motion, &span, loss)
@@ -78,7 +78,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         loss: &Loss<'_, N>,
     ) -> Result<(f64, LossGradient<N>), RunError<N>> {
         let model = &*self.model;
-        let (value, looks) = loss.looks(&motion);
+        let (value, looks) = match loss.looks(&motion) {
+            Ok(looks) => looks,
+            Err(kind) => return Err(RunError::new(kind, motion)),
+        };
         let indices: Vec<usize> = (0..model.parameters()).collect();
         let mut parameters = directions(model, &indices);
         if M::CONSTRAINTS.is_empty() {
@@ -120,7 +123,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                 // A long step that was cut, or not, where it now is not, or is.
                 let start = motion.states()[0].state();
                 let sensitive = self.run_sensitive(start, span.clone())?;
-                return Ok(self.forwards(&sensitive, loss));
+                return self.forwards(&sensitive, loss);
             }
             let differentiated = step.and_then(|()| {
                 let adjoint = stepper.adjoint(&parameters, &mut lambda, &mut by_parameters);
@@ -178,9 +181,16 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
     }
 
-    fn forwards(&self, sensitive: &Sensitive<N>, loss: &Loss<'_, N>) -> (f64, LossGradient<N>) {
+    fn forwards(
+        &self,
+        sensitive: &Sensitive<N>,
+        loss: &Loss<'_, N>,
+    ) -> Result<(f64, LossGradient<N>), RunError<N>> {
         let motion = sensitive.motion().clone();
-        let (value, looks) = loss.looks(&motion);
+        let (value, looks) = match loss.looks(&motion) {
+            Ok(looks) => looks,
+            Err(kind) => return Err(RunError::new(kind, motion)),
+        };
         let count = self.model.parameters();
         let mut all = vec![0.0; 2 * N + count];
         for number in 0..motion.states().len() {
@@ -198,7 +208,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             }
         }
         let by_parameters = all.split_off(2 * N);
-        (value, self.gathered(motion, &all, by_parameters))
+        Ok((value, self.gathered(motion, &all, by_parameters)))
     }
 
     /// The gradient by parameters and by the start, ordered (p, q).

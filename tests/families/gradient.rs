@@ -272,6 +272,11 @@ fn losses_that_do_not_belong_are_told() {
         matches!(&unknown, RunErrorKind::NoOutput { name, known } if name == "midle" && known == &["middle"]),
         "{unknown}"
     );
+    let undefined = error(Loss::of_end(|q, _, _| (-1.0 - q[0].abs()).sqrt()));
+    assert!(
+        matches!(undefined, RunErrorKind::Loss { .. }),
+        "{undefined}"
+    );
     for (times, values) in [
         (&[0.5, 2.0][..], &[0.0, 0.0][..]),
         (&[0.5], &[]),
@@ -280,7 +285,7 @@ fn losses_that_do_not_belong_are_told() {
         let kind = error(Loss::squares("middle", times, values));
         assert!(matches!(kind, RunErrorKind::Loss { .. }), "{kind}");
     }
-    // Models that do not fit together, steps that are cut, constraints.
+    // Models that do not fit together.
     let short = Chain {
         k: vec![1.0],
         ..chain(5).0

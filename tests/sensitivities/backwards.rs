@@ -235,6 +235,12 @@ fn losses_that_are_none_are_told() {
     };
     let unknown = error(Loss::output_at_end("hight"));
     assert!(unknown.to_string().contains("height"), "{unknown}");
+    let undefined = error(Loss::at_end(|node| (-1.0 - node.q[0].abs()).sqrt()));
+    assert!(
+        matches!(undefined, RunErrorKind::Loss { .. }),
+        "{undefined}"
+    );
+    assert!(undefined.to_string().contains("not finite"), "{undefined}");
     for (times, values) in [
         (vec![0.5], vec![]),
         (vec![1.5], vec![1.0]),

@@ -63,7 +63,10 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         trail: &Trail,
         loss: &Loss<'_, 0, RunTimeLength>,
     ) -> Result<(f64, LossGradient<0, RunTimeLength>), RunError<0, RunTimeLength>> {
-        let (value, looks) = loss.looks(&motion);
+        let (value, looks) = match loss.looks(&motion) {
+            Ok(looks) => looks,
+            Err(kind) => return Err(RunError::new(kind, motion)),
+        };
         let elements = &trail.elements;
         let mut number = elements.len();
         let mut pulled = || -> Result<_, family::OperatorError> {
