@@ -29,6 +29,9 @@ pub const EXPLANATION: &str = "Van der Pol's oscillator with μ = 1000 from (2, 
 
 type Row = [String; 10];
 
+/// A run to the end.
+type Chosen<'r> = &'r dyn Fn() -> Result<Node<1>, tfe::RunError<1>>;
+
 const MODEL: VanDerPol = VanDerPol { mu: 1000.0 };
 
 const START: Start<1> = Start {
@@ -139,8 +142,7 @@ fn by_accuracy(
                 .run(start, 0.0..START.end)
                 .map(|motion| *motion.last())
         };
-        let runs: [(&str, &dyn Fn() -> Result<Node<1>, tfe::RunError<1>>); 2] =
-            [("search", &search), ("picked", &alone)];
+        let runs: [(&str, Chosen<'_>); 2] = [("search", &search), ("picked", &alone)];
         for (name, run) in runs {
             let mut least = Duration::MAX;
             for _ in 0..20 {

@@ -57,7 +57,7 @@ impl<'m, M: Model> View<'m, M> {
     }
 
     /// What the kernels take beside coordinates, if it is not the velocities.
-    pub(super) fn momenta<R: Real>(&self, v: &[R]) -> Vec<R> {
+    fn momenta<R: Real>(&self, v: &[R]) -> Vec<R> {
         let masses = self.mass.iter().zip(v);
         masses.map(|(mass, v)| *v * v.like(*mass)).collect()
     }
