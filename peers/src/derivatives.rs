@@ -1,6 +1,6 @@
 //! Derivatives by parameters beside those of `diffsol`: forwards and backwards.
 
-use crate::table::{milliseconds, verdict};
+use crate::ways::{self, Way, Ways};
 use diffsol::{
     AdjointOdeSolverMethod, DenseMatrix, NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod,
     OdeSolverState, OdeSolverStopReason, Vector,
@@ -16,7 +16,6 @@ const END: f64 = 20.0;
 const TARGETS: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
 /// The ratio of times, ours to theirs, that is aimed at.
 const AIM: f64 = 0.5;
-const REPETITIONS: usize = 5;
 
 /// What the page says above the table.
 pub const EXPLANATION: &str = "The gradient of ½ q₁² at t = 20 by the 36 parameters of twelve masses in a row with springs of a cubic force and friction: forwards (derivatives of the whole state), and \
@@ -256,13 +255,7 @@ backwards!(bdf_back, bdf, bdf_solver_adjoint, LU);
 
 type Method = fn(f64, bool) -> Found;
 
-/// A way to a gradient: what it is called, and its seconds with what it found.
-struct Way {
-    name: String,
-    run: Box<dyn Fn() -> Found>,
-}
-
-fn peers(methods: [(&'static str, Method); 3]) -> Vec<Way> {
+fn peers<'k>(methods: [(&'static str, Method); 3], known: &'k Gradient) -> Vec<Way<'k>> {
     let mut ways = Vec::new();
     for (name, method) in methods {
         for k in 6..=26 {
@@ -271,7 +264,7 @@ fn peers(methods: [(&'static str, Method); 3]) -> Vec<Way> {
                 let told = if controlled { "controlled" } else { "alone" };
                 ways.push(Way {
                     name: format!("{name}, {tolerance:.1e} {told}"),
-                    run: Box::new(move || method(tolerance, controlled)),
+                    run: Box::new(move || measured(method(tolerance, controlled), known)),
                 });
             }
         }
@@ -279,11 +272,11 @@ fn peers(methods: [(&'static str, Method); 3]) -> Vec<Way> {
     ways
 }
 
-fn ours(is_backwards: bool) -> Vec<Way> {
+fn ours(is_backwards: bool, known: &Gradient) -> Vec<Way<'_>> {
     let mut ways = Vec::new();
     for nodes in [3, 4, 5, 6, 7, 8, 9, 12] {
         for steps in [10, 14, 20, 28, 40, 56, 80, 112, 160, 224, 320, 640] {
-            let run = move || {
+            let run = move || -> Found {
                 let chain = model();
                 let simulation = Simulation::new(&chain).element(Element::mixed(nodes));
                 let simulation = simulation.step(END / f64::from(steps));
@@ -305,7 +298,7 @@ fn ours(is_backwards: bool) -> Vec<Way> {
             };
             ways.push(Way {
                 name: format!("Mixed {nodes}, {steps} steps"),
-                run: Box::new(run),
+                run: Box::new(move || measured(run(), known)),
             });
         }
     }
@@ -319,16 +312,10 @@ fn error(found: &Gradient, known: &Gradient) -> f64 {
     apart.fold(0.0, |most, x| if x <= most { most } else { x }) / largest
 }
 
-/// The fastest way to an error: its name and seconds, the least of some runs.
-fn fastest<'w>(looks: &[(&'w Way, f64, f64)], target: f64) -> Option<(&'w Way, f64)> {
-    let mut found: Vec<_> = looks.iter().filter(|look| look.2 <= target).collect();
-    found.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let least = |way: &Way| {
-        let runs = (0..REPETITIONS).filter_map(|_| (way.run)().ok());
-        runs.map(|run| run.0).fold(f64::INFINITY, f64::min)
-    };
-    let tried = found.iter().take(3).map(|look| (look.0, least(look.0)));
-    tried.min_by(|a, b| a.1.total_cmp(&b.1))
+/// The seconds and the error of a way that has not failed.
+fn measured(found: Found, known: &Gradient) -> Option<(f64, f64)> {
+    let (seconds, gradient) = found.ok()?;
+    Some((seconds, error(&gradient, known)))
 }
 
 /// The columns.
@@ -376,50 +363,15 @@ pub fn table() -> Result<Vec<[String; 7]>, Box<dyn Error>> {
                 ("BDF", bdf),
             ]
         };
-        let (ours, peers) = (ours(is_backwards), peers(methods));
-        let look = |ways: &'_ [Way]| -> Vec<(usize, f64, f64)> {
-            let all = ways.iter().enumerate();
-            all.filter_map(|(at, way)| {
-                let (one, other) = ((way.run)().ok()?, (way.run)().ok()?);
-                Some((at, one.0.min(other.0), error(&other.1, &known)))
-            })
-            .collect()
+        let ours = Ways::look_at(ours(is_backwards, &known));
+        let peers = Ways::look_at(peers(methods, &known));
+        let way = if is_backwards {
+            "backwards"
+        } else {
+            "forwards"
         };
-        let (of_ours, of_peers) = (look(&ours), look(&peers));
-        let named = |ways: &'_ [Way], looks: &[(usize, f64, f64)], target: f64| {
-            let looks: Vec<_> = looks
-                .iter()
-                .map(|look| (&ways[look.0], look.1, look.2))
-                .collect();
-            fastest(&looks, target).map(|(way, seconds)| (way.name.clone(), seconds))
-        };
-        for target in TARGETS {
-            let one = named(&ours, &of_ours, target);
-            let other = named(&peers, &of_peers, target);
-            let ratio = match (&one, &other) {
-                (Some((_, ours)), Some((_, theirs))) => verdict(ours / theirs, AIM),
-                _ => "—".to_owned(),
-            };
-            let parts = |found: Option<(String, f64)>| {
-                let dash = || "—".to_owned();
-                found.map_or_else(|| (dash(), dash()), |(name, s)| (name, milliseconds(s)))
-            };
-            let ((own, time), (peer, its)) = (parts(one), parts(other));
-            let way = if is_backwards {
-                "backwards"
-            } else {
-                "forwards"
-            };
-            rows.push([
-                format!("{way}, 36 parameters"),
-                format!("{target:.0e}"),
-                own,
-                time,
-                peer,
-                its,
-                ratio,
-            ]);
-        }
+        let what = format!("{way}, 36 parameters");
+        rows.extend(TARGETS.map(|target| ways::row(&what, target, [&ours, &peers], AIM)));
     }
     Ok(rows)
 }

@@ -3,7 +3,7 @@
 use crate::run::{Problem, Run, de, fixed, ode_solvers};
 use crate::scenes::Start;
 use crate::system::System;
-use crate::table::{milliseconds, verdict};
+use crate::ways::{self, Way, Ways};
 use std::error::Error;
 use std::time::Instant;
 use tfe::family::{FamilyState, Node as FamilyNode};
@@ -15,7 +15,6 @@ const END: f64 = 100.0;
 const TARGETS: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
 /// The ratio of times, ours to theirs, that is aimed at.
 const AIM: f64 = 0.5;
-const REPETITIONS: usize = 7;
 
 /// What the page says above the table.
 pub const EXPLANATION: &str = "The lattice of Fermi, Pasta, Ulam and Tsingou with 1024 free sites, to t = 100: ours is a declaration of run-time length, whose steps keep nothing on \
@@ -83,12 +82,6 @@ fn start() -> Start<SITES> {
         v: [0.0; SITES],
         end: END,
     }
-}
-
-/// A way to run: what it is called, and its seconds and error.
-struct Way<'w> {
-    name: String,
-    run: Box<dyn Fn() -> Option<(f64, f64)> + 'w>,
 }
 
 /// The largest difference, relative to the largest coordinate or velocity.
@@ -179,24 +172,6 @@ fn peers<'w>(problem: &'w Problem1024<'w>, known: &'w FamilyNode) -> Vec<Way<'w>
     ways
 }
 
-/// The fastest way to an error: its place and seconds, the least of some runs.
-fn fastest(ways: &[Way<'_>], looks: &[Option<(f64, f64)>], target: f64) -> Option<(usize, f64)> {
-    let places = looks.iter().enumerate();
-    let mut found: Vec<(f64, usize)> = places
-        .filter_map(|(k, look)| {
-            look.filter(|(_, error)| *error <= target)
-                .map(|look| (look.0, k))
-        })
-        .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let least = |k: usize| {
-        let runs = (0..REPETITIONS).filter_map(|_| (ways[k].run)());
-        runs.map(|run| run.0).fold(f64::INFINITY, f64::min)
-    };
-    let tried = found.iter().take(4).map(|(_, k)| (*k, least(*k)));
-    tried.min_by(|a, b| a.1.total_cmp(&b.1))
-}
-
 /// The columns.
 pub const HEADER: [&str; 7] = [
     "scene",
@@ -224,44 +199,8 @@ pub fn table() -> Result<Vec<[String; 7]>, Box<dyn Error>> {
     let uncertainty = error(&known.q, &known.p, &finer);
     println!("  lattice of 1024: reference known to {uncertainty:.1e}");
     let problem = Problem::new(&ByHand, &start);
-    let (ours, peers) = (ours(&fput, &begin, &finer), peers(&problem, &finer));
-    // Twice, so that neither side pays for the first look.
-    let look = |ways: &[Way<'_>]| -> Vec<Option<(f64, f64)>> {
-        ways.iter()
-            .map(|way| {
-                let (one, other) = ((way.run)()?, (way.run)()?);
-                Some((one.0.min(other.0), other.1))
-            })
-            .collect()
-    };
-    let (of_ours, of_peers) = (look(&ours), look(&peers));
-    let row = |target: f64| {
-        let dash = || "—".to_owned();
-        let one = fastest(&ours, &of_ours, target);
-        let other = fastest(&peers, &of_peers, target);
-        let name = |ways: &[Way<'_>], found: Option<(usize, f64)>| {
-            found.map_or_else(dash, |(k, _)| ways[k].name.clone())
-        };
-        let time = |found: Option<(usize, f64)>| found.map_or_else(dash, |(_, s)| milliseconds(s));
-        let ratio = match (one, other) {
-            (Some((_, ours)), Some((_, theirs))) => verdict(ours / theirs, AIM),
-            _ => dash(),
-        };
-        [
-            "FPUT lattice, n = 1024".to_owned(),
-            format!("{target:.0e}"),
-            name(&ours, one),
-            time(one),
-            name(&peers, other),
-            time(other),
-            ratio,
-        ]
-    };
+    let ours = Ways::look_at(ours(&fput, &begin, &finer));
+    let peers = Ways::look_at(peers(&problem, &finer));
+    let row = |target| ways::row("FPUT lattice, n = 1024", target, [&ours, &peers], AIM);
     Ok(TARGETS.map(row).into())
-}
-
-/// A printed line.
-pub fn line(row: &[impl AsRef<str>; 7]) -> String {
-    let [a, b, c, d, e, f, g] = row.each_ref().map(AsRef::as_ref);
-    format!("{a:<24} {b:>5}  {c:<40} {d:>12}  {e:<48} {f:>12}  {g}")
 }

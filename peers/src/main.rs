@@ -23,6 +23,7 @@ mod scenes;
 mod stiff;
 mod system;
 mod table;
+mod ways;
 
 use contest::{Field, contest};
 use runs::Scene;
@@ -140,10 +141,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         scenes.push(scene);
     }
     let stiff = stiff_section(&folder)?;
-    println!("\n{}", long::line(&long::HEADER));
+    println!("\n{}", ways::line(&long::HEADER));
     let lattices = long::table()?;
     for row in &lattices {
-        println!("{}", long::line(row));
+        println!("{}", ways::line(row));
     }
     fs::write(folder.join("long.csv"), table::csv(long::HEADER, &lattices))?;
     let lattices = Section::new("A long lattice")
@@ -183,10 +184,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn derivatives_section(folder: &Path) -> Result<Section, Box<dyn Error>> {
-    println!("\n{}", long::line(&derivatives::HEADER));
+    println!("\n{}", ways::line(&derivatives::HEADER));
     let rows = derivatives::table()?;
     for row in &rows {
-        println!("{}", long::line(row));
+        println!("{}", ways::line(row));
     }
     fs::write(
         folder.join("derivatives.csv"),
