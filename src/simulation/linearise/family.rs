@@ -47,11 +47,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let mut transitions = Vec::with_capacity(elements.len());
         let steps = elements.iter();
         let steps = steps.map(|element| (element.t, element.h, &element.before));
-        let mut passed = elements.iter();
         let each = |transition: family::TransitionOperator| {
-            passed
-                .next()
-                .map_or(Ok(()), |element| element.check(transition.end()))?;
+            elements[transitions.len()].check(transition.end())?;
             transitions.push(transition.matrix());
             Ok(())
         };

@@ -64,6 +64,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         record(0, &current);
         let mut passed = 0;
         let each = |transition: family::TransitionOperator| {
+            trail.elements[passed].check(transition.end())?;
             let mut next = DMatrix::zeros(current.nrows(), current.ncols());
             for (from, mut to) in current.column_iter().zip(next.column_iter_mut()) {
                 let from: Vec<f64> = from.iter().copied().collect();
@@ -78,7 +79,6 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             {
                 to += DVector::from_column_slice(by);
             }
-            trail.elements[passed].check(transition.end())?;
             current = next;
             passed += 1;
             record(passed, &current);
