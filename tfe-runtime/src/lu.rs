@@ -138,32 +138,7 @@ pub(crate) fn solve_columns(factors: &[f64], pivots: &[usize], columns: usize, s
     {
         return wide::substitute(isa, size, factors, columns, sides);
     }
-    substitute_plainly(factors, size, columns, sides);
-}
-
-fn substitute_plainly(factors: &[f64], size: usize, columns: usize, sides: &mut [f64]) {
-    let subtract = |row: &mut [f64], factor: f64, other: &[f64]| {
-        for (entry, other) in row.iter_mut().zip(other) {
-            *entry -= factor * other;
-        }
-    };
-    for (k, factors) in factors.chunks_exact(size).enumerate() {
-        let (done, rest) = sides.split_at_mut(k * columns);
-        for (factor, other) in factors.iter().zip(done.chunks_exact(columns)) {
-            subtract(&mut rest[..columns], *factor, other);
-        }
-    }
-    for (k, factors) in factors.chunks_exact(size).enumerate().rev() {
-        let (rest, done) = sides.split_at_mut((k + 1) * columns);
-        let row = &mut rest[k * columns..];
-        for (factor, other) in factors[k + 1..].iter().zip(done.chunks_exact(columns)) {
-            subtract(row, *factor, other);
-        }
-        let inverse = 1.0 / factors[k];
-        for entry in row {
-            *entry *= inverse;
-        }
-    }
+    substitution::solve_columns(size, factors, columns, sides);
 }
 
 /// Factors an N × N block; one that is singular up to rounding counts as singular.
@@ -285,6 +260,32 @@ mod wide_tests {
             (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
         };
         (0..count).map(|_| next()).collect()
+    }
+
+    /// One row of factors after the other.
+    fn substitute_plainly(factors: &[f64], size: usize, columns: usize, sides: &mut [f64]) {
+        let subtract = |row: &mut [f64], factor: f64, other: &[f64]| {
+            for (entry, other) in row.iter_mut().zip(other) {
+                *entry -= factor * other;
+            }
+        };
+        for (k, factors) in factors.chunks_exact(size).enumerate() {
+            let (done, rest) = sides.split_at_mut(k * columns);
+            for (factor, other) in factors.iter().zip(done.chunks_exact(columns)) {
+                subtract(&mut rest[..columns], *factor, other);
+            }
+        }
+        for (k, factors) in factors.chunks_exact(size).enumerate().rev() {
+            let (rest, done) = sides.split_at_mut((k + 1) * columns);
+            let row = &mut rest[k * columns..];
+            for (factor, other) in factors[k + 1..].iter().zip(done.chunks_exact(columns)) {
+                subtract(row, *factor, other);
+            }
+            let inverse = 1.0 / factors[k];
+            for entry in row {
+                *entry *= inverse;
+            }
+        }
     }
 
     /// Every bit as with one pivot after the other, in all sizes.

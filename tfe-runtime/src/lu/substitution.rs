@@ -74,3 +74,59 @@ pub(super) fn solve_transposed(size: usize, factors: &[f64], vector: &mut [f64])
         }
     }
 }
+
+/// Solves L U X = B in place, many right sides at once, row by row; B with its rows exchanged.
+#[inline(always)]
+pub(super) fn solve_columns(size: usize, factors: &[f64], columns: usize, sides: &mut [f64]) {
+    for k in 0..size {
+        let (done, rest) = sides.split_at_mut(k * columns);
+        let factors = &factors[k * size..k * size + k];
+        subtract_all(&mut rest[..columns], factors, done);
+    }
+    for k in (0..size).rev() {
+        let (rest, done) = sides.split_at_mut((k + 1) * columns);
+        let row = &mut rest[k * columns..];
+        let factors = &factors[k * size + k..(k + 1) * size];
+        subtract_all(row, &factors[1..], done);
+        let inverse = 1.0 / factors[0];
+        for entry in row {
+            *entry *= inverse;
+        }
+    }
+}
+
+/// row −= Σ factor · other, one after the other.
+#[inline(always)]
+fn subtract_all(row: &mut [f64], factors: &[f64], others: &[f64]) {
+    let columns = row.len();
+    let (fours, rest) = factors.as_chunks::<FOUR>();
+    for (at, factors) in fours.iter().enumerate() {
+        let first = at * FOUR * columns;
+        let other = |k: usize| &others[first + k * columns..first + (k + 1) * columns];
+        subtract_four(row, *factors, [other(0), other(1), other(2), other(3)]);
+    }
+    for (k, factor) in rest.iter().enumerate() {
+        let first = (fours.len() * FOUR + k) * columns;
+        subtract(row, *factor, &others[first..first + columns]);
+    }
+}
+
+#[inline(always)]
+pub(super) fn subtract(row: &mut [f64], factor: f64, other: &[f64]) {
+    for (entry, other) in row.iter_mut().zip(other) {
+        *entry -= factor * other;
+    }
+}
+
+#[inline(always)]
+pub(super) fn subtract_four(row: &mut [f64], factors: [f64; FOUR], others: [&[f64]; FOUR]) {
+    let length = row.len();
+    let others = others.map(|other| &other[..length]);
+    for j in 0..length {
+        let mut entry = row[j];
+        for k in 0..FOUR {
+            entry -= factors[k] * others[k][j];
+        }
+        row[j] = entry;
+    }
+}

@@ -1,11 +1,8 @@
 //! Elimination in wide registers: four pivots at a time, each entry with the roundings of one after the other.
 
-use super::substitution::{self, FOUR};
+use super::substitution::{self, FOUR, subtract, subtract_four};
 use pulp::x86::V3;
 use pulp::{NullaryFnOnce, f64x4};
-
-/// Pivots that a row is eliminated with at a time.
-const PANEL: usize = 4;
 
 /// Solves L U x = b in place; b with its rows exchanged.
 pub(super) fn solve(isa: V3, size: usize, factors: &[f64], vector: &mut [f64]) {
@@ -174,7 +171,7 @@ impl NullaryFnOnce for Factor<'_> {
         } = self;
         let mut first = 0;
         while first < size {
-            let end = (first + PANEL).min(size);
+            let end = (first + FOUR).min(size);
             for column in first..end {
                 pivots[column] = pivot(size, matrix, column)?;
                 eliminate(size, matrix, column, end);
@@ -192,7 +189,7 @@ impl NullaryFnOnce for Factor<'_> {
                 }
             }
             let pivot_row = |k: usize| &panel[(first + k) * size + end..(first + k + 1) * size];
-            if end - first == PANEL {
+            if end - first == FOUR {
                 let rows = [pivot_row(0), pivot_row(1), pivot_row(2), pivot_row(3)];
                 for row in below.chunks_exact_mut(size) {
                     let (factors, entries) = row.split_at_mut(end);
@@ -207,7 +204,7 @@ impl NullaryFnOnce for Factor<'_> {
                         subtract_four(entries, factors, rows);
                         continue;
                     }
-                    for k in 0..PANEL {
+                    for k in 0..FOUR {
                         if factors[k] != 0.0 {
                             subtract(entries, factors[k], rows[k]);
                         }
@@ -267,62 +264,6 @@ impl NullaryFnOnce for Substitute<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self {
-            size,
-            factors,
-            columns,
-            sides,
-        } = self;
-        for k in 0..size {
-            let (done, rest) = sides.split_at_mut(k * columns);
-            let factors = &factors[k * size..k * size + k];
-            subtract_all(&mut rest[..columns], factors, done);
-        }
-        for k in (0..size).rev() {
-            let (rest, done) = sides.split_at_mut((k + 1) * columns);
-            let row = &mut rest[k * columns..];
-            let factors = &factors[k * size + k..(k + 1) * size];
-            subtract_all(row, &factors[1..], done);
-            let inverse = 1.0 / factors[0];
-            for entry in row {
-                *entry *= inverse;
-            }
-        }
-    }
-}
-
-/// row −= Σ factor · other, one after the other.
-#[inline(always)]
-fn subtract_all(row: &mut [f64], factors: &[f64], others: &[f64]) {
-    let columns = row.len();
-    let (fours, rest) = factors.as_chunks::<PANEL>();
-    for (at, factors) in fours.iter().enumerate() {
-        let first = at * PANEL * columns;
-        let other = |k: usize| &others[first + k * columns..first + (k + 1) * columns];
-        subtract_four(row, *factors, [other(0), other(1), other(2), other(3)]);
-    }
-    for (k, factor) in rest.iter().enumerate() {
-        let first = (fours.len() * PANEL + k) * columns;
-        subtract(row, *factor, &others[first..first + columns]);
-    }
-}
-
-#[inline(always)]
-fn subtract(row: &mut [f64], factor: f64, other: &[f64]) {
-    for (entry, other) in row.iter_mut().zip(other) {
-        *entry -= factor * other;
-    }
-}
-
-#[inline(always)]
-fn subtract_four(row: &mut [f64], factors: [f64; PANEL], others: [&[f64]; PANEL]) {
-    let length = row.len();
-    let others = others.map(|other| &other[..length]);
-    for j in 0..length {
-        let mut entry = row[j];
-        for k in 0..PANEL {
-            entry -= factors[k] * others[k][j];
-        }
-        row[j] = entry;
+        substitution::solve_columns(self.size, self.factors, self.columns, self.sides);
     }
 }
