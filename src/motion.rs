@@ -4,6 +4,7 @@ mod arcs;
 mod at_error;
 mod checkpoint;
 mod event;
+pub(crate) mod points;
 mod warning;
 
 pub use at_error::AtError;
@@ -21,11 +22,11 @@ use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length, Polynomial};
 use crate::numbers::larger;
 use arcs::Arcs;
+use points::Points;
 use std::fmt;
 use std::io;
 use std::ops::Range;
 use std::path::Path;
-use tfe_runtime::quadrature::Quadrature;
 use tfe_runtime::{CoordinateName, Statistics};
 
 /// A state with its time: of arrays, or of vectors where the length is known at run time only.
@@ -375,6 +376,11 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         }
     }
 
+    /// The elements between the recorded nodes.
+    pub(crate) fn elements(&self) -> &[L::Polynomial] {
+        &self.elements
+    }
+
     /// The integral of an output from the start to every recorded node,
     ///
     /// ```text
@@ -424,9 +430,8 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
                 known: names,
             });
         };
-        let mut velocity = self.nodes[0].v.clone();
+        let mut points = Points::new(self.nodes[0].v.clone());
         let (mut sum, mut integrals) = (0.0, vec![0.0]);
-        let mut rule = Quadrature::gauss(1);
         let mut elements = self.elements.iter();
         let mut changed = None;
         for (node, pair) in self.nodes.windows(2).enumerate() {
@@ -445,21 +450,13 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
             if (element.start(), element.end()) != (from, to) {
                 return Err(AtError::NotRecorded { time: from });
             }
-            if rule.len() != element.degree().max(1) {
-                rule = Quadrature::gauss(element.degree());
-            }
             for piece in element.pieces() {
-                let (from, length) = (piece.start(), piece.end() - piece.start());
-                for point in 0..rule.len() {
-                    let (node, weight) = (rule.node(point), rule.weight(point));
-                    let (t, state) = (from + node * length, piece.at(node));
-                    if const { M::NEEDS_VELOCITY } {
-                        let found = model.velocity(t, &state, &velocity);
-                        velocity = found.ok_or(AtError::NoVelocity { time: t })?;
-                    }
-                    model.outputs(t, L::parts(&state), &velocity, &mut values);
-                    sum += weight * length * values[column];
-                }
+                points.of(model, piece, |point| {
+                    let at = L::parts(&point.state);
+                    model.outputs(point.t, at, &point.velocity, &mut values);
+                    sum += point.weight * values[column];
+                    Ok::<_, AtError>(())
+                })?;
             }
             integrals.push(sum);
         }

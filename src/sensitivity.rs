@@ -1,12 +1,14 @@
 //! A motion with its derivatives by parameters and by its start.
 
+pub(crate) mod inside;
 pub(crate) mod loss;
 #[cfg(feature = "sparse")]
 pub(crate) mod run_time;
 pub(crate) mod slopes;
 
 use crate::length::{FixedLength, Length};
-use crate::motion::{Motion, Node};
+use crate::motion::{AtError, Motion, Node};
+use inside::{Between, Inside};
 use nalgebra::DMatrix;
 use std::fmt;
 
@@ -49,6 +51,8 @@ pub struct Sensitive<const N: usize, L: Length<N> = FixedLength> {
     motion: Motion<N, L>,
     parameters: Vec<String>,
     nodes: Vec<Slopes>,
+    /// Between the nodes, where that is kept.
+    inside: Vec<Inside>,
     events: Vec<(usize, Vec<f64>)>,
 }
 
@@ -74,8 +78,19 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
             motion,
             parameters,
             nodes,
+            inside: Vec::new(),
             events,
         }
+    }
+
+    /// The same with derivatives between the nodes.
+    pub(crate) fn with_inside(self, inside: Vec<Inside>) -> Self {
+        Self { inside, ..self }
+    }
+
+    /// The derivatives along the elements, and their pieces, where that is kept.
+    pub(crate) fn inside(&self) -> &[Inside] {
+        &self.inside
     }
 
     /// The number of coordinates.
@@ -149,6 +164,29 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         &self.nodes[node].state
     }
 
+    /// The derivatives of (p, q) and of velocities at a time of the motion, those before it at an event.
+    fn between(&self, time: f64) -> Result<Between, AtError> {
+        self.motion.at(time)?;
+        let states = self.motion.states();
+        let direction = match self.motion.last().t < states[0].t {
+            true => -1.0,
+            false => 1.0,
+        };
+        let number = states.partition_point(|node| direction * node.t < direction * time);
+        if states.get(number).is_some_and(|node| node.t == time) {
+            let Slopes {
+                state, velocity, ..
+            } = self.nodes[number].clone();
+            return Ok(Between { state, velocity });
+        }
+        let begun = |inside: &Inside| direction * inside.times.0 <= direction * time;
+        let after = self.inside.partition_point(begun);
+        let inside = after.checked_sub(1).map(|at| &self.inside[at]);
+        inside
+            .map(|inside| inside.at(time))
+            .ok_or(AtError::NotRecorded { time })
+    }
+
     /// The derivatives at the last node.
     fn last(&self) -> &Slopes {
         self.nodes.last().expect("a run is recorded from its start")
@@ -180,15 +218,38 @@ pub struct ByParameter<'s, const N: usize, L: Length<N> = FixedLength> {
 impl<const N: usize, L: Length<N>> ByParameter<'_, N, L> {
     /// ∂q/∂a, ∂p/∂a and ∂v/∂a at the last node, with its time.
     pub fn last(&self) -> Node<N, L> {
-        self.at(self.of.motion.last().t, self.of.last())
+        self.of_node(self.of.motion.last().t, self.of.last())
     }
 
     /// The same at all recorded nodes, in the order of [`Motion::states`].
     pub fn states(&self) -> Vec<Node<N, L>> {
         let nodes = self.of.motion.states().iter().zip(&self.of.nodes);
         nodes
-            .map(|(node, slopes)| self.at(node.t, slopes))
+            .map(|(node, slopes)| self.of_node(node.t, slopes))
             .collect()
+    }
+
+    /// ∂q/∂a, ∂p/∂a and ∂v/∂a at any time of the motion: the derivatives of what [`Motion::at`] gives there, of its polynomials.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(y), lagrangian = m/2*dot(y)^2 - m*g*y)]
+    /// struct Ball { m: f64, g: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let ball = Ball { m: 1.0, g: 9.81 };
+    /// let s = Simulation::new(&ball).step(0.5).run_sensitive(ball.state([1.0], [0.5]), 0.0..2.0)?;
+    /// assert!((s.by("g").at(1.2)?.q[0] + 1.2 * 1.2 / 2.0).abs() < 1e-13);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As of [`Motion::at`].
+    pub fn at(&self, time: f64) -> Result<Node<N, L>, AtError> {
+        let Between { state, velocity } = self.of.between(time)?;
+        Ok(self.of_columns(time, &state, &velocity))
     }
 
     /// The derivatives of an output at all recorded nodes; `None` where the model declares no such name.
@@ -204,9 +265,13 @@ impl<const N: usize, L: Length<N>> ByParameter<'_, N, L> {
         found.and_then(|(_, slopes)| slopes.get(self.column).copied())
     }
 
-    fn at(&self, t: f64, slopes: &Slopes) -> Node<N, L> {
-        let state = |row: usize| slopes.state[(row, self.column)];
-        let velocity = |row: usize| slopes.velocity[(row, self.column)];
+    fn of_node(&self, t: f64, slopes: &Slopes) -> Node<N, L> {
+        self.of_columns(t, &slopes.state, &slopes.velocity)
+    }
+
+    fn of_columns(&self, t: f64, state: &DMatrix<f64>, velocity: &DMatrix<f64>) -> Node<N, L> {
+        let state = |row: usize| state[(row, self.column)];
+        let velocity = |row: usize| velocity[(row, self.column)];
         let (like, n) = (&self.of.motion.last().q, self.of.coordinates());
         Node {
             t,
@@ -226,12 +291,25 @@ pub struct ByStart<'s, const N: usize, L: Length<N> = FixedLength> {
 impl<const N: usize, L: Length<N>> ByStart<'_, N, L> {
     /// ∂(p, q)/∂(p₀, q₀) at the last node.
     pub fn last(&self) -> DMatrix<f64> {
-        self.matrix(self.of.last())
+        self.matrix(&self.of.last().state)
+    }
+
+    /// The same at any time of the motion, as [`ByParameter::at`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn at(&self, time: f64) -> Result<DMatrix<f64>, AtError> {
+        Ok(self.matrix(&self.of.between(time)?.state))
     }
 
     /// The same at all recorded nodes, in the order of [`Motion::states`].
     pub fn matrices(&self) -> Vec<DMatrix<f64>> {
-        (self.of.nodes.iter().map(|slopes| self.matrix(slopes))).collect()
+        (self
+            .of
+            .nodes
+            .iter()
+            .map(|slopes| self.matrix(&slopes.state)))
+        .collect()
     }
 
     /// The gradients of an output at all recorded nodes, by q₀ and p₀; `None` where the model declares no such name.
@@ -246,8 +324,8 @@ impl<const N: usize, L: Length<N>> ByStart<'_, N, L> {
         Some(self.of.nodes.iter().map(gradient).collect())
     }
 
-    fn matrix(&self, slopes: &Slopes) -> DMatrix<f64> {
+    fn matrix(&self, state: &DMatrix<f64>) -> DMatrix<f64> {
         let size = 2 * self.of.coordinates();
-        slopes.state.columns(0, size).into_owned()
+        state.columns(0, size).into_owned()
     }
 }

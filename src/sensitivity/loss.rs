@@ -1,17 +1,15 @@
 //! Losses: numbers of a motion that are to be small, and their gradients.
 
-use super::slopes::{Along, Change};
 use crate::error::RunErrorKind;
+use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
 use crate::motion::{Motion, Node};
 use std::fmt;
 use std::sync::Arc;
-use tfe_runtime::{CoordinateName, Model};
+use tfe_runtime::CoordinateName;
 
-/// A number of a motion whose gradient is asked for: a sum of functions of its end, of outputs at the end, and of squares of what outputs are off from values given. For
+/// A number of a motion whose gradient is asked for: a sum of functions of its end, of outputs at the end, of integrals of outputs, and of squares of what outputs are off from values given. For
 /// [`Simulation::gradient`](crate::Simulation::gradient).
-///
-/// The integral of an expression is the end of a coordinate that has it as its velocity.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -19,12 +17,14 @@ use tfe_runtime::{CoordinateName, Model};
 ///
 /// let loss: Loss<1> = Loss::at_end(|node| 0.5 * (node.q[0] - 1.0).powi(2))
 ///     .and(Loss::output_at_end("energy"))
+///     .and(Loss::integral("effort").times(0.1))
 ///     .and(Loss::squares("height", [0.5, 1.0], [0.3, 0.2]));
 /// # let _ = loss;
 /// ```
 #[derive(Clone)]
 pub struct Loss<'l, const N: usize, L: Length<N> = FixedLength> {
-    terms: Vec<Term<'l, N, L>>,
+    /// With their factors.
+    terms: Vec<(f64, Term<'l, N, L>)>,
 }
 
 type OfNode<'l, const N: usize, L> = Arc<dyn Fn(&Node<N, L>) -> f64 + Send + Sync + 'l>;
@@ -33,6 +33,7 @@ type OfNode<'l, const N: usize, L> = Arc<dyn Fn(&Node<N, L>) -> f64 + Send + Syn
 enum Term<'l, const N: usize, L: Length<N>> {
     End(OfNode<'l, N, L>),
     Output(String),
+    Integral(String),
     Squares(String, Vec<f64>, Vec<f64>),
 }
 
@@ -40,7 +41,7 @@ impl<const N: usize, L: Length<N>> Term<'_, N, L> {
     fn name(&self) -> &str {
         match self {
             Self::End(_) => "a function of the end",
-            Self::Output(name) | Self::Squares(name, ..) => name,
+            Self::Output(name) | Self::Integral(name) | Self::Squares(name, ..) => name,
         }
     }
 }
@@ -49,9 +50,7 @@ impl<'l, const N: usize> Loss<'l, N> {
     /// A function of the last node of a model of fixed size; of a model of any length [`of_end`](Self::of_end) is. It is differentiated by differences of sixth order; what is an output of
     /// the model is differentiated exactly.
     pub fn at_end(function: impl Fn(&Node<N>) -> f64 + Send + Sync + 'l) -> Self {
-        Self {
-            terms: vec![Term::End(Arc::new(function))],
-        }
+        Self::of(Term::End(Arc::new(function)))
     }
 }
 
@@ -71,16 +70,33 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
             let [q, p, v] = parts.map(AsRef::as_ref);
             function(q, p, v)
         };
-        Self {
-            terms: vec![Term::End(Arc::new(of_node))],
-        }
+        Self::of(Term::End(Arc::new(of_node)))
     }
 
     /// The value of an output at the end.
     pub fn output_at_end(name: impl Into<String>) -> Self {
-        Self {
-            terms: vec![Term::Output(name.into())],
-        }
+        Self::of(Term::Output(name.into()))
+    }
+
+    /// ∫ y dt of an output y over the span, as [`Motion::integral`] has it, by the Gauss points of every element: a running loss.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    /// use tfe::sensitivity::Loss;
+    ///
+    /// #[dynamics(coordinates(y), lagrangian = m/2*dot(y)^2 - m*g*y, output(height) = y)]
+    /// struct Ball { m: f64, g: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let ball = Ball { m: 1.0, g: 9.81 };
+    /// let (mean, gradient) = Simulation::new(&ball).step(0.1).gradient(ball.state([1.0], [4.0]), 0.0..1.0, &Loss::integral("height"))?;
+    /// assert!((mean - (1.0 + 4.0/2.0 - 9.81/6.0)).abs() < 1e-13);
+    /// assert!((gradient.by("g") + 1.0/6.0).abs() < 1e-13);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn integral(name: impl Into<String>) -> Self {
+        Self::of(Term::Integral(name.into()))
     }
 
     /// ½ Σ (y(t_i) − m_i)² of an output y. Elements end at the times t_i, which lie in the span.
@@ -90,8 +106,21 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         values: impl AsRef<[f64]>,
     ) -> Self {
         let (times, values) = (times.as_ref().to_vec(), values.as_ref().to_vec());
+        Self::of(Term::Squares(name.into(), times, values))
+    }
+
+    /// A multiple of it.
+    #[must_use]
+    pub fn times(mut self, factor: f64) -> Self {
+        for (own, _) in &mut self.terms {
+            *own *= factor;
+        }
+        self
+    }
+
+    fn of(term: Term<'l, N, L>) -> Self {
         Self {
-            terms: vec![Term::Squares(name.into(), times, values)],
+            terms: vec![(1.0, term)],
         }
     }
 
@@ -102,12 +131,18 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         self
     }
 
+    /// Whether it looks at the motion between the nodes, too.
+    pub(crate) fn has_integrals(&self) -> bool {
+        let mut terms = self.terms.iter();
+        terms.any(|(_, term)| matches!(term, Term::Integral(_)))
+    }
+
     /// Where it looks at the motion besides the end.
-    pub(crate) fn times(&self) -> impl Iterator<Item = f64> {
-        self.terms.iter().flat_map(|term| {
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = f64> {
+        self.terms.iter().flat_map(|(_, term)| {
             match term {
                 Term::Squares(_, times, _) => times.as_slice(),
-                Term::End(_) | Term::Output(_) => &[],
+                Term::End(_) | Term::Output(_) | Term::Integral(_) => &[],
             }
             .iter()
             .copied()
@@ -120,8 +155,15 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         outputs: &[CoordinateName],
         (start, end): (f64, f64),
     ) -> Result<(), RunErrorKind> {
-        for term in &self.terms {
-            let (Term::Output(name) | Term::Squares(name, ..)) = term else {
+        for (factor, term) in &self.terms {
+            let refused = |why| RunErrorKind::Loss {
+                name: term.name().to_owned(),
+                why,
+            };
+            if !factor.is_finite() {
+                return Err(refused("its factor is not finite"));
+            }
+            let (Term::Output(name) | Term::Integral(name) | Term::Squares(name, ..)) = term else {
                 continue;
             };
             if !outputs.iter().any(|own| own.is(name)) {
@@ -143,46 +185,52 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
             } else {
                 continue;
             };
-            return Err(RunErrorKind::Loss {
-                name: name.clone(),
-                why,
-            });
+            return Err(refused(why));
         }
         Ok(())
     }
 
     /// Its value, and where and how it depends on the motion; an error where that is not finite.
-    pub(crate) fn looks(&self, motion: &Motion<N, L>) -> Result<(f64, Vec<Look>), RunErrorKind> {
+    pub(crate) fn seen<M: Evaluate<N, L>>(
+        &self,
+        motion: &Motion<N, L>,
+        model: &M,
+    ) -> Result<(f64, Seen), RunErrorKind> {
         let nodes = motion.states();
         let last = nodes.len() - 1;
         let mut value = 0.0;
-        let mut looks = Vec::new();
+        let (mut looks, mut integrals) = (Vec::new(), Vec::new());
         let names = motion.outputs().names();
         let column = |name: &str| names.iter().position(|own| own.is(name));
         let output = |node: usize, column: usize| motion.outputs().row(node).map(|row| row[column]);
-        for term in &self.terms {
+        for (factor, term) in &self.terms {
             let (before, first) = (value, looks.len());
             match term {
                 Term::End(function) => {
-                    value += function(&nodes[last]);
-                    looks.push(Look {
-                        node: last,
-                        by: partial(&nodes[last], &**function),
-                    });
+                    value += factor * function(&nodes[last]);
+                    let by = partial(&nodes[last], *factor, &**function);
+                    looks.push(Look { node: last, by });
                 }
                 Term::Output(name) => {
                     let Some(column) = column(name) else { continue };
-                    value += output(last, column).unwrap_or(f64::NAN);
-                    let by = By::Output(column, 1.0);
+                    value += factor * output(last, column).unwrap_or(f64::NAN);
+                    let by = By::Output(column, *factor);
                     looks.push(Look { node: last, by });
+                }
+                Term::Integral(name) => {
+                    let Some(column) = column(name) else { continue };
+                    let integral = motion.integral(model, name).ok();
+                    let integral = integral.and_then(|all| all.last().copied());
+                    value += factor * integral.unwrap_or(f64::NAN);
+                    integrals.push((column, *factor));
                 }
                 Term::Squares(name, times, values) => {
                     let Some(column) = column(name) else { continue };
                     for (t, measured) in times.iter().zip(values) {
                         let node = motion.nearest(*t);
                         let off = output(node, column).unwrap_or(f64::NAN) - measured;
-                        value += 0.5 * off * off;
-                        let by = By::Output(column, off);
+                        value += factor * 0.5 * off * off;
+                        let by = By::Output(column, factor * off);
                         looks.push(Look { node, by });
                     }
                 }
@@ -201,7 +249,9 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
                 });
             }
         }
-        Ok((value, looks))
+        // In the order of nodes, in which they are asked for.
+        looks.sort_by_key(|look| look.node);
+        Ok((value, Seen { looks, integrals }))
     }
 }
 
@@ -211,10 +261,27 @@ impl<const N: usize, L: Length<N>> fmt::Debug for Loss<'_, N, L> {
     }
 }
 
+/// Where and how a loss depends on a motion.
+pub(crate) struct Seen {
+    /// At nodes, in their order.
+    looks: Vec<Look>,
+    /// Integrals of outputs, with their factors.
+    pub(crate) integrals: Vec<(usize, f64)>,
+}
+
+impl Seen {
+    /// What it sees of a node.
+    pub(crate) fn of_node(&self, node: usize) -> &[Look] {
+        let first = self.looks.partition_point(|look| look.node < node);
+        let own = &self.looks[first..];
+        &own[..own.partition_point(|look| look.node == node)]
+    }
+}
+
 /// A look of a loss at a node.
 pub(crate) struct Look {
-    pub(crate) node: usize,
-    by: By,
+    node: usize,
+    pub(crate) by: By,
 }
 
 /// The derivative of what is seen.
@@ -229,32 +296,10 @@ pub(crate) enum By {
     },
 }
 
-impl Look {
-    /// The derivative of what is seen.
-    #[cfg(feature = "sparse")]
-    pub(crate) fn by(&self) -> &By {
-        &self.by
-    }
-
-    /// What a change of the node does to the loss.
-    pub(crate) fn slope<M: Model<N>, const N: usize>(
-        &self,
-        along: &Along<'_, M, N>,
-        change: &Change<N>,
-    ) -> f64 {
-        let velocity = along.velocity(change);
-        match &self.by {
-            By::Output(column, factor) => factor * along.outputs(change, &velocity)[*column],
-            By::Node { q, p, v } => (0..N)
-                .map(|a| q[a] * change.q[a] + p[a] * change.p[a] + v[a] * velocity[a])
-                .sum(),
-        }
-    }
-}
-
 /// The derivative of a function of a node, by differences of sixth order.
 fn partial<const N: usize, L: Length<N>>(
     node: &Node<N, L>,
+    factor: f64,
     function: &dyn Fn(&Node<N, L>) -> f64,
 ) -> By {
     const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
@@ -275,7 +320,7 @@ fn partial<const N: usize, L: Length<N>>(
                 let step = f64::from(k) * distance;
                 weight * (at(step) - at(-step)) / distance
             });
-            differences.sum::<f64>()
+            factor * differences.sum::<f64>()
         };
         still.as_ref().iter().enumerate().map(slope).collect()
     };

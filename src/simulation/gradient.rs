@@ -1,6 +1,7 @@
 //! Gradients of losses, backwards along a run (T-127).
 
 mod family;
+mod view;
 
 use super::follow::Nobody;
 use super::sensitive::directions;
@@ -10,12 +11,18 @@ use crate::error::{RunError, RunErrorKind};
 use crate::length::FixedLength;
 use crate::motion::Motion;
 use crate::sensitivity::Sensitive;
-use crate::sensitivity::loss::{Look, Loss, LossGradient};
-use crate::sensitivity::slopes::{Along, Change, Place};
+use crate::sensitivity::loss::{Loss, LossGradient, Seen};
 use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::step::Stepper;
-use tfe_runtime::{Model, Parameter, State};
+use tfe_runtime::{Direction, Model, Parameter, Pull, State};
+use view::{Pulls, Unseen, View};
+
+/// A gradient: by the start, ordered (p, q), and by all parameters.
+struct Sums {
+    by_start: Vec<f64>,
+    by_parameters: Vec<f64>,
+}
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and gives a loss of the motion with its gradient by all parameters of the model and by the start.
@@ -62,10 +69,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             return Err(RunError::new(kind, motion));
         }
         let mut run = self.clone().record_every(1);
-        run.breaks.extend(loss.times());
+        run.breaks.extend(loss.nodes());
         if !run.events.is_empty() {
-            let sensitive = run.run_sensitive(start, span)?;
-            return run.forwards(&sensitive, loss);
+            return run.forwards(start, span, loss);
         }
         let motion = run.drive(start, &span, identity, Nobody)?;
         run.backwards(motion, &span, loss)
@@ -78,148 +84,160 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         loss: &Loss<'_, N>,
     ) -> Result<(f64, LossGradient<N>), RunError<N>> {
         let model = &*self.model;
-        let (value, looks) = match loss.looks(&motion) {
-            Ok(looks) => looks,
+        let (value, seen) = match loss.seen(&motion, model) {
+            Ok(seen) => seen,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
-        let indices: Vec<usize> = (0..model.parameters()).collect();
-        let mut parameters = directions(model, &indices);
-        if M::CONSTRAINTS.is_empty() {
-            // All at once by one kernel, which goes by numbers.
-            for (index, direction) in parameters.iter_mut().enumerate() {
-                direction.parameter = Some(Parameter::Any(index));
+        match self.pulled(&motion, span, &seen) {
+            Ok(Some(gradient)) => Ok((value, self.gathered(motion, gradient))),
+            // A long step that was cut, or not, where it now is not, or is.
+            Ok(None) => {
+                let start = motion.states()[0].state();
+                self.forwards(start, span.clone(), loss)
             }
+            Err(kind) => Err(RunError::new(kind, motion)),
         }
+    }
+
+    /// The gradient; `None` where an element does not end where it did.
+    fn pulled(
+        &self,
+        motion: &Motion<N>,
+        span: &Range<f64>,
+        seen: &Seen,
+    ) -> Result<Option<Sums>, RunErrorKind> {
+        let mesh = self.mesh(span)?;
+        let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control);
+        let mut stepper = stepper.map_err(RunErrorKind::Element)?;
+        let parameters = self.all_parameters();
+        let mut view = View::new(&*self.model, seen, &motion.last().v);
+        let mut pull = Pull::new(&*self.model);
         let mut lambda = vec![0.0; 2 * N];
-        let mut by_parameters = vec![0.0; indices.len()];
-        let elements = self.mesh(span).and_then(|mesh| {
-            let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control);
-            Ok((mesh, stepper.map_err(RunErrorKind::Element)?))
-        });
-        let (mesh, mut stepper) = match elements {
-            Ok(elements) => elements,
-            Err(kind) => return Err(RunError::new(kind, motion)),
-        };
+        let mut by_parameters = vec![0.0; parameters.len()];
         let all: Vec<_> = mesh.elements().collect();
         for (element, &(t, next, h)) in all.iter().enumerate().rev() {
-            self.look(
-                &motion,
-                &looks,
-                element + 1,
-                (&mut lambda, &mut by_parameters),
-            );
+            look(&view, &mut pull, (motion, element + 1), &mut lambda)?;
             let mut state = motion.states()[element].state();
             let impulses = mesh.impulses_in(t, next, element + 1 == all.len());
             let step = stepper.advance(mesh.begin(t, h), h, &mut state, impulses);
-            let step = step.map_err(|source| RunErrorKind::Solve {
+            step.map_err(|source| RunErrorKind::Solve {
                 element,
                 time: t,
                 step: h,
                 source,
-            });
-            if step.is_ok()
-                && !is_same::<N, FixedLength>(&state, &motion.states()[element + 1].state())
-            {
-                // A long step that was cut, or not, where it now is not, or is.
-                let start = motion.states()[0].state();
-                let sensitive = self.run_sensitive(start, span.clone())?;
-                return self.forwards(&sensitive, loss);
+            })?;
+            let inside = view.of_element(&mut pull, &motion.elements()[element])?;
+            let pieces = stepper.dense(t, next).pieces().len();
+            let is_cut_alike = inside.is_empty() || inside.len() == pieces;
+            let after = motion.states()[element + 1].state();
+            if !(is_same::<N, FixedLength>(&state, &after) && is_cut_alike) {
+                return Ok(None);
             }
-            let differentiated = step.and_then(|()| {
-                let adjoint = stepper.adjoint(&parameters, &mut lambda, &mut by_parameters);
-                adjoint.map_err(|source| RunErrorKind::Transition {
-                    element,
-                    time: t,
-                    step: h,
-                    source,
-                })
-            });
-            if let Err(kind) = differentiated {
-                return Err(RunError::new(kind, motion));
-            }
+            let adjoint =
+                stepper.adjoint_inside(&parameters, &inside, &mut lambda, &mut by_parameters);
+            adjoint.map_err(|source| RunErrorKind::Transition {
+                element,
+                time: t,
+                step: h,
+                source,
+            })?;
         }
-        self.look(&motion, &looks, 0, (&mut lambda, &mut by_parameters));
-        Ok((value, self.gathered(motion, &lambda, by_parameters)))
+        look(&view, &mut pull, (motion, 0), &mut lambda)?;
+        add_explicit(&pull, &mut by_parameters);
+        Ok(Some(Sums {
+            by_start: lambda,
+            by_parameters,
+        }))
     }
 
-    /// Adds what the loss has directly of a node.
-    fn look(
-        &self,
-        motion: &Motion<N>,
-        looks: &[Look],
-        number: usize,
-        (lambda, by_parameters): (&mut [f64], &mut [f64]),
-    ) {
-        let mut looks = looks.iter().filter(|look| look.node == number).peekable();
-        if looks.peek().is_none() {
-            return;
-        }
-        let node = motion.states()[number];
-        let state = node.state();
-        let place = Place {
-            t: node.t,
-            state: &state,
-            v: &node.v,
-        };
-        let along = Along::new(&*self.model, place);
-        for look in looks {
-            for (row, lambda) in lambda.iter_mut().enumerate() {
-                let mut change = Change::ZERO;
-                match row.checked_sub(N) {
-                    None => change.p[row] = 1.0,
-                    Some(row) => change.q[row] = 1.0,
-                }
-                *lambda += look.slope(&along, &change);
-            }
-            for (index, sum) in by_parameters.iter_mut().enumerate() {
-                let change = Change {
-                    parameter: Some(index),
-                    ..Change::ZERO
-                };
-                *sum += look.slope(&along, &change);
+    /// All parameters as directions, to be taken at once where that can be.
+    fn all_parameters(&self) -> Vec<Direction> {
+        let indices: Vec<usize> = (0..self.model.parameters()).collect();
+        let mut parameters = directions(&*self.model, &indices);
+        if M::CONSTRAINTS.is_empty() {
+            // By one kernel, which goes by numbers.
+            for (index, direction) in parameters.iter_mut().enumerate() {
+                direction.parameter = Some(Parameter::Any(index));
             }
         }
+        parameters
     }
 
+    /// The same forwards.
     fn forwards(
         &self,
-        sensitive: &Sensitive<N>,
+        start: State<N>,
+        span: Range<f64>,
         loss: &Loss<'_, N>,
     ) -> Result<(f64, LossGradient<N>), RunError<N>> {
-        let motion = sensitive.motion().clone();
-        let (value, looks) = match loss.looks(&motion) {
-            Ok(looks) => looks,
-            Err(kind) => return Err(RunError::new(kind, motion)),
+        let sensitive = match loss.has_integrals() {
+            true => self.run_sensitive(start, span)?,
+            false => self.run_sensitive_at_nodes(start, span)?,
         };
-        let count = self.model.parameters();
-        let mut all = vec![0.0; 2 * N + count];
-        for number in 0..motion.states().len() {
-            let (mut lambda, mut direct) = (vec![0.0; 2 * N], vec![0.0; count]);
-            self.look(&motion, &looks, number, (&mut lambda, &mut direct));
-            if lambda.iter().chain(&direct).all(|one| *one == 0.0) {
-                continue;
-            }
-            let slopes = sensitive.state_slopes(number);
-            for (column, sum) in all.iter_mut().enumerate() {
-                let through: f64 = (0..2 * N)
-                    .map(|row| lambda[row] * slopes[(row, column)])
-                    .sum();
-                *sum += through + column.checked_sub(2 * N).map_or(0.0, |index| direct[index]);
-            }
+        let motion = sensitive.motion().clone();
+        let found = loss.seen(&motion, &*self.model);
+        let summed = found.and_then(|(value, seen)| Ok((value, self.summed(&sensitive, &seen)?)));
+        match summed {
+            Ok((value, gradient)) => Ok((value, self.gathered(motion, gradient))),
+            Err(kind) => Err(RunError::new(kind, motion)),
         }
-        let by_parameters = all.split_off(2 * N);
-        Ok((value, self.gathered(motion, &all, by_parameters)))
     }
 
-    /// The gradient by parameters and by the start, ordered (p, q).
-    fn gathered(
-        &self,
-        motion: Motion<N>,
-        lambda: &[f64],
-        by_parameters: Vec<f64>,
-    ) -> LossGradient<N> {
+    /// What a loss has of nodes and of elements, times their derivatives.
+    fn summed(&self, sensitive: &Sensitive<N>, seen: &Seen) -> Result<Sums, RunErrorKind> {
+        let motion = sensitive.motion();
+        let mut view = View::new(&*self.model, seen, &motion.last().v);
+        let mut pull = Pull::new(&*self.model);
+        let mut all = vec![0.0; 2 * N + self.model.parameters()];
+        for number in 0..motion.states().len() {
+            let mut lambda = vec![0.0; 2 * N];
+            look(&view, &mut pull, (motion, number), &mut lambda)?;
+            if lambda.iter().any(|one| *one != 0.0) {
+                let slopes = sensitive.state_slopes(number);
+                for (column, sum) in all.iter_mut().enumerate() {
+                    let through = (0..2 * N).map(|row| lambda[row] * slopes[(row, column)]);
+                    *sum += through.sum::<f64>();
+                }
+            }
+        }
+        view.add_along(&mut pull, sensitive, &mut all)?;
+        let mut by_parameters = all.split_off(2 * N);
+        add_explicit(&pull, &mut by_parameters);
+        Ok(Sums {
+            by_start: all,
+            by_parameters,
+        })
+    }
+
+    fn gathered(&self, motion: Motion<N>, sums: Sums) -> LossGradient<N> {
         let names =
             (0..self.model.parameters()).map(|at| self.model.parameter_name(at).to_string());
-        LossGradient::new(motion, names.collect(), by_parameters, lambda)
+        LossGradient::new(motion, names.collect(), sums.by_parameters, &sums.by_start)
+    }
+}
+
+/// Adds what a loss has directly of a node to λ, ordered (p, q), and to the sums of parameters.
+fn look<M: Model<N>, const N: usize>(
+    view: &View<'_, M, N>,
+    pull: &mut Pull<'_, M, N>,
+    (motion, number): (&Motion<N>, usize),
+    lambda: &mut [f64],
+) -> Result<(), RunErrorKind> {
+    let Some(partials) = view.of_node(number) else {
+        return Ok(());
+    };
+    let node = &motion.states()[number];
+    let by_state = pull.pulled(node.t, (&node.state(), &node.v), &partials);
+    let by_state = by_state.ok_or(Unseen)?;
+    for (sum, own) in lambda.iter_mut().zip(by_state.p.iter().chain(&by_state.q)) {
+        *sum += own;
+    }
+    Ok(())
+}
+
+/// Adds what was seen of parameters directly.
+fn add_explicit<M: Model<N>, const N: usize>(pull: &Pull<'_, M, N>, by_parameters: &mut [f64]) {
+    for (index, sum) in by_parameters.iter_mut().enumerate() {
+        *sum += pull.by_parameter(index);
     }
 }

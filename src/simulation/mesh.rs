@@ -145,7 +145,7 @@ impl<const N: usize> Mesh<N> {
                 segment.at_break = (is_break(pair[0]), is_break(pair[1]));
                 Ok(segment)
             })
-            .collect::<Result<_, _>>()?;
+            .collect::<Result<_, RunErrorKind>>()?;
         Ok(mesh)
     }
 

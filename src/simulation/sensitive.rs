@@ -10,14 +10,17 @@ use super::follow::{Follow, Passed};
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
+use crate::sensitivity::inside::{Before, Inside, Moved};
 use crate::sensitivity::slopes::{Along, Change, Place};
 use crate::sensitivity::{Sensitive, Slopes};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, RowDVector};
 use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Direction, Element, First, Form, Model, Parameter, Share, State, StepError};
+use tfe_runtime::{
+    Direction, Element, First, Form, InsideSlopes, Model, Parameter, Share, State, StepError,
+};
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node by all parameters of the model and by the start.
@@ -36,18 +39,45 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
     ) -> Result<Sensitive<N>, RunError<N>> {
         let all: Vec<_> = (0..self.model.parameters()).collect();
-        self.run_sensitive_by(start, span, &all)
+        let tangents = self.tangents(&all);
+        match self.record_every {
+            1 => self.differentiated(start, span, tangents.with_inside()),
+            _ => self.differentiated(start, span, tangents),
+        }
     }
 
-    /// The same by some of the parameters.
+    /// The same at the nodes alone.
+    pub(super) fn run_sensitive_at_nodes(
+        &self,
+        start: State<N>,
+        span: Range<f64>,
+    ) -> Result<Sensitive<N>, RunError<N>> {
+        let all: Vec<_> = (0..self.model.parameters()).collect();
+        self.differentiated(start, span, self.tangents(&all))
+    }
+
+    /// The same by some of the parameters, at the nodes alone.
+    #[cfg(feature = "fit")]
     pub(crate) fn run_sensitive_by(
         &self,
         start: State<N>,
         span: Range<f64>,
         parameters: &[usize],
     ) -> Result<Sensitive<N>, RunError<N>> {
+        self.differentiated(start, span, self.tangents(parameters))
+    }
+
+    fn tangents(&self, parameters: &[usize]) -> Tangents<'m, M, N> {
         let chosen = (self.chosen_element(), self.control);
-        let mut tangents = Tangents::new(self.model.clone(), chosen, parameters);
+        Tangents::new(self.model.clone(), chosen, parameters)
+    }
+
+    fn differentiated(
+        &self,
+        start: State<N>,
+        span: Range<f64>,
+        mut tangents: Tangents<'m, M, N>,
+    ) -> Result<Sensitive<N>, RunError<N>> {
         let motion = self.drive(start, &span, identity, &mut tangents)?;
         Ok(tangents.into_sensitive(motion))
     }
@@ -60,16 +90,26 @@ pub struct Tangents<'m, M, const N: usize> {
     /// The parameters, among all, and as directions.
     indices: Vec<usize>,
     parameters: Vec<Direction>,
-    /// ∂(p, q)/∂(start, parameters), where the run is.
-    current: DMatrix<f64>,
-    /// The same after an act that is to come.
+    /// Where the run is.
+    before: Before,
+    /// ∂(p, q)/∂(start, parameters) after an act that is to come.
     acted: Option<DMatrix<f64>>,
-    /// dt of the place where the next element begins, if that moves.
-    moved: Option<Vec<f64>>,
     nodes: Vec<Slopes>,
+    /// Along the elements so far, where that is asked for.
+    inside: Option<Vec<Inside>>,
     events: Vec<(usize, Vec<f64>)>,
     /// Solves elements that events have cut.
     probe: Option<Stepper<'m, M, N>>,
+}
+
+/// The derivatives of an element.
+struct Across {
+    /// Of its end.
+    end: DMatrix<f64>,
+    /// Of its end by more directions.
+    more: DMatrix<f64>,
+    /// Along it, by its start and all directions, where that is asked for.
+    inside: Vec<InsideSlopes>,
 }
 
 /// Parameters, by their index among all, as directions: with kernels of their own where the model has them.
@@ -113,20 +153,31 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             chosen,
             indices: indices.to_vec(),
             parameters,
-            current: DMatrix::identity(2 * N, columns),
+            before: Before {
+                state: DMatrix::identity(2 * N, columns),
+                start: None,
+            },
             acted: None,
-            moved: None,
             nodes: Vec::new(),
+            inside: None,
             events: Vec::new(),
             probe: None,
+        }
+    }
+
+    /// Keeps derivatives along the elements, too.
+    fn with_inside(self) -> Self {
+        Self {
+            inside: Some(Vec::new()),
+            ..self
         }
     }
 
     /// The derivatives since the start, or since this was last called, from where they are counted anew.
     pub(super) fn restart(&mut self) -> DMatrix<f64> {
         let columns = self.columns();
-        self.moved = None;
-        std::mem::replace(&mut self.current, DMatrix::identity(2 * N, columns))
+        self.before.start = None;
+        std::mem::replace(&mut self.before.state, DMatrix::identity(2 * N, columns))
     }
 
     /// The derivative of the state at an event that changes nothing, with its time; from there on derivatives are counted anew.
@@ -134,16 +185,20 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         &mut self,
         severed: &Severed<'_, 'm, N>,
     ) -> Result<DMatrix<f64>, TransitionError> {
-        let (at, rate) = self.up_to(severed)?;
+        let Across {
+            end: at,
+            more: rate,
+            ..
+        } = self.up_to(severed)?;
         let times = self.times(severed, (&at, &rate))?;
         // Where the element begins, by the state at the event at a fixed time.
         let back = at.clone().try_inverse();
         let back = back.ok_or(TransitionError::from(StepError::NonFinite))?;
-        if let Some(moved) = &mut self.moved {
+        if let Some(moved) = &mut self.before.start {
             let row = DMatrix::from_row_slice(1, moved.len(), moved) * &back;
             *moved = row.iter().copied().collect();
         }
-        self.current = &self.current * back;
+        self.before.state = &self.before.state * back;
         let mut matrix = at;
         for (mut column, dt) in matrix.column_iter_mut().zip(&times) {
             column.axpy(*dt, &rate.column(0), 1.0);
@@ -192,11 +247,12 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
     fn into_sensitive(self, motion: Motion<N>) -> Sensitive<N> {
         let names = self.indices.iter();
         let names = names.map(|index| self.model.parameter_name(*index).to_string());
-        Sensitive::new(motion, names.collect(), self.nodes, self.events)
+        let inside = self.inside.unwrap_or_default();
+        Sensitive::new(motion, names.collect(), self.nodes, self.events).with_inside(inside)
     }
 
     fn columns(&self) -> usize {
-        self.current.ncols()
+        self.before.state.ncols()
     }
 
     /// The parameter that a column is by, among all.
@@ -204,36 +260,72 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         self.indices.get(column.checked_sub(2 * N)?).copied()
     }
 
-    /// The derivatives at the end of an element that `stepper` has done last, and the columns of more directions.
+    /// The derivatives of an element that `stepper` has done last.
     fn across(
         &self,
         stepper: &mut Stepper<'m, M, N>,
         more: &[Direction],
-    ) -> Result<(DMatrix<f64>, DMatrix<f64>), TransitionError> {
+    ) -> Result<Across, TransitionError> {
         let mut directions = self.parameters.clone();
-        directions.extend(self.moved.as_ref().map(|_| START));
+        directions.extend(self.before.start.as_ref().map(|_| START));
         directions.extend_from_slice(more);
-        let (own, all) = (self.columns(), 2 * N + directions.len());
+        let all = 2 * N + directions.len();
         let mut entries = vec![0.0; 2 * N * all];
-        stepper.linearise(&directions, &mut entries)?;
-        let matrix = DMatrix::from_row_slice(2 * N, all, &entries);
-        let mut next = matrix.columns(0, 2 * N) * &self.current;
-        let mut by_parameters = next.columns_mut(2 * N, self.parameters.len());
-        by_parameters += matrix.columns(2 * N, self.parameters.len());
-        if let Some(moved) = &self.moved {
-            for (mut column, dt) in next.column_iter_mut().zip(moved) {
-                column.axpy(*dt, &matrix.column(own), 1.0);
-            }
+        let mut inside = Vec::new();
+        match &self.inside {
+            Some(_) => stepper.linearise_inside(&directions, &mut entries, &mut inside)?,
+            None => stepper.linearise(&directions, &mut entries)?,
         }
+        let matrix = DMatrix::from_row_slice(2 * N, all, &entries);
         let more = matrix.columns(all - more.len(), more.len()).into_owned();
-        Ok((next, more))
+        Ok(Across {
+            end: self.before.through(&matrix, None),
+            more,
+            inside,
+        })
     }
 
-    /// The derivatives where an event has cut an element, before anything is done, at a fixed time; and the rate of the state there.
-    fn up_to(
+    /// Keeps the derivatives along an element that `stepper` has done last, whose end moves where it is said how.
+    fn keep(
         &mut self,
-        severed: &Severed<'_, '_, N>,
-    ) -> Result<(DMatrix<f64>, DMatrix<f64>), TransitionError> {
+        stepper: &Stepper<'m, M, N>,
+        (start, end): (f64, f64),
+        slopes: Vec<InsideSlopes>,
+        ends: Option<&[f64]>,
+    ) {
+        let Some(mut inside) = self.inside.take() else {
+            return;
+        };
+        let dense = stepper.dense(start, end);
+        for (slopes, piece) in slopes.into_iter().zip(dense.pieces()) {
+            let times = (piece.start(), piece.end());
+            let moved = (self.before.start.is_some() || ends.is_some()).then(|| {
+                let still = vec![0.0; self.columns()];
+                let starts = self.before.start.as_ref().unwrap_or(&still);
+                let starts = RowDVector::from_row_slice(starts);
+                let ends = RowDVector::from_row_slice(ends.unwrap_or(&still));
+                let at = |t: f64| {
+                    let part = (t - start) / (end - start);
+                    &starts * (1.0 - part) + &ends * part
+                };
+                Moved {
+                    ends: [at(times.0), at(times.1)],
+                    values: piece.coefficients().as_flattened().to_vec(),
+                }
+            });
+            inside.push(Inside {
+                times,
+                slopes,
+                before: self.before.clone(),
+                ends: ends.map(<[f64]>::to_vec),
+                moved,
+            });
+        }
+        self.inside = Some(inside);
+    }
+
+    /// The derivatives where an event has cut an element, before anything is done, at a fixed time, and with them the rate of the state there.
+    fn up_to(&mut self, severed: &Severed<'_, '_, N>) -> Result<Across, TransitionError> {
         if severed.inside {
             let (element, control) = self.chosen;
             let mut probe = match self.probe.take() {
@@ -269,14 +361,18 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             rate[a] = sign * first.q[a] + first.force[a];
             rate[N + a] = event.v[a];
         }
-        let mut next = self.current.clone();
-        if let Some(moved) = &self.moved {
+        let mut next = self.before.state.clone();
+        if let Some(moved) = &self.before.start {
             // Time to the fixed place is what the start gains.
             for (mut column, dt) in next.column_iter_mut().zip(moved) {
                 column.axpy(-dt, &rate.column(0), 1.0);
             }
         }
-        Ok((next, rate))
+        Ok(Across {
+            end: next,
+            more: rate,
+            inside: Vec::new(),
+        })
     }
 
     /// The derivatives after the act of an event, from those of the state and the time before it.
@@ -350,10 +446,16 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
     fn passed(
         &mut self,
         stepper: &mut Stepper<'m, M, N>,
-        _: &Passed<'_, N>,
+        passed: &Passed<'_, N>,
     ) -> Result<(), TransitionError> {
-        let (next, _) = self.across(stepper, &[])?;
-        (self.current, self.moved) = (next, None);
+        let Across { end, inside, .. } = self.across(stepper, &[])?;
+        self.keep(
+            stepper,
+            (passed.start, passed.start + passed.h),
+            inside,
+            None,
+        );
+        (self.before.state, self.before.start) = (end, None);
         Ok(())
     }
 
@@ -367,11 +469,16 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
     }
 
     fn cut(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
-        let (mut at, rate) = self.up_to(severed)?;
+        let Across {
+            end: mut at,
+            more: rate,
+            inside,
+        } = self.up_to(severed)?;
         let event = severed.event;
         let state = event.state();
+        let model = self.model.clone();
         let along = Along::new(
-            &*self.model,
+            &*model,
             Place {
                 t: event.t,
                 state: &state,
@@ -379,6 +486,11 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
             },
         );
         let times = self.times(severed, (&at, &rate))?;
+        if let Some(probe) = self.probe.take() {
+            let whole = (severed.start, event.t);
+            self.keep(&probe, whole, inside, Some(&times));
+            self.probe = Some(probe);
+        }
         for (mut column, dt) in at.column_iter_mut().zip(&times) {
             column.axpy(*dt, &rate.column(0), 1.0);
         }
@@ -386,15 +498,15 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
             true => Some(self.through(severed, &along, (&at, &rate), &times)?),
             false => None,
         };
-        self.current = at;
+        self.before.state = at;
         self.events.push((severed.number, times.clone()));
-        self.moved = Some(times);
+        self.before.start = Some(times);
         Ok(())
     }
 
     fn acted(&mut self) {
         if let Some(acted) = self.acted.take() {
-            self.current = acted;
+            self.before.state = acted;
         }
     }
 
@@ -408,16 +520,20 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
         let along = Along::new(&*self.model, place);
         let columns = self.columns();
         let mut slopes = Slopes {
-            state: self.current.clone(),
+            state: self.before.state.clone(),
             velocity: DMatrix::zeros(N, columns),
             outputs: DMatrix::zeros(self.model.columns(), columns),
         };
         for column in 0..columns {
             let change = Change {
                 // At an event the time moves, too.
-                t: self.moved.as_ref().map_or(0.0, |moved| moved[column]),
+                t: self
+                    .before
+                    .start
+                    .as_ref()
+                    .map_or(0.0, |moved| moved[column]),
                 parameter: self.parameter(column),
-                ..Change::of_column(&self.current, column)
+                ..Change::of_column(&self.before.state, column)
             };
             let velocity = along.velocity(&change);
             slopes

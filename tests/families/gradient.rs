@@ -101,17 +101,17 @@ fn off<M: Model>(
     force(q[0]) = f*sin(omega*t)*k[1],
     output(middle) = q[2]*k[1] + c*dot(q[3])^2,
 )]
-struct Chain {
-    n: usize,
-    m: Vec<f64>,
-    k: Vec<f64>,
-    b: f64,
-    c: f64,
-    f: f64,
-    omega: f64,
+pub(super) struct Chain {
+    pub(super) n: usize,
+    pub(super) m: Vec<f64>,
+    pub(super) k: Vec<f64>,
+    pub(super) b: f64,
+    pub(super) c: f64,
+    pub(super) f: f64,
+    pub(super) omega: f64,
 }
 
-fn chain(n: usize) -> (Chain, FamilyState) {
+pub(super) fn chain(n: usize) -> (Chain, FamilyState) {
     let swing = |a: usize| (a as f64).sin();
     let chain = Chain {
         n,

@@ -13,6 +13,8 @@ mod events;
 #[cfg(feature = "sparse")]
 mod gradient;
 mod impulses;
+#[cfg(feature = "sparse")]
+mod inside;
 mod kernels;
 mod lists;
 mod motions;

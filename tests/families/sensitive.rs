@@ -28,11 +28,11 @@ pub(super) struct Long {
     force(q[i]) = -c*dot(q[i]) + c*sin(t),
     output(power) = c*dot(q[0])^2 + s[1]*q[1],
 )]
-struct Five {
-    m: [f64; 5],
-    a: f64,
-    s: [f64; 4],
-    c: f64,
+pub(super) struct Five {
+    pub(super) m: [f64; 5],
+    pub(super) a: f64,
+    pub(super) s: [f64; 4],
+    pub(super) c: f64,
 }
 
 /// In phase space, with friction by momenta.
@@ -56,11 +56,11 @@ pub(super) struct LongPendula {
     force(q[i]) = -c*p[i],
     output(energy) = p[0]^2/(2*m) + b*q[0]^4,
 )]
-struct ThreePendula {
-    m: f64,
-    k: [f64; 2],
-    b: f64,
-    c: f64,
+pub(super) struct ThreePendula {
+    pub(super) m: f64,
+    pub(super) k: [f64; 2],
+    pub(super) b: f64,
+    pub(super) c: f64,
 }
 
 /// The largest difference of all derivatives of two runs, over the largest derivative; and that there are as many.
@@ -125,7 +125,7 @@ fn compare<M: family::Model, F: Model<N>, const N: usize>(
 }
 
 /// The same model in both kinds of length.
-fn pair() -> (Long, Five) {
+pub(super) fn pair() -> (Long, Five) {
     let (m, s) = ([1.0, 1.5, 0.7, 2.0, 0.4], [1.0, 2.0, 0.5, 3.0]);
     let (a, c) = (0.3, 0.2);
     let long = Long {

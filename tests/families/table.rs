@@ -209,11 +209,15 @@ macro_rules! calls {
             let run = run().run_linearised(start(), span())?;
             is_finite(run.product().as_slice())
         });
-        call("`run_sensitive`", &|| {
-            Ok(run().run_sensitive(start(), span()).map(|_| ())?)
+        call("`run_sensitive`, also between the nodes", &|| {
+            let s = run().run_sensitive(start(), span())?;
+            is_finite(s.by_start().at(0.55)?.as_slice())
         });
-        call("`gradient`", &|| {
-            Ok(run().gradient(start(), span(), &$loss).map(|_| ())?)
+        call("`gradient`, also of `Loss::integral`", &|| {
+            let loss = $loss.and(Loss::integral("height"));
+            let (loss, gradient) = run().gradient(start(), span(), &loss)?;
+            is_finite(&[loss])?;
+            is_finite(gradient.by_parameters())
         });
         call(
             "`Motion`: `states`, `at`, `energies`, `outputs`, `warnings`, `arcs`, `write_csv`",

@@ -3,6 +3,7 @@
 mod backwards;
 mod events;
 mod forwards;
+mod inside;
 
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};

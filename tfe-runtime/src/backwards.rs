@@ -9,6 +9,7 @@
 
 use crate::condense::{Direction, add_multiple};
 use crate::error::StepError;
+use crate::inside::{InsideLoss, Seeds};
 use crate::lu::Block;
 use crate::model::{First, Form, Model};
 use crate::phase_form::PhaseForm;
@@ -71,12 +72,13 @@ impl<const N: usize> Backwards<N> {
         }
     }
 
-    /// Of an element in velocities, with λ of the momenta at its end.
+    /// Of an element in velocities, with λ of the momenta at its end, and seeds of the forces at its points, if there are any.
     pub(crate) fn of_velocities<M: Model<N>>(
         &mut self,
         equations: &mut VelocityForm<'_, M, N>,
         x: &[f64],
         (lambda, mu): (&[f64; N], &[f64]),
+        seeds: &[f64],
     ) -> Result<(), StepError> {
         if self.tape.parameters() == 0 {
             return Ok(());
@@ -93,6 +95,9 @@ impl<const N: usize> Backwards<N> {
                     momentum[a] -= scheme.momentum[i * points + l] * mu[a];
                     force[a] += h * scheme.force[i * points + l] * mu[a];
                 }
+            }
+            if let Some(seed) = seeds.as_chunks::<N>().0.get(l) {
+                add_multiple(&mut force, 1.0, seed);
             }
             let (t, q, v) = equations.place(l, rates);
             let (z, weights) = match M::FORM {
@@ -155,6 +160,8 @@ struct Points<const N: usize> {
     /// One where it is constant.
     masses: Vec<Mass<N>>,
     mu: Vec<[f64; N]>,
+    /// What a loss has of the inside.
+    seeds: Seeds,
     pulled: Vec<[f64; N]>,
     rows: Vec<[f64; N]>,
 }
@@ -329,6 +336,7 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
             momentum_q,
             masses,
             mu,
+            seeds,
             pulled,
             rows,
         } = self.points;
@@ -342,6 +350,10 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
                 for a in 0..N {
                     seed[a] = h * scheme.weights[l] * of_p[a];
                     rows[l][a] = h * scheme.advance[l] * of_q[a];
+                }
+                if !seeds.is_empty() {
+                    add_multiple(&mut seed, 1.0, &seeds.forces[l * N..]);
+                    add_multiple(&mut rows[l], 1.0, &seeds.rates[l * N..]);
                 }
                 for i in 0..points {
                     add_multiple(&mut seed, h * scheme.force[i * points + l], &mu[i]);
@@ -396,14 +408,17 @@ impl<const N: usize> Backwards<N> {
         &mut self,
         equations: &mut VelocityForm<'_, M, N>,
         x: &[f64],
-        lambda: &mut [f64],
+        (inside, lambda): (Option<&InsideLoss>, &mut [f64]),
     ) -> Result<bool, StepError> {
         if M::FORM != Form::Lagrangian
             || !equations.scheme.collocated
             || !M::CONSTRAINTS.is_empty()
             || !self.points.set(equations, x.as_chunks::<N>().0)?
-            || !self.points.iterate(equations, lambda)
         {
+            return Ok(false);
+        }
+        self.points.seeds = Seeds::of(inside, &equations.scheme, equations.span.h);
+        if !self.points.iterate(equations, lambda) {
             return Ok(false);
         }
         let mut of_p = [0.0; N];
@@ -415,7 +430,8 @@ impl<const N: usize> Backwards<N> {
             }
         }
         let mu = core::mem::take(&mut self.points.mu);
-        self.of_velocities(equations, x, (&of_p, mu.as_flattened()))?;
+        let seeds = core::mem::take(&mut self.points.seeds);
+        self.of_velocities(equations, x, (&of_p, mu.as_flattened()), &seeds.forces)?;
         self.points.mu = mu;
         Ok(true)
     }

@@ -328,7 +328,7 @@ where
     M: Model<N>,
 {
     /// What a direction changes at a point while velocities and start stay: the derivatives of the momentum and of the force.
-    fn along(
+    pub(crate) fn along(
         &self,
         l: usize,
         rates: &[[f64; N]],

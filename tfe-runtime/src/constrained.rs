@@ -28,6 +28,6 @@ pub(crate) use trail::Foreseen;
 #[cfg(feature = "alloc")]
 pub use trail::Trail;
 
-pub(crate) use derivative::{linearise, product};
+pub(crate) use derivative::linearise;
 #[cfg(feature = "alloc")]
 pub(crate) use layout::refused;

@@ -161,6 +161,12 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
+    /// The Legendre coefficients of h dq/dτ, then those of h dp/dτ; none of an element that was cut, whose [pieces](Self::pieces) have them.
+    #[must_use]
+    pub fn coefficients(&self) -> &[[f64; N]] {
+        &self.rates
+    }
+
     /// The parts before and after a time inside.
     pub(crate) fn split(&self, time: f64) -> (Self, Self) {
         let tau = (time - self.times.0) / (self.times.1 - self.times.0);

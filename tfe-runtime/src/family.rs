@@ -42,7 +42,7 @@ mod transition;
 mod view;
 
 #[cfg(feature = "sparse")]
-pub use backwards::{Backwards, Partials};
+pub use backwards::Backwards;
 pub use dense::DenseElement;
 pub use error::ModelError;
 pub use model::{Block, Entries, FamilyState, Gradient, Model, STRIDE, Sweep};

@@ -42,6 +42,8 @@ mod exponential;
 pub mod family;
 mod input;
 #[cfg(feature = "alloc")]
+mod inside;
+#[cfg(feature = "alloc")]
 mod kinks;
 pub mod lanes;
 pub mod legendre;
@@ -54,6 +56,8 @@ mod phase_form;
 mod points;
 #[cfg(feature = "alloc")]
 mod propagator;
+#[cfg(feature = "alloc")]
+mod pull;
 pub mod quadrature;
 pub mod real;
 mod registers;
@@ -86,12 +90,16 @@ pub use element::markers::*;
 pub use element::{Element, ElementError, Family, Rule};
 pub use error::{ConstraintError, LegendreError, StepError};
 pub use input::{InputFailure, InputPanicked};
+#[cfg(feature = "alloc")]
+pub use inside::{InsideLoss, InsideSlopes};
 pub use lanes::Lanes;
 pub use model::{
     By, Constraint, ConstraintKind, ConstraintSecond, CoordinateName, Facts, First, Form, Model,
     Second, State,
 };
 pub use newton::Solve;
+#[cfg(feature = "alloc")]
+pub use pull::{Partials, Pull};
 pub use real::Real;
 #[cfg(feature = "alloc")]
 pub use share::Share;

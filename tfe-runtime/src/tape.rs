@@ -174,7 +174,6 @@ impl Tape {
     }
 
     /// A sum, which is zero then.
-    #[cfg(feature = "sparse")]
     pub(crate) fn take(&mut self, place: usize) -> f64 {
         let sum = self.sum(place);
         self.adjoints[place] = ZERO;
@@ -267,7 +266,6 @@ impl<'t> Taped<'t> {
     }
 
     /// A number that derivatives are asked by, as if it were the parameter of this place.
-    #[cfg(feature = "sparse")]
     pub(crate) fn variable(value: f64, place: usize, tape: &'t RefCell<Operations>) -> Self {
         Self {
             place: place as u32,
@@ -276,7 +274,6 @@ impl<'t> Taped<'t> {
     }
 
     /// Where its operation stands.
-    #[cfg(feature = "sparse")]
     pub(crate) fn place(&self) -> u32 {
         self.place
     }

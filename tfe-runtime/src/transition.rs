@@ -10,11 +10,13 @@ use crate::condense::{
 };
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
+use crate::constrained::linearise;
 use crate::constrained::rows::Rows;
-use crate::constrained::{linearise, product as constrained_product};
 use crate::equations::Span;
 use crate::error::StepError;
 pub use crate::error::TransitionError;
+#[cfg(feature = "alloc")]
+use crate::inside::{Columns, InsideLoss, Seeds};
 use crate::method::{Impulse, Interval, Memory, Method, may_be_phase, set_kicks, total};
 use crate::model::Model;
 #[cfg(feature = "alloc")]
@@ -23,6 +25,8 @@ use crate::phase_form::PhaseForm;
 use crate::scheme::Tables;
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Workspace, linearised_len};
+#[cfg(feature = "alloc")]
+use alloc::{vec, vec::Vec};
 
 /// Writes the transition matrix of one step from `state`, 2N × 2N, row by row, ordered (p, q);
 /// returns the end of the step.
@@ -52,9 +56,17 @@ where
 /// What is made of the linear system of an element.
 enum Asked<'a, const N: usize> {
     /// The derivatives of the end, row by row, with the columns of the sides.
-    Matrix(&'a mut [f64]),
+    Matrix(Matrix<'a>),
     /// Their product with λ, from the left: that with the columns of the start takes the place of λ, those of the directions are added to others.
     Product(Product<'a, N>),
+}
+
+/// Where derivatives go.
+struct Matrix<'a> {
+    ends: &'a mut [f64],
+    /// Those of the polynomials of the element, where they are asked for.
+    #[cfg(feature = "alloc")]
+    inside: Option<&'a mut Vec<f64>>,
 }
 
 /// What is multiplied, and where the product goes.
@@ -65,6 +77,24 @@ struct Product<'a, const N: usize> {
     /// For all parameters at once, which are no directions then.
     #[cfg(feature = "alloc")]
     at_once: Option<&'a mut Backwards<N>>,
+    /// What else is asked for: a loss of the inside of the element.
+    #[cfg(feature = "alloc")]
+    inside: Option<&'a InsideLoss>,
+}
+
+/// Refuses sums that are not as many as the columns.
+fn check_sums<const N: usize>(
+    directions: &[Direction],
+    lambda: &[f64],
+    by_direction: &[f64],
+) -> Result<(), TransitionError> {
+    if lambda.len() == 2 * N && by_direction.len() == directions.len() {
+        return Ok(());
+    }
+    Err(TransitionError::Shape {
+        needed: 2 * N + directions.len(),
+        given: lambda.len().min(2 * N) + by_direction.len(),
+    })
 }
 
 impl<M, T> Method<'_, M, T>
@@ -113,8 +143,32 @@ where
             let given = matrix.len();
             return Err(TransitionError::Shape { needed, given });
         }
-        let asked = Asked::Matrix(&mut matrix[..needed]);
+        let asked = Asked::Matrix(Matrix {
+            ends: &mut matrix[..needed],
+            #[cfg(feature = "alloc")]
+            inside: None,
+        });
         self.differentiate(memory, workspace, extra, (impulses, directions), asked)
+    }
+
+    /// The same, and the derivatives of the Legendre coefficients of the element's polynomials.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn linearise_inside<const N: usize>(
+        &self,
+        memory: &mut Memory<N>,
+        workspace: Workspace<'_>,
+        extra: &mut [f64],
+        given: (&[Impulse<N>], &[Direction]),
+        (ends, inside): (&mut [f64], &mut Vec<f64>),
+    ) -> Result<(), TransitionError>
+    where
+        M: Model<N>,
+    {
+        let asked = Asked::Matrix(Matrix {
+            ends,
+            inside: Some(inside),
+        });
+        self.differentiate(memory, workspace, extra, given, asked)
     }
 
     /// Multiplies that matrix with `lambda`, 2N numbers, from the left: its first 2N columns take the place of `lambda`, the others are added to the g numbers `by_direction`. Without
@@ -133,20 +187,39 @@ where
     where
         M: Model<N>,
     {
-        let (needed, given) = (
-            2 * N + directions.len(),
-            lambda.len().min(2 * N) + by_direction.len(),
-        );
-        if lambda.len() != 2 * N || by_direction.len() != directions.len() {
-            return Err(TransitionError::Shape { needed, given });
-        }
+        check_sums::<N>(directions, lambda, by_direction)?;
         let asked = Asked::Product(Product {
             lambda,
             by_direction,
             #[cfg(feature = "alloc")]
             at_once: None,
+            #[cfg(feature = "alloc")]
+            inside: None,
         });
         self.differentiate(memory, workspace, extra, (impulses, directions), asked)
+    }
+
+    /// The same with a loss of the inside of the element.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn adjoint_inside<const N: usize>(
+        &self,
+        memory: &mut Memory<N>,
+        workspace: Workspace<'_>,
+        extra: &mut [f64],
+        given: (&[Impulse<N>], &[Direction]),
+        (inside, lambda, by_direction): (Option<&InsideLoss>, &mut [f64], &mut [f64]),
+    ) -> Result<(), TransitionError>
+    where
+        M: Model<N>,
+    {
+        check_sums::<N>(given.1, lambda, by_direction)?;
+        let asked = Asked::Product(Product {
+            lambda,
+            by_direction,
+            at_once: None,
+            inside,
+        });
+        self.differentiate(memory, workspace, extra, given, asked)
     }
 
     /// The same by all parameters at once, of a model without constraints.
@@ -157,7 +230,7 @@ where
         workspace: Workspace<'_>,
         extra: &mut [f64],
         impulses: &[Impulse<N>],
-        (lambda, backwards): (&mut [f64], &mut Backwards<N>),
+        (inside, lambda, backwards): (Option<&InsideLoss>, &mut [f64], &mut Backwards<N>),
     ) -> Result<(), TransitionError>
     where
         M: Model<N>,
@@ -166,6 +239,7 @@ where
             lambda,
             by_direction: &mut [],
             at_once: Some(backwards),
+            inside,
         });
         self.differentiate(memory, workspace, extra, (impulses, &[]), asked)
     }
@@ -251,11 +325,25 @@ where
             };
             let x = &*parts.unknowns;
             let linearised = match asked {
-                Asked::Matrix(matrix) => linearise(&mut form, x, directions, false, system, matrix),
-                Asked::Product(product) => {
-                    let sums = (product.lambda, product.by_direction);
-                    constrained_product(&mut form, x, directions, system, sums)
+                Asked::Matrix(matrix) => {
+                    let solved = linearise(&mut form, x, directions, false, system, matrix.ends);
+                    #[cfg(feature = "alloc")]
+                    let solved = solved.and_then(|sides| {
+                        let Some(inside) = matrix.inside else {
+                            return Ok(sides);
+                        };
+                        let columns = Columns {
+                            scheme,
+                            h: last.h,
+                            directions,
+                            sides,
+                        };
+                        *inside = columns.of_constrained(&mut form.inner, x, matrix.ends)?;
+                        Ok(sides)
+                    });
+                    solved.map(|_| ())
                 }
+                Asked::Product(product) => multiply(&mut form, x, directions, system, product),
             };
             if is_combined {
                 for place in layout.multipliers() {
@@ -279,13 +367,28 @@ where
             let (scheme, x) = (&equations.scheme, &*parts.unknowns);
             match asked {
                 Asked::Matrix(matrix) => {
-                    let sides = system.solve()?.sides;
-                    phase_ends::<N>(scheme, span.h, x, directions, sides, matrix);
+                    let sides = &*system.solve()?.sides;
+                    phase_ends::<N>(scheme, span.h, x, directions, sides, matrix.ends);
+                    #[cfg(feature = "alloc")]
+                    if let Some(inside) = matrix.inside {
+                        let columns: Columns<'_, N> = Columns {
+                            scheme: *scheme,
+                            h: span.h,
+                            directions,
+                            sides,
+                        };
+                        *inside = columns.of_phase(x);
+                    }
                 }
                 Asked::Product(product) => {
                     let (lambda, by_direction) = (product.lambda, product.by_direction);
                     let sums = (&*lambda, &mut *by_direction, &mut *system.residual);
                     phase_weights::<N>(scheme, span.h, x, directions, sums);
+                    #[cfg(feature = "alloc")]
+                    {
+                        let seeds = Seeds::of(product.inside, scheme, span.h);
+                        seeds.add_to_phase(x, (directions, span.h), by_direction, system.residual);
+                    }
                     let _mu = system.product(lambda, by_direction)?;
                     #[cfg(feature = "alloc")]
                     if let Some(backwards) = product.at_once {
@@ -310,7 +413,11 @@ where
             #[cfg(feature = "alloc")]
             if let Asked::Product(product) = &mut asked
                 && let Some(backwards) = &mut product.at_once
-                && backwards.try_iteration(&mut equations, parts.unknowns, product.lambda)?
+                && backwards.try_iteration(
+                    &mut equations,
+                    parts.unknowns,
+                    (product.inside, product.lambda),
+                )?
             {
                 return Ok(());
             }
@@ -319,8 +426,18 @@ where
             let (x, h) = (&*parts.unknowns, span.h);
             match asked {
                 Asked::Matrix(matrix) => {
-                    let sides = system.solve()?.sides;
-                    velocity_ends(&scheme, h, x, directions, &forces, sides, matrix);
+                    let sides = &*system.solve()?.sides;
+                    velocity_ends(&scheme, h, x, directions, &forces, sides, matrix.ends);
+                    #[cfg(feature = "alloc")]
+                    if let Some(inside) = matrix.inside {
+                        let columns = Columns {
+                            scheme,
+                            h,
+                            directions,
+                            sides,
+                        };
+                        *inside = columns.of_velocities(&mut equations, x)?;
+                    }
                 }
                 Asked::Product(product) => {
                     let (lambda, by_direction) = (product.lambda, product.by_direction);
@@ -328,14 +445,76 @@ where
                     _of_p.copy_from_slice(&lambda[..N]);
                     let sums = (&mut *lambda, &mut *by_direction, &mut *system.residual);
                     velocity_weights(&scheme, h, x, (directions, &forces), sums);
+                    #[cfg(feature = "alloc")]
+                    let seeds = Seeds::of(product.inside, &scheme, h);
+                    #[cfg(feature = "alloc")]
+                    {
+                        let sums = (&mut *lambda, &mut *by_direction, &mut *system.residual);
+                        seeds.add_to_velocities(&mut equations, x, directions, sums)?;
+                    }
                     let _mu = system.product(lambda, by_direction)?;
                     #[cfg(feature = "alloc")]
                     if let Some(backwards) = product.at_once {
-                        backwards.of_velocities(&mut equations, x, (&_of_p, _mu))?;
+                        let sums = (&_of_p, _mu);
+                        backwards.of_velocities(&mut equations, x, sums, &seeds.forces)?;
                     }
                 }
             }
         }
         Ok(())
     }
+}
+
+/// The product of the derivatives of a constrained element with λ, from the left.
+#[cfg(feature = "alloc")]
+fn multiply<M: Model<N>, const N: usize>(
+    form: &mut ConstrainedForm<'_, M, N>,
+    x: &[f64],
+    directions: &[Direction],
+    system: System<'_>,
+    product: Product<'_, N>,
+) -> Result<(), StepError> {
+    let columns = 2 * N + directions.len();
+    let mut ends = vec![0.0; 2 * N * columns];
+    let sides = linearise(form, x, directions, false, system, &mut ends)?;
+    let Product {
+        lambda,
+        by_direction,
+        inside,
+        ..
+    } = product;
+    let weights = lambda.to_vec();
+    lambda.fill(0.0);
+    let mut add = |weights: &[f64], rows: &[f64]| {
+        for (weight, row) in weights.iter().zip(rows.chunks_exact(columns)) {
+            let sums = lambda.iter_mut().chain(by_direction.iter_mut());
+            for (sum, entry) in sums.zip(row) {
+                *sum += weight * entry;
+            }
+        }
+    };
+    add(&weights, &ends);
+    if let Some(inside) = inside {
+        let own = Columns {
+            scheme: form.inner.scheme,
+            h: form.inner.span.h,
+            directions,
+            sides,
+        };
+        let rows = own.of_constrained(&mut form.inner, x, &ends)?;
+        add(&inside.coefficients, &rows);
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "alloc"))]
+fn multiply<M: Model<N>, const N: usize>(
+    _: &mut ConstrainedForm<'_, M, N>,
+    _: &[f64],
+    _: &[Direction],
+    _: System<'_>,
+    _: Product<'_, N>,
+) -> Result<(), StepError> {
+    // Gradients are asked for where there is an allocator.
+    Err(StepError::NonFinite)
 }

@@ -10,9 +10,31 @@ use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use {
-    super::super::linearise::family::operator_failed, crate::motion::Node,
-    crate::sensitivity::loss::By, crate::sensitivity::loss::Look,
+    super::super::linearise::family::operator_failed, super::view::View, crate::error::RunErrorKind,
 };
+
+/// Why there is no gradient.
+#[cfg(feature = "sparse")]
+enum Failure {
+    /// An element has none.
+    Element(family::OperatorError),
+    /// The loss has none.
+    Loss(RunErrorKind),
+}
+
+#[cfg(feature = "sparse")]
+impl From<family::OperatorError> for Failure {
+    fn from(error: family::OperatorError) -> Self {
+        Self::Element(error)
+    }
+}
+
+#[cfg(feature = "sparse")]
+impl From<RunErrorKind> for Failure {
+    fn from(kind: RunErrorKind) -> Self {
+        Self::Loss(kind)
+    }
+}
 
 impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Runs over the span as [`run`](Self::run) does, and gives a loss of the motion with its gradient by all parameters of the model and by the start, in one pass backwards.
@@ -40,7 +62,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             }
         }
         let mut run = self.clone().record_every(1);
-        run.breaks.extend(loss.times());
+        run.breaks.extend(loss.nodes());
         let (motion, trail) = run.trailed("gradient", start, &span, Trail::default())?;
         #[cfg(feature = "sparse")]
         return run.pulled(motion, &trail, loss);
@@ -63,18 +85,19 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         trail: &Trail,
         loss: &Loss<'_, 0, RunTimeLength>,
     ) -> Result<(f64, LossGradient<0, RunTimeLength>), RunError<0, RunTimeLength>> {
-        let (value, looks) = match loss.looks(&motion) {
-            Ok(looks) => looks,
+        let (value, seen) = match loss.seen(&motion, self.model) {
+            Ok(seen) => seen,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
         let elements = &trail.elements;
         let mut number = elements.len();
-        let mut pulled = || -> Result<_, family::OperatorError> {
+        let mut view = View::new(self.model, &seen, &motion.last().v);
+        let mut pulled = || -> Result<_, Failure> {
             let element = self.chosen_element();
             let mut backwards = family::Backwards::new(self.model, element, self.control)?;
             loop {
                 let node = &motion.states()[number];
-                if let Some(partials) = self.partials(node, number, &looks) {
+                if let Some(partials) = view.of_node(number) {
                     let state = node.state();
                     backwards.see(node.t, (&state, &node.v), &partials)?;
                 }
@@ -83,7 +106,9 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 };
                 number = before;
                 let element = &elements[number];
-                let end = backwards.pass((element.t, element.h), &element.before)?;
+                let inside = view.of_element(&mut backwards, &motion.elements()[number])?;
+                let place = (element.t, element.h);
+                let end = backwards.pass(place, &element.before, inside.first())?;
                 element.check(&end)?;
             }
         };
@@ -96,47 +121,12 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 let gradient = LossGradient::new(motion, names.collect(), by_parameters, by_start);
                 Ok((value, gradient))
             }
-            Err(error) => {
+            Err(Failure::Element(error)) => {
                 let element = elements.get(number).map(|element| (number, element));
                 let kind = operator_failed(error, element, "gradient");
                 Err(RunError::new(kind, motion))
             }
+            Err(Failure::Loss(kind)) => Err(RunError::new(kind, motion)),
         }
-    }
-
-    /// What a loss has directly of a node; `None` where it has nothing of it.
-    #[cfg(feature = "sparse")]
-    fn partials(
-        &self,
-        node: &Node<0, RunTimeLength>,
-        number: usize,
-        looks: &[Look],
-    ) -> Option<family::Partials> {
-        let mut looks = looks.iter().filter(|look| look.node == number).peekable();
-        looks.peek()?;
-        let zeros = || vec![0.0; node.q.len()];
-        let mut partials = family::Partials {
-            q: zeros(),
-            p: zeros(),
-            v: zeros(),
-            outputs: vec![0.0; self.model.columns()],
-        };
-        for look in looks {
-            match look.by() {
-                By::Output(column, factor) => partials.outputs[*column] += factor,
-                By::Node { q, p, v } => {
-                    for (sums, own) in [
-                        (&mut partials.q, q),
-                        (&mut partials.p, p),
-                        (&mut partials.v, v),
-                    ] {
-                        for (sum, own) in sums.iter_mut().zip(own) {
-                            *sum += own;
-                        }
-                    }
-                }
-            }
-        }
-        Some(partials)
     }
 }

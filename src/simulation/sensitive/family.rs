@@ -12,6 +12,7 @@ use {
     super::super::linearise::family::operator_failed,
     crate::motion::{Motion, Node},
     crate::sensitivity::Slopes,
+    crate::sensitivity::inside::Inside,
     crate::sensitivity::run_time::Along,
     nalgebra::{DMatrix, DVector},
 };
@@ -62,15 +63,20 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             }
         };
         record(0, &current);
+        let keeps = self.record_every == 1;
+        let mut inside = Vec::new();
         let mut passed = 0;
         let each = |transition: family::TransitionOperator| {
-            trail.elements[passed].check(transition.end())?;
+            let element = &trail.elements[passed];
+            element.check(transition.end())?;
             let mut next = DMatrix::zeros(current.nrows(), current.ncols());
+            let mut along = Vec::new();
             for (from, mut to) in current.column_iter().zip(next.column_iter_mut()) {
                 let from: Vec<f64> = from.iter().copied().collect();
-                let mut end = vec![0.0; size];
-                transition.apply(&from, &mut end)?;
+                let (mut end, mut own) = (vec![0.0; size], Vec::new());
+                transition.apply_inside(&from, &mut end, keeps.then_some(&mut own))?;
                 to.copy_from_slice(&end);
+                along.extend(own);
             }
             for (by, mut to) in transition
                 .by_parameters()
@@ -78,6 +84,16 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 .zip(next.column_iter_mut().skip(size))
             {
                 to += DVector::from_column_slice(by);
+            }
+            if keeps {
+                let rows = along.len() / current.ncols();
+                let mut along = DMatrix::from_vec(rows, current.ncols(), along);
+                let by_parameters = transition.inside_by_parameters().iter();
+                for (by, mut to) in by_parameters.zip(along.column_iter_mut().skip(size)) {
+                    to += DVector::from_column_slice(by);
+                }
+                let times = (element.t, element.t + element.h);
+                inside.push(Inside::whole(times, &current, &along));
             }
             current = next;
             passed += 1;
@@ -96,7 +112,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         }
         let names = parameters.iter();
         let names = names.map(|index| model.parameter_name(*index).to_string());
-        Ok(Sensitive::new(motion, names.collect(), slopes, Vec::new()))
+        let sensitive = Sensitive::new(motion, names.collect(), slopes, Vec::new());
+        Ok(sensitive.with_inside(inside))
     }
 }
 

@@ -19,15 +19,15 @@ use crate::{
 use alloc::{vec, vec::Vec};
 
 /// Solves for the interior as a function of the start and of directions, and writes the derivatives of the end, 2N rows with the columns of the
-/// sides, ordered (p, q). With `newton_step` the last column is the Newton step of the interior itself.
-pub(crate) fn linearise<M, const N: usize>(
+/// sides, ordered (p, q). With `newton_step` the last column is the Newton step of the interior itself. Gives the sides, solved.
+pub(crate) fn linearise<'s, M, const N: usize>(
     form: &mut ConstrainedForm<'_, M, N>,
     x: &[f64],
     directions: &[Direction],
     newton_step: bool,
-    system: System<'_>,
+    system: System<'s>,
     ends: &mut [f64],
-) -> Result<(), StepError>
+) -> Result<&'s [f64], StepError>
 where
     M: Model<N>,
 {
@@ -83,7 +83,7 @@ where
             system.sides[(row + 1) * columns - 1] = -residual;
         }
     }
-    let sides = system.solve()?.sides;
+    let sides = &*system.solve()?.sides;
     for a in 0..N {
         for (u, weight) in scheme.advance.iter().enumerate() {
             for k in 0..columns {
@@ -116,48 +116,7 @@ where
             }
         }
     }
-    Ok(())
-}
-
-/// The product of what [`linearise`] writes with λ from the left: that with the columns of the start takes the place of λ, those of the directions are added to others.
-#[cfg(feature = "alloc")]
-pub(crate) fn product<M, const N: usize>(
-    form: &mut ConstrainedForm<'_, M, N>,
-    x: &[f64],
-    directions: &[Direction],
-    system: System<'_>,
-    (lambda, by_direction): (&mut [f64], &mut [f64]),
-) -> Result<(), StepError>
-where
-    M: Model<N>,
-{
-    let columns = 2 * N + directions.len();
-    let mut ends = vec![0.0; 2 * N * columns];
-    linearise(form, x, directions, false, system, &mut ends)?;
-    let weights = lambda.to_vec();
-    lambda.fill(0.0);
-    for (weight, row) in weights.iter().zip(ends.chunks_exact(columns)) {
-        let sums = lambda.iter_mut().chain(by_direction.iter_mut());
-        for (sum, entry) in sums.zip(row) {
-            *sum += weight * entry;
-        }
-    }
-    Ok(())
-}
-
-#[cfg(not(feature = "alloc"))]
-pub(crate) fn product<M, const N: usize>(
-    _: &mut ConstrainedForm<'_, M, N>,
-    _: &[f64],
-    _: &[Direction],
-    _: System<'_>,
-    _: (&mut [f64], &mut [f64]),
-) -> Result<(), StepError>
-where
-    M: Model<N>,
-{
-    // Gradients are asked for where there is an allocator.
-    Err(StepError::NonFinite)
+    Ok(sides)
 }
 
 #[cfg(not(feature = "alloc"))]

@@ -12,11 +12,14 @@ use super::rates::Rates;
 use super::stepper::Stepper;
 use super::transition::{OperatorError, Seeds, TransitionOperator};
 use super::view::View;
+use crate::condense::add_multiple;
 use crate::element::Element;
 use crate::error::StepError;
+use crate::inside::{InsideLoss, Seeds as Within};
 use crate::lanes::Lanes;
 use crate::model::Form;
 use crate::newton::Control;
+use crate::pull::Partials;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::tape::Tape;
 use alloc::sync::Arc;
@@ -25,19 +28,6 @@ use alloc::vec::Vec;
 use core::fmt;
 use iteration::Iteration;
 use written::{Points, Results, add_of_place, add_of_points};
-
-/// The derivatives of a loss by what a node consists of.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Partials {
-    /// By coordinates; as many as the model has, as of the next two.
-    pub q: Vec<f64>,
-    /// By momenta.
-    pub p: Vec<f64>,
-    /// By velocities.
-    pub v: Vec<f64>,
-    /// By outputs, one for each column.
-    pub outputs: Vec<f64>,
-}
 
 /// Goes backwards along a run, from its last node: carries the row λ = ∂ℓ/∂(p, q) of a loss ℓ, and adds up its derivatives by all parameters.
 ///
@@ -138,9 +128,27 @@ impl<'m, M: Model> Backwards<'m, M> {
     pub fn see(
         &mut self,
         t: f64,
-        (state, v): (&FamilyState, &[f64]),
+        at: (&FamilyState, &[f64]),
         partials: &Partials,
     ) -> Result<(), OperatorError> {
+        let by_state = self.pulled(t, at, partials)?;
+        let by_state = by_state.p.iter().chain(&by_state.q);
+        for (sum, own) in self.lambda.iter_mut().zip(by_state) {
+            *sum += own;
+        }
+        Ok(())
+    }
+
+    /// What the loss has of the state of a place, through outputs and velocities, too; what it has of parameters is added to their sums.
+    ///
+    /// # Errors
+    /// As [`see`](Self::see).
+    pub fn pulled(
+        &mut self,
+        t: f64,
+        (state, v): (&FamilyState, &[f64]),
+        partials: &Partials,
+    ) -> Result<FamilyState, OperatorError> {
         let model = self.view.model();
         let n = model.len();
         for (given, needed) in [
@@ -157,18 +165,18 @@ impl<'m, M: Model> Backwards<'m, M> {
             }
         }
         let parameters = model.parameters();
-        let (of_p, of_q) = self.lambda.split_at_mut(n);
-        for a in 0..n {
-            of_p[a] += partials.p[a];
-            of_q[a] += partials.q[a];
-        }
+        let mut by_state = FamilyState {
+            q: partials.q.clone(),
+            p: partials.p.clone(),
+        };
+        let (of_p, of_q) = (&mut by_state.p, &mut by_state.q);
         let z = match M::FORM {
             Form::Lagrangian => v,
             Form::Hamiltonian => &state.p,
         };
         let place = (t, &state.q[..], z);
         let mut by_v = partials.v.clone();
-        if !is_zero(&partials.outputs) {
+        if partials.sees_outputs() {
             let weights = &partials.outputs;
             add_of_place(&mut self.tape, model, place, Results::Observables, weights);
             for a in 0..n {
@@ -180,8 +188,8 @@ impl<'m, M: Model> Backwards<'m, M> {
                 }
             }
         }
-        if is_zero(&by_v) {
-            return Ok(());
+        if by_v.iter().all(|value| *value == 0.0) {
+            return Ok(by_state);
         }
         if M::FORM == Form::Lagrangian {
             // p = L_v(q, v): δv = L_vv⁻¹ (δp − ∂L_v/∂(q, a)).
@@ -199,7 +207,7 @@ impl<'m, M: Model> Backwards<'m, M> {
                 of_p[a] += by_z;
             }
         }
-        Ok(())
+        Ok(by_state)
     }
 
     fn divide_by_mass(
@@ -231,7 +239,7 @@ impl<'m, M: Model> Backwards<'m, M> {
         }
     }
 
-    /// Goes back over the element from t to t + h, from where it ends to `before`; where it has ended, solved once more.
+    /// Goes back over the element from t to t + h, from where it ends to `before`, with what the loss has of its inside; where it has ended, solved once more.
     ///
     /// # Errors
     /// [`OperatorError`], of the step and of its tangent; [`OperatorError::Cut`] where it was too long to be made at once.
@@ -239,7 +247,30 @@ impl<'m, M: Model> Backwards<'m, M> {
         &mut self,
         (t, h): (f64, f64),
         before: &FamilyState,
+        inside: Option<&InsideLoss>,
     ) -> Result<FamilyState, OperatorError> {
+        let end = self.pass_inside((t, h), before, inside)?;
+        if let Some(inside) = inside {
+            add_multiple(&mut self.lambda, 1.0, &inside.start);
+        }
+        Ok(end)
+    }
+
+    fn pass_inside(
+        &mut self,
+        (t, h): (f64, f64),
+        before: &FamilyState,
+        inside: Option<&InsideLoss>,
+    ) -> Result<FamilyState, OperatorError> {
+        if let Some(inside) = inside {
+            let degree = self.table.element().degree();
+            let needed = 2 * degree * self.view.model().len();
+            let given = inside.coefficients.len();
+            if given != needed {
+                return Err(OperatorError::Shape { needed, given });
+            }
+        }
+        let within = Within::of(inside, &self.table.view(), h);
         let mut end = before.clone();
         if self.iteration.is_some() {
             let cuts = self.stepper.statistics().cuts;
@@ -247,14 +278,14 @@ impl<'m, M: Model> Backwards<'m, M> {
             if self.stepper.statistics().cuts > cuts {
                 return Err(OperatorError::Cut);
             }
-            if self.iterate(t, h) {
+            if self.iterate(t, h, &within) {
                 self.take_derivatives();
                 return Ok(end);
             }
         }
         let transition = self.transition((t, h), before)?;
         end.clone_from(transition.end());
-        let seeds = transition.pull(&mut self.lambda);
+        let seeds = transition.pull(&within, &mut self.lambda);
         if !self.lambda.iter().all(|one| one.is_finite()) {
             return Err(StepError::SingularTangent { unknown: 0 }.into());
         }
@@ -285,7 +316,7 @@ impl<'m, M: Model> Backwards<'m, M> {
     }
 
     /// By iteration, with the points of the step that the stepper has made; false where that does not contract.
-    fn iterate(&mut self, t: f64, h: f64) -> bool {
+    fn iterate(&mut self, t: f64, h: f64, within: &Within) -> bool {
         let Some(iteration) = &mut self.iteration else {
             return false;
         };
@@ -301,7 +332,7 @@ impl<'m, M: Model> Backwards<'m, M> {
             &self.pattern,
             (&places.times, &places.q, &places.v),
         );
-        if !iteration.pull(h, &mut self.lambda) {
+        if !iteration.pull(h, within, &mut self.lambda) {
             return false;
         }
         for (momentum, mu) in places.momenta.iter_mut().zip(&iteration.mu) {
@@ -375,8 +406,4 @@ impl Places {
             }
         }
     }
-}
-
-fn is_zero(values: &[f64]) -> bool {
-    values.iter().all(|value| *value == 0.0)
 }

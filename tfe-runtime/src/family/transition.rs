@@ -7,8 +7,10 @@ use super::model::{Block, FamilyState, Gradient, Model};
 use super::pattern::Pattern;
 use super::rates::Rates;
 use super::view::View;
+use crate::condense::add_multiple;
 use crate::element::Element;
 use crate::error::StepError;
+use crate::inside::Seeds as Within;
 use crate::model::Form;
 use crate::newton::Control;
 use crate::registers::storage::MAX_GROUPS;
@@ -106,6 +108,7 @@ pub struct TransitionOperator {
     by_length: Vec<f64>,
     by_damping: Vec<f64>,
     by_parameters: Vec<Vec<f64>>,
+    inside_by_parameters: Vec<Vec<f64>>,
 }
 
 /// What a row of phase space weighs at the points of an element, a row of n for each point.
@@ -258,6 +261,7 @@ impl TransitionOperator {
             by_length: Vec::new(),
             by_damping: Vec::new(),
             by_parameters: Vec::new(),
+            inside_by_parameters: Vec::new(),
         };
         transition.differentiate(rates);
         Ok(transition)
@@ -307,14 +311,17 @@ impl TransitionOperator {
                 self.bend(l, &still, &by.velocity, &mut unused, &mut by.force);
                 points.push(by);
             }
-            let end = self.respond(&Change {
+            let mut inside = Vec::new();
+            let change = Change {
                 shift: |_, _| 0.0,
                 lift: |l: usize, a: usize| points[l].momentum[a],
                 push: |l: usize, a: usize| points[l].force[a],
                 impulse: |_| 0.0,
                 advance: |_| 0.0,
-            });
+            };
+            let end = self.respond_inside(&change, Some(&mut inside));
             self.by_parameters.push(end);
+            self.inside_by_parameters.push(inside);
         }
     }
 
@@ -322,6 +329,12 @@ impl TransitionOperator {
     #[must_use]
     pub fn by_parameters(&self) -> &[Vec<f64>] {
         &self.by_parameters
+    }
+
+    /// The derivatives of the Legendre coefficients of the element's polynomials by the same parameters: of h dq/dτ, a row of n each, then of h dp/dτ.
+    #[must_use]
+    pub fn inside_by_parameters(&self) -> &[Vec<f64>] {
+        &self.inside_by_parameters
     }
 
     /// The numbers of the phase space, 2n.
@@ -359,6 +372,19 @@ impl TransitionOperator {
     /// # Errors
     /// [`OperatorError::Shape`] unless both have 2n numbers.
     pub fn apply(&self, input: &[f64], output: &mut [f64]) -> Result<(), OperatorError> {
+        self.apply_inside(input, output, None)
+    }
+
+    /// The same, and the changes of the Legendre coefficients of the element's polynomials, in the order of [`inside_by_parameters`](Self::inside_by_parameters).
+    ///
+    /// # Errors
+    /// As [`apply`](Self::apply).
+    pub fn apply_inside(
+        &self,
+        input: &[f64],
+        output: &mut [f64],
+        inside: Option<&mut Vec<f64>>,
+    ) -> Result<(), OperatorError> {
         let needed = self.size();
         for given in [input.len(), output.len()] {
             if given != needed {
@@ -366,19 +392,19 @@ impl TransitionOperator {
             }
         }
         let (p, q) = input.split_at(needed / 2);
-        let end = self.respond(&Change {
+        let change = Change {
             shift: |_, a: usize| q[a],
             lift: |_, _| 0.0,
             push: |_, _| 0.0,
             impulse: |a: usize| p[a],
             advance: |a: usize| q[a],
-        });
-        output.copy_from_slice(&end);
+        };
+        output.copy_from_slice(&self.respond_inside(&change, inside));
         Ok(())
     }
 
     /// Writes the row λ of phase space times the derivative for λ, and gives what λ weighs at the points (T-127).
-    pub(super) fn pull(&self, lambda: &mut [f64]) -> Seeds {
+    pub(super) fn pull(&self, within: &Within, lambda: &mut [f64]) -> Seeds {
         let scheme = self.table.view();
         let (n, h) = (self.end.q.len(), self.h);
         let (count, points) = (scheme.unknowns(), scheme.points());
@@ -390,10 +416,16 @@ impl TransitionOperator {
                 *rate = h * advance * of_q;
             }
         }
+        for (j, seeds) in within.rates.chunks_exact(n.max(1)).enumerate() {
+            for (rates, seed) in mu.chunks_exact_mut(count).zip(seeds) {
+                rates[j] += seed;
+            }
+        }
         for l in 0..points {
             by_q.fill(0.0);
             by_v.fill(0.0);
-            let force: Vec<f64> = of_p.iter().map(|p| h * scheme.weights[l] * p).collect();
+            let mut force: Vec<f64> = of_p.iter().map(|p| h * scheme.weights[l] * p).collect();
+            within.add_forces(l, &mut force);
             self.bend_back(l, (&still, &force), &mut by_q, &mut by_v);
             let row = l * count..(l + 1) * count;
             let (position, velocity) = (&scheme.position[row.clone()], &scheme.velocity[row]);
@@ -423,6 +455,7 @@ impl TransitionOperator {
                     force[a] += h * scheme.force[i * points + l] * mu;
                 }
             }
+            within.add_forces(l, force);
             let by_v = &mut seeds.by_velocities[own];
             self.bend_back(l, (momentum, force), &mut by_q, by_v);
         }
@@ -482,6 +515,22 @@ impl TransitionOperator {
         P: Fn(usize) -> f64,
         A: Fn(usize) -> f64,
     {
+        self.respond_inside(change, None)
+    }
+
+    /// The same with the coefficients of the polynomials, where they are asked for.
+    fn respond_inside<S, L, F, P, A>(
+        &self,
+        change: &Change<S, L, F, P, A>,
+        mut inside: Option<&mut Vec<f64>>,
+    ) -> Vec<f64>
+    where
+        S: Fn(usize, usize) -> f64,
+        L: Fn(usize, usize) -> f64,
+        F: Fn(usize, usize) -> f64,
+        P: Fn(usize) -> f64,
+        A: Fn(usize) -> f64,
+    {
         let scheme = self.table.view();
         let (n, h) = (self.end.q.len(), self.h);
         let (count, points) = (scheme.unknowns(), scheme.points());
@@ -518,6 +567,13 @@ impl TransitionOperator {
             let rates = &rates[a * count..(a + 1) * count];
             weights.iter().zip(rates).map(|(w, rate)| w * rate).sum()
         };
+        if let Some(inside) = &mut inside {
+            inside.clear();
+            for weights in scheme.rate.chunks_exact(count) {
+                inside.extend((0..n).map(|a| h * product(weights, a)));
+            }
+            inside.resize(2 * inside.len(), 0.0);
+        }
         for l in 0..points {
             let row = l * count..(l + 1) * count;
             for a in 0..n {
@@ -528,6 +584,13 @@ impl TransitionOperator {
             self.bend(l, &q, &v, &mut momentum, &mut force);
             for (p, force) in end_p.iter_mut().zip(&force) {
                 *p += h * scheme.weights[l] * force;
+            }
+            if let Some(inside) = &mut inside {
+                let half = inside.len() / 2;
+                let rows = inside[half..].chunks_exact_mut(n.max(1));
+                for (row, weights) in rows.zip(scheme.force_rate.chunks_exact(points)) {
+                    add_multiple(row, h * weights[l], &force);
+                }
             }
         }
         for (a, end) in end_q.iter_mut().enumerate() {

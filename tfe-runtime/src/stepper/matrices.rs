@@ -2,14 +2,35 @@
 
 use super::setup::Stepper;
 use crate::backwards::are_parameters;
-use crate::condense::Direction;
+use crate::condense::{Direction, add_multiple};
 use crate::error::{ConstraintError, StepError, TransitionError};
+use crate::inside::{InsideLoss, InsideSlopes};
 use crate::method::{Impulse, Last, Memory, Method};
 use crate::model::Model;
 use crate::scheme::{SchemeTable, Tables};
 use crate::workspace::{Workspace, linearised_len};
 use alloc::vec;
 use alloc::vec::Vec;
+
+/// Rows of derivatives by the start of a piece and by directions, after those of the pieces before, all with the columns of the whole step.
+fn chain(columns: usize, (rows, before): (&[f64], &[f64]), chained: &mut [f64]) {
+    let width = before.len() / columns;
+    let rows = rows.chunks_exact(columns);
+    for (row, sums) in rows.zip(chained.chunks_exact_mut(columns)) {
+        for (column, sum) in sums.iter_mut().enumerate() {
+            let own = if column < width { 0.0 } else { row[column] };
+            let through = (0..width).map(|k| row[k] * before[k * columns + column]);
+            *sum = through.sum::<f64>() + own;
+        }
+    }
+}
+
+/// Adds what a loss of the inside has of the start directly.
+fn add_start(inside: Option<&InsideLoss>, lambda: &mut [f64]) {
+    if let Some(InsideLoss { start, .. }) = inside {
+        add_multiple(lambda, 1.0, start);
+    }
+}
 
 impl<M, const N: usize> Stepper<'_, M, N>
 where
@@ -35,12 +56,35 @@ where
         directions: &[Direction],
         matrix: &mut [f64],
     ) -> Result<(), TransitionError> {
+        self.linearise_all(directions, matrix, None)
+    }
+
+    /// The same, and the derivatives of the polynomial of the step, or of each of its [pieces](crate::step::DenseElement::pieces), with the same columns.
+    ///
+    /// # Errors
+    /// As [`transition`](Self::transition).
+    pub fn linearise_inside(
+        &mut self,
+        directions: &[Direction],
+        matrix: &mut [f64],
+        inside: &mut Vec<InsideSlopes>,
+    ) -> Result<(), TransitionError> {
+        inside.clear();
+        self.linearise_all(directions, matrix, Some(inside))
+    }
+
+    fn linearise_all(
+        &mut self,
+        directions: &[Direction],
+        matrix: &mut [f64],
+        mut inside: Option<&mut Vec<InsideSlopes>>,
+    ) -> Result<(), TransitionError> {
         if self.passes_node {
             // Where constraints lose rank the tangents of the motion are open.
             return Err(StepError::from(ConstraintError::RankChanged).into());
         }
-        if self.pieces.is_empty() {
-            return self.linearise_last(directions, matrix);
+        if self.pieces.is_empty() && inside.is_none() {
+            return self.linearise_last(directions, matrix, None);
         }
         let width = 2 * N;
         let columns = width + directions.len();
@@ -55,23 +99,30 @@ where
         }
         let (mut factor, mut next) = (vec![0.0; needed], vec![0.0; needed]);
         // The last one leaves the stepper as the step has left it.
-        for piece in 0..self.pieces.len() {
-            let own = self.of_piece(directions, piece);
-            self.recall(piece);
-            self.linearise_last(&own, &mut factor)?;
-            for row in 0..width {
-                for column in 0..columns {
-                    let own = if column < width {
-                        0.0
-                    } else {
-                        factor[row * columns + column]
-                    };
-                    next[row * columns + column] = (0..width)
-                        .map(|k| factor[row * columns + k] * product[k * columns + column])
-                        .sum::<f64>()
-                        + own;
-                }
+        for piece in 0..self.pieces.len().max(1) {
+            let mut own = directions.to_vec();
+            if !self.pieces.is_empty() {
+                own = self.of_piece(directions, piece);
+                self.recall(piece);
             }
+            let mut coefficients = Vec::new();
+            let asked = inside.is_some().then_some(&mut coefficients);
+            self.linearise_last(&own, &mut factor, asked)?;
+            if let Some(inside) = &mut inside {
+                if piece > 0 {
+                    let own = coefficients.clone();
+                    chain(columns, (&own, &product), &mut coefficients);
+                }
+                inside.push(InsideSlopes {
+                    start: product.clone(),
+                    coefficients,
+                });
+            }
+            if self.pieces.is_empty() {
+                core::mem::swap(&mut product, &mut factor);
+                break;
+            }
+            chain(columns, (&factor, &product), &mut next);
             core::mem::swap(&mut product, &mut next);
         }
         matrix[..needed].copy_from_slice(&product);
@@ -89,16 +140,34 @@ where
         lambda: &mut [f64],
         by_direction: &mut [f64],
     ) -> Result<(), TransitionError> {
+        self.adjoint_inside(directions, &[], lambda, by_direction)
+    }
+
+    /// The same with a loss of the inside of the step: its derivatives by the polynomial, or by that of each of its [pieces](crate::step::DenseElement::pieces); nothing where it has nothing of them.
+    ///
+    /// # Errors
+    /// As [`transition`](Self::transition); [`TransitionError::Shape`] where there are not as many as pieces.
+    pub fn adjoint_inside(
+        &mut self,
+        directions: &[Direction],
+        inside: &[InsideLoss],
+        lambda: &mut [f64],
+        by_direction: &mut [f64],
+    ) -> Result<(), TransitionError> {
         if self.passes_node {
             return Err(StepError::from(ConstraintError::RankChanged).into());
         }
+        let (needed, given) = (self.pieces.len().max(1), inside.len());
+        if !inside.is_empty() && given != needed {
+            return Err(TransitionError::Shape { needed, given });
+        }
         if self.pieces.is_empty() {
-            return self.adjoint_of_last(directions, lambda, by_direction);
+            return self.adjoint_of_last(directions, inside.first(), lambda, by_direction);
         }
         for piece in (0..self.pieces.len()).rev() {
             let own = self.of_piece(directions, piece);
             self.recall(piece);
-            self.adjoint_of_last(&own, lambda, by_direction)?;
+            self.adjoint_of_last(&own, inside.get(piece), lambda, by_direction)?;
         }
         // The stepper is where the step has left it.
         self.recall(self.pieces.len() - 1);
@@ -133,23 +202,34 @@ where
         &mut self,
         directions: &[Direction],
         matrix: &mut [f64],
+        inside: Option<&mut Vec<f64>>,
     ) -> Result<(), TransitionError> {
-        self.of_last(directions, |method, memory, workspace, extra, given| {
-            method.linearise(memory, workspace, extra, given, matrix)
-        })
+        self.of_last(
+            directions,
+            |method, memory, workspace, extra, given| match inside {
+                None => method.linearise(memory, workspace, extra, given, matrix),
+                Some(inside) => {
+                    method.linearise_inside(memory, workspace, extra, given, (matrix, inside))
+                }
+            },
+        )
     }
 
     fn adjoint_of_last(
         &mut self,
         directions: &[Direction],
+        inside: Option<&InsideLoss>,
         lambda: &mut [f64],
         by_direction: &mut [f64],
     ) -> Result<(), TransitionError> {
         let is_free = M::CONSTRAINTS.is_empty();
         if !(is_free && (directions.is_empty() || are_parameters(&*self.model, directions))) {
-            return self.of_last(directions, |method, memory, workspace, extra, given| {
-                method.adjoint(memory, workspace, extra, given, (lambda, by_direction))
-            });
+            self.of_last(directions, |method, memory, workspace, extra, given| {
+                let sums = (inside, &mut *lambda, by_direction);
+                method.adjoint_inside(memory, workspace, extra, given, sums)
+            })?;
+            add_start(inside, lambda);
+            return Ok(());
         }
         let mut backwards = self.backwards.take().unwrap_or_default();
         backwards.begin(match directions {
@@ -157,9 +237,11 @@ where
             _ => self.model.parameters(),
         });
         let done = self.of_last(&[], |method, memory, workspace, extra, given| {
-            method.adjoint_at_once(memory, workspace, extra, given.0, (lambda, &mut backwards))
+            let sums = (inside, &mut *lambda, &mut *backwards);
+            method.adjoint_at_once(memory, workspace, extra, given.0, sums)
         });
         if done.is_ok() {
+            add_start(inside, lambda);
             backwards.add_to(&*self.model, directions, by_direction);
         }
         self.backwards = Some(backwards);

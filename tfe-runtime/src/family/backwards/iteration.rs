@@ -5,6 +5,7 @@ use crate::backwards::Judge;
 use crate::family::inertia::Inertia;
 use crate::family::model::{Block, Gradient, Model};
 use crate::family::pattern::Pattern;
+use crate::inside::Seeds as Within;
 use crate::lanes::Lanes;
 use crate::scheme::SchemeRef;
 use alloc::vec;
@@ -29,6 +30,8 @@ pub(super) struct Iteration {
     /// Second derivatives, a row for each group.
     values: Vec<Points>,
     gradient: [Vec<Points>; 3],
+    /// What a loss has of rates and of forces inside the element.
+    within: Option<[Vec<Points>; 2]>,
     pub(super) mu: Vec<Points>,
     pub(super) seeds: Vec<Points>,
     pulled: Vec<Points>,
@@ -89,6 +92,7 @@ impl Iteration {
             parts: [Block::QQ, Block::ForceZ, Block::ForceQ].map(|one| Part::of(pattern, one)),
             values: vec![ZERO; points.div_ceil(4) * pattern.places().len()],
             gradient: [vec![ZERO; n], vec![ZERO; n], vec![ZERO; n]],
+            within: None,
             mu: all(),
             seeds: all(),
             pulled: all(),
@@ -133,7 +137,20 @@ impl Iteration {
     }
 
     /// Moves λ over the element, and leaves μ and the seeds of forces; false where the iteration does not contract, and λ stays.
-    pub(super) fn pull(&mut self, h: f64, lambda: &mut [f64]) -> bool {
+    pub(super) fn pull(&mut self, h: f64, within: &Within, lambda: &mut [f64]) -> bool {
+        let rows = |rows: &[f64]| -> Vec<Points> {
+            let n = self.inverse_mass.len();
+            let mut grouped = vec![ZERO; self.weights.len() * n];
+            for (at, value) in rows.iter().enumerate() {
+                let (l, a) = (at / n, at % n);
+                grouped[l / 4 * n + a].0[l % 4] = *value;
+            }
+            grouped
+        };
+        self.within = match within.is_empty() {
+            true => None,
+            false => Some([rows(&within.rates), rows(&within.forces)]),
+        };
         let solve = Solve {
             of: self,
             h,
@@ -193,6 +210,7 @@ impl Solve<'_> {
             parts,
             values,
             gradient: _,
+            within,
             mu,
             seeds,
             pulled,
@@ -215,6 +233,10 @@ impl Solve<'_> {
                     }
                     seeds[g * n + a] = h * seed;
                     pushed[g * n + a] = h * advance[g] * splat(of_q[a]);
+                    if let Some([rates, forces]) = within {
+                        seeds[g * n + a] += forces[g * n + a];
+                        pushed[g * n + a] += rates[g * n + a];
+                    }
                 }
                 let own = g * n..(g + 1) * n;
                 let values = &values[g * count..(g + 1) * count];

@@ -1,0 +1,210 @@
+//! Derivatives of a motion between its nodes (T-154).
+
+use nalgebra::{DMatrix, RowDVector};
+use tfe_runtime::basis::{MAX_NODES, legendre, legendre_integrals};
+use tfe_runtime::{InsideLoss, InsideSlopes};
+
+/// Where an element begins: what its own derivatives are multiplied with.
+#[derive(Clone, Debug)]
+pub(crate) struct Before {
+    /// Of (p, q), a column for each number of the start of the run and for each parameter.
+    pub(crate) state: DMatrix<f64>,
+    /// Of its time, where that moves.
+    pub(crate) start: Option<Vec<f64>>,
+}
+
+impl Before {
+    /// Rows by the start of an element and by its directions (parameters, its start in time, its end) as rows by the start of the run and by parameters; `ends` says how its end moves.
+    pub(crate) fn through(&self, rows: &DMatrix<f64>, ends: Option<&[f64]>) -> DMatrix<f64> {
+        let (size, columns) = self.state.shape();
+        let parameters = columns - size;
+        let mut next = rows.columns(0, size) * &self.state;
+        let mut by_parameters = next.columns_mut(size, parameters);
+        by_parameters += rows.columns(size, parameters);
+        let starts = self.start.as_deref().map(|moved| (columns, moved));
+        let ends = ends.map(|ends| (rows.ncols() - 1, ends));
+        for (direction, times) in starts.into_iter().chain(ends) {
+            for (mut column, dt) in next.column_iter_mut().zip(times) {
+                column.axpy(*dt, &rows.column(direction), 1.0);
+            }
+        }
+        next
+    }
+}
+
+/// The derivatives along an element, or a piece of one that was cut.
+#[derive(Clone, Debug)]
+pub(crate) struct Inside {
+    pub(crate) times: (f64, f64),
+    /// By the start of the element and by its directions.
+    pub(crate) slopes: InsideSlopes,
+    pub(crate) before: Before,
+    /// How the end of the element moves.
+    pub(crate) ends: Option<Vec<f64>>,
+    /// How the piece does, where events move it.
+    pub(crate) moved: Option<Moved>,
+}
+
+/// How an element moves in time.
+#[derive(Clone, Debug)]
+pub(crate) struct Moved {
+    /// Derivatives of its start and of its end.
+    pub(crate) ends: [RowDVector<f64>; 2],
+    /// The coefficients themselves.
+    pub(crate) values: Vec<f64>,
+}
+
+impl Moved {
+    /// The derivative of the time at a part of the element.
+    pub(crate) fn time(&self, tau: f64) -> RowDVector<f64> {
+        &self.ends[0] * (1.0 - tau) + &self.ends[1] * tau
+    }
+
+    /// The derivative of its length.
+    pub(crate) fn length(&self) -> RowDVector<f64> {
+        &self.ends[1] - &self.ends[0]
+    }
+}
+
+/// The derivatives of a place.
+pub(crate) struct Between {
+    /// Of (p, q).
+    pub(crate) state: DMatrix<f64>,
+    /// Of the slope of the polynomial of q.
+    pub(crate) velocity: DMatrix<f64>,
+}
+
+impl Inside {
+    /// Of an element whose derivatives by the start of the run and by parameters are known: of (p, q) where it begins, and of its coefficients.
+    #[cfg(feature = "sparse")]
+    pub(crate) fn whole(
+        times: (f64, f64),
+        start: &DMatrix<f64>,
+        coefficients: &DMatrix<f64>,
+    ) -> Self {
+        let rows = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
+        let (size, columns) = start.shape();
+        Self {
+            times,
+            slopes: InsideSlopes {
+                start: rows(start),
+                coefficients: rows(coefficients),
+            },
+            before: Before {
+                state: DMatrix::identity(size, columns),
+                start: None,
+            },
+            ends: None,
+            moved: None,
+        }
+    }
+
+    fn coordinates(&self) -> usize {
+        self.before.state.nrows() / 2
+    }
+
+    /// The columns of what is not multiplied yet.
+    fn width(&self) -> usize {
+        self.slopes.start.len() / (2 * self.coordinates())
+    }
+
+    fn degree(&self) -> usize {
+        self.slopes.coefficients.len() / (2 * self.coordinates() * self.width())
+    }
+
+    fn through(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
+        self.before.through(rows, self.ends.as_deref())
+    }
+
+    /// Adds Σ weight_m C_m of the coordinates, or of the momenta, to rows from a first one on.
+    fn add_weighted(
+        &self,
+        momenta: bool,
+        weights: &[f64],
+        (rows, first): (&mut DMatrix<f64>, usize),
+    ) {
+        let (n, width, degree) = (self.coordinates(), self.width(), self.degree());
+        let skipped = if momenta { degree * n } else { 0 };
+        let own = self.slopes.coefficients.chunks_exact(width).skip(skipped);
+        for (number, row) in own.take(degree * n).enumerate() {
+            let (m, a) = (number / n, number % n);
+            for (column, slope) in row.iter().enumerate() {
+                rows[(first + a, column)] += weights[m] * slope;
+            }
+        }
+    }
+
+    /// Of (p, q) at a part τ of the element, which moves in time as the element does.
+    fn at_part(&self, tau: f64) -> DMatrix<f64> {
+        let n = self.coordinates();
+        let mut integrals = [0.0; MAX_NODES];
+        legendre_integrals(tau, &mut integrals);
+        let mut state = DMatrix::from_row_slice(2 * n, self.width(), &self.slopes.start);
+        self.add_weighted(true, &integrals, (&mut state, 0));
+        self.add_weighted(false, &integrals, (&mut state, n));
+        self.through(&state)
+    }
+
+    /// What a loss of the polynomial is, times the derivatives along it: one number a column.
+    pub(crate) fn product(&self, loss: &InsideLoss) -> DMatrix<f64> {
+        let width = self.width();
+        let mut row = DMatrix::zeros(1, width);
+        let weights = loss.start.iter().chain(&loss.coefficients);
+        let rows = self.slopes.start.chunks_exact(width);
+        let rows = rows.chain(self.slopes.coefficients.chunks_exact(width));
+        for (weight, slopes) in weights.zip(rows) {
+            for (sum, slope) in row.iter_mut().zip(slopes) {
+                *sum += weight * slope;
+            }
+        }
+        self.through(&row)
+    }
+
+    /// Of (p, q) and q̇ at a time.
+    pub(crate) fn at(&self, t: f64) -> Between {
+        let (n, length) = (self.coordinates(), self.times.1 - self.times.0);
+        let tau = (t - self.times.0) / length;
+        let mut values = [0.0; MAX_NODES];
+        legendre(tau, &mut values);
+        let mut velocity = DMatrix::zeros(n, self.width());
+        self.add_weighted(false, &values, (&mut velocity, 0));
+        let mut between = Between {
+            state: self.at_part(tau),
+            velocity: self.through(&velocity) / length,
+        };
+        let Some(moved) = &self.moved else {
+            return between;
+        };
+        // δτ = −δt/h at a fixed time.
+        let time = moved.time(tau) / -length;
+        let stretch = moved.length() / length;
+        let slopes = legendre_slopes(&values);
+        let degree = self.degree();
+        let along = |first: usize, a: usize, weights: &[f64]| -> f64 {
+            let own = (0..degree).map(|m| weights[m] * moved.values[(first + m) * n + a]);
+            own.sum()
+        };
+        for a in 0..n {
+            let velocity = along(0, a, &values) / length;
+            for column in 0..between.state.ncols() {
+                let (tau, stretch) = (time[column], stretch[column]);
+                between.state[(a, column)] += along(degree, a, &values) * tau;
+                between.state[(n + a, column)] += velocity * length * tau;
+                between.velocity[(a, column)] +=
+                    along(0, a, &slopes) / length * tau - velocity * stretch;
+            }
+        }
+        between
+    }
+}
+
+/// dP_m(2τ − 1)/dτ from P_m.
+fn legendre_slopes(values: &[f64; MAX_NODES]) -> [f64; MAX_NODES] {
+    let mut slopes = [0.0; MAX_NODES];
+    for (m, slope) in slopes.iter_mut().enumerate() {
+        for k in (0..m).rev().step_by(2) {
+            *slope += 2.0 * (2.0 * k as f64 + 1.0) * values[k];
+        }
+    }
+    slopes
+}

@@ -1,0 +1,233 @@
+//! What a loss sees of a motion, and what that is of states.
+
+use crate::error::RunErrorKind;
+use crate::evaluate::Evaluate;
+use crate::length::{FixedLength, Length, Polynomial};
+use crate::motion::AtError;
+use crate::motion::points::{Point, Points};
+use crate::sensitivity::Sensitive;
+use crate::sensitivity::inside::Moved;
+use crate::sensitivity::loss::{By, Seen};
+use crate::sensitivity::slopes::{Along, Change, Place};
+use tfe_runtime::step::DenseElement;
+use tfe_runtime::{InsideLoss, Model, Partials, Pull, State};
+#[cfg(feature = "sparse")]
+use {
+    crate::length::RunTimeLength,
+    tfe_runtime::family::{self, FamilyState},
+};
+
+/// A loss on its way along the nodes and elements of a motion.
+pub(super) struct View<'a, M, const N: usize, L: Length<N> = FixedLength> {
+    model: &'a M,
+    seen: &'a Seen,
+    /// The integrals, at a point of weight one.
+    running: Partials,
+    points: Points<N, L>,
+}
+
+/// Takes derivatives from outputs and velocities to states, and keeps the sums of parameters.
+pub(super) trait Pulls<const N: usize, L: Length<N>> {
+    /// What the loss has of a state; `None` where that has no velocity.
+    fn pulled(
+        &mut self,
+        t: f64,
+        at: (&L::State, &L::Vector),
+        partials: &Partials,
+    ) -> Option<L::State>;
+}
+
+impl<M: Model<N>, const N: usize> Pulls<N, FixedLength> for Pull<'_, M, N> {
+    fn pulled(
+        &mut self,
+        t: f64,
+        at: (&State<N>, &[f64; N]),
+        partials: &Partials,
+    ) -> Option<State<N>> {
+        self.see(t, at, partials).ok()
+    }
+}
+
+#[cfg(feature = "sparse")]
+impl<M: family::Model> Pulls<0, RunTimeLength> for family::Backwards<'_, M> {
+    fn pulled(
+        &mut self,
+        t: f64,
+        (state, v): (&FamilyState, &Vec<f64>),
+        partials: &Partials,
+    ) -> Option<FamilyState> {
+        self.pulled(t, (state, v), partials).ok()
+    }
+}
+
+impl<'a, M: Evaluate<N, L>, const N: usize, L: Length<N>> View<'a, M, N, L> {
+    /// Of a motion with such a velocity.
+    pub(super) fn new(model: &'a M, seen: &'a Seen, velocity: &L::Vector) -> Self {
+        let columns = model.output_names().len();
+        let mut running = Partials::none(velocity.as_ref().len(), columns);
+        for (column, factor) in &seen.integrals {
+            running.outputs[*column] += factor;
+        }
+        Self {
+            model,
+            seen,
+            running,
+            points: Points::new(velocity.clone()),
+        }
+    }
+
+    /// What the loss has directly of a node; `None` where it has nothing of it.
+    pub(super) fn of_node(&self, number: usize) -> Option<Partials> {
+        let looks = self.seen.of_node(number);
+        if looks.is_empty() {
+            return None;
+        }
+        let Partials { q, outputs, .. } = &self.running;
+        let mut partials = Partials::none(q.len(), outputs.len());
+        for look in looks {
+            match &look.by {
+                By::Output(column, factor) => partials.outputs[*column] += factor,
+                By::Node { q, p, v } => {
+                    for (sums, own) in [
+                        (&mut partials.q, q),
+                        (&mut partials.p, p),
+                        (&mut partials.v, v),
+                    ] {
+                        for (sum, own) in sums.iter_mut().zip(own) {
+                            *sum += own;
+                        }
+                    }
+                }
+            }
+        }
+        Some(partials)
+    }
+
+    /// What the integrals have of an element, for each of its pieces; nothing where there are none.
+    pub(super) fn of_element(
+        &mut self,
+        pull: &mut impl Pulls<N, L>,
+        element: &L::Polynomial,
+    ) -> Result<Vec<InsideLoss>, RunErrorKind> {
+        if self.seen.integrals.is_empty() {
+            return Ok(Vec::new());
+        }
+        let pieces = element.pieces().iter();
+        pieces.map(|piece| self.of_piece(pull, piece)).collect()
+    }
+
+    fn of_piece(
+        &mut self,
+        pull: &mut impl Pulls<N, L>,
+        piece: &L::Polynomial,
+    ) -> Result<InsideLoss, RunErrorKind> {
+        let coordinates = self.running.q.len();
+        let mut inside = InsideLoss::none(coordinates, piece.degree());
+        let mut partials = self.running.clone();
+        self.points.of(self.model, piece, |point| {
+            let all = partials.outputs.iter_mut().zip(&self.running.outputs);
+            for (output, factor) in all {
+                *output = point.weight * factor;
+            }
+            let at = (&point.state, &point.velocity);
+            let by_state = pull.pulled(point.t, at, &partials);
+            let by_state = by_state.ok_or(Unseen)?;
+            let (q, p) = L::parts(&by_state);
+            let (q, p) = (q.as_ref(), p.as_ref());
+            if !q.iter().chain(p).all(|one| one.is_finite()) {
+                return Err(Unseen);
+            }
+            inside.add(point.tau, (q, p));
+            Ok(())
+        })?;
+        Ok(inside)
+    }
+}
+
+impl<M: Model<N>, const N: usize> View<'_, M, N> {
+    /// Adds what the integrals have of all elements, times the derivatives along these, by the start, ordered (p, q), and by parameters; explicit derivatives by parameters are left to the sums.
+    pub(super) fn add_along(
+        &mut self,
+        pull: &mut Pull<'_, M, N>,
+        sensitive: &Sensitive<N>,
+        all: &mut [f64],
+    ) -> Result<(), RunErrorKind> {
+        if self.seen.integrals.is_empty() {
+            return Ok(());
+        }
+        let elements = sensitive.motion().elements().iter();
+        let pieces: Vec<_> = elements.flat_map(DenseElement::pieces).collect();
+        if pieces.len() != sensitive.inside().len() {
+            return Err(Unseen.into());
+        }
+        for (piece, inside) in pieces.into_iter().zip(sensitive.inside()) {
+            let loss = self.of_piece(pull, piece)?;
+            for (sum, own) in all.iter_mut().zip(&inside.product(&loss)) {
+                *sum += own;
+            }
+            if let Some(moved) = &inside.moved {
+                let length = piece.end() - piece.start();
+                let (model, outputs) = (self.model, &self.running.outputs);
+                self.points.of(model, piece, |point| {
+                    add_moving((model, outputs), &point, (moved, length), all);
+                    Ok::<_, Unseen>(())
+                })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Adds what integrals have of the time of a point, and of the length of its element, where these move.
+fn add_moving<M: Model<N>, const N: usize>(
+    (model, factors): (&M, &[f64]),
+    point: &Point<N, FixedLength>,
+    (moved, length): (&Moved, f64),
+    all: &mut [f64],
+) {
+    let Point {
+        tau,
+        t,
+        weight,
+        state,
+        velocity,
+    } = point;
+    let place = Place {
+        t: *t,
+        state,
+        v: velocity,
+    };
+    let along = Along::new(model, place);
+    let change = Change {
+        t: 1.0,
+        ..Change::ZERO
+    };
+    let by_time = along.outputs(&change, &along.velocity(&change));
+    let mut values = vec![0.0; factors.len()];
+    model.outputs(*t, (&state.q, &state.p), velocity, &mut values);
+    let (times, lengths) = (moved.time(*tau), moved.length() / length);
+    for (column, sum) in all.iter_mut().enumerate() {
+        for (output, factor) in factors.iter().enumerate() {
+            let slope = by_time[output] * times[column] + values[output] * lengths[column];
+            *sum += weight * factor * slope;
+        }
+    }
+}
+
+/// A place at which the loss has no derivatives.
+pub(super) struct Unseen;
+
+impl From<AtError> for Unseen {
+    fn from(_: AtError) -> Self {
+        Self
+    }
+}
+
+impl From<Unseen> for RunErrorKind {
+    fn from(_: Unseen) -> Self {
+        Self::Loss {
+            name: "the loss".to_owned(),
+            why: "its derivatives are not finite",
+        }
+    }
+}
