@@ -15,6 +15,7 @@ type Failure = Box<dyn std::error::Error>;
     coordinates(q[12]),
     lagrangian = sum(i in 0..12, m[i]/2*dot(q[i])^2) - k[0]/2*q[0]^2 - sum(i in 1..12, k[i]/2*(q[i] - q[i-1])^2 + (q[i] - q[i-1])^4/4),
     force(q[i]) = -c[i]*dot(q[i]),
+    output(loss) = sum(i in 0..12, c[i]*dot(q[i])^2),
 )]
 struct Chain {
     m: [f64; 12],
@@ -27,6 +28,7 @@ struct Chain {
     coordinates(q[32]),
     lagrangian = sum(i in 0..32, dot(q[i])^2/2 - a*q[i]^4/4)
         - sum(i in 1..32, sum(j in 0..i, (k[32*i+j] + k[32*j+i])*(q[i] - q[j])^2/4)),
+    output(loss) = sum(i in 0..32, a*q[i]^4),
 )]
 struct Net {
     a: f64,
@@ -38,6 +40,7 @@ struct Net {
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k[i]*((q[i+1] - q[i])^2/2 + b*(q[i+1] - q[i])^4/4)),
+    output(loss) = sum(i in 0..n-1, k[i]*(q[i+1] - q[i])^2),
 )]
 struct Row {
     n: usize,
@@ -46,12 +49,12 @@ struct Row {
     k: Vec<f64>,
 }
 
-/// The least time of several calls of both, one after the other so that both see the same machine.
+/// The least time of several calls of all, one after the other so that they see the same machine.
 fn least(
-    mut calls: [&mut dyn FnMut() -> Result<(), Failure>; 2],
-) -> Result<[Duration; 2], Failure> {
+    mut calls: [&mut dyn FnMut() -> Result<(), Failure>; 3],
+) -> Result<[Duration; 3], Failure> {
     const TURNS: usize = 15;
-    let mut least = [Duration::MAX; 2];
+    let mut least = [Duration::MAX; 3];
     for _ in 0..TURNS {
         for (call, least) in calls.iter_mut().zip(&mut least) {
             let begin = Instant::now();
@@ -78,17 +81,24 @@ where
         black_box(simulation.gradient(start, span(), &loss)?);
         Ok(())
     };
-    tell(name, model.parameters(), least([&mut run, &mut gradient])?);
+    let running = Loss::integral("loss");
+    let mut integral = || {
+        black_box(simulation.gradient(start, span(), &running)?);
+        Ok(())
+    };
+    let calls: [&mut dyn FnMut() -> _; 3] = [&mut run, &mut gradient, &mut integral];
+    tell(name, model.parameters(), least(calls)?);
     Ok(())
 }
 
-fn tell(name: &str, parameters: usize, [of_run, of_gradient]: [Duration; 2]) {
+fn tell(name: &str, parameters: usize, [of_run, of_gradient, of_integral]: [Duration; 3]) {
     let micros = |time: Duration| time.as_secs_f64() * 1e6 / f64::from(STEPS);
     println!(
-        "{name:6} {parameters:5} parameters: {:7.2} µs a step of a run, {:7.2} of a gradient, {:.1} times as long",
+        "{name:6} {parameters:5} parameters: {:7.2} µs a step of a run, {:7.2} of a gradient, {:.1} times as long, {:.1} times that of an integral",
         micros(of_run),
         micros(of_gradient),
-        micros(of_gradient) / micros(of_run)
+        micros(of_gradient) / micros(of_run),
+        micros(of_integral) / micros(of_run)
     );
 }
 
@@ -114,7 +124,13 @@ fn compare_row(n: usize) -> Result<(), Failure> {
         black_box(simulation.gradient(start.clone(), span(), &loss)?);
         Ok(())
     };
-    tell("row", row.parameters(), least([&mut run, &mut gradient])?);
+    let running: Loss = Loss::integral("loss");
+    let mut integral = || {
+        black_box(simulation.gradient(start.clone(), span(), &running)?);
+        Ok(())
+    };
+    let calls: [&mut dyn FnMut() -> _; 3] = [&mut run, &mut gradient, &mut integral];
+    tell("row", row.parameters(), least(calls)?);
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::step::Stepper;
 use tfe_runtime::{Direction, Model, Parameter, Pull, State};
-use view::{Pulls, Unseen, View};
+use view::{Unseen, View};
 
 /// A gradient: by the start, ordered (p, q), and by all parameters.
 struct Sums {
@@ -227,8 +227,8 @@ fn look<M: Model<N>, const N: usize>(
         return Ok(());
     };
     let node = &motion.states()[number];
-    let by_state = pull.pulled(node.t, (&node.state(), &node.v), &partials);
-    let by_state = by_state.ok_or(Unseen)?;
+    let by_state = pull.see(node.t, (&node.state(), &node.v), &partials);
+    let by_state = by_state.map_err(|_| Unseen)?;
     for (sum, own) in lambda.iter_mut().zip(by_state.p.iter().chain(&by_state.q)) {
         *sum += own;
     }

@@ -99,7 +99,7 @@ pub use model::{
 };
 pub use newton::Solve;
 #[cfg(feature = "alloc")]
-pub use pull::{Partials, Pull};
+pub use pull::{Partials, Pull, Sight};
 pub use real::Real;
 #[cfg(feature = "alloc")]
 pub use share::Share;

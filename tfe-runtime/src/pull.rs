@@ -3,7 +3,7 @@
 use crate::error::{ConstraintError, StepError, TransitionError};
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
-use crate::tape::{LANES, Operations, Tape, Taped};
+use crate::tape::{LANES, Operations, Row, Tape, Taped};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::RefCell;
@@ -38,6 +38,19 @@ impl Partials {
     pub(crate) fn sees_outputs(&self) -> bool {
         self.outputs.iter().any(|weight| *weight != 0.0)
     }
+}
+
+/// A place of a motion, and what a loss has directly of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight<'a, S, V> {
+    /// Its time.
+    pub t: f64,
+    /// Coordinates and momenta.
+    pub state: &'a S,
+    /// The velocity of that momentum.
+    pub v: &'a V,
+    /// What the loss has of it.
+    pub partials: &'a Partials,
 }
 
 /// Takes derivatives of a loss from outputs and velocities to states and to all parameters of a model, whose sums it keeps.
@@ -93,77 +106,124 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
         (state, v): (&State<N>, &[f64; N]),
         partials: &Partials,
     ) -> Result<State<N>, TransitionError> {
-        let Partials {
-            q,
-            p,
-            v: by_v,
-            outputs,
-        } = partials;
-        let lengths = [q.len(), p.len(), by_v.len(), outputs.len()];
-        let expected = [N, N, N, self.model.columns()];
-        for (given, needed) in lengths.into_iter().zip(expected) {
-            if given != needed {
-                return Err(TransitionError::Shape { needed, given });
-            }
-        }
-        let row = |values: &[f64]| core::array::from_fn(|a| values[a]);
-        let mut by_state: State<N> = State {
-            q: row(q),
-            p: row(p),
+        let mut by_state = State::ZERO;
+        let place = Sight {
+            t,
+            state,
+            v,
+            partials,
         };
-        let mut by_v: [f64; N] = row(by_v);
-        let z = match M::FORM {
-            Form::Lagrangian => v,
-            Form::Hamiltonian => &state.p,
-        };
-        let place = (t, &state.q, z);
-        if partials.sees_outputs() {
-            let (by_q, by_z) = self.pulled(place, Results::Observables, outputs);
-            let of_z = match M::FORM {
-                Form::Lagrangian => &mut by_v,
-                Form::Hamiltonian => &mut by_state.p,
-            };
-            for a in 0..N {
-                by_state.q[a] += by_q[a];
-                of_z[a] += by_z[a];
-            }
-        }
-        if by_v == [0.0; N] {
-            return Ok(by_state);
-        }
-        if M::FORM == Form::Lagrangian {
-            // p = L_v(q, v): δv = L_vv⁻¹ (δp − ∂L_v/∂(q, a)).
-            let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
-            (self.model).first_and_mass(t, &state.q, v, &mut first, &mut zz);
-            let singular = |_| StepError::from(ConstraintError::SingularMass);
-            Block::of(&zz).map_err(singular)?.solve(&mut by_v);
-            for a in 0..N {
-                by_state.p[a] += by_v[a];
-                by_v[a] = -by_v[a];
-            }
-        }
-        let (by_q, by_z) = self.pulled(place, Results::Slopes, &by_v);
-        for a in 0..N {
-            by_state.q[a] += by_q[a];
-            if M::FORM == Form::Hamiltonian {
-                by_state.p[a] += by_z[a];
-            }
-        }
+        self.see_all(&[place], |one| by_state = one)?;
         Ok(by_state)
+    }
+
+    /// The same of several places, four side by side; `each` is given what the loss has of them, in their order.
+    ///
+    /// # Errors
+    /// As [`see`](Self::see).
+    pub fn see_all(
+        &mut self,
+        places: &[Sight<'_, State<N>, [f64; N]>],
+        mut each: impl FnMut(State<N>),
+    ) -> Result<(), TransitionError> {
+        let expected = [N, N, N, self.model.columns()];
+        for places in places.chunks(LANES) {
+            for place in places {
+                let Partials { q, p, v, outputs } = place.partials;
+                let lengths = [q.len(), p.len(), v.len(), outputs.len()];
+                for (given, needed) in lengths.into_iter().zip(expected) {
+                    if given != needed {
+                        return Err(TransitionError::Shape { needed, given });
+                    }
+                }
+            }
+            for by_state in &self.see_some(places)?[..places.len()] {
+                each(*by_state);
+            }
+        }
+        Ok(())
+    }
+
+    fn see_some(
+        &mut self,
+        places: &[Sight<'_, State<N>, [f64; N]>],
+    ) -> Result<[State<N>; LANES], StepError> {
+        // Where there are no more places the first one stands, without weights.
+        let at = |lane: usize| &places[if lane < places.len() { lane } else { 0 }];
+        let weight = |number: &dyn Fn(&Partials) -> f64| -> Row {
+            core::array::from_fn(|lane| {
+                places.get(lane).map_or(0.0, |place| number(place.partials))
+            })
+        };
+        let rows = |number: &dyn Fn(&Partials, usize) -> f64| -> [Row; N] {
+            core::array::from_fn(|a| weight(&|partials| number(partials, a)))
+        };
+        let mut by_q = rows(&|partials, a| partials.q[a]);
+        let mut by_p = rows(&|partials, a| partials.p[a]);
+        let mut by_v = rows(&|partials, a| partials.v[a]);
+        let t = core::array::from_fn(|lane| at(lane).t);
+        let z = |lane: usize| match M::FORM {
+            Form::Lagrangian => at(lane).v,
+            Form::Hamiltonian => &at(lane).state.p,
+        };
+        let q = core::array::from_fn(|a| core::array::from_fn(|lane| at(lane).state.q[a]));
+        let z = core::array::from_fn(|a| core::array::from_fn(|lane| z(lane)[a]));
+        if places.iter().any(|place| place.partials.sees_outputs()) {
+            let columns = 0..self.model.columns();
+            let outputs: Vec<Row> = columns
+                .map(|column| weight(&|partials| partials.outputs[column]))
+                .collect();
+            let (of_q, of_z) = self.pulled((t, &q, &z), Results::Observables, &outputs);
+            add(&mut by_q, &of_q);
+            match M::FORM {
+                Form::Lagrangian => add(&mut by_v, &of_z),
+                Form::Hamiltonian => add(&mut by_p, &of_z),
+            }
+        }
+        if by_v.as_flattened().iter().any(|weight| *weight != 0.0) {
+            if M::FORM == Form::Lagrangian {
+                // p = L_v(q, v): δv = L_vv⁻¹ (δp − ∂L_v/∂(q, a)).
+                for (lane, place) in places.iter().enumerate() {
+                    let mut own: [f64; N] = core::array::from_fn(|a| by_v[a][lane]);
+                    self.mass(place)?.solve(&mut own);
+                    for a in 0..N {
+                        by_p[a][lane] += own[a];
+                        by_v[a][lane] = -own[a];
+                    }
+                }
+            }
+            let (of_q, of_z) = self.pulled((t, &q, &z), Results::Slopes, &by_v);
+            add(&mut by_q, &of_q);
+            if M::FORM == Form::Hamiltonian {
+                add(&mut by_p, &of_z);
+            }
+        }
+        Ok(core::array::from_fn(|lane| State {
+            q: core::array::from_fn(|a| by_q[a][lane]),
+            p: core::array::from_fn(|a| by_p[a][lane]),
+        }))
+    }
+
+    /// L_vv
+    fn mass(&self, place: &Sight<'_, State<N>, [f64; N]>) -> Result<Block<N>, StepError> {
+        let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
+        let Sight { t, state, v, .. } = place;
+        (self.model).first_and_mass(*t, &state.q, v, &mut first, &mut zz);
+        Block::of(&zz).map_err(|_| ConstraintError::SingularMass.into())
     }
 
     /// Weights of results to q and z, and to the sums of parameters.
     fn pulled(
         &mut self,
-        (t, q, z): (f64, &[f64; N], &[f64; N]),
+        (t, q, z): (Row, &[Row; N], &[Row; N]),
         results: Results,
-        weights: &[f64],
-    ) -> ([f64; N], [f64; N]) {
+        weights: &[Row],
+    ) -> ([Row; N], [Row; N]) {
         let (model, parameters) = (self.model, self.parameters);
         let ends: Vec<u32> = self.tape.record(|operations| {
             let q = variables(q, parameters, operations);
             let z = variables(z, parameters + N, operations);
-            let time = Taped::time([t; LANES], operations);
+            let time = Taped::time(t, operations);
             match results {
                 Results::Slopes => {
                     let mut first = First::zero();
@@ -177,15 +237,20 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
                 }
             }
         });
-        let weights: Vec<_> = weights.iter().map(|one| [*one, 0.0, 0.0, 0.0]).collect();
-        self.tape.read(ends.into_iter().zip(&weights));
-        let mut taken = |first: usize| core::array::from_fn(|a| self.tape.take(first + a));
+        self.tape.read(ends.into_iter().zip(weights));
+        let mut taken = |first: usize| core::array::from_fn(|a| self.tape.take_row(first + a));
         (taken(parameters), taken(parameters + N))
     }
 }
 
+fn add<const N: usize>(sums: &mut [Row; N], rows: &[Row; N]) {
+    for (sum, row) in sums.as_flattened_mut().iter_mut().zip(rows.as_flattened()) {
+        *sum += row;
+    }
+}
+
 fn variables<'t, const N: usize>(
-    values: &[f64; N],
+    values: &[Row; N],
     first: usize,
     operations: &'t RefCell<Operations>,
 ) -> [Taped<'t>; N] {

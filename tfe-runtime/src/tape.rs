@@ -174,10 +174,14 @@ impl Tape {
     }
 
     /// A sum, which is zero then.
+    #[cfg(feature = "sparse")]
     pub(crate) fn take(&mut self, place: usize) -> f64 {
-        let sum = self.sum(place);
-        self.adjoints[place] = ZERO;
-        sum
+        self.take_row(place).iter().sum()
+    }
+
+    /// The parts of it, one for each point; zeros then.
+    pub(crate) fn take_row(&mut self, place: usize) -> Row {
+        core::mem::replace(&mut self.adjoints[place], ZERO)
     }
 
     /// Runs a kernel whose numbers write down their operations.
@@ -266,10 +270,10 @@ impl<'t> Taped<'t> {
     }
 
     /// A number that derivatives are asked by, as if it were the parameter of this place.
-    pub(crate) fn variable(value: f64, place: usize, tape: &'t RefCell<Operations>) -> Self {
+    pub(crate) fn variable(value: Row, place: usize, tape: &'t RefCell<Operations>) -> Self {
         Self {
             place: place as u32,
-            ..Self::time([value; LANES], tape)
+            ..Self::time(value, tape)
         }
     }
 

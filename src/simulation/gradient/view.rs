@@ -10,7 +10,7 @@ use crate::sensitivity::inside::Moved;
 use crate::sensitivity::loss::{By, Seen};
 use crate::sensitivity::slopes::{Along, Change, Place};
 use tfe_runtime::step::DenseElement;
-use tfe_runtime::{InsideLoss, Model, Partials, Pull, State};
+use tfe_runtime::{InsideLoss, Model, Partials, Pull, Sight, State};
 #[cfg(feature = "sparse")]
 use {
     crate::length::RunTimeLength,
@@ -28,23 +28,21 @@ pub(super) struct View<'a, M, const N: usize, L: Length<N> = FixedLength> {
 
 /// Takes derivatives from outputs and velocities to states, and keeps the sums of parameters.
 pub(super) trait Pulls<const N: usize, L: Length<N>> {
-    /// What the loss has of a state; `None` where that has no velocity.
+    /// What the loss has of states, in their order.
     fn pulled(
         &mut self,
-        t: f64,
-        at: (&L::State, &L::Vector),
-        partials: &Partials,
-    ) -> Option<L::State>;
+        places: &[Sight<'_, L::State, L::Vector>],
+        each: impl FnMut(L::State),
+    ) -> Result<(), Unseen>;
 }
 
 impl<M: Model<N>, const N: usize> Pulls<N, FixedLength> for Pull<'_, M, N> {
     fn pulled(
         &mut self,
-        t: f64,
-        at: (&State<N>, &[f64; N]),
-        partials: &Partials,
-    ) -> Option<State<N>> {
-        self.see(t, at, partials).ok()
+        places: &[Sight<'_, State<N>, [f64; N]>],
+        each: impl FnMut(State<N>),
+    ) -> Result<(), Unseen> {
+        self.see_all(places, each).map_err(|_| Unseen)
     }
 }
 
@@ -52,11 +50,15 @@ impl<M: Model<N>, const N: usize> Pulls<N, FixedLength> for Pull<'_, M, N> {
 impl<M: family::Model> Pulls<0, RunTimeLength> for family::Backwards<'_, M> {
     fn pulled(
         &mut self,
-        t: f64,
-        (state, v): (&FamilyState, &Vec<f64>),
-        partials: &Partials,
-    ) -> Option<FamilyState> {
-        self.pulled(t, (state, v), partials).ok()
+        places: &[Sight<'_, FamilyState, Vec<f64>>],
+        mut each: impl FnMut(FamilyState),
+    ) -> Result<(), Unseen> {
+        for place in places {
+            let at = (place.state, &place.v[..]);
+            let by_state = self.pulled(place.t, at, place.partials);
+            each(by_state.map_err(|_| Unseen)?);
+        }
+        Ok(())
     }
 }
 
@@ -121,26 +123,36 @@ impl<'a, M: Evaluate<N, L>, const N: usize, L: Length<N>> View<'a, M, N, L> {
         pull: &mut impl Pulls<N, L>,
         piece: &L::Polynomial,
     ) -> Result<InsideLoss, RunErrorKind> {
-        let coordinates = self.running.q.len();
-        let mut inside = InsideLoss::none(coordinates, piece.degree());
-        let mut partials = self.running.clone();
+        let mut inside = InsideLoss::none(self.running.q.len(), piece.degree());
+        let mut places = Vec::with_capacity(piece.degree());
         self.points.of(self.model, piece, |point| {
-            let all = partials.outputs.iter_mut().zip(&self.running.outputs);
-            for (output, factor) in all {
-                *output = point.weight * factor;
+            let mut partials = self.running.clone();
+            for output in &mut partials.outputs {
+                *output *= point.weight;
             }
-            let at = (&point.state, &point.velocity);
-            let by_state = pull.pulled(point.t, at, &partials);
-            let by_state = by_state.ok_or(Unseen)?;
+            places.push((point, partials));
+            Ok::<_, Unseen>(())
+        })?;
+        let sights = places.iter().map(|(point, partials)| Sight {
+            t: point.t,
+            state: &point.state,
+            v: &point.velocity,
+            partials,
+        });
+        let sights: Vec<_> = sights.collect();
+        let (mut seen, mut is_finite) = (places.iter(), true);
+        pull.pulled(&sights, |by_state| {
             let (q, p) = L::parts(&by_state);
             let (q, p) = (q.as_ref(), p.as_ref());
-            if !q.iter().chain(p).all(|one| one.is_finite()) {
-                return Err(Unseen);
+            is_finite &= q.iter().chain(p).all(|one| one.is_finite());
+            if let Some((point, _)) = seen.next() {
+                inside.add(point.tau, (q, p));
             }
-            inside.add(point.tau, (q, p));
-            Ok(())
         })?;
-        Ok(inside)
+        match is_finite {
+            true => Ok(inside),
+            false => Err(Unseen.into()),
+        }
     }
 }
 

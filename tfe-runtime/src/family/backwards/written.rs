@@ -68,7 +68,7 @@ fn variables<'t>(
     operations: &'t RefCell<Operations>,
 ) -> Vec<Taped<'t>> {
     let all = values.iter().enumerate();
-    all.map(|(a, value)| Taped::variable(*value, first + a, operations))
+    all.map(|(a, value)| Taped::variable([*value; LANES], first + a, operations))
         .collect()
 }
 
