@@ -1,6 +1,7 @@
 //! Events of runs: where an output changes its sign, and what is done there (T-122).
 
 pub(super) mod act;
+mod clear;
 pub(super) mod on;
 pub(super) mod remodel;
 mod search;
@@ -12,6 +13,7 @@ use super::kind::{Chosen, Simulated};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length, Polynomial};
 use act::{Act, After, Event, On};
+use clear::Clear;
 use remodel::Remodel;
 use search::Course;
 use std::cell::RefCell;
@@ -33,17 +35,23 @@ type Look<'m, M, const N: usize, L> = fn(
     &Passage<'_, N, L>,
 ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind>;
 
+/// [`Events::keep_off`], or nothing.
+type KeepOff<'m, M, const N: usize, L> =
+    fn(&mut Events<'m, M, N, L>, &mut <L as Length<N>>::Stepper<'m, M>, (f64, f64)) -> bool;
+
 /// Looks for the events of a run.
 pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     model: L::Held<'m, M>,
     remodel: Option<Remodel<'m, M, N, L>>,
     look: Look<'m, M, N, L>,
+    keep_off: KeepOff<'m, M, N, L>,
     watched: Vec<Watched<'m, N, L>>,
     /// Sides on which the values were seen last; 0 where this is not known.
     sides: Vec<f64>,
     /// Of the steps that look for the times of events, as of those of the run.
     chosen: Chosen,
     rooms: Rooms,
+    clear: Clear,
     /// Finds the times of events, apart from the run.
     probe: Option<L::Stepper<'m, M>>,
     pub(super) met: Vec<Event<N, L>>,
@@ -53,8 +61,18 @@ pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> 
     cuts: u32,
     /// Length of this step.
     step: f64,
-    /// When an event last cut an element, and which.
-    last: Option<(f64, usize)>,
+    last: Option<LastCut>,
+}
+
+/// An event that cut an element.
+#[derive(Clone, Copy, Debug)]
+struct LastCut {
+    time: f64,
+    /// Among those that are looked for.
+    function: usize,
+    rises: bool,
+    /// Whether the motion went on as if nothing had happened.
+    is_idle: bool,
 }
 
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Events<'_, M, N, L> {
@@ -169,6 +187,7 @@ where
     /// Goes on with another model.
     pub(super) fn set_model(&mut self, model: L::Held<'m, M>) {
         (self.model, self.probe) = (model, None);
+        self.clear.forget();
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -178,6 +197,44 @@ where
     /// A new step of the run.
     pub(super) fn begin(&mut self, step: f64) {
         (self.cuts, self.step) = (0, step);
+    }
+
+    /// Whether it is proved, for less than the polynomial of the element takes that was done last, that nothing that is watched vanishes there.
+    pub(super) fn stays_clear(
+        &mut self,
+        stepper: &mut L::Stepper<'m, M>,
+        element: (f64, f64),
+    ) -> bool {
+        (self.keep_off)(self, stepper, element)
+    }
+
+    fn keep_off(&mut self, stepper: &mut L::Stepper<'m, M>, element: (f64, f64)) -> bool {
+        let within = |bounds: &[(f64, f64)]| M::reaches_within(stepper, bounds);
+        (self.clear.holds(element, within) || self.look_about(stepper, element))
+            && self.clear.agree(&mut self.sides)
+    }
+
+    #[cold]
+    fn look_about(&mut self, stepper: &mut L::Stepper<'m, M>, element: (f64, f64)) -> bool {
+        if self.has_functions() {
+            return false;
+        }
+        let (model, watched) = (&self.model, &self.watched);
+        let mut values = self.rooms.bounds.borrow_mut();
+        self.clear.look(
+            element,
+            |reached| M::reach(stepper, reached),
+            |bounds, sides| {
+                if !model.outputs_within(bounds, &mut values) {
+                    return false;
+                }
+                sides.extend(watched.iter().map(|watched| match watched.value {
+                    Value::Column(column) => values[column].side(),
+                    Value::Function(_) => 0.0,
+                }));
+                true
+            },
+        )
     }
 
     /// Does what is to be done at the events inside an element, in their order, up to the first that ends it.
@@ -228,6 +285,9 @@ where
             let name = on.name.clone();
             let met = self.locate(arc, root, resolution);
             let met = met.unwrap_or_else(|| Met::between(dense, t, root.tau * h));
+            if self.is_seen_again(root, t + met.length) {
+                continue;
+            }
             let time = if (h - met.length).abs() <= resolution {
                 dense.end()
             } else {
@@ -259,11 +319,15 @@ where
                 continue;
             }
             self.cuts += 1;
-            let is_soon = |(last, function): (f64, usize)| {
-                function == root.function && (time - last).abs() < Self::SOON * self.step.abs()
-            };
-            let returns = after.is_some() && self.last.is_some_and(is_soon);
-            self.last = Some((time, root.function));
+            let returns = after.is_some() && self.comes_soon(root, time).is_some();
+            let is_idle =
+                |after: &After<'m, M, N, L>| after.model.is_none() && after.state == met.state;
+            self.last = Some(LastCut {
+                time,
+                function: root.function,
+                rises: root.rises,
+                is_idle: after.as_ref().is_some_and(is_idle),
+            });
             if returns || self.cuts > Self::MAX_CUTS {
                 return Err(RunErrorKind::EventsWithoutEnd { name, time });
             }
@@ -278,6 +342,20 @@ where
         }
         self.sides = sides;
         Ok(None)
+    }
+
+    /// Whether this is the event that has cut the element before, where nothing was done: its polynomial has another velocity than the node at which this one begins.
+    fn is_seen_again(&self, root: &search::Root, time: f64) -> bool {
+        let is_last = |last: LastCut| last.is_idle && last.rises == root.rises;
+        self.comes_soon(root, time).is_some_and(is_last)
+    }
+
+    /// The last cut, where this event made it and comes again too soon.
+    fn comes_soon(&self, root: &search::Root, time: f64) -> Option<LastCut> {
+        let soon = Self::SOON * self.step.abs();
+        let is_soon =
+            |last: &LastCut| last.function == root.function && (time - last.time).abs() < soon;
+        self.last.filter(is_soon)
     }
 
     /// A cut, with all that derivatives need.
@@ -439,7 +517,7 @@ where
                 let before = |impulse: &&Impulse<N>| (impulse.time - t).abs() < length.abs();
                 let impulses: Vec<_> = arc.impulses.iter().filter(before).copied().collect();
                 M::advance(&mut probe, (t, length), &mut state, &impulses).ok()?;
-                inside = Some(M::inside(&probe, None, (t, t + length)));
+                inside = Some(M::inside(&mut probe, None, (t, t + length)));
             }
             let guess = dense.velocity_at_time(t + length);
             let velocity = self.model.velocity(t + length, &state, &guess)?;

@@ -164,9 +164,18 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError>;
 
+    /// Appends bounds of coordinates, then of velocities (momenta of a Hamiltonian), all along the last element; false where they are not to be had for less than its polynomial.
+    fn reach(stepper: &mut L::Stepper<'_, Self>, bounds: &mut Vec<(f64, f64)>) -> bool;
+
+    /// Whether coordinates and velocities stay within such bounds all along the last element, as far as these tell.
+    fn reaches_within(stepper: &mut L::Stepper<'_, Self>, bounds: &[(f64, f64)]) -> bool;
+
+    /// Bounds of all outputs over a box of times, coordinates and velocities (momenta); false where there are none.
+    fn outputs_within(&self, bounds: &[Enclosure], values: &mut [Enclosure]) -> bool;
+
     /// The polynomial of the last element, in memory that is not needed any more.
     fn inside(
-        stepper: &L::Stepper<'_, Self>,
+        stepper: &mut L::Stepper<'_, Self>,
         spare: Option<L::Polynomial>,
         nodes: (f64, f64),
     ) -> L::Polynomial;

@@ -206,16 +206,16 @@ where
         M::advance(stepper, (begin, h), state, impulses)
             .map_err(|source| self.model.failed(number, (t, h), source))?;
         let keeps = observer.keeps();
+        let looks = !self.events.is_empty() && !self.events.stays_clear(stepper, (t, h));
         // Before a matrix, which needs the same memory.
-        let dense = (keeps || !self.events.is_empty())
-            .then(|| M::inside(stepper, self.spare.take(), (t, next)));
+        let dense = (keeps || looks).then(|| M::inside(stepper, self.spare.take(), (t, next)));
         let no_matrix = |source| RunErrorKind::Transition {
             element: number,
             time: t,
             step: h,
             source,
         };
-        if let Some(dense) = dense.as_ref().filter(|_| !self.events.is_empty()) {
+        if let Some(dense) = dense.as_ref().filter(|_| looks) {
             let arc = Passage {
                 t,
                 h,
@@ -254,7 +254,8 @@ where
         );
         match dense {
             Some(dense) if keeps => observer.inside(dense),
-            unneeded => self.spare = unneeded,
+            Some(unneeded) => self.spare = Some(unneeded),
+            None => {}
         }
         Ok(None)
     }

@@ -43,7 +43,9 @@ where
     /// # }
     /// ```
     pub fn run(&self, start: L::State, span: Range<f64>) -> Result<Motion<N, L>, RunError<N, L>> {
-        let ends_only = self.record_every != 1 && self.events.is_empty();
+        // Events ask for the inside of nonlinear models only where one may be.
+        let looks_now_and_then = self.events.is_empty() || M::MAY_ITERATE;
+        let ends_only = self.record_every != 1 && looks_now_and_then;
         let ready = |stepper| match ends_only {
             true => M::ends_only(stepper),
             false => stepper,

@@ -1,6 +1,7 @@
 //! Events: when they are met, and what is done there.
 
 mod acts;
+mod clear;
 mod derivatives;
 mod meeting;
 #[path = "../../examples/events_beside_scans.rs"]

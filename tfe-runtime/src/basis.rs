@@ -12,6 +12,18 @@ pub const MAX_NODES: usize = 12;
 /// The largest number of coefficients of a rate: degree s − 1 ≤ 10.
 pub const MAX_RATES: usize = MAX_NODES - 1;
 
+/// No less than |∫₀^τ P_k(2σ − 1) dσ|: 1/(2k + 1), for |P_{k+1} − P_{k−1}| ≤ 2.
+#[cfg(feature = "alloc")]
+pub(crate) const MOST_OF_INTEGRALS: [f64; MAX_NODES] = {
+    let mut most = [1.0; MAX_NODES];
+    let mut k = 1;
+    while k < MAX_NODES {
+        most[k] = 1.0 / (2 * k + 1) as f64;
+        k += 1;
+    }
+    most
+};
+
 /// Fills `values[j]` with P_j(2τ − 1).
 pub const fn legendre(tau: f64, values: &mut [f64]) {
     let x = 2.0 * tau - 1.0;

@@ -23,6 +23,8 @@
 #[cfg(feature = "alloc")]
 mod computed;
 pub(crate) mod end;
+#[cfg(feature = "alloc")]
+pub(crate) mod reach;
 mod second_order;
 mod step;
 pub(crate) mod sweep;

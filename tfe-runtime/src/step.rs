@@ -20,6 +20,8 @@ pub use crate::control::{Control, Solve};
 pub use crate::dense::DenseElement;
 pub use crate::method::{Impulse, Interval, Memory, Method};
 #[cfg(feature = "alloc")]
+pub use crate::points::reach::Reach;
+#[cfg(feature = "alloc")]
 pub use crate::stepper::{Stepper, Suspended};
 
 impl<M, T> Method<'_, M, T>

@@ -1,9 +1,10 @@
 //! What runs are asked to look for, and what looks for it.
 
 use super::act::{Act, Crossing, Occurrence, On};
+use super::clear::Clear;
 use super::remodel::{Remodel, remodel};
 use super::value::{Function, Value};
-use super::{Events, Look, Rooms, Watched};
+use super::{Events, KeepOff, Look, Rooms, Watched};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length, RunTimeLength};
 use crate::simulation::kind::{Chosen, Simulated};
@@ -19,6 +20,7 @@ pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength
     remodel: Option<Remodel<'m, M, N, L>>,
     /// Called where there is anything to look for, and so compiled for models with events only.
     look: Look<'m, M, N, L>,
+    keep_off: KeepOff<'m, M, N, L>,
 }
 
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Watching<'_, M, N, L> {
@@ -43,6 +45,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
         on: Vec::new(),
         remodel: None,
         look: |_, _| Ok(None),
+        keep_off: |_, _, _| false,
     };
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -59,7 +62,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
         M: Simulated<N, L>,
     {
         self.on.push(on);
-        self.look = Events::look;
+        (self.look, self.keep_off) = (Events::look, Events::keep_off);
     }
 
     /// One event more: of an output, or of a function.
@@ -154,9 +157,11 @@ where
             model,
             remodel: watching.remodel,
             look: watching.look,
+            keep_off: watching.keep_off,
             sides: vec![0.0; watched.len()],
             watched,
             chosen,
+            clear: Clear::default(),
             rooms: Rooms::new(columns),
             probe: None,
             met: Vec::new(),

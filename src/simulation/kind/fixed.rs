@@ -165,11 +165,46 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         stepper.advance(t, h, state, impulses)
     }
 
+    #[inline(always)]
+    fn reach(stepper: &mut Stepper<'_, M, N>, bounds: &mut Vec<(f64, f64)>) -> bool {
+        let Some(reach) = stepper.reach() else {
+            return false;
+        };
+        bounds.extend(reach.q);
+        bounds.extend(reach.z);
+        true
+    }
+
+    #[inline(always)]
+    fn reaches_within(stepper: &mut Stepper<'_, M, N>, bounds: &[(f64, f64)]) -> bool {
+        let (Some(reach), Some((q, z))) = (stepper.reach(), bounds.split_at_checked(N)) else {
+            return false;
+        };
+        let mut is_within = q.len() == N && z.len() == N;
+        for (bounds, reached) in [(q, &reach.q), (z, &reach.z)] {
+            for ((low, high), (from, to)) in bounds.iter().zip(reached) {
+                is_within &= low <= from && to <= high;
+            }
+        }
+        is_within
+    }
+
+    fn outputs_within(&self, bounds: &[Enclosure], values: &mut [Enclosure]) -> bool {
+        let [t, rest @ ..] = bounds else { return false };
+        let (rest, []) = rest.as_chunks::<N>() else {
+            return false;
+        };
+        let [q, z] = rest else { return false };
+        self.observables(*t, q, z, values);
+        true
+    }
+
     fn inside(
-        stepper: &Stepper<'_, M, N>,
+        stepper: &mut Stepper<'_, M, N>,
         spare: Option<DenseElement<N>>,
         (start, end): (f64, f64),
     ) -> DenseElement<N> {
+        stepper.look_inside();
         stepper.dense_in(spare, start, end)
     }
 

@@ -168,8 +168,20 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         stepper.advance(t, h, state)
     }
 
+    fn reach(_: &mut family::Stepper<'_, M>, _: &mut Vec<(f64, f64)>) -> bool {
+        false
+    }
+
+    fn reaches_within(_: &mut family::Stepper<'_, M>, _: &[(f64, f64)]) -> bool {
+        false
+    }
+
+    fn outputs_within(&self, _: &[Enclosure], _: &mut [Enclosure]) -> bool {
+        false
+    }
+
     fn inside(
-        stepper: &family::Stepper<'_, M>,
+        stepper: &mut family::Stepper<'_, M>,
         _: Option<family::DenseElement>,
         (start, end): (f64, f64),
     ) -> family::DenseElement {

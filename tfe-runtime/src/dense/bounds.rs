@@ -1,7 +1,7 @@
 //! What an element does not leave: bounds of its polynomials (T-128).
 
 use super::DenseElement;
-use crate::basis::MAX_NODES;
+use crate::basis::{MAX_NODES, MOST_OF_INTEGRALS};
 use crate::dual::Dual;
 use crate::enclosure::Enclosure;
 use crate::model::Form;
@@ -20,17 +20,6 @@ pub struct Arguments<R, const N: usize> {
     /// Momenta.
     pub p: [R; N],
 }
-
-/// No less than |∫₀^τ P_k(2σ − 1) dσ|: 1/(2k + 1), for |P_{k+1} − P_{k−1}| ≤ 2.
-const MOST_OF_INTEGRALS: [f64; MAX_NODES] = {
-    let mut most = [1.0; MAX_NODES];
-    let mut k = 1;
-    while k < MAX_NODES {
-        most[k] = 1.0 / (2 * k + 1) as f64;
-        k += 1;
-    }
-    most
-};
 
 /// Powers of y ∈ [−1, 1].
 fn power(exponent: usize) -> Enclosure {

@@ -181,7 +181,7 @@ where
     }
 
     /// Rates and forces of the last step to where an ordinary step has them; false if there is none.
-    fn write_back(&mut self) -> bool {
+    pub(super) fn write_back(&mut self) -> bool {
         self.make_room();
         let points = self.points.as_mut();
         points.is_some_and(|points| points.write_back::<M>(&self.table, &mut self.numbers))
@@ -242,6 +242,7 @@ where
     ) -> Result<(), StepError> {
         self.impulses.clear();
         self.impulses.extend_from_slice(impulses);
+        self.is_of_points = false;
         if Self::MAY_BE_PROPAGATED
             && self.is_propagated()
             && impulses.is_empty()
@@ -251,7 +252,10 @@ where
         }
         if Self::MAY_HAVE_POINTS && impulses.is_empty() && h.is_finite() && h != 0.0 {
             match self.together(t, h, state) {
-                Together::Arrived => return Ok(()),
+                Together::Arrived => {
+                    self.is_of_points = true;
+                    return Ok(());
+                }
                 Together::Stalled(error) => return Err(error),
                 Together::LeftToOthers => {}
             }

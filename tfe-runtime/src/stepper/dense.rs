@@ -4,6 +4,7 @@ use super::setup::Stepper;
 use crate::dense::DenseElement;
 use crate::method::{Interval, Memory, may_be_phase};
 use crate::model::{Model, State};
+use crate::points::reach::{Reach, Weights};
 use crate::scheme::Tables;
 use crate::workspace::{interior_len, width};
 use alloc::vec::Vec;
@@ -21,6 +22,34 @@ where
         self.ordinary(&mut memory, (&mut numbers, &mut pivots), place, &mut state)
             .ok()
             .map(|()| numbers)
+    }
+
+    /// A box that the polynomial of the last step does not leave, for much less than that polynomial takes; none where it is not to be had for so little: of steps that were cut or not made by
+    /// fixed-point iteration, of linear and of constrained models, and of elements that are no Runge–Kutta methods.
+    #[must_use]
+    #[inline(always)]
+    pub fn reach(&mut self) -> Option<Reach<N>> {
+        if !(self.is_of_points && self.pieces.is_empty()) {
+            return None;
+        }
+        if self.weights.is_none() {
+            self.weigh();
+        }
+        let (points, last) = (self.points.as_ref()?, self.memory.last.as_ref()?);
+        let weights = self.weights.as_ref()?;
+        points.reach::<M>(weights, last.h, &last.start)
+    }
+
+    #[cold]
+    fn weigh(&mut self) {
+        self.weights = Some(Weights::of(&self.table.view()));
+    }
+
+    /// Makes the inside of the last step ready to be looked at, where [`ends_only`](Self::ends_only) has left it out.
+    pub fn look_inside(&mut self) {
+        if self.skipped && self.is_of_points && self.write_back() {
+            self.skipped = false;
+        }
     }
 
     /// The polynomial of the last step, from time `start` to time `end`.

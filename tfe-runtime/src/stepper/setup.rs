@@ -7,6 +7,7 @@ use crate::element::{Element, ElementError};
 use crate::method::{Impulse, Memory};
 use crate::model::Model;
 use crate::newton::{Control, Solve};
+use crate::points::reach::Weights;
 use crate::points::tables;
 use crate::points::{Points, are_possible};
 use crate::propagator::Propagator;
@@ -79,6 +80,10 @@ pub struct Stepper<'m, M, const N: usize> {
     pub(super) points: Option<Points<N, Heap>>,
     /// Steps of one length so far.
     pub(super) alike: (f64, usize),
+    /// What the numbers at points weigh for the reach of a step, once that was asked for.
+    pub(super) weights: Option<Weights>,
+    /// The last step was made with all points at once.
+    pub(super) is_of_points: bool,
     /// The workspace does not hold the last step.
     pub(super) skipped: bool,
     /// Of a last step that was cut.
@@ -114,6 +119,8 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             propagator: self.propagator.clone(),
             points: self.points.clone(),
             alike: self.alike,
+            weights: self.weights.clone(),
+            is_of_points: self.is_of_points,
             skipped: self.skipped,
             pieces: self.pieces.clone(),
             ahead: self.ahead.clone(),
@@ -179,6 +186,8 @@ where
             propagator: None,
             points,
             alike: (0.0, 0),
+            weights: None,
+            is_of_points: false,
             skipped: false,
             pieces: Vec::new(),
             ahead: None,

@@ -88,6 +88,8 @@ where
             propagator: suspended.propagator,
             points: suspended.points,
             alike: suspended.alike,
+            weights: None,
+            is_of_points: false,
             skipped: suspended.skipped,
             pieces: suspended.pieces,
             ahead: suspended.ahead,

@@ -1,0 +1,165 @@
+//! How far a step goes, from the numbers at its points: boxes that its polynomials do not leave, for much less than these polynomials take (T-155).
+
+use crate::basis::{MAX_RATES, MOST_OF_INTEGRALS};
+use crate::model::{Form, Model, State};
+use crate::points::{Points, is_second_order};
+use crate::registers::storage::Heap;
+use crate::scheme::SchemeRef;
+use alloc::vec::Vec;
+
+/// A box that coordinates, and velocities (momenta of a Hamiltonian), do not leave all along a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reach<const N: usize> {
+    /// Bounds of coordinates.
+    pub q: [(f64, f64); N],
+    /// Bounds of velocities, or of momenta.
+    pub z: [(f64, f64); N],
+}
+
+/// What numbers at the points weigh, four to a group; zeros beyond the last.
+#[derive(Clone, Debug)]
+pub(crate) struct Weights {
+    groups: Vec<Group>,
+    /// Σ integral
+    whole: f64,
+    /// Σ value: no less than what interpolation makes of numbers that are one at most.
+    most: f64,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Group {
+    /// b_l
+    mean: [f64; 4],
+    /// No less than |∫₀^τ ℓ_l|, and than |ℓ_l|, of the Lagrange polynomials ℓ_l of the points.
+    integral: [f64; 4],
+    value: [f64; 4],
+    /// The largest |A_jl|.
+    stage: [f64; 4],
+}
+
+/// What is added for roundings, relative to the numbers.
+const ROUNDING: f64 = 1e-13;
+
+impl Weights {
+    /// Those of an element that is a Runge–Kutta method; none of others.
+    pub(crate) fn of(scheme: &SchemeRef<'_>) -> Self {
+        let points = if scheme.collocated {
+            scheme.points()
+        } else {
+            0
+        };
+        let mut groups = alloc::vec![Group::default(); points.div_ceil(4)];
+        let (mut whole, mut most) = (0.0, 0.0);
+        for l in 0..points {
+            let mut part = [0.0; 3];
+            // Legendre coefficients of ℓ_l: rates and forces have the same where points are unknowns.
+            for m in 0..scheme.rates().min(MAX_RATES) {
+                let at = m * points + l;
+                let size = scheme.rate[at].abs().max(scheme.force_rate[at].abs());
+                part[0] += size * MOST_OF_INTEGRALS[m];
+                part[1] += size;
+            }
+            for row in scheme.position.chunks_exact(points) {
+                part[2] = part[2].max(row[l].abs());
+            }
+            let [integral, value, stage] = part;
+            let (group, lane) = (&mut groups[l / 4], l % 4);
+            group.mean[lane] = scheme.weights[l];
+            (group.integral[lane], group.value[lane]) = (integral, value);
+            group.stage[lane] = stage;
+            whole += integral;
+            most += value;
+        }
+        Self {
+            groups,
+            whole,
+            most,
+        }
+    }
+}
+
+/// Σ weight · |value|, of four.
+#[inline(always)]
+fn sizes(weights: &[f64; 4], values: &[f64; 4]) -> f64 {
+    let mut sum = 0.0;
+    for lane in 0..4 {
+        sum += weights[lane] * values[lane].abs();
+    }
+    sum
+}
+
+#[inline(always)]
+fn about(centre: f64, radius: f64) -> (f64, f64) {
+    let radius = radius + ROUNDING * (radius + centre.abs());
+    (centre - radius, centre + radius)
+}
+
+impl<const N: usize> Points<N, Heap> {
+    /// That of the last step, h long, from its start; none without weights.
+    #[inline(always)]
+    pub(crate) fn reach<M: Model<N>>(
+        &self,
+        weights: &Weights,
+        h: f64,
+        start: &State<N>,
+    ) -> Option<Reach<N>> {
+        if weights.groups.is_empty() {
+            return None;
+        }
+        let size = h.abs();
+        let mut reach = Reach {
+            q: [(0.0, 0.0); N],
+            z: [(0.0, 0.0); N],
+        };
+        // |p − p₀| of the polynomial, over h, and |p_l − p₀| at the points.
+        let (mut forces, mut stages) = ([0.0; N], [0.0; N]);
+        for (group, row) in weights.groups.iter().zip(&*self.forces) {
+            for a in 0..N {
+                forces[a] += sizes(&group.integral, &row[a]);
+                stages[a] += sizes(&group.stage, &row[a]);
+            }
+        }
+        if M::FORM == Form::Hamiltonian {
+            for a in 0..N {
+                reach.z[a] = about(start.p[a], size * forces[a]);
+            }
+        }
+        if is_second_order::<M, N>() {
+            for a in 0..N {
+                let change = match &self.inertia.diagonal {
+                    Some(_) => self.inertia.inverse_diagonal[a].abs() * stages[a],
+                    None => {
+                        let row = self.inertia.inverse[a].iter().zip(&stages);
+                        row.map(|(inverse, stage)| inverse.abs() * stage).sum()
+                    }
+                };
+                let (velocity, change) = (self.velocity[a], size * change);
+                let distance = size * weights.whole * (velocity.abs() + change);
+                reach.q[a] = about(start.q[a], distance);
+                if M::FORM == Form::Lagrangian {
+                    reach.z[a] =
+                        about(velocity, weights.most * change + ROUNDING * distance / size);
+                }
+            }
+            return Some(reach);
+        }
+        for a in 0..N {
+            let (mut distance, mut mean, mut off) = (0.0, 0.0, 0.0);
+            for (group, row) in weights.groups.iter().zip(&*self.rates) {
+                distance += sizes(&group.integral, &row[a]);
+                for lane in 0..4 {
+                    mean += group.mean[lane] * row[a][lane];
+                }
+            }
+            reach.q[a] = about(start.q[a], size * distance);
+            if M::FORM == Form::Lagrangian {
+                for (group, row) in weights.groups.iter().zip(&*self.rates) {
+                    let from_mean = row[a].map(|rate| rate - mean);
+                    off += sizes(&group.value, &from_mean);
+                }
+                reach.z[a] = about(mean, off + ROUNDING * distance);
+            }
+        }
+        Some(reach)
+    }
+}
