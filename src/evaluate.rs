@@ -164,7 +164,9 @@ impl<M: family::Model> Evaluate<0, RunTimeLength> for M {
         reactions.unwrap_or_else(|| vec![f64::NAN; self.constraints()])
     }
 
-    fn with(&self, _: &str, _: f64) -> Option<Self> {
-        None
+    fn with(&self, parameter: &str, value: f64) -> Option<Self> {
+        let mut names = (0..self.parameters()).map(|index| self.parameter_name(index));
+        let index = names.position(|name| name.is(parameter))?;
+        self.with_parameter(index, value)
     }
 }

@@ -74,7 +74,7 @@ impl<const N: usize> Length<N> for FixedLength {
 }
 
 impl Length<0> for RunTimeLength {
-    type Held<'m, M: 'm> = &'m M;
+    type Held<'m, M: 'm> = Share<'m, M>;
     type Vector = Vec<f64>;
     type State = FamilyState;
     type Polynomial = family::DenseElement;

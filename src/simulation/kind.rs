@@ -36,8 +36,6 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     const CUTS_AT_KINKS: bool;
     /// Whether the energy is kept, and jumps of it tell of steps that are too long.
     const CONSERVES: bool;
-    /// Whether parameters have numbers by which they can be set.
-    const HAS_PARAMETERS: bool;
 
     /// The number of coordinates.
     fn coordinates(&self) -> usize;

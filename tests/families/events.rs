@@ -220,10 +220,19 @@ fn what_cannot_be_is_a_typed_error() {
             known: known.map(str::to_owned).to_vec(),
         }
     );
-    let set =
-        |_: &tfe::Occurrence<'_, 0, family::RunTimeLength>| Act::Set(tfe::Settings::new("a", 1.0));
-    let set = kind(long().on("first", Crossing::Either, set));
-    assert_eq!(set, RunErrorKind::ParametersFixed);
+    let set = |name: &'static str, value: f64| {
+        let act = move |_: &tfe::Occurrence<'_, 0, family::RunTimeLength>| {
+            Act::Set(tfe::Settings::new(name, value))
+        };
+        kind(long().on("first", Crossing::Either, act))
+    };
+    let none = set("n", 1.0);
+    assert!(matches!(none, RunErrorKind::NoParameter { .. }), "{none}");
+    let infinite = set("a", f64::INFINITY);
+    assert!(
+        matches!(infinite, RunErrorKind::Parameter { .. }),
+        "{infinite}"
+    );
     // A state that is too short, or not finite.
     for bad in [vec![0.0; 2], vec![f64::NAN; 3]] {
         let act = move |_: &tfe::Occurrence<'_, 0, family::RunTimeLength>| {
@@ -298,5 +307,96 @@ fn impacts_along_constraints() -> Result<(), Box<dyn Error>> {
     let end = beside.last().q;
     assert!((run.last().q[1] - end[0].sin() - end[1].sin()).abs() < 1e-10);
     assert!(run.energy_error() < 1e-11 && run.constraint_residual().position < 1e-13);
+    Ok(())
+}
+
+/// Springs that are parameters each, and masses that are not.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, m*dot(q[i])^2/2) - sum(i in 0..n-1, k[i]*((q[i+1] - q[i])^2/2 + (q[i+1] - q[i])^4/8)) - k[0]*q[0]^2/2,
+    output(first) = q[0],
+    output(last) = q[n-1],
+)]
+struct Springs {
+    n: usize,
+    m: f64,
+    k: Vec<f64>,
+}
+
+#[dynamics(
+    coordinates(q[3]),
+    lagrangian = sum(i in 0..3, m*dot(q[i])^2/2) - sum(i in 0..2, k[i]*((q[i+1] - q[i])^2/2 + (q[i+1] - q[i])^4/8)) - k[0]*q[0]^2/2,
+    output(first) = q[0],
+    output(last) = q[2],
+)]
+struct ThreeSprings {
+    m: f64,
+    k: [f64; 2],
+}
+
+/// A spring yields at one event; at another masses change, and velocities stay.
+#[test]
+fn parameters_are_set_at_events() -> Result<(), Box<dyn Error>> {
+    let springs = Springs {
+        n: 3,
+        m: 1.2,
+        k: vec![2.0, 3.0],
+    };
+    let three = ThreeSprings {
+        m: 1.2,
+        k: [2.0, 3.0],
+    };
+    let span = || 0.0..30.0;
+    for every in [1, 7] {
+        let long = Simulation::new(&springs)
+            .element(Mixed::<6>)
+            .step(0.1)
+            .record_every(every)
+            .on("first", Crossing::Rising, |event| {
+                Act::Set(tfe::Settings::new("k[1]", 3.0 + event.t))
+            })
+            .on("last", Crossing::Falling, |event| {
+                let settings = tfe::Settings::new("m", 1.0 + 0.1 * event.t).and("k[0]", 2.5);
+                Act::Set(settings.and_velocity(event.v.clone()))
+            })
+            .run(springs.state(Q, V), span())?;
+        let fixed = Simulation::new(&three)
+            .element(Mixed::<6>)
+            .step(0.1)
+            .record_every(every)
+            .on("first", Crossing::Rising, |event| {
+                Act::Set(tfe::Settings::new("k[1]", 3.0 + event.t))
+            })
+            .on("last", Crossing::Falling, |event| {
+                let settings = tfe::Settings::new("m", 1.0 + 0.1 * event.t).and("k[0]", 2.5);
+                Act::Set(settings.and_velocity(event.v))
+            })
+            .run(three.state(Q, V), span())?;
+        assert!(long.events().len() > 4, "{}", long.events().len());
+        assert_eq!(long.events().len(), fixed.events().len());
+        for (a, b) in long.events().iter().zip(fixed.events()) {
+            assert!((a.t - b.t).abs() < 1e-12, "{} {}", a.t, b.t);
+        }
+        assert_eq!(long.settings().len(), fixed.settings().len());
+        assert!(distance(&long.last().q, &fixed.last().q) < 1e-11);
+        assert!(distance(&long.last().p, &fixed.last().p) < 1e-11);
+        let energies = long.energies().iter().zip(fixed.energies());
+        for (a, b) in energies {
+            assert!((a - b).abs() < 1e-11, "{a} {b}");
+        }
+    }
+    // The caller's model is as it was.
+    assert_eq!((springs.m, &springs.k[..]), (1.2, &[2.0, 3.0][..]));
+    // Steps see the new parameters, too, and runs of several starts.
+    let run = Simulation::new(&springs).element(Mixed::<6>).step(0.1).on(
+        "first",
+        Crossing::Rising,
+        |event| Act::Set(tfe::Settings::new("k[1]", 3.0 + event.t)),
+    );
+    let whole = run.run(springs.state(Q, V), 0.0..10.0)?;
+    let mut steps = run.steps(springs.state(Q, V), 0.0);
+    let last = steps.find(|node| node.as_ref().is_ok_and(|node| node.t > 9.99));
+    let last = last.expect("a step")?;
+    assert!(distance(&last.q, &whole.last().q) < 1e-12);
     Ok(())
 }

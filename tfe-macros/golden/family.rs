@@ -299,6 +299,35 @@ const _: () = {
             let index = index - 1;
             ::core::primitive::f64::NAN
         }
+        fn with_parameter(
+            &self,
+            index: usize,
+            value: f64,
+        ) -> ::core::option::Option<Self> {
+            let mut made = Self {
+                n: ::core::clone::Clone::clone(&self.n),
+                w: ::core::clone::Clone::clone(&self.w),
+                m: ::core::clone::Clone::clone(&self.m),
+                k: ::core::clone::Clone::clone(&self.k),
+                a: ::core::clone::Clone::clone(&self.a),
+            };
+            if index < self.m.len() {
+                made.m[index] = value;
+                return ::core::option::Option::Some(made);
+            }
+            let index = index - self.m.len();
+            if index == 0 {
+                made.k = value;
+                return ::core::option::Option::Some(made);
+            }
+            let index = index - 1;
+            if index == 0 {
+                made.a = value;
+                return ::core::option::Option::Some(made);
+            }
+            let index = index - 1;
+            ::core::option::Option::None
+        }
     }
 };
 #[automatically_derived]

@@ -3,7 +3,7 @@
 
 use crate::indices::{identifier, index};
 use crate::input;
-use proc_macro2::{Literal, TokenStream};
+use proc_macro2::{Ident, Literal, TokenStream};
 use quote::quote;
 use std::collections::BTreeMap;
 use syn::ItemStruct;
@@ -173,6 +173,8 @@ fn numbered(count: &TokenStream, names: &TokenStream, values: &TokenStream) -> T
 pub(crate) struct RunTimeParameters {
     /// Names, and how many there are; of single numbers nothing.
     fields: Vec<(String, Option<TokenStream>)>,
+    /// All fields of the struct, unless one is of a type that may not be `Clone`.
+    cloned: Option<Vec<Ident>>,
 }
 
 impl RunTimeParameters {
@@ -195,8 +197,12 @@ impl RunTimeParameters {
             Some((field.name, size))
         };
         let context = input::context(item);
+        let is_other = |field: &Field| matches!(field.kind, FieldKind::Other(_));
+        let all = item.fields.iter().filter_map(|field| field.ident.clone());
+        let cloned = (!context.fields.iter().any(is_other)).then(|| all.collect());
         Self {
             fields: context.fields.into_iter().filter_map(size).collect(),
+            cloned,
         }
     }
 
@@ -220,7 +226,7 @@ impl RunTimeParameters {
         places
     }
 
-    /// `parameters`, `parameter_name` and `parameter` of an implementation of `FamilyModel`.
+    /// `parameters`, `parameter_name`, `parameter` and `with_parameter` of an implementation of `FamilyModel`.
     pub(crate) fn members(&self) -> TokenStream {
         if self.fields.is_empty() {
             return TokenStream::new();
@@ -228,39 +234,59 @@ impl RunTimeParameters {
         let one = quote!(1);
         let sizes = (self.fields.iter()).map(|(_, size)| size.as_ref().unwrap_or(&one));
         let count = quote!(#(#sizes)+*);
-        let arms = |single: &dyn Fn(&str) -> TokenStream, element: &dyn Fn(&str) -> TokenStream| {
-            let arm = |(name, size): &(String, Option<TokenStream>)| match size {
-                None => {
-                    let value = single(name);
-                    quote! {
-                        if index == 0 { return #value; }
-                        let index = index - 1;
-                    }
-                }
-                Some(size) => {
-                    let value = element(name);
-                    quote! {
-                        if index < #size { return #value; }
-                        let index = index - #size;
-                    }
-                }
-            };
-            self.fields.iter().map(arm).collect::<TokenStream>()
-        };
-        let names = arms(
-            &|name| quote!(__tfe::CoordinateName::single(#name)),
-            &|name| quote!(__tfe::CoordinateName::element(#name, index)),
-        );
-        let values = arms(
-            &|name| {
+        let names = arms_of(&self.fields, |name, is_single| match is_single {
+            true => quote!({ return __tfe::CoordinateName::single(#name); }),
+            false => quote!({ return __tfe::CoordinateName::element(#name, index); }),
+        });
+        let values = arms_of(&self.fields, |name, is_single| {
+            let name = identifier(name);
+            match is_single {
+                true => quote!({ return self.#name; }),
+                false => quote!({ return self.#name[index]; }),
+            }
+        });
+        let numbered = numbered(&count, &names, &values);
+        let with_parameter = self.cloned.as_ref().map(|cloned| {
+            let return_made = quote!(return ::core::option::Option::Some(made););
+            let set = arms_of(&self.fields, |name, is_single| {
                 let name = identifier(name);
-                quote!(self.#name)
-            },
-            &|name| {
-                let name = identifier(name);
-                quote!(self.#name[index])
-            },
-        );
-        numbered(&count, &names, &values)
+                match is_single {
+                    true => quote!({ made.#name = value; #return_made }),
+                    false => quote!({ made.#name[index] = value; #return_made }),
+                }
+            });
+            quote! {
+                fn with_parameter(&self, index: usize, value: f64) -> ::core::option::Option<Self> {
+                    let mut made = Self { #(#cloned: ::core::clone::Clone::clone(&self.#cloned)),* };
+                    #set
+                    ::core::option::Option::None
+                }
+            }
+        });
+        quote! {
+            #numbered
+            #with_parameter
+        }
     }
+}
+
+/// What is done with the parameter of a number: one arm a field, with its name and whether it is a single number.
+fn arms_of(
+    fields: &[(String, Option<TokenStream>)],
+    arm: impl Fn(&str, bool) -> TokenStream,
+) -> TokenStream {
+    let arm = |(name, size): &(String, Option<TokenStream>)| {
+        let done = arm(name, size.is_none());
+        match size {
+            None => quote! {
+                if index == 0 #done
+                let index = index - 1;
+            },
+            Some(size) => quote! {
+                if index < #size #done
+                let index = index - #size;
+            },
+        }
+    };
+    fields.iter().map(arm).collect()
 }

@@ -86,9 +86,6 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
         model: &M,
         remodel: Option<Remodel<'m, M, N, L>>,
     ) -> Result<Changed<'m, M, N, L>, RunErrorKind> {
-        if const { !M::HAS_PARAMETERS } {
-            return Err(RunErrorKind::ParametersFixed);
-        }
         let names = model.parameter_names();
         let number = |(name, value): &(String, f64)| {
             let index = names.iter().position(|own| own.is(name));

@@ -2,7 +2,7 @@
 
 use super::act::{Act, Crossing, Occurrence, On};
 use super::clear::Clear;
-use super::remodel::{Remodel, remodel};
+use super::remodel::{Remodel, remodel, remodel_long};
 use super::value::{Function, Value};
 use super::{Events, KeepOff, Look, Rooms, Watched};
 use crate::error::RunErrorKind;
@@ -115,8 +115,8 @@ where
     const REMODEL: Option<Remodel<'m, M, N, FixedLength>> = Some(remodel);
 }
 
-impl<'m, M: family::Model + 'm> Settable<'m, 0, RunTimeLength> for M {
-    const REMODEL: Option<Remodel<'m, M, 0, RunTimeLength>> = None;
+impl<'m, M: family::Model + Send + Sync + 'm> Settable<'m, 0, RunTimeLength> for M {
+    const REMODEL: Option<Remodel<'m, M, 0, RunTimeLength>> = Some(remodel_long);
 }
 
 impl<'m, M, const N: usize, L> Events<'m, M, N, L>

@@ -85,16 +85,16 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         trail: &Trail,
         loss: &Loss<'_, 0, RunTimeLength>,
     ) -> Result<(f64, LossGradient<0, RunTimeLength>), RunError<0, RunTimeLength>> {
-        let (value, seen) = match loss.seen(&motion, self.model) {
+        let (value, seen) = match loss.seen(&motion, &*self.model) {
             Ok(seen) => seen,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
         let elements = &trail.elements;
         let mut number = elements.len();
-        let mut view = View::new(self.model, &seen, &motion.last().v);
+        let mut view = View::new(&*self.model, &seen, &motion.last().v);
         let mut pulled = || -> Result<_, Failure> {
             let element = self.chosen_element();
-            let mut backwards = family::Backwards::new(self.model, element, self.control)?;
+            let mut backwards = family::Backwards::new(&*self.model, element, self.control)?;
             loop {
                 let node = &motion.states()[number];
                 if let Some(partials) = view.of_node(number) {

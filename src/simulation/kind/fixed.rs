@@ -36,7 +36,6 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     const MAY_ITERATE: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
     const CUTS_AT_KINKS: bool = true;
     const CONSERVES: bool = conserves_energy::<M, N>();
-    const HAS_PARAMETERS: bool = true;
 
     fn coordinates(&self) -> usize {
         N

@@ -14,7 +14,7 @@ use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::step::{Control, Impulse};
-use tfe_runtime::{CoordinateName, Element, Facts, Statistics, StepError};
+use tfe_runtime::{CoordinateName, Element, Facts, Share, Statistics, StepError};
 
 impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     const FACTS: Facts = M::FACTS;
@@ -22,7 +22,6 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     const MAY_ITERATE: bool = M::FACTS.separable && !M::CONSTRAINED;
     const CUTS_AT_KINKS: bool = false;
     const CONSERVES: bool = conserves_energies::<M>();
-    const HAS_PARAMETERS: bool = false;
 
     fn coordinates(&self) -> usize {
         self.len()
@@ -106,16 +105,19 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         }
     }
 
-    fn stepper<'m>(model: &'m M, chosen: Chosen) -> Result<family::Stepper<'m, M>, RunErrorKind>
+    fn stepper<'m>(
+        model: Share<'m, M>,
+        chosen: Chosen,
+    ) -> Result<family::Stepper<'m, M>, RunErrorKind>
     where
         M: 'm,
     {
-        let stepper = family::Stepper::new(model, chosen.element, chosen.control);
+        let stepper = family::Stepper::sharing(model, chosen.element, chosen.control);
         stepper.map_err(RunErrorKind::Family)
     }
 
     fn resumed<'m>(
-        model: &'m M,
+        model: Share<'m, M>,
         chosen: Chosen,
         suspended: family::Suspended,
     ) -> Result<family::Stepper<'m, M>, RunErrorKind>
@@ -152,11 +154,14 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         (stepper.element(), stepper.control())
     }
 
-    fn exchange<'m>(_: &mut family::Stepper<'m, M>, _: &'m M) -> Result<(), RunErrorKind>
+    fn exchange<'m>(
+        stepper: &mut family::Stepper<'m, M>,
+        model: Share<'m, M>,
+    ) -> Result<(), RunErrorKind>
     where
         M: 'm,
     {
-        Err(RunErrorKind::ParametersFixed)
+        stepper.set_model(model).map_err(RunErrorKind::Family)
     }
 
     fn advance(
@@ -266,7 +271,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         None
     }
 
-    fn exchange_in<'m>(_: &mut Option<Resolution<'m, M, 0>>, _: &'m M)
+    fn exchange_in<'m>(_: &mut Option<Resolution<'m, M, 0>>, _: Share<'m, M>)
     where
         M: 'm,
     {
@@ -318,11 +323,12 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     }
 
     fn parameter_names(&self) -> Vec<CoordinateName> {
-        Vec::new()
+        let numbers = 0..self.parameters();
+        numbers.map(|number| self.parameter_name(number)).collect()
     }
 
-    fn parameter_value(&self, _: usize) -> f64 {
-        f64::NAN
+    fn parameter_value(&self, number: usize) -> f64 {
+        self.parameter(number)
     }
 
     fn guarded<T>(&self, f: impl FnOnce() -> T) -> Option<T> {

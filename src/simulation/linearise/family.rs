@@ -55,7 +55,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let element = self.chosen_element();
         let asked = (0.0, &[][..]);
         let found =
-            family::TransitionOperator::of_steps_by(self.model, element, asked, steps, each);
+            family::TransitionOperator::of_steps_by(&*self.model, element, asked, steps, each);
         let Err((number, error)) = found else {
             return Ok(Linearised::free(motion, transitions));
         };

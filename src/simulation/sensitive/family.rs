@@ -51,7 +51,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         motion: Motion<0, RunTimeLength>,
         trail: &Trail,
     ) -> Result<Sensitive<0, RunTimeLength>, RunError<0, RunTimeLength>> {
-        let model = self.model;
+        let model = &*self.model;
         let parameters: Vec<usize> = (0..model.parameters()).collect();
         let size = 2 * model.len();
         let mut current = DMatrix::identity(size, size + parameters.len());

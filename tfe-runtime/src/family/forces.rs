@@ -20,6 +20,7 @@ use crate::points::tables::Tables;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::{Contraction, Statistics};
 use alloc::vec;
+use core::ops::Deref;
 
 /// A stepper of this kind: a fixed-point iteration, and where that contracts badly Newton's method.
 #[derive(Clone, Debug)]
@@ -63,22 +64,18 @@ impl<M> Forces<M> {
     }
 }
 
-impl<'m, M: Model> Forces<&'m M> {
+impl<M: Model, H: Deref<Target = M>> Forces<H> {
     /// A stepper at rest; the model has been checked.
     ///
     /// # Errors
     /// [`ModelError`]: a kinetic energy that is not ½ Σ m v², Newton's method without the feature for it.
-    pub(super) fn new(
-        model: &'m M,
-        table: SchemeTable,
-        control: Control,
-    ) -> Result<Self, ModelError> {
+    pub(super) fn new(model: H, table: SchemeTable, control: Control) -> Result<Self, ModelError> {
         if control.solve == Solve::Newton && !cfg!(feature = "sparse") {
             return Err(ModelError::NoNewton);
         }
         let n = model.len();
         let problem = Problem {
-            inertia: Inertia::of(model)?,
+            inertia: Inertia::of(&*model)?,
             tables: Tables::of(&table.view()),
             velocity: vec![0.0; n],
             velocity_low: vec![0.0; n],
@@ -155,7 +152,7 @@ impl<'m, M: Model> Forces<&'m M> {
             };
             let outcome =
                 self.registers
-                    .iterate(self.model, &self.problem, &self.control, leg, yielding);
+                    .iterate(&*self.model, &self.problem, &self.control, leg, yielding);
             let iterations = u64::from(outcome.iterations);
             self.statistics.iterations += iterations;
             self.statistics.fixed_point_iterations += iterations;
@@ -191,7 +188,7 @@ impl<'m, M: Model> Forces<&'m M> {
             low: &self.low,
         };
         self.registers
-            .prepare(self.model, &mut self.problem, leg, is_warm);
+            .prepare(&*self.model, &mut self.problem, leg, is_warm);
     }
 
     #[cfg(not(feature = "sparse"))]
@@ -205,7 +202,7 @@ impl<'m, M: Model> Forces<&'m M> {
     fn newton(&mut self, t: f64, h: f64) -> Result<(), StepError> {
         let mut tangent = match self.tangent.take() {
             Some(tangent) => tangent,
-            None => Tangent::new(self.model, self.table.view().points())
+            None => Tangent::new(&*self.model, self.table.view().points())
                 .ok_or(StepError::SingularTangent { unknown: 0 })?,
         };
         let outcome = self.newton_with(&mut tangent, t, h);
@@ -243,11 +240,11 @@ impl<'m, M: Model> Forces<&'m M> {
                 let (q, z) = (&mut tangent.q[..], &mut tangent.z[..]);
                 self.registers.positions(&self.problem, leg, q, z);
                 self.statistics.tangent_evaluations += points as u64;
-                tangent.factor(self.model, &scheme, &self.problem, t, h)?;
+                tangent.factor(&*self.model, &scheme, &self.problem, t, h)?;
                 self.statistics.factorizations += 1;
             }
             self.registers
-                .rest(self.model, &self.problem, leg, &mut tangent.rest);
+                .rest(&*self.model, &self.problem, leg, &mut tangent.rest);
             self.statistics.residual_evaluations += points as u64;
             tangent.solve();
             let sizes = self.registers.correct(&self.problem, &tangent.rest);

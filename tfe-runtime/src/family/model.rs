@@ -186,6 +186,15 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
         f64::NAN
     }
 
+    /// The same model with another value of a parameter; none of models that cannot be copied, and beyond the parameters.
+    #[must_use]
+    fn with_parameter(&self, _index: usize, _value: f64) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+
     /// The names of the observables as declared.
     const OBSERVABLES: &'static [&'static str] = &[];
 

@@ -29,6 +29,7 @@ use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::Statistics;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Deref;
 
 /// Velocities that move so small a part of the positions in one step are rest.
 const REST: f64 = 1e-5;
@@ -94,27 +95,23 @@ impl<M> Rates<M> {
     }
 }
 
-impl<'m, M: Model> Rates<&'m M> {
+impl<M: Model, H: Deref<Target = M>> Rates<H> {
     /// A stepper at rest; the model has been checked.
     ///
     /// # Errors
     /// [`ModelError`]
-    pub(super) fn new(
-        model: &'m M,
-        table: SchemeTable,
-        control: Control,
-    ) -> Result<Self, ModelError> {
+    pub(super) fn new(model: H, table: SchemeTable, control: Control) -> Result<Self, ModelError> {
         if control.solve == Solve::FixedPoint {
             return Err(ModelError::NeedsNewton);
         }
         let (n, m) = (model.len(), model.constraints());
-        let rows = Rows::new(model);
+        let rows = Rows::new(&*model);
         let scheme = table.view();
         let unknowns = scheme.unknowns();
         let point = |node: &f64| Point::new(n, rows.values.len(), m, slopes(*node, unknowns));
         let points = scheme.nodes.iter().map(point).collect();
-        let (parts, matrix) = Parts::new(model, &rows, unknowns).ok_or(ModelError::TooLarge)?;
-        let node = Node::new(model, &rows).ok_or(ModelError::TooLarge)?;
+        let (parts, matrix) = Parts::new(&*model, &rows, unknowns).ok_or(ModelError::TooLarge)?;
+        let node = Node::new(&*model, &rows).ok_or(ModelError::TooLarge)?;
         let zero = || FamilyState {
             q: vec![0.0; n],
             p: vec![0.0; n],
@@ -161,7 +158,7 @@ impl<'m, M: Model> Rates<&'m M> {
     ) -> Result<(), StepError> {
         let last = self.last.take().filter(|_| continues);
         self.start.clone_from(state);
-        self.rows.evaluate(self.model, t, &self.start.q);
+        self.rows.evaluate(&*self.model, t, &self.start.q);
         self.start_rows.copy_from_slice(&self.rows.values);
         match last {
             Some(length) => self.continue_rates(h / length),
@@ -178,7 +175,7 @@ impl<'m, M: Model> Rates<&'m M> {
                 return Err(error);
             }
             // The continued polynomial may be a worse start than none.
-            self.rows.evaluate(self.model, t, &self.start.q);
+            self.rows.evaluate(&*self.model, t, &self.start.q);
             self.begin(t)?;
             self.newton(t, h)?;
         }
@@ -213,7 +210,7 @@ impl<'m, M: Model> Rates<&'m M> {
         self.v_end.fill(0.0);
         let FamilyState { q, p } = &self.start;
         self.node
-            .solve(self.model, (t, q), p, &self.rows, &mut self.v_end)?;
+            .solve(&*self.model, (t, q), p, &self.rows, &mut self.v_end)?;
         let rates = self.unknowns.chunks_exact_mut(count);
         for (rates, v) in rates.zip(&self.v_end) {
             rates.fill(*v);
@@ -285,7 +282,7 @@ impl<'m, M: Model> Rates<&'m M> {
                     start_rows: &self.start_rows,
                     end_rows: &self.rows.values,
                 };
-                self.parts.fill(self.model, &element, &mut self.matrix);
+                self.parts.fill(&*self.model, &element, &mut self.matrix);
                 self.statistics.tangent_evaluations += self.points.len() as u64;
                 self.matrix.factor()?;
                 self.factored = h;
@@ -372,7 +369,7 @@ impl<'m, M: Model> Rates<&'m M> {
                 {
                     *rate = product(&point.slopes[1..count], &m[1..]);
                 }
-                self.rows.evaluate(self.model, time, &point.q);
+                self.rows.evaluate(&*self.model, time, &point.q);
                 self.rows
                     .add_reaction(&self.rows.values, -1.0, &point.mu_rate, &mut point.force);
                 point.rows.copy_from_slice(&self.rows.values);
@@ -385,7 +382,7 @@ impl<'m, M: Model> Rates<&'m M> {
                 let advance = h * product(scheme.advance, rates);
                 self.q_end[a] = self.start.q[a] + (advance + self.low.q[a]);
             }
-            self.rows.evaluate(self.model, t + h, &self.q_end);
+            self.rows.evaluate(&*self.model, t + h, &self.q_end);
         }
     }
 
@@ -448,9 +445,9 @@ impl<'m, M: Model> Rates<&'m M> {
                 self.v_end.copy_from_slice(&point.v);
             }
             let at = (t + h, &self.end.q[..]);
-            self.rows.evaluate(self.model, at.0, at.1);
+            self.rows.evaluate(&*self.model, at.0, at.1);
             self.node
-                .solve(self.model, at, &self.end.p, &self.rows, &mut self.v_end)?;
+                .solve(&*self.model, at, &self.end.p, &self.rows, &mut self.v_end)?;
             self.end.p.copy_from_slice(&self.node.slope);
             self.low.p.fill(0.0);
         }
@@ -476,7 +473,7 @@ impl<'m, M: Model> Rates<&'m M> {
             start_rows: &self.start_rows,
             end_rows: &self.rows.values,
         };
-        self.parts.fill(self.model, &element, &mut self.matrix);
+        self.parts.fill(&*self.model, &element, &mut self.matrix);
         self.matrix.factor()?;
         self.factored = h;
         Ok(self.matrix.clone())

@@ -17,6 +17,7 @@ use crate::model::Form;
 use crate::newton::Control;
 use crate::registers::storage::MAX_GROUPS;
 use crate::scheme::{SchemeTable, Tables as _};
+use crate::share::Share;
 use crate::statistics::Statistics;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -32,10 +33,10 @@ use core::convert::Infallible;
 /// The example is at [`Simulation::new`](https://docs.rs/tfe), with which families are run.
 #[derive(Clone, Debug)]
 pub struct Stepper<'m, M> {
-    model: &'m M,
+    model: Share<'m, M>,
     element: Element,
     length: usize,
-    way: Way<&'m M>,
+    way: Way<Share<'m, M>>,
     legendre: Legendre,
     /// For reactions, made when it is needed.
     #[cfg(feature = "sparse")]
@@ -93,17 +94,34 @@ impl<'m, M: Model> Stepper<'m, M> {
     /// # Errors
     /// [`ModelError`]: lengths that do not fit together, an element that does not exist, and what families cannot do.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ModelError> {
+        Self::sharing(model.into(), element, control)
+    }
+
+    /// The same of a model that may belong to those that use it.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn sharing(
+        model: Share<'m, M>,
+        element: Element,
+        control: Control,
+    ) -> Result<Self, ModelError> {
         model.check()?;
         let table = SchemeTable::new(element).map_err(ModelError::Element)?;
-        let way = Self::way(model, element, table, control)?;
+        let way = Self::way(&model, element, table, control)?;
         Ok(Self::with(model, element, way, control))
     }
 
-    fn with(model: &'m M, element: Element, way: Way<&'m M>, control: Control) -> Self {
+    fn with(
+        model: Share<'m, M>,
+        element: Element,
+        way: Way<Share<'m, M>>,
+        control: Control,
+    ) -> Self {
         Self {
+            length: model.len(),
             model,
             element,
-            length: model.len(),
             way,
             legendre: Legendre::default(),
             #[cfg(feature = "sparse")]
@@ -128,27 +146,27 @@ impl<'m, M: Model> Stepper<'m, M> {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn resume(
-        model: &'m M,
+        model: Share<'m, M>,
         element: Element,
         control: Control,
         suspended: Suspended,
     ) -> Result<Self, ModelError> {
         model.check()?;
-        let mut way = suspended.way.hand_over(model);
+        let mut way = suspended.way.hand_over(model.clone());
         let is_same = suspended.element == element && suspended.length == model.len();
         if !is_same || way.control_mut().solve != control.solve {
-            return Self::new(model, element, control);
+            return Self::sharing(model, element, control);
         }
         *way.control_mut() = control;
         Ok(Self::with(model, element, way, control))
     }
 
     fn way(
-        model: &'m M,
+        model: &Share<'m, M>,
         element: Element,
         table: SchemeTable,
         control: Control,
-    ) -> Result<Way<&'m M>, ModelError> {
+    ) -> Result<Way<Share<'m, M>>, ModelError> {
         let by_rates = cfg!(feature = "sparse") && M::FORM == Form::Lagrangian;
         let has_form = match M::FORM {
             Form::Lagrangian => element.is_collocated(),
@@ -162,7 +180,7 @@ impl<'m, M: Model> Stepper<'m, M> {
                 return Err(ModelError::ElementNotSupported { element });
             }
         } else if has_form && table.view().points() <= 4 * MAX_GROUPS {
-            match Forces::new(model, table.clone(), control) {
+            match Forces::new(model.clone(), table.clone(), control) {
                 Err(ModelError::NotSecondOrder | ModelError::MassNotDiagonal { .. })
                     if by_rates => {}
                 forces => return Ok(Way::Forces(Box::new(forces?))),
@@ -171,7 +189,11 @@ impl<'m, M: Model> Stepper<'m, M> {
             return Err(ModelError::ElementNotSupported { element });
         }
         #[cfg(feature = "sparse")]
-        return Ok(Way::Rates(Box::new(Rates::new(model, table, control)?)));
+        return Ok(Way::Rates(Box::new(Rates::new(
+            model.clone(),
+            table,
+            control,
+        )?)));
         #[cfg(not(feature = "sparse"))]
         Err(ModelError::NotSecondOrder)
     }
@@ -252,7 +274,7 @@ impl<'m, M: Model> Stepper<'m, M> {
     /// # Errors
     /// As [`velocity`](super::velocity).
     pub fn velocity(&mut self, t: f64, state: &FamilyState) -> Result<Vec<f64>, ModelError> {
-        self.legendre.velocity(self.model, t, state)
+        self.legendre.velocity(&*self.model, t, state)
     }
 
     /// What [`reactions`](super::reactions) says, with the ordering of equations kept from one call to the next.
@@ -261,9 +283,9 @@ impl<'m, M: Model> Stepper<'m, M> {
         {
             let instant = match &mut self.instant {
                 Some(instant) => instant,
-                empty => empty.insert(Instant::new(self.model)?),
+                empty => empty.insert(Instant::new(&*self.model)?),
             };
-            instant.reactions(self.model, (t, q), v).ok()
+            instant.reactions(&*self.model, (t, q), v).ok()
         }
         #[cfg(not(feature = "sparse"))]
         {
@@ -287,6 +309,18 @@ impl<'m, M: Model> Stepper<'m, M> {
     /// Changes what iterations may leave from the next step on: [`Control::tolerance`].
     pub fn set_tolerance(&mut self, tolerance: f64) {
         self.way.control_mut().tolerance = tolerance;
+    }
+
+    /// Goes on with another model, of which nothing is known yet; what the steps so far have cost stays counted.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn set_model(&mut self, model: Share<'m, M>) -> Result<(), ModelError> {
+        let mut other = Self::sharing(model, self.element, self.control)?;
+        other.set_tolerance(self.way.control_mut().tolerance);
+        *other.statistics_mut() = *self.statistics();
+        *self = other;
+        Ok(())
     }
 
     /// What the steps so far have cost.
