@@ -131,6 +131,24 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         self
     }
 
+    /// What it sees of a part of the motion, between two nodes: of the first one only in the first part, of the end only in the last.
+    pub(crate) fn part(&self, (from, to): (f64, f64), (is_first, is_last): (bool, bool)) -> Self {
+        let place = |t: f64| (t - from) / (to - from);
+        let is_in = |t: f64| (place(t) > 0.0 || is_first) && place(t) <= 1.0;
+        let of_term = |(factor, term): &(f64, Term<'l, N, L>)| match term {
+            Term::End(_) | Term::Output(_) => is_last.then(|| (*factor, term.clone())),
+            Term::Integral(_) => Some((*factor, term.clone())),
+            Term::Squares(name, times, values) => {
+                let pairs = times.iter().zip(values).filter(|(t, _)| is_in(**t));
+                let (times, values) = pairs.unzip();
+                Some((*factor, Term::Squares(name.clone(), times, values)))
+            }
+        };
+        Self {
+            terms: self.terms.iter().filter_map(of_term).collect(),
+        }
+    }
+
     /// Whether it looks at the motion between the nodes, too.
     pub(crate) fn has_integrals(&self) -> bool {
         let mut terms = self.terms.iter();

@@ -4,12 +4,13 @@ mod family;
 mod view;
 
 use super::follow::Nobody;
+use super::mesh::Mesh;
 use super::sensitive::directions;
 use super::setup::Simulation;
 use super::trail::is_same;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::FixedLength;
-use crate::motion::Motion;
+use crate::motion::{Motion, Node};
 use crate::sensitivity::Sensitive;
 use crate::sensitivity::loss::{Loss, LossGradient, Seen};
 use std::convert::identity;
@@ -33,6 +34,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// constraints it takes as much as [`run_sensitive`](Self::run_sensitive).
     /// Runs with [events](Self::on), and those with steps so long that an element does not end where it did when it is solved once more,
     /// are differentiated forwards.
+    ///
+    /// Nodes and elements of the whole run are in memory, unless [`record_every`](Self::record_every) keeps every k-th node: between two of them the motion is made once more on the way back, so that
+    /// about k + n/k nodes of n are in memory at a time, the least with k = √n. This takes as long as one more run.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -68,86 +72,51 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             let motion = Motion::from_start(&*self.model, span.start, &start);
             return Err(RunError::new(kind, motion));
         }
-        let mut run = self.clone().record_every(1);
+        let mut run = self.clone();
         run.breaks.extend(loss.nodes());
         if !run.events.is_empty() {
-            return run.forwards(start, span, loss);
+            return run.record_every(1).forwards(start, span, loss);
         }
         let motion = run.drive(start, &span, identity, Nobody)?;
-        run.backwards(motion, &span, loss)
-    }
-
-    fn backwards(
-        &self,
-        motion: Motion<N>,
-        span: &Range<f64>,
-        loss: &Loss<'_, N>,
-    ) -> Result<(f64, LossGradient<N>), RunError<N>> {
-        let model = &*self.model;
-        let (value, seen) = match loss.seen(&motion, model) {
-            Ok(seen) => seen,
-            Err(kind) => return Err(RunError::new(kind, motion)),
-        };
-        match self.pulled(&motion, span, &seen) {
-            Ok(Some(gradient)) => Ok((value, self.gathered(motion, gradient))),
+        match run.descended(&motion, &span, loss) {
+            Ok(Some((value, sums))) => Ok((value, run.gathered(motion, sums))),
             // A long step that was cut, or not, where it now is not, or is.
-            Ok(None) => {
-                let start = motion.states()[0].state();
-                self.forwards(start, span.clone(), loss)
-            }
+            Ok(None) => run.record_every(1).forwards(start, span, loss),
             Err(kind) => Err(RunError::new(kind, motion)),
         }
     }
 
-    /// The gradient; `None` where an element does not end where it did.
-    fn pulled(
+    /// The loss and its gradient, backwards from node to recorded node; `None` where an element does not end where it did.
+    fn descended(
         &self,
         motion: &Motion<N>,
         span: &Range<f64>,
-        seen: &Seen,
-    ) -> Result<Option<Sums>, RunErrorKind> {
+        loss: &Loss<'_, N>,
+    ) -> Result<Option<(f64, Sums)>, RunErrorKind> {
         let mesh = self.mesh(span)?;
-        let stepper = Stepper::sharing(self.model.clone(), self.chosen_element(), self.control);
-        let mut stepper = stepper.map_err(RunErrorKind::Element)?;
-        let parameters = self.all_parameters();
-        let mut view = View::new(&*self.model, seen, &motion.last().v);
-        let mut pull = Pull::new(&*self.model);
-        let mut lambda = vec![0.0; 2 * N];
-        let mut by_parameters = vec![0.0; parameters.len()];
-        let all: Vec<_> = mesh.elements().collect();
-        for (element, &(t, next, h)) in all.iter().enumerate().rev() {
-            look(&view, &mut pull, (motion, element + 1), &mut lambda)?;
-            let mut state = motion.states()[element].state();
-            let impulses = mesh.impulses_in(t, next, element + 1 == all.len());
-            let step = stepper.advance(mesh.begin(t, h), h, &mut state, impulses);
-            step.map_err(|source| RunErrorKind::Solve {
-                element,
-                time: t,
-                step: h,
-                source,
-            })?;
-            let inside = view.of_element(&mut pull, &motion.elements()[element])?;
-            let pieces = stepper.dense(t, next).pieces().len();
-            let is_cut_alike = inside.is_empty() || inside.len() == pieces;
-            let after = motion.states()[element + 1].state();
-            if !(is_same::<N, FixedLength>(&state, &after) && is_cut_alike) {
+        let elements: Vec<_> = mesh.elements().collect();
+        let mut descent = Descent::new(self, (&mesh, &elements))?;
+        if self.record_every == 1 || elements.is_empty() {
+            let (value, seen) = loss.seen(motion, &*self.model)?;
+            let whole = descent.pass(motion, 0, &seen)?;
+            return Ok(whole.then(|| (value, descent.into_sums())));
+        }
+        let mut sum = 0.0;
+        let segments = elements.len().div_ceil(self.record_every);
+        for segment in (0..segments).rev() {
+            let first = segment * self.record_every;
+            let [before, after] = [segment, segment + 1].map(|node| &motion.states()[node]);
+            let part = loss.part((before.t, after.t), (segment == 0, segment + 1 == segments));
+            let Some(again) = descent.repeat(before, first, after)? else {
+                return Ok(None);
+            };
+            let (value, seen) = part.seen(&again, &*self.model)?;
+            sum += value;
+            if !descent.pass(&again, first, &seen)? {
                 return Ok(None);
             }
-            let adjoint =
-                stepper.adjoint_inside(&parameters, &inside, &mut lambda, &mut by_parameters);
-            adjoint.map_err(|source| RunErrorKind::Transition {
-                element,
-                time: t,
-                step: h,
-                source,
-            })?;
         }
-        look(&view, &mut pull, (motion, 0), &mut lambda)?;
-        add_explicit(&pull, &mut by_parameters);
-        Ok(Some(Sums {
-            by_start: lambda,
-            by_parameters,
-        }))
+        Ok(Some((sum, descent.into_sums())))
     }
 
     /// All parameters as directions, to be taken at once where that can be.
@@ -213,6 +182,122 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let names =
             (0..self.model.parameters()).map(|at| self.model.parameter_name(at).to_string());
         LossGradient::new(motion, names.collect(), sums.by_parameters, &sums.by_start)
+    }
+}
+
+/// A loss on its way back along the elements of a run.
+struct Descent<'a, 'm, M, const N: usize> {
+    model: &'a M,
+    mesh: &'a Mesh<N>,
+    /// Its elements: nodes and lengths.
+    elements: &'a [(f64, f64, f64)],
+    stepper: Stepper<'m, M, N>,
+    parameters: Vec<Direction>,
+    pull: Pull<'a, M, N>,
+    lambda: Vec<f64>,
+    by_parameters: Vec<f64>,
+}
+
+impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
+    fn new(
+        run: &'a Simulation<'m, M, N>,
+        (mesh, elements): (&'a Mesh<N>, &'a [(f64, f64, f64)]),
+    ) -> Result<Self, RunErrorKind> {
+        let stepper = Stepper::sharing(run.model.clone(), run.chosen_element(), run.control);
+        let parameters = run.all_parameters();
+        Ok(Self {
+            model: &*run.model,
+            mesh,
+            elements,
+            stepper: stepper.map_err(RunErrorKind::Element)?,
+            by_parameters: vec![0.0; parameters.len()],
+            parameters,
+            pull: Pull::new(&*run.model),
+            lambda: vec![0.0; 2 * N],
+        })
+    }
+
+    /// Solves an element from its start.
+    fn solve(&mut self, element: usize, state: &mut State<N>) -> Result<(), RunErrorKind> {
+        let (time, next, step) = self.elements[element];
+        let is_last = element + 1 == self.elements.len();
+        let impulses = self.mesh.impulses_in(time, next, is_last);
+        let begin = self.mesh.begin(time, step);
+        let solved = self.stepper.advance(begin, step, state, impulses);
+        solved.map_err(|source| RunErrorKind::Solve {
+            element,
+            time,
+            step,
+            source,
+        })
+    }
+
+    /// The motion between two recorded nodes once more, with all nodes; none where it ends elsewhere.
+    fn repeat(
+        &mut self,
+        before: &Node<N>,
+        first: usize,
+        after: &Node<N>,
+    ) -> Result<Option<Motion<N>>, RunErrorKind> {
+        let mut state = before.state();
+        let mut motion = Motion::from_start(self.model, before.t, &state);
+        let mut element = first;
+        while motion.last().t != after.t && element < self.elements.len() {
+            self.solve(element, &mut state)?;
+            let (t, next, _) = self.elements[element];
+            motion.keep_element(self.stepper.dense(t, next));
+            motion.record(self.model, next, &state);
+            element += 1;
+        }
+        let is_same = is_same::<N, FixedLength>(&state, &after.state());
+        Ok(is_same.then_some(motion))
+    }
+
+    /// Goes back over a motion whose first element has this number; false where an element does not end where it did.
+    fn pass(
+        &mut self,
+        motion: &Motion<N>,
+        first: usize,
+        seen: &Seen,
+    ) -> Result<bool, RunErrorKind> {
+        let mut view = View::new(self.model, seen, &motion.last().v);
+        for (number, inner) in motion.elements().iter().enumerate().rev() {
+            look(
+                &view,
+                &mut self.pull,
+                (motion, number + 1),
+                &mut self.lambda,
+            )?;
+            let (element, mut state) = (first + number, motion.states()[number].state());
+            self.solve(element, &mut state)?;
+            let inside = view.of_element(&mut self.pull, inner)?;
+            let (time, next, step) = self.elements[element];
+            let pieces = self.stepper.dense(time, next).pieces().len();
+            let is_cut_alike = inside.is_empty() || inside.len() == pieces;
+            let after = motion.states()[number + 1].state();
+            if !(is_same::<N, FixedLength>(&state, &after) && is_cut_alike) {
+                return Ok(false);
+            }
+            let (lambda, by_parameters) = (&mut self.lambda, &mut self.by_parameters);
+            let parameters = &self.parameters;
+            let adjoint = (self.stepper).adjoint_inside(parameters, &inside, lambda, by_parameters);
+            adjoint.map_err(|source| RunErrorKind::Transition {
+                element,
+                time,
+                step,
+                source,
+            })?;
+        }
+        look(&view, &mut self.pull, (motion, 0), &mut self.lambda)?;
+        Ok(true)
+    }
+
+    fn into_sums(mut self) -> Sums {
+        add_explicit(&self.pull, &mut self.by_parameters);
+        Sums {
+            by_start: self.lambda,
+            by_parameters: self.by_parameters,
+        }
     }
 }
 

@@ -257,3 +257,100 @@ fn losses_that_are_none_are_told() {
         (None, 6)
     );
 }
+
+/// The gradient of a run that keeps some nodes, as one row.
+fn gradient_of<M: Model<N> + Sync, const N: usize>(
+    simulation: &Simulation<'_, M, N>,
+    start: State<N>,
+    span: std::ops::Range<f64>,
+    loss: &Loss<'_, N>,
+) -> Vec<f64> {
+    let (value, gradient) = simulation.gradient(start, span, loss).expect("a gradient");
+    let by_start = gradient.by_start();
+    let numbers = gradient.by_parameters().iter();
+    let numbers = numbers
+        .chain(&by_start.q)
+        .chain(&by_start.p)
+        .chain([&value]);
+    numbers.copied().collect()
+}
+
+/// Nodes that are not kept are made again on the way back.
+#[test]
+fn gradients_of_runs_that_keep_some_nodes_are_those_of_runs_that_keep_all() {
+    #[track_caller]
+    fn compare<M: Model<N> + Sync, const N: usize>(
+        simulation: &Simulation<'_, M, N>,
+        start: State<N>,
+        span: std::ops::Range<f64>,
+        output: &str,
+    ) {
+        // At the start, within, twice at the same time, and at the end.
+        let length = span.end - span.start;
+        let times = [0.0, 0.31, 0.5, 0.5, 1.0].map(|part| span.start + part * length);
+        let loss = Loss::at_end(|node: &Node<N>| node.q[0].sin() + node.p[N - 1] * node.v[0])
+            .and(Loss::squares(output, times, [0.2, -0.1, 0.4, 0.1, 0.3]).times(0.7))
+            .and(Loss::output_at_end(output))
+            .and(Loss::integral(output));
+        let all = gradient_of(simulation, start, span.clone(), &loss);
+        let size = all.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+        for every in [2, 7, usize::MAX] {
+            let some = simulation.clone().record_every(every);
+            let some = gradient_of(&some, start, span.clone(), &loss);
+            for (found, expected) in some.iter().zip(&all) {
+                assert!(
+                    (found - expected).abs() < 1e-12 * size,
+                    "every {every}: {found} instead of {expected}"
+                );
+            }
+        }
+    }
+    let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
+    for element in [Mixed::<4>.into(), Element::primal(3), Radau::<3>.into()] {
+        let simulation = Simulation::new(&PENDULUMS).element(element).step(0.05);
+        compare(&simulation, start, 0.0..1.0, "speed");
+        let simulation = simulation.impulse(0.42, [0.1, -0.2]).break_at(0.77);
+        compare(&simulation, start, 0.0..1.0, "height");
+    }
+    let simulation = Simulation::new(&PENDULUMS).step(0.05);
+    compare(&simulation, start, 1.0..0.0, "speed");
+    compare(&simulation, start, 0.5..0.5, "speed");
+    compare(&simulation.solver(Solve::Newton), start, 0.0..1.0, "speed");
+    let simulation = Simulation::new(&PENDULUMS).step(0.9).element(Mixed::<3>);
+    compare(&simulation, start, 0.0..3.0, "speed");
+    let rod = Rod {
+        m: 1.3,
+        g: 9.81,
+        c: 0.2,
+        l: 1.0,
+    };
+    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
+    compare(&Simulation::new(&rod).step(0.02), start, 0.0..1.0, "height");
+    let ball = Ball {
+        m: 1.0,
+        g: 9.81,
+        floor: 0.0,
+    };
+    compare(
+        &bouncing(&ball),
+        ball.state([0.6], [0.0]),
+        0.0..1.0,
+        "velocity",
+    );
+}
+
+/// With √n of n nodes memory is one of √n.
+#[test]
+fn nodes_that_are_not_kept_take_no_memory() {
+    let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
+    let loss = Loss::output_at_end("height");
+    let most = |every: usize| {
+        let simulation = Simulation::new(&PENDULUMS).step(0.01).record_every(every);
+        let run = || {
+            gradient_of(&simulation, start, 0.0..25.0, &loss);
+        };
+        allocation_counter::measure(run).bytes_max
+    };
+    let (all, some) = (most(1), most(50));
+    assert!(10 * some < all, "{some} bytes beside {all}");
+}
