@@ -1,6 +1,7 @@
 //! Derivatives of motions by parameters and starts, against differences of runs.
 
 mod backwards;
+mod dual_runs;
 mod events;
 mod forwards;
 mod inside;
