@@ -3,18 +3,15 @@
 pub use tfe_runtime::length::{Declared, FixedLength, RunTimeLength};
 
 use std::fmt::{Debug, Display};
-use std::ops::Deref;
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::step::{DenseElement, Impulse, Stepper, Suspended};
-use tfe_runtime::{CoordinateName, Share, State};
+use tfe_runtime::{CoordinateName, State};
 
 /// What runs and motions consist of: [`FixedLength`] keeps numbers in arrays, [`RunTimeLength`] in vectors. There is no third.
 ///
 /// A [`Motion<N>`](crate::Motion) is one of `FixedLength`; of a model of run-time length it is a `Motion<0, RunTimeLength>`, or
 /// [`family::Motion`](crate::family::Motion).
 pub trait Length<const N: usize>: Copy + Debug + PartialEq + 'static {
-    /// How a run holds its model: borrowed, or also one of its own.
-    type Held<'m, M: 'm>: Clone + Deref<Target = M> + From<&'m M>;
     /// Coordinates, momenta or velocities.
     type Vector: Clone + Debug + PartialEq + AsRef<[f64]>;
     /// A point of phase space.
@@ -51,7 +48,6 @@ pub trait Length<const N: usize>: Copy + Debug + PartialEq + 'static {
 }
 
 impl<const N: usize> Length<N> for FixedLength {
-    type Held<'m, M: 'm> = Share<'m, M>;
     type Vector = [f64; N];
     type State = State<N>;
     type Polynomial = DenseElement<N>;
@@ -74,7 +70,6 @@ impl<const N: usize> Length<N> for FixedLength {
 }
 
 impl Length<0> for RunTimeLength {
-    type Held<'m, M: 'm> = Share<'m, M>;
     type Vector = Vec<f64>;
     type State = FamilyState;
     type Polynomial = family::DenseElement;

@@ -301,14 +301,23 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.nodes.last().expect("a motion is made with its start")
     }
 
+    /// −1 of a motion backwards in time, else 1.
+    pub(crate) fn direction(&self) -> f64 {
+        match self.last().t < self.nodes[0].t {
+            true => -1.0,
+            false => 1.0,
+        }
+    }
+
+    /// How many recorded nodes come before a time.
+    pub(crate) fn nodes_before(&self, time: f64) -> usize {
+        let direction = self.direction();
+        (self.nodes).partition_point(|node| direction * node.t < direction * time)
+    }
+
     /// The place of the recorded node that is nearest to a time.
     pub(crate) fn nearest(&self, time: f64) -> usize {
-        let direction = if self.last().t < self.nodes[0].t {
-            -1.0
-        } else {
-            1.0
-        };
-        let after = (self.nodes).partition_point(|node| direction * node.t < direction * time);
+        let after = self.nodes_before(time);
         let before = after.saturating_sub(1);
         let far = |node: usize| {
             self.nodes
@@ -356,13 +365,11 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         if !((start.min(end)..=start.max(end)).contains(&time)) {
             return Err(AtError::Outside { time, start, end });
         }
-        let direction = if end < start { -1.0 } else { 1.0 };
-        let node = self
-            .nodes
-            .partition_point(|node| direction * node.t < direction * time);
-        if let Some(node) = self.nodes.get(node).filter(|node| node.t == time) {
+        let node = self.nodes.get(self.nodes_before(time));
+        if let Some(node) = node.filter(|node| node.t == time) {
             return Ok(node.clone());
         }
+        let direction = self.direction();
         let after = self
             .elements
             .partition_point(|element| direction * element.start() <= direction * time);

@@ -167,18 +167,14 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
     /// The derivatives of (p, q) and of velocities at a time of the motion, those before it at an event.
     fn between(&self, time: f64) -> Result<Between, AtError> {
         self.motion.at(time)?;
-        let states = self.motion.states();
-        let direction = match self.motion.last().t < states[0].t {
-            true => -1.0,
-            false => 1.0,
-        };
-        let number = states.partition_point(|node| direction * node.t < direction * time);
-        if states.get(number).is_some_and(|node| node.t == time) {
+        let number = self.motion.nodes_before(time);
+        if (self.motion.states().get(number)).is_some_and(|node| node.t == time) {
             let Slopes {
                 state, velocity, ..
             } = self.nodes[number].clone();
             return Ok(Between { state, velocity });
         }
+        let direction = self.motion.direction();
         let begun = |inside: &Inside| direction * inside.times.0 <= direction * time;
         let after = self.inside.partition_point(begun);
         let inside = after.checked_sub(1).map(|at| &self.inside[at]);

@@ -18,6 +18,7 @@ use remodel::Remodel;
 use search::Course;
 use std::cell::RefCell;
 use std::fmt;
+use tfe_runtime::Share;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::Impulse;
@@ -41,8 +42,8 @@ type KeepOff<'m, M, const N: usize, L> =
 
 /// Looks for the events of a run.
 pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
-    model: L::Held<'m, M>,
-    remodel: Option<Remodel<'m, M, N, L>>,
+    model: Share<'m, M>,
+    remodel: Option<Remodel<'m, M>>,
     look: Look<'m, M, N, L>,
     keep_off: KeepOff<'m, M, N, L>,
     watched: Vec<Watched<'m, N, L>>,
@@ -185,7 +186,7 @@ where
     const SOON: f64 = 1e-6;
 
     /// Goes on with another model.
-    pub(super) fn set_model(&mut self, model: L::Held<'m, M>) {
+    pub(super) fn set_model(&mut self, model: Share<'m, M>) {
         (self.model, self.probe) = (model, None);
         self.clear.forget();
     }

@@ -5,6 +5,7 @@ use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::motion::Node;
 use std::ops::ControlFlow;
+use tfe_runtime::Share;
 use tfe_runtime::transition::TransitionError;
 
 /// An element that a run has passed.
@@ -43,7 +44,7 @@ pub trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     fn acted(&mut self) {}
 
     /// Parameters that were set at that event: the model with them.
-    fn set(&mut self, _model: &L::Held<'m, M>) -> Result<(), RunErrorKind> {
+    fn set(&mut self, _model: &Share<'m, M>) -> Result<(), RunErrorKind> {
         Ok(())
     }
 
@@ -92,7 +93,7 @@ where
         (**self).acted();
     }
 
-    fn set(&mut self, model: &L::Held<'m, M>) -> Result<(), RunErrorKind> {
+    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
         (**self).set(model)
     }
 

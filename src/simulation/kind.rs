@@ -11,6 +11,7 @@ use crate::evaluate::Evaluate;
 use crate::length::Length;
 use crate::motion::{Motion, Node, Warning};
 use std::ops::Range;
+use tfe_runtime::Share;
 use tfe_runtime::constrained::Trail;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
@@ -102,7 +103,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// # Errors
     /// Where the model cannot be stepped with the element.
     fn stepper<'m>(
-        model: L::Held<'m, Self>,
+        model: Share<'m, Self>,
         chosen: Chosen,
     ) -> Result<L::Stepper<'m, Self>, RunErrorKind>
     where
@@ -113,7 +114,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// # Errors
     /// As [`stepper`](Self::stepper).
     fn resumed<'m>(
-        model: L::Held<'m, Self>,
+        model: Share<'m, Self>,
         chosen: Chosen,
         suspended: L::Suspended,
     ) -> Result<L::Stepper<'m, Self>, RunErrorKind>
@@ -146,7 +147,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// As [`stepper`](Self::stepper).
     fn exchange<'m>(
         stepper: &mut L::Stepper<'m, Self>,
-        model: L::Held<'m, Self>,
+        model: Share<'m, Self>,
     ) -> Result<(), RunErrorKind>
     where
         Self: 'm;
@@ -213,7 +214,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     fn check_restart(&self, t: f64, h: f64, state: &L::State) -> Result<(), RunErrorKind>;
 
     /// What an element is examined with a second time, if that is done.
-    fn resolution<'m>(again: Again<'m, Self, N, L>) -> Option<Resolution<'m, Self, N>>
+    fn resolution<'m>(again: Again<'m, Self>) -> Option<Resolution<'m, Self, N>>
     where
         Self: 'm;
 
@@ -228,7 +229,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     fn doubt(resolution: &Option<Resolution<'_, Self, N>>, last: &L::State) -> Option<Warning>;
 
     /// Goes on with other parameters.
-    fn exchange_in<'m>(resolution: &mut Option<Resolution<'m, Self, N>>, model: L::Held<'m, Self>)
+    fn exchange_in<'m>(resolution: &mut Option<Resolution<'m, Self, N>>, model: Share<'m, Self>)
     where
         Self: 'm;
 
@@ -274,6 +275,9 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
 
     /// The names of the parameters that can be set.
     fn parameter_names(&self) -> Vec<CoordinateName>;
+
+    /// The same model with another value of a parameter, if one can be made.
+    fn with_value(&self, number: usize, value: f64) -> Option<Self>;
 
     /// The value of a parameter.
     fn parameter_value(&self, number: usize) -> f64;

@@ -8,6 +8,7 @@ use super::kind::Simulated;
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use std::ops::ControlFlow;
+use tfe_runtime::Share;
 use tfe_runtime::step::Impulse;
 
 /// An element of the grid.
@@ -62,7 +63,7 @@ pub(super) trait Observe<'m, M: 'm, const N: usize, L: Length<N> = FixedLength>:
     );
 
     /// Parameters, by their numbers, that were set at the time of the node that is to come.
-    fn changed(&mut self, _model: &L::Held<'m, M>, _values: &[(usize, f64)]) {}
+    fn changed(&mut self, _model: &Share<'m, M>, _values: &[(usize, f64)]) {}
 }
 
 /// How an element was left.
@@ -92,7 +93,7 @@ pub(super) struct Broken<const N: usize, L: Length<N> = FixedLength> {
 /// Passes elements, with a look at events.
 pub(super) struct Pieces<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// As events have left it.
-    pub(super) model: L::Held<'m, M>,
+    pub(super) model: Share<'m, M>,
     pub(super) events: Events<'m, M, N, L>,
     /// Of an element that was looked into and is not kept.
     spare: Option<L::Polynomial>,
@@ -105,7 +106,7 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    pub(super) fn new(model: L::Held<'m, M>, events: Events<'m, M, N, L>) -> Self {
+    pub(super) fn new(model: Share<'m, M>, events: Events<'m, M, N, L>) -> Self {
         Self {
             model,
             events,
@@ -265,7 +266,7 @@ where
         &mut self,
         stepper: &mut L::Stepper<'m, M>,
         observer: &mut impl Observe<'m, M, N, L>,
-        (model, values): Changed<'m, M, N, L>,
+        (model, values): Changed<'m, M>,
     ) -> Result<(), RunErrorKind> {
         observer.set(&model)?;
         M::exchange(stepper, model.clone())?;

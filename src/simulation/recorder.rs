@@ -11,6 +11,7 @@ use crate::error::RunErrorKind;
 use crate::length::Length;
 use crate::motion::{Motion, Node};
 use std::ops::ControlFlow;
+use tfe_runtime::Share;
 use tfe_runtime::transition::TransitionError;
 
 /// Keeps what a run passes, and shows it to a follower.
@@ -142,7 +143,7 @@ where
         self.follower.acted();
     }
 
-    fn set(&mut self, model: &L::Held<'m, M>) -> Result<(), RunErrorKind> {
+    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
         self.follower.set(model)
     }
 
@@ -204,7 +205,7 @@ where
         self.follower.recorded(self.motion.last());
     }
 
-    fn changed(&mut self, model: &L::Held<'m, M>, values: &[(usize, f64)]) {
+    fn changed(&mut self, model: &Share<'m, M>, values: &[(usize, f64)]) {
         M::exchange_in(&mut self.resolution, model.clone());
         let names = model.parameter_names();
         self.motion.set_parameters(&names, values);

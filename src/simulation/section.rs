@@ -16,6 +16,7 @@ use std::convert::Infallible;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
+use tfe_runtime::Share;
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Model, family};
 
@@ -120,7 +121,7 @@ where
     L: Length<N>,
 {
     chosen: (tfe_runtime::Element, tfe_runtime::step::Control),
-    model: L::Held<'m, M>,
+    model: Share<'m, M>,
     way: Way<'m, M, N, L>,
     crossings: Crossings<'m, M, N, L>,
 }
@@ -273,7 +274,7 @@ where
         }
     }
 
-    fn set(&mut self, model: &L::Held<'m, M>) -> Result<(), RunErrorKind> {
+    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
         match &mut self.tangents {
             Some(tangents) => tangents.set(model),
             None => Ok(()),

@@ -6,6 +6,7 @@ use super::mesh::Grid;
 use super::watch::resolution::Again;
 use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
+use tfe_runtime::Share;
 use tfe_runtime::step::{Control, Impulse};
 use tfe_runtime::{Element, Mixed, Model, Solve};
 
@@ -63,7 +64,7 @@ use tfe_runtime::{Element, Mixed, Model, Solve};
 /// is in `docs/calls.md`.
 #[derive(Debug)]
 pub struct Simulation<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
-    pub(super) model: L::Held<'m, M>,
+    pub(super) model: Share<'m, M>,
     /// The default where it is not chosen.
     pub(super) element: Option<Element>,
     pub(super) step: Option<f64>,
@@ -254,7 +255,7 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
     }
 
     /// With what elements are looked at a second time.
-    pub(super) fn again(&self) -> Again<'m, M, N, L> {
+    pub(super) fn again(&self) -> Again<'m, M> {
         let Chosen {
             element,
             control,

@@ -13,6 +13,7 @@ use crate::motion::Warning;
 use crate::motion::{Event, Node};
 use std::collections::VecDeque;
 use std::fmt;
+use tfe_runtime::Share;
 use tfe_runtime::Statistics;
 
 /// The endless sequence of states of [`Simulation::steps`](crate::Simulation::steps).
@@ -38,7 +39,7 @@ impl<M, const N: usize, L: Length<N>> fmt::Debug for Steps<'_, M, N, L> {
 /// A stepper with its state on an endless course.
 pub(super) struct Way<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// As it was at first.
-    model: L::Held<'m, M>,
+    model: Share<'m, M>,
     pub(super) course: Course<L::Stepper<'m, M>>,
     pub(super) state: L::State,
     impulses: Vec<L::Impulse>,
@@ -64,7 +65,7 @@ where
     L: Length<N>,
 {
     pub(super) fn new(
-        model: L::Held<'m, M>,
+        model: Share<'m, M>,
         beginning: Beginning<'m, M, N, L>,
         start: L::State,
         impulses: Vec<L::Impulse>,
@@ -137,11 +138,11 @@ where
     L: Length<N>,
 {
     pub(super) fn new(
-        model: L::Held<'m, M>,
+        model: Share<'m, M>,
         beginning: Beginning<'m, M, N, L>,
         (t0, start): (f64, L::State),
         impulses: Vec<L::Impulse>,
-        again: Again<'m, M, N, L>,
+        again: Again<'m, M>,
     ) -> Self {
         let mut watch = Watch::new(again.element);
         let (q, _) = L::parts(&start);
@@ -340,7 +341,7 @@ where
         }
     }
 
-    fn changed(&mut self, model: &L::Held<'m, M>, _: &[(usize, f64)]) {
+    fn changed(&mut self, model: &Share<'m, M>, _: &[(usize, f64)]) {
         M::exchange_in(self.resolution, model.clone());
     }
 

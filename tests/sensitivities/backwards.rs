@@ -99,20 +99,9 @@ fn gradients_backwards_are_derivatives_forwards() {
     // Steps that are cut into pieces.
     let simulation = Simulation::new(&PENDULUMS).step(0.9).element(Mixed::<3>);
     check_gradient(&simulation, start, "speed");
-    let driven = Driven {
-        m: 1.2,
-        k: 1.0,
-        b: 0.8,
-        a: 0.3,
-        omega: 1.7,
-        c: 0.05,
-    };
-    let start = State {
-        q: [0.2, 0.3],
-        p: [0.1, -0.2],
-    };
+    let start = PHASE;
     for element in [Mixed::<4>.into(), Element::primal(3)] {
-        let simulation = Simulation::new(&driven).element(element).step(0.1);
+        let simulation = Simulation::new(&DRIVEN).element(element).step(0.1);
         check_gradient(&simulation, start, "moment");
     }
     let ball = Ball {
@@ -122,14 +111,8 @@ fn gradients_backwards_are_derivatives_forwards() {
     };
     let start = ball.state([0.6], [0.0]);
     check_gradient(&bouncing(&ball), start, "velocity");
-    let rod = Rod {
-        m: 1.3,
-        g: 9.81,
-        c: 0.2,
-        l: 1.0,
-    };
-    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
-    check_gradient(&Simulation::new(&rod).step(0.02), start, "height");
+    let start = ROD.state([0.6, -0.8], [0.4, 0.3]);
+    check_gradient(&Simulation::new(&ROD).step(0.02), start, "height");
 }
 
 /// A function of slices, of models of any length, is that of nodes.
@@ -258,23 +241,6 @@ fn losses_that_are_none_are_told() {
     );
 }
 
-/// The gradient of a run that keeps some nodes, as one row.
-fn gradient_of<M: Model<N> + Sync, const N: usize>(
-    simulation: &Simulation<'_, M, N>,
-    start: State<N>,
-    span: std::ops::Range<f64>,
-    loss: &Loss<'_, N>,
-) -> Vec<f64> {
-    let (value, gradient) = simulation.gradient(start, span, loss).expect("a gradient");
-    let by_start = gradient.by_start();
-    let numbers = gradient.by_parameters().iter();
-    let numbers = numbers
-        .chain(&by_start.q)
-        .chain(&by_start.p)
-        .chain([&value]);
-    numbers.copied().collect()
-}
-
 /// Nodes that are not kept are made again on the way back.
 #[test]
 fn gradients_of_runs_that_keep_some_nodes_are_those_of_runs_that_keep_all() {
@@ -293,16 +259,10 @@ fn gradients_of_runs_that_keep_some_nodes_are_those_of_runs_that_keep_all() {
             .and(Loss::output_at_end(output))
             .and(Loss::integral(output));
         let all = gradient_of(simulation, start, span.clone(), &loss);
-        let size = all.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         for every in [2, 7, usize::MAX] {
             let some = simulation.clone().record_every(every);
             let some = gradient_of(&some, start, span.clone(), &loss);
-            for (found, expected) in some.iter().zip(&all) {
-                assert!(
-                    (found - expected).abs() < 1e-12 * size,
-                    "every {every}: {found} instead of {expected}"
-                );
-            }
+            compare_rows(&some, &all, &format!("every {every}"));
         }
     }
     let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
@@ -318,14 +278,8 @@ fn gradients_of_runs_that_keep_some_nodes_are_those_of_runs_that_keep_all() {
     compare(&simulation.solver(Solve::Newton), start, 0.0..1.0, "speed");
     let simulation = Simulation::new(&PENDULUMS).step(0.9).element(Mixed::<3>);
     compare(&simulation, start, 0.0..3.0, "speed");
-    let rod = Rod {
-        m: 1.3,
-        g: 9.81,
-        c: 0.2,
-        l: 1.0,
-    };
-    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
-    compare(&Simulation::new(&rod).step(0.02), start, 0.0..1.0, "height");
+    let start = ROD.state([0.6, -0.8], [0.4, 0.3]);
+    compare(&Simulation::new(&ROD).step(0.02), start, 0.0..1.0, "height");
     let ball = Ball {
         m: 1.0,
         g: 9.81,

@@ -212,14 +212,6 @@ struct Bent {
 fn derivatives_are_those_of_runs_in_dual_numbers() {
     // Roundings of ten steps of both, relative to the largest derivative.
     const ROUNDING: f64 = 1e-12;
-    let driven = Driven {
-        m: 1.2,
-        k: 1.0,
-        b: 0.8,
-        a: 0.3,
-        omega: 1.7,
-        c: 0.05,
-    };
     let charged = Charged {
         m: 1.3,
         mu: 1.1,
@@ -260,14 +252,10 @@ fn derivatives_are_those_of_runs_in_dual_numbers() {
     let span = (10, 0.05);
     for element in [Element::mixed(3), Element::mixed(6)] {
         let starts = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
-        let phase = State {
-            q: [0.2, 0.3],
-            p: [0.1, -0.2],
-        };
         let swaying = row.state(std::array::from_fn(|a| 0.5 * swing(3 * a)), [0.1; 8]);
         let found = [
             ("pendulums", off(&PENDULUMS, starts, element, span)),
-            ("driven", off(&driven, phase, element, span)),
+            ("driven", off(&DRIVEN, PHASE, element, span)),
             (
                 "charged",
                 off(
@@ -291,7 +279,7 @@ fn derivatives_are_those_of_runs_in_dual_numbers() {
                     span,
                 ),
             ),
-            ("bent", off(&bent, phase, element, span)),
+            ("bent", off(&bent, PHASE, element, span)),
             ("ball", off(&ball, ball.state([1.0], [4.0]), element, span)),
         ];
         for (name, off) in found {

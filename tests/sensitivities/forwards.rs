@@ -44,21 +44,10 @@ fn derivatives_are_those_of_the_numbers_of_a_run() {
 
 #[test]
 fn hamiltonians_have_derivatives() {
-    let driven = Driven {
-        m: 1.2,
-        k: 1.0,
-        b: 0.8,
-        a: 0.3,
-        omega: 1.7,
-        c: 0.05,
-    };
-    let start = State {
-        q: [0.2, 0.3],
-        p: [0.1, -0.2],
-    };
+    let start = PHASE;
     for element in [Mixed::<4>.into(), Element::primal(3), Radau::<4>.into()] {
         let s = check::<_, 2, 4>(
-            &driven,
+            &DRIVEN,
             start,
             3.0,
             1e-11,
@@ -73,10 +62,10 @@ fn hamiltonians_have_derivatives() {
         let found = s.by("b").output("moment").expect("declared");
         assert!((found[30] - expected).abs() < 1e-14);
         // v = p/m
-        let expected = last.p[0] / driven.m;
+        let expected = last.p[0] / DRIVEN.m;
         assert!((last.v[0] - expected).abs() < 1e-14);
         let by_mass = s.by("m").last();
-        let expected = by_mass.p[0] / driven.m - state.p[0] / driven.m.powi(2);
+        let expected = by_mass.p[0] / DRIVEN.m - state.p[0] / DRIVEN.m.powi(2);
         assert!((by_mass.v[0] - expected).abs() < 1e-14);
     }
 }
@@ -131,24 +120,18 @@ fn velocities_and_outputs_move_with_the_state() {
 /// Parameters that are not in constraints: a run from another start is as good, so that differences know the derivative.
 #[test]
 fn constrained_motions_have_derivatives() {
-    let rod = Rod {
-        m: 1.3,
-        g: 9.81,
-        c: 0.2,
-        l: 1.0,
-    };
-    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
-    let simulation = Simulation::new(&rod).step(0.02);
+    let start = ROD.state([0.6, -0.8], [0.4, 0.3]);
+    let simulation = Simulation::new(&ROD).step(0.02);
     let s = simulation
         .run_sensitive(start, 0.0..1.0)
         .expect("derivatives");
     for (index, name) in ["m", "g", "c"].into_iter().enumerate() {
         let expected = difference(
             |value| {
-                let other = rod.with_parameter(index, value).expect("numbers");
+                let other = ROD.with_parameter(index, value).expect("numbers");
                 end::<_, 2, 4>(&Simulation::new(&other).step(0.02), start, 1.0)
             },
-            rod.parameter(index),
+            ROD.parameter(index),
         );
         let last = s.by(name).last();
         for (found, expected) in [last.q[0], last.q[1], last.p[0], last.p[1]]
@@ -208,12 +191,6 @@ fn parameters_of_constraints_count() {
             p: [1.3 * l * 0.7 * cos, 1.3 * l * 0.7 * sin],
         }
     }
-    let rod = Rod {
-        m: 1.3,
-        g: 9.81,
-        c: 0.2,
-        l: 1.0,
-    };
     let twice = Twice {
         m: 1.3,
         g: 9.81,
@@ -222,12 +199,12 @@ fn parameters_of_constraints_count() {
     let start = at(1.0);
     let both = [
         (
-            Simulation::new(&rod)
+            Simulation::new(&ROD)
                 .step(0.02)
                 .run_sensitive(start, 0.0..1.0),
             difference(
                 |l| {
-                    let other = Rod { l, ..rod };
+                    let other = Rod { l, ..ROD };
                     end::<_, 2, 4>(&Simulation::new(&other).step(0.02), at(l), 1.0)
                 },
                 1.0,

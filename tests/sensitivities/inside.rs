@@ -200,21 +200,10 @@ fn of_steps_that_are_cut() {
 
 #[test]
 fn of_hamiltonians() {
-    let driven = Driven {
-        m: 1.2,
-        k: 1.0,
-        b: 0.8,
-        a: 0.3,
-        omega: 1.7,
-        c: 0.05,
-    };
-    let start = State {
-        q: [0.2, 0.3],
-        p: [0.1, -0.2],
-    };
+    let start = PHASE;
     for element in [Mixed::<4>.into(), Element::primal(3)] {
         check_inside(
-            &driven,
+            &DRIVEN,
             start,
             |model| Simulation::new(model).element(element).step(0.1),
             "moment",
@@ -225,27 +214,21 @@ fn of_hamiltonians() {
 
 #[test]
 fn of_constrained_motions() {
-    let rod = Rod {
-        m: 1.3,
-        g: 9.81,
-        c: 0.2,
-        l: 1.0,
-    };
     // Starts beside the constraint are none: neither moves the length, nor the start.
-    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
-    let s = Simulation::new(&rod).step(0.02);
+    let start = ROD.state([0.6, -0.8], [0.4, 0.3]);
+    let s = Simulation::new(&ROD).step(0.02);
     let s = s.run_sensitive(start, 0.0..SPAN).expect("derivatives");
     let loss = Loss::integral("height");
-    let (_, gradient) = Simulation::new(&rod)
+    let (_, gradient) = Simulation::new(&ROD)
         .step(0.02)
         .gradient(start, 0.0..SPAN, &loss)
         .expect("a gradient");
     for (index, name) in ["m", "g", "c"].into_iter().enumerate() {
         let of = |value| {
-            let other = rod.with_parameter(index, value).expect("numbers alone");
+            let other = ROD.with_parameter(index, value).expect("numbers alone");
             seen(&Simulation::new(&other).step(0.02), &other, start, "height")
         };
-        let (at, integral) = differences::<2>(of, rod.parameter(index));
+        let (at, integral) = differences::<2>(of, ROD.parameter(index));
         for (t, expected) in TIMES.into_iter().zip(at) {
             let node = s.by(name).at(t).expect("in the span");
             let what = format!("{name} at {t}");
@@ -312,20 +295,9 @@ fn integrals_backwards_are_integrals_forwards() {
             |_, _, _| 1.0,
             |_| Act::Record,
         );
-        let [backwards, forwards] = [simulation, &forwards].map(|run| {
-            let (_, gradient) = run.gradient(start, 0.0..SPAN, &loss).expect("a gradient");
-            let by_start = gradient.by_start();
-            let numbers = gradient.by_parameters().iter();
-            let numbers = numbers.chain(&by_start.q).chain(&by_start.p);
-            numbers.copied().collect::<Vec<f64>>()
-        });
-        let size = forwards.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-        for (found, expected) in backwards.iter().zip(&forwards) {
-            assert!(
-                (found - expected).abs() < 1e-12 * size,
-                "{found} instead of {expected}"
-            );
-        }
+        let [backwards, forwards] =
+            [simulation, &forwards].map(|run| gradient_of(run, start, 0.0..SPAN, &loss));
+        compare_rows(&backwards, &forwards, output);
     }
     let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
     for element in [Mixed::<4>.into(), Element::primal(3), Radau::<3>.into()] {
@@ -335,12 +307,6 @@ fn integrals_backwards_are_integrals_forwards() {
     }
     let simulation = Simulation::new(&PENDULUMS).step(0.9).element(Mixed::<3>);
     compare_ways(&simulation, start, "speed");
-    let rod = Rod {
-        m: 1.3,
-        g: 9.81,
-        c: 0.2,
-        l: 1.0,
-    };
-    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
-    compare_ways(&Simulation::new(&rod).step(0.02), start, "height");
+    let start = ROD.state([0.6, -0.8], [0.4, 0.3]);
+    compare_ways(&Simulation::new(&ROD).step(0.02), start, "height");
 }

@@ -38,6 +38,36 @@ fn end<M: Model<N> + Sync, const N: usize, const D: usize>(
     std::array::from_fn(|a| if a < N { last.q[a] } else { last.p[a - N] })
 }
 
+/// The gradient of a loss by all parameters and by the start, and the loss, as one row.
+fn gradient_of<M: Model<N> + Sync, const N: usize>(
+    simulation: &Simulation<'_, M, N>,
+    start: State<N>,
+    span: std::ops::Range<f64>,
+    loss: &Loss<'_, N>,
+) -> Vec<f64> {
+    let (value, gradient) = simulation.gradient(start, span, loss).expect("a gradient");
+    let by_start = gradient.by_start();
+    let numbers = gradient.by_parameters().iter();
+    let numbers = numbers
+        .chain(&by_start.q)
+        .chain(&by_start.p)
+        .chain([&value]);
+    numbers.copied().collect()
+}
+
+/// Two such rows are the same but for roundings.
+#[track_caller]
+fn compare_rows(found: &[f64], expected: &[f64], what: &str) {
+    assert_eq!(found.len(), expected.len());
+    let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(
+            (found - expected).abs() < 1e-12 * size,
+            "{what}: {found} instead of {expected}"
+        );
+    }
+}
+
 /// Compares all derivatives of a run with differences; `allowed` is relative to the largest derivative by the same thing.
 fn check<M: Model<N> + Sync, const N: usize, const D: usize>(
     model: &M,
@@ -146,6 +176,21 @@ struct Driven {
     c: f64,
 }
 
+const DRIVEN: Driven = Driven {
+    m: 1.2,
+    k: 1.0,
+    b: 0.8,
+    a: 0.3,
+    omega: 1.7,
+    c: 0.05,
+};
+
+/// A start in phase space.
+const PHASE: State<2> = State {
+    q: [0.2, 0.3],
+    p: [0.1, -0.2],
+};
+
 /// A pendulum on a rod, with the angle of its trajectory as a redundant constraint: the length is a parameter of constraints.
 #[dynamics(
     coordinates(x, y),
@@ -160,6 +205,13 @@ struct Rod {
     c: f64,
     l: f64,
 }
+
+const ROD: Rod = Rod {
+    m: 1.3,
+    g: 9.81,
+    c: 0.2,
+    l: 1.0,
+};
 
 #[dynamics(
     coordinates(x, y),

@@ -70,7 +70,7 @@ pub struct Pull<'m, M, const N: usize> {
 
 /// Which results of a kernel.
 #[derive(Clone, Copy, Debug)]
-enum Results {
+pub(crate) enum Results {
     /// L_v, or H_p.
     Slopes,
     Observables,

@@ -308,13 +308,13 @@ where
 pub(in crate::simulation) struct After<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     pub(in crate::simulation) state: L::State,
     /// The model with other parameters, if any were set, and these by their numbers.
-    pub(in crate::simulation) model: Option<Changed<'m, M, N, L>>,
+    pub(in crate::simulation) model: Option<Changed<'m, M>>,
 }
 
 /// What an act lets a run go on with; none where it ends.
 pub(super) fn after<'m, M, L, const N: usize>(
     model: &M,
-    remodel: Option<Remodel<'m, M, N, L>>,
+    remodel: Option<Remodel<'m, M>>,
     event: &Event<N, L>,
     act: Act<N, L>,
 ) -> Result<Option<After<'m, M, N, L>>, RunErrorKind>

@@ -84,8 +84,8 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
     pub(super) fn applied<'m, M: Simulated<N, L>>(
         &self,
         model: &M,
-        remodel: Option<Remodel<'m, M, N, L>>,
-    ) -> Result<Changed<'m, M, N, L>, RunErrorKind> {
+        remodel: Option<Remodel<'m, M>>,
+    ) -> Result<Changed<'m, M>, RunErrorKind> {
         let names = model.parameter_names();
         let number = |(name, value): &(String, f64)| {
             let index = names.iter().position(|own| own.is(name));

@@ -2,22 +2,22 @@
 
 use super::act::{Act, Crossing, Occurrence, On};
 use super::clear::Clear;
-use super::remodel::{Remodel, remodel, remodel_long};
+use super::remodel::{Remodel, remodel};
 use super::value::{Function, Value};
 use super::{Events, KeepOff, Look, Rooms, Watched};
 use crate::error::RunErrorKind;
-use crate::length::{FixedLength, Length, RunTimeLength};
+use crate::length::{FixedLength, Length};
 use crate::simulation::kind::{Chosen, Simulated};
 use std::fmt;
 use std::sync::Arc;
 use tfe_runtime::Model;
-use tfe_runtime::family;
+use tfe_runtime::Share;
 
 /// What runs are asked to look for.
 pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     on: Vec<On<'m, N, L>>,
     /// Makes models with other parameters, where events may ask for them.
-    remodel: Option<Remodel<'m, M, N, L>>,
+    remodel: Option<Remodel<'m, M>>,
     /// Called where there is anything to look for, and so compiled for models with events only.
     look: Look<'m, M, N, L>,
     keep_off: KeepOff<'m, M, N, L>,
@@ -81,7 +81,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
             crossing,
             act: Arc::new(act),
         });
-        self.remodel = M::REMODEL;
+        self.remodel = Some(remodel);
     }
 }
 
@@ -95,28 +95,17 @@ impl<'m, M, const N: usize> Watching<'m, M, N> {
         for on in self.on {
             watching.watch(on);
         }
-        watching.remodel = self
-            .remodel
-            .map(|_| remodel as Remodel<'m, T, N, FixedLength>);
+        watching.remodel = self.remodel.map(|_| remodel as Remodel<'m, T>);
         watching
     }
 }
 
-/// A model whose events may set parameters, if they can be set at all: it may go to other threads then.
-pub trait Settable<'m, const N: usize, L: Length<N>>: Simulated<N, L> + 'm {
-    /// How another model is made.
-    const REMODEL: Option<Remodel<'m, Self, N, L>>;
-}
+/// A model whose events may set parameters: it may go to other threads.
+pub trait Settable<'m, const N: usize, L: Length<N>>: Simulated<N, L> + Send + Sync + 'm {}
 
-impl<'m, M, const N: usize> Settable<'m, N, FixedLength> for M
-where
-    M: Model<N> + Send + Sync + 'm,
+impl<'m, M, const N: usize, L: Length<N>> Settable<'m, N, L> for M where
+    M: Simulated<N, L> + Send + Sync + 'm
 {
-    const REMODEL: Option<Remodel<'m, M, N, FixedLength>> = Some(remodel);
-}
-
-impl<'m, M: family::Model + Send + Sync + 'm> Settable<'m, 0, RunTimeLength> for M {
-    const REMODEL: Option<Remodel<'m, M, 0, RunTimeLength>> = Some(remodel_long);
 }
 
 impl<'m, M, const N: usize, L> Events<'m, M, N, L>
@@ -126,7 +115,7 @@ where
 {
     /// Those of a run.
     pub(in crate::simulation) fn new(
-        model: L::Held<'m, M>,
+        model: Share<'m, M>,
         watching: &Watching<'m, M, N, L>,
         chosen: Chosen,
     ) -> Result<Self, RunErrorKind> {

@@ -247,7 +247,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         check_constraints(self, t, h, state)
     }
 
-    fn resolution<'m>(again: Again<'m, M, N>) -> Option<Resolution<'m, M, N>>
+    fn resolution<'m>(again: Again<'m, M>) -> Option<Resolution<'m, M, N>>
     where
         M: 'm,
     {
@@ -338,6 +338,10 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     fn parameter_names(&self) -> Vec<CoordinateName> {
         let numbers = 0..self.parameters();
         numbers.map(|number| self.parameter_name(number)).collect()
+    }
+
+    fn with_value(&self, number: usize, value: f64) -> Option<Self> {
+        self.with_parameter(number, value)
     }
 
     fn parameter_value(&self, number: usize) -> f64 {

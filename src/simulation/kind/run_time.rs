@@ -253,7 +253,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         check_lengths(self.len(), state)
     }
 
-    fn resolution<'m>(_: Again<'m, M, 0, RunTimeLength>) -> Option<Resolution<'m, M, 0>>
+    fn resolution<'m>(_: Again<'m, M>) -> Option<Resolution<'m, M, 0>>
     where
         M: 'm,
     {
@@ -325,6 +325,10 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     fn parameter_names(&self) -> Vec<CoordinateName> {
         let numbers = 0..self.parameters();
         numbers.map(|number| self.parameter_name(number)).collect()
+    }
+
+    fn with_value(&self, number: usize, value: f64) -> Option<Self> {
+        self.with_parameter(number, value)
     }
 
     fn parameter_value(&self, number: usize) -> f64 {

@@ -8,7 +8,7 @@ use tfe_runtime::{Element, Model, Share, Solve, State, Statistics};
 /// Compares elements with three of a third of the length, those that were cut with nine of a ninth: halves might be cut into the same pieces as the element.
 #[derive(Debug)]
 pub struct Resolution<'m, M, const N: usize> {
-    again: Again<'m, M, N>,
+    again: Again<'m, M>,
     /// The largest ratio of increments that is not doubtful.
     quick: f64,
     /// Made when it is first needed.
@@ -28,8 +28,8 @@ pub struct Resolution<'m, M, const N: usize> {
 
 /// With what elements are stepped over again: as in the run.
 #[derive(Debug)]
-pub struct Again<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
-    pub(in crate::simulation) model: L::Held<'m, M>,
+pub struct Again<'m, M: 'm> {
+    pub(in crate::simulation) model: Share<'m, M>,
     pub(in crate::simulation) element: Element,
     pub(in crate::simulation) control: Control,
     pub(in crate::simulation) at_kinks: bool,
@@ -67,7 +67,7 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
     /// The part of what the motion extends over that its parts may end elsewhere.
     const MOST: f64 = 0.03;
 
-    pub(in crate::simulation) fn new(again: Again<'m, M, N>) -> Self {
+    pub(in crate::simulation) fn new(again: Again<'m, M>) -> Self {
         Self {
             quick: Self::DOUBTFUL.powf(2.0 / again.element.order() as f64),
             again,
@@ -219,8 +219,11 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
     }
 }
 
-impl<'m, M: Model<N>, const N: usize> Again<'m, M, N> {
-    fn stepper(&self) -> Option<Stepper<'m, M, N>> {
+impl<'m, M> Again<'m, M> {
+    fn stepper<const N: usize>(&self) -> Option<Stepper<'m, M, N>>
+    where
+        M: Model<N>,
+    {
         let stepper = Stepper::sharing(self.model.clone(), self.element, self.control).ok()?;
         let stepper = stepper.ends_only();
         Some(if self.at_kinks {

@@ -19,7 +19,7 @@ use crate::inside::{InsideLoss, Seeds as Within};
 use crate::lanes::Lanes;
 use crate::model::Form;
 use crate::newton::Control;
-use crate::pull::Partials;
+use crate::pull::{Partials, Results};
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::tape::Tape;
 use alloc::sync::Arc;
@@ -27,7 +27,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 use iteration::Iteration;
-use written::{Points, Results, add_of_place, add_of_points};
+use written::{Points, add_of_place, add_of_points};
 
 /// Goes backwards along a run, from its last node: carries the row λ = ∂ℓ/∂(p, q) of a loss ℓ, and adds up its derivatives by all parameters.
 ///

@@ -2,6 +2,7 @@
 
 use crate::family::model::{Gradient, Model};
 use crate::lanes::Lanes;
+use crate::pull::Results;
 use crate::tape::{LANES, Operations, Row, Tape, Taped};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -9,14 +10,6 @@ use core::cell::RefCell;
 
 /// Numbers at some points.
 pub(super) type Points = Lanes<LANES>;
-
-/// Which results of a kernel.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Results {
-    /// L_v, or H_p.
-    Slopes,
-    Observables,
-}
 
 /// Adds Σ weights · ∂(first derivatives and forces)/∂a at some points to the sum of every parameter a. Weights are those of the derivatives by z, by q, and of forces.
 pub(super) fn add_of_points<M: Model>(
