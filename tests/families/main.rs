@@ -2,12 +2,17 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[cfg(feature = "sparse")]
+#[path = "../common/duals.rs"]
+mod duals;
 
 mod calls;
 mod checkpoints;
 #[cfg(feature = "sparse")]
 mod constrained;
 mod constraints;
+#[cfg(feature = "sparse")]
+mod dual_runs;
 mod errors;
 mod events;
 #[cfg(feature = "sparse")]

@@ -1,155 +1,83 @@
-//! Whole runs in dual numbers, by a solver of their own: the oracle of derivatives, without differences.
+//! Derivatives of whole runs beside those of an oracle in dual numbers, and gradients backwards beside them.
+
+mod constrained;
+mod events;
 
 use super::*;
-use tfe::runtime::dual::Dual;
-use tfe::runtime::scheme::{SchemeTable, Tables as _};
-use tfe::runtime::{First, Form};
+use crate::duals::{self, Beside, Phase, number};
 
-/// Enough for steps that contract by a factor of four; derivatives converge as values do.
-const ITERATIONS: usize = 40;
+/// What the roundings of ten steps, of both solvers, leave of the largest derivative.
+const ROUNDING: f64 = 1e-12;
 
-/// A⁻¹ r, by elimination with a choice of rows, where r carries derivatives.
-fn solved<const N: usize>(mut matrix: [[f64; N]; N], mut right: [Dual; N]) -> [Dual; N] {
-    for column in 0..N {
-        let size = |row: usize| matrix[row][column].abs();
-        let pivot = (column..N).max_by(|a, b| size(*a).total_cmp(&size(*b)));
-        let pivot = pivot.expect("a row");
-        matrix.swap(column, pivot);
-        right.swap(column, pivot);
-        for row in column + 1..N {
-            let factor = matrix[row][column] / matrix[column][column];
-            for k in column..N {
-                matrix[row][k] -= factor * matrix[column][k];
-            }
-            right[row] -= right[column] * number(factor);
-        }
-    }
-    for row in (0..N).rev() {
-        for k in row + 1..N {
-            right[row] -= right[k] * number(matrix[row][k]);
-        }
-        right[row] = right[row] / number(matrix[row][row]);
-    }
-    right
-}
-
-fn number(value: f64) -> Dual {
-    Dual::new(value, 0.0)
-}
-
-/// start + h Σ weight · rate
-fn moved<const N: usize>(
-    start: &[Dual; N],
-    h: f64,
-    weights: &[f64],
-    rates: &[[Dual; N]],
-) -> [Dual; N] {
-    let mut sum = *start;
-    for (weight, rate) in weights.iter().zip(rates) {
-        for a in 0..N {
-            sum[a] += rate[a] * number(h * weight);
-        }
-    }
-    sum
-}
-
-/// The end of a run of a Gauss element in dual numbers, q then p, with the derivative by a parameter, or by what the slopes of the start say.
-fn end_in_duals<M: Model<N>, const N: usize>(
-    model: &M,
-    element: Element,
-    (mut q, mut p): ([Dual; N], [Dual; N]),
-    (steps, h): (u32, f64),
-    parameter: Option<usize>,
-) -> ([Dual; N], [Dual; N]) {
-    let table = SchemeTable::new(element).expect("an element");
-    let scheme = table.view();
-    let points = scheme.points();
-    for step in 0..steps {
-        let begin = f64::from(step) * h;
-        let zero = [number(0.0); N];
-        let (mut rates, mut forces) = (vec![zero; points], vec![zero; points]);
-        for _ in 0..ITERATIONS {
-            for l in 0..points {
-                let row = &scheme.position[l * points..(l + 1) * points];
-                let time = Dual::new(begin + scheme.nodes[l] * h, 0.0).by_parameter(parameter);
-                let (here, momentum) = (moved(&q, h, row, &rates), moved(&p, h, row, &forces));
-                let mut first = First::zero();
-                match M::FORM {
-                    Form::Hamiltonian => {
-                        model.first(time, &here, &momentum, &mut first);
-                        rates[l] = first.z;
-                    }
-                    // L_v(q, v) = p by Newton's method with the mass matrix in mere numbers.
-                    Form::Lagrangian => {
-                        model.first(time, &here, &rates[l], &mut first);
-                        let mut left = first.z;
-                        for a in 0..N {
-                            left[a] -= momentum[a];
-                        }
-                        let (mut plain, mut mass) = (First::ZERO, [[0.0; N]; N]);
-                        let (at, v) = (here.map(|x| x.value), rates[l].map(|x| x.value));
-                        model.first_and_mass(time.value, &at, &v, &mut plain, &mut mass);
-                        let change = solved(mass, left);
-                        for a in 0..N {
-                            rates[l][a] -= change[a];
-                        }
-                        model.first(time, &here, &rates[l], &mut first);
-                    }
-                }
-                for a in 0..N {
-                    forces[l][a] = match M::FORM {
-                        Form::Hamiltonian => first.force[a] - first.q[a],
-                        Form::Lagrangian => first.q[a] + first.force[a],
-                    };
-                }
-            }
-        }
-        q = moved(&q, h, scheme.weights, &rates);
-        p = moved(&p, h, scheme.weights, &forces);
-    }
-    (q, p)
-}
-
-/// The largest difference over the largest derivative, by all parameters and by the start.
+/// The largest difference over the largest derivative, by all parameters and by the start, of the end of a run; then the gradient of a loss, backwards, is compared with them.
 fn off<M: Model<N> + Sync, const N: usize>(
+    run: &Simulation<'_, M, N>,
+    start: State<N>,
+    length: f64,
+    end: &dyn Fn(&Phase, Option<usize>) -> Phase,
+) -> f64 {
+    let s = run.run_sensitive(start, 0.0..length);
+    let s = s.expect("derivatives");
+    let mut beside = Beside::new((&start.q, &start.p), end);
+    for (index, name) in s.parameters().iter().enumerate() {
+        let found = s.by(name).last();
+        beside.by_parameter(index, &found.q, &found.p);
+    }
+    let matrix = s.by_start().last();
+    for column in 0..2 * N {
+        let found: Vec<f64> = matrix.column(column).iter().copied().collect();
+        beside.by_start(column, &found[N..], &found[..N]);
+    }
+    let weight = |a: usize| (1.0 + a as f64).sin();
+    let loss = |q: &[f64; N], p: &[f64; N]| -> f64 {
+        (0..N)
+            .map(|a| weight(a) * q[a] + weight(N + a) * p[a])
+            .sum()
+    };
+    let (_, gradient) = run
+        .gradient(
+            start,
+            0.0..length,
+            &Loss::at_end(move |node: &Node<N>| loss(&node.q, &node.p)),
+        )
+        .expect("a gradient");
+    let found = gradient.by_start();
+    let found: Vec<f64> = (gradient.by_parameters().iter().copied())
+        .chain(found.p)
+        .chain(found.q)
+        .collect();
+    let forwards: Vec<f64> = (s.parameters().iter())
+        .map(|name| s.by(name).last())
+        .map(|by| loss(&by.q, &by.p))
+        .chain((0..2 * N).map(|column| {
+            let by = matrix.column(column);
+            loss(
+                &std::array::from_fn(|a| by[N + a]),
+                &std::array::from_fn(|a| by[a]),
+            )
+        }))
+        .collect();
+    compare_rows(&found, &forwards, "backwards");
+    beside.off()
+}
+
+/// The same of a run of so many steps without constraints and events.
+fn off_free<M: Model<N> + Sync, const N: usize>(
     model: &M,
     start: State<N>,
     element: Element,
     (steps, h): (u32, f64),
 ) -> f64 {
-    let run = Simulation::new(model).element(element).step(h);
-    let s = run.run_sensitive(start, 0.0..f64::from(steps) * h);
-    let s = s.expect("derivatives");
-    assert_eq!(s.motion().states().len(), steps as usize + 1);
-    let (mut off, mut size) = (0.0_f64, 0.0_f64);
-    let mut see = |found: f64, expected: f64| {
-        assert!(found.is_finite() && expected.is_finite());
-        (off, size) = (off.max((found - expected).abs()), size.max(expected.abs()));
+    let end = |start: &Phase, parameter: Option<usize>| {
+        (0..steps).fold(start.clone(), |at, step| {
+            let begin = number(f64::from(step) * h);
+            duals::element_end(element, &at, (begin, number(h)), |t, at, rate| {
+                duals::flow(model, t.by_parameter(parameter), at, rate)
+            })
+        })
     };
-    let still = (start.q.map(number), start.p.map(number));
-    for (index, name) in s.parameters().iter().enumerate() {
-        let (q, p) = end_in_duals(model, element, still, (steps, h), Some(index));
-        let found = s.by(name).last();
-        for a in 0..N {
-            see(found.q[a], q[a].slope);
-            see(found.p[a], p[a].slope);
-        }
-    }
-    let matrix = s.by_start().last();
-    for column in 0..2 * N {
-        let (mut from_q, mut from_p) = still;
-        // Ordered (p, q).
-        match column.checked_sub(N) {
-            None => from_p[column].slope = 1.0,
-            Some(a) => from_q[a].slope = 1.0,
-        }
-        let (q, p) = end_in_duals(model, element, (from_q, from_p), (steps, h), None);
-        for a in 0..N {
-            see(matrix[(a, column)], p[a].slope);
-            see(matrix[(N + a, column)], q[a].slope);
-        }
-    }
-    off / size
+    let run = Simulation::new(model).element(element).step(h);
+    off(&run, start, f64::from(steps) * h, &end)
 }
 
 #[dynamics(
@@ -210,8 +138,6 @@ struct Bent {
 /// Eight models, two elements: what is differentiated is every operation of the run.
 #[test]
 fn derivatives_are_those_of_runs_in_dual_numbers() {
-    // Roundings of ten steps of both, relative to the largest derivative.
-    const ROUNDING: f64 = 1e-12;
     let charged = Charged {
         m: 1.3,
         mu: 1.1,
@@ -254,11 +180,11 @@ fn derivatives_are_those_of_runs_in_dual_numbers() {
         let starts = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
         let swaying = row.state(std::array::from_fn(|a| 0.5 * swing(3 * a)), [0.1; 8]);
         let found = [
-            ("pendulums", off(&PENDULUMS, starts, element, span)),
-            ("driven", off(&DRIVEN, PHASE, element, span)),
+            ("pendulums", off_free(&PENDULUMS, starts, element, span)),
+            ("driven", off_free(&DRIVEN, PHASE, element, span)),
             (
                 "charged",
-                off(
+                off_free(
                     &charged,
                     charged.state([1.0, 0.1], [0.1, 1.1]),
                     element,
@@ -267,20 +193,23 @@ fn derivatives_are_those_of_runs_in_dual_numbers() {
             ),
             (
                 "van der Pol",
-                off(&van_der_pol, van_der_pol.state([0.5], [0.2]), element, span),
+                off_free(&van_der_pol, van_der_pol.state([0.5], [0.2]), element, span),
             ),
-            ("row", off(&row, swaying, element, span)),
+            ("row", off_free(&row, swaying, element, span)),
             (
                 "coil",
-                off(
+                off_free(
                     &coil,
                     coil.state([1.0, 0.2, 0.1], [0.1, 0.9, -0.2]),
                     element,
                     span,
                 ),
             ),
-            ("bent", off(&bent, PHASE, element, span)),
-            ("ball", off(&ball, ball.state([1.0], [4.0]), element, span)),
+            ("bent", off_free(&bent, PHASE, element, span)),
+            (
+                "ball",
+                off_free(&ball, ball.state([1.0], [4.0]), element, span),
+            ),
         ];
         for (name, off) in found {
             assert!(off < ROUNDING, "{name}, {element}: {off:.1e}");

@@ -1,5 +1,8 @@
 //! Derivatives of motions by parameters and starts, against differences of runs.
 
+#[path = "../common/duals.rs"]
+mod duals;
+
 mod backwards;
 mod dual_runs;
 mod events;
