@@ -8,6 +8,7 @@
 mod chain;
 mod control;
 mod convergence;
+mod derivative;
 mod error;
 mod mesh;
 mod newton;
@@ -21,6 +22,7 @@ pub(crate) use control::Control;
 #[cfg(feature = "sparse")]
 pub(crate) use convergence::Convergence;
 pub(crate) use convergence::size;
+pub(crate) use derivative::{By, derivatives};
 pub(crate) use mesh::Mesh;
 pub(crate) use newton::{Assembly, Iterate, Problem};
 pub(crate) use solution::Solution;

@@ -13,10 +13,13 @@ mod error;
 #[cfg(feature = "sparse")]
 mod family;
 mod hybrid;
+mod hybrid_sensitive;
 mod kind;
+mod moving;
 pub(crate) mod orbit;
 mod phase;
 pub(crate) mod problem;
+mod sensitive;
 mod setup;
 
 pub use error::OrbitError;
@@ -24,5 +27,6 @@ pub use hybrid::{HybridOrbit, HybridOrbits};
 pub use kind::{Chained, Closed};
 pub use orbit::{Exponent, Orbit, Verdict};
 pub use phase::Phase;
+pub use sensitive::{OrbitSlopes, SensitiveOrbit};
 pub use setup::PeriodicOrbit;
 pub(crate) use setup::along_motion;

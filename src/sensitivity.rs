@@ -2,6 +2,7 @@
 
 pub(crate) mod inside;
 pub(crate) mod loss;
+pub(crate) mod names;
 #[cfg(feature = "sparse")]
 pub(crate) mod run_time;
 pub(crate) mod slopes;
@@ -10,6 +11,7 @@ use crate::length::{FixedLength, Length};
 use crate::motion::{AtError, Motion, Node};
 use inside::{Between, Inside};
 use nalgebra::DMatrix;
+use names::place_of;
 use std::fmt;
 
 pub use loss::{Loss, LossGradient};
@@ -114,12 +116,10 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
     /// Where no parameter has this name, as an index out of bounds does; [`get`](Self::get) does not.
     #[track_caller]
     pub fn by(&self, name: &str) -> ByParameter<'_, N, L> {
-        self.get(name).unwrap_or_else(|| {
-            panic!(
-                "the model has no parameter `{name}`, only `{}`",
-                self.parameters.join("`, `")
-            )
-        })
+        ByParameter {
+            of: self,
+            column: 2 * self.coordinates() + place_of(name, &self.parameters),
+        }
     }
 
     /// The derivatives by a parameter; `None` where none has this name.

@@ -30,6 +30,10 @@ pub(crate) trait Problem<const N: usize> {
     }
     /// What each global changes in an element.
     fn directions(&self, element: usize, directions: &mut [Direction]);
+    /// What a unit of the length of the whole changes in an element.
+    fn stretched(&self, _element: usize) -> Direction {
+        Direction::default()
+    }
     /// A size of a global beside which corrections are small.
     fn scale(&self, _global: usize) -> f64 {
         1.0
@@ -38,6 +42,10 @@ pub(crate) trait Problem<const N: usize> {
     fn set_globals(&mut self, globals: &[f64]);
     /// The equations at the ends: B₀ δy₀ + B_E δy_E + B_γ δγ = b.
     fn close(&self, iterate: &Iterate<N>, closure: ClosureMut<'_>) -> Result<(), LegendreError>;
+    /// What a parameter, by its index among all, adds to the right side of the equations at the ends.
+    fn close_by(&self, _: usize, _: &Iterate<N>, _: &mut [f64]) -> Result<(), LegendreError> {
+        Ok(())
+    }
     /// The k-th equation over all nodes.
     fn span(&self, _k: usize, _iterate: &Iterate<N>, _dense: DenseMut<'_>) {}
 }
@@ -134,32 +142,9 @@ impl<const N: usize> Assembly<N> {
 
     /// The tangent of the last linearisation, nodes, interiors and globals; see [`with_tangent`](Self::with_tangent).
     pub(crate) fn tangent(&self) -> Iterate<N> {
-        let globals = self.chain.globals_of(1);
-        let (m, columns) = (self.condenser.interior(), 2 * N + globals.len() + 1);
-        let mut interiors = vec![0.0; self.elements * m];
-        let mut weights = Vec::with_capacity(columns);
-        for element in 0..self.elements {
-            let response = &self.responses[element * m * columns..(element + 1) * m * columns];
-            let interior = &mut interiors[element * m..(element + 1) * m];
-            weights.clear();
-            weights.extend_from_slice(self.chain.node_of(1, element));
-            weights.extend_from_slice(globals);
-            for (x, row) in interior.iter_mut().zip(response.chunks_exact(columns)) {
-                *x = inner(row, &weights);
-            }
-        }
-        let nodes = (0..=self.elements).map(|e| {
-            let (p, q) = self.chain.node_of(1, e).split_at(N);
-            State {
-                q: std::array::from_fn(|a| q[a]),
-                p: std::array::from_fn(|a| p[a]),
-            }
-        });
-        Iterate {
-            nodes: nodes.collect(),
-            interiors,
-            globals: globals.to_vec(),
-        }
+        let columns = 2 * N + self.directions.len() + 1;
+        let shape = (self.elements, self.condenser.interior());
+        changes(&self.chain, 1, shape, (&self.responses, columns))
     }
 
     /// Iterations so far.
@@ -358,6 +343,40 @@ impl<const N: usize> Assembly<N> {
             problem.set_globals(&iterate.globals);
             self.linearise(problem, iterate)?;
         }
+    }
+}
+
+/// The solution of a chain for one of its right sides, with the interiors of so many unknowns that follow from nodes and globals.
+pub(super) fn changes<const N: usize>(
+    chain: &Chain,
+    side: usize,
+    (elements, m): (usize, usize),
+    (responses, columns): (&[f64], usize),
+) -> Iterate<N> {
+    let globals = chain.globals_of(side);
+    let mut interiors = vec![0.0; elements * m];
+    let mut weights = Vec::with_capacity(columns);
+    for element in 0..elements {
+        let response = &responses[element * m * columns..(element + 1) * m * columns];
+        let interior = &mut interiors[element * m..(element + 1) * m];
+        weights.clear();
+        weights.extend_from_slice(chain.node_of(side, element));
+        weights.extend_from_slice(globals);
+        for (x, row) in interior.iter_mut().zip(response.chunks_exact(columns)) {
+            *x = inner(row, &weights);
+        }
+    }
+    let nodes = (0..=elements).map(|e| {
+        let (p, q) = chain.node_of(side, e).split_at(N);
+        State {
+            q: std::array::from_fn(|a| q[a]),
+            p: std::array::from_fn(|a| p[a]),
+        }
+    });
+    Iterate {
+        nodes: nodes.collect(),
+        interiors,
+        globals: globals.to_vec(),
     }
 }
 

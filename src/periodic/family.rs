@@ -1,6 +1,7 @@
 //! Periodic orbits of models of run-time length.
 
 mod chain;
+mod sensitive;
 mod shooting;
 
 use super::error::OrbitError;
@@ -10,8 +11,9 @@ use super::problem::Global;
 use super::setup::{Guess, PeriodicOrbit};
 use crate::assembly::Mesh;
 use crate::length::RunTimeLength;
-use crate::periodic_schur;
+use crate::periodic_schur::{self, Multiplier};
 use crate::simulation::Simulation;
+use nalgebra::DMatrix;
 use shooting::Shooting;
 use tfe_runtime::family::{self, FamilyState};
 
@@ -21,6 +23,11 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
     /// # Errors
     /// [`OrbitError`]: what was asked for makes no sense, or there is no solution near the guess.
     pub fn solve(&self) -> Result<Orbit<'m, M, 0, RunTimeLength>, OrbitError> {
+        orbit_of(self.solved()?)
+    }
+
+    /// The equations and their solution.
+    fn solved(&self) -> Result<Shooting<'m, M>, OrbitError> {
         let period = self.period.checked()?;
         if self.advance.is_some() {
             return Err(OrbitError::Unsupported {
@@ -56,11 +63,7 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
             }
         }
         shooting.solve(self.control)?;
-        let floquet = periodic_schur::multipliers(&shooting.transitions);
-        let mut floquet = floquet.map_err(OrbitError::Multipliers)?;
-        sort(&mut floquet);
-        let (trivial, unfolding) = (shooting.trivial(), shooting.unfolding());
-        Ok(Orbit::of_solution(shooting, floquet, trivial, unfolding))
+        Ok(shooting)
     }
 
     /// The states of the guess at the nodes.
@@ -93,4 +96,21 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
             }
         }
     }
+}
+
+/// An orbit with its multipliers.
+fn orbit_of<M: family::Model>(
+    shooting: Shooting<'_, M>,
+) -> Result<Orbit<'_, M, 0, RunTimeLength>, OrbitError> {
+    let floquet = floquet_of(&shooting.transitions)?;
+    let (trivial, unfolding) = (shooting.trivial(), shooting.unfolding());
+    Ok(Orbit::of_solution(shooting, floquet, trivial, unfolding))
+}
+
+/// The multipliers of the matrices of elements, the largest first.
+fn floquet_of(transitions: &[DMatrix<f64>]) -> Result<Vec<Multiplier>, OrbitError> {
+    let floquet = periodic_schur::multipliers(transitions);
+    let mut floquet = floquet.map_err(OrbitError::Multipliers)?;
+    sort(&mut floquet);
+    Ok(floquet)
 }

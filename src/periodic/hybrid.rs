@@ -9,7 +9,7 @@ use crate::motion::Motion;
 use crate::periodic_schur::Multiplier;
 use crate::simulation::Simulation;
 use nalgebra::{Complex, DMatrix, DVector};
-use tfe_runtime::{First, Form, Model, State};
+use tfe_runtime::{First, Form, Model, Share, State};
 
 impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// An orbit of a simulation with [events](Simulation::on) that change the state: an oscillator that hits a wall, a machine that switches. The simulation brings model, element and events;
@@ -73,10 +73,10 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
 /// r larger are halved. The guess should meet the events of the orbit, and begin away from them.
 #[derive(Debug)]
 pub struct HybridOrbits<'m, M, const N: usize> {
-    simulation: Simulation<'m, M, N>,
-    elements: usize,
-    start: f64,
-    period: Period,
+    pub(super) simulation: Simulation<'m, M, N>,
+    pub(super) elements: usize,
+    pub(super) start: f64,
+    pub(super) period: Period,
     guess: Option<State<N>>,
     advance: [f64; N],
     tolerance: f64,
@@ -168,7 +168,16 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
             iterations += 1;
             let scales = scales(run.motion());
             let residual = self.residual(&run, &scales);
-            let (change, stretch) = self.correction(&run, &residual, &scales, is_free, period)?;
+            let last_node = run.motion().last();
+            let model = self.simulation.model();
+            let rate = rate(model, last_node.t, &last_node.state(), &last_node.v);
+            let closing = Closing {
+                product: run.product(),
+                rate: is_free.then_some(rate),
+                scales: &scales,
+                period,
+            };
+            let (change, stretch) = closing.shortest(&residual)?;
             let size = change.amax().max(stretch.abs() / period);
             let is_done = size <= self.tolerance || (size < ROUNDED && size > 0.5 * last);
             last = size;
@@ -207,7 +216,15 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         })
     }
 
-    fn run(&self, state: &State<N>, period: f64) -> Result<Linearised<N>, OrbitError> {
+    /// The same of another model.
+    pub(super) fn of_model(&self, model: Share<'m, M>) -> Self {
+        Self {
+            simulation: self.simulation.of_model(model),
+            ..*self
+        }
+    }
+
+    pub(super) fn run(&self, state: &State<N>, period: f64) -> Result<Linearised<N>, OrbitError> {
         if !(period > 0.0 && period.is_finite()) {
             return Err(OrbitError::Period { period });
         }
@@ -234,42 +251,6 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         })
     }
 
-    /// The shortest correction, of the start in parts of the scales, and of the period.
-    fn correction(
-        &self,
-        run: &Linearised<N>,
-        residual: &DVector<f64>,
-        scales: &Scales,
-        is_free: bool,
-        period: f64,
-    ) -> Result<(DVector<f64>, f64), OrbitError> {
-        /// Singular values below this, of the largest, are zeros: of families of orbits.
-        const ZERO: f64 = 1e-9;
-        let product = run.product();
-        let scale = |row: usize| if row < N { scales.p } else { scales.q };
-        let columns = 2 * N + usize::from(is_free);
-        let last = run.motion().last();
-        let rate = rate(self.simulation.model(), last.t, &last.state(), &last.v);
-        let matrix = DMatrix::from_fn(2 * N, columns, |row, column| {
-            if column == 2 * N {
-                return rate[row] * period / scale(row);
-            }
-            let unit = if row == column { 1.0 } else { 0.0 };
-            product[(row, column)] * scale(column) / scale(row) - unit
-        });
-        let svd = matrix.svd(true, true);
-        let largest = svd.singular_values.amax();
-        let change = svd.solve(&-residual, ZERO * largest);
-        let Ok(change) = change else {
-            return Err(OrbitError::Stalled {
-                residual: residual.amax(),
-                iterations: 0,
-            });
-        };
-        let stretch = if is_free { change[2 * N] * period } else { 0.0 };
-        Ok((change.rows(0, 2 * N).into_owned(), stretch))
-    }
-
     fn found(
         &self,
         run: Linearised<N>,
@@ -294,13 +275,65 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     }
 }
 
-/// By what coordinates and momenta are measured.
-struct Scales {
-    q: f64,
-    p: f64,
+/// The linear equations of an orbit that closes.
+pub(super) struct Closing<'a> {
+    /// The derivative of the end by the start, ordered (p, q).
+    pub(super) product: DMatrix<f64>,
+    /// What a unit of the period does to the end, where it is unknown.
+    pub(super) rate: Option<DVector<f64>>,
+    pub(super) scales: &'a Scales,
+    pub(super) period: f64,
 }
 
-fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
+impl Closing<'_> {
+    /// The shortest correction, of the start in parts of the scales, and of the period.
+    pub(super) fn shortest(
+        &self,
+        residual: &DVector<f64>,
+    ) -> Result<(DVector<f64>, f64), OrbitError> {
+        /// Singular values below this, of the largest, are zeros: of families of orbits.
+        const ZERO: f64 = 1e-9;
+        let size = residual.len();
+        let scale = |row: usize| self.scales.of(row, size);
+        let columns = size + usize::from(self.rate.is_some());
+        let matrix = DMatrix::from_fn(size, columns, |row, column| match &self.rate {
+            Some(rate) if column == size => rate[row] * self.period / scale(row),
+            _ => {
+                let unit = if row == column { 1.0 } else { 0.0 };
+                self.product[(row, column)] * scale(column) / scale(row) - unit
+            }
+        });
+        let svd = matrix.svd(true, true);
+        let largest = svd.singular_values.amax();
+        let change = svd.solve(&-residual, ZERO * largest);
+        let Ok(change) = change else {
+            return Err(OrbitError::Stalled {
+                residual: residual.amax(),
+                iterations: 0,
+            });
+        };
+        let stretch = self
+            .rate
+            .as_ref()
+            .map_or(0.0, |_| change[size] * self.period);
+        Ok((change.rows(0, size).into_owned(), stretch))
+    }
+}
+
+/// By what coordinates and momenta are measured.
+pub(super) struct Scales {
+    pub(super) q: f64,
+    pub(super) p: f64,
+}
+
+impl Scales {
+    /// That of a row of so many, ordered (p, q).
+    pub(super) fn of(&self, row: usize, size: usize) -> f64 {
+        if row < size / 2 { self.p } else { self.q }
+    }
+}
+
+pub(super) fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
     let largest = |of: fn(&State<N>) -> &[f64; N]| {
         let states = motion.states().iter().map(crate::motion::Node::state);
         let sizes = states.map(|state| of(&state).iter().fold(0.0_f64, |m, x| m.max(x.abs())));
@@ -375,6 +408,11 @@ impl<const N: usize> HybridOrbit<N> {
     /// The Floquet multipliers, the largest modulus first; from the matrices of the elements, not from their product.
     pub fn multipliers(&self) -> &[Complex<f64>] {
         &self.multipliers
+    }
+
+    /// The same as logarithm of the modulus and argument.
+    pub(super) fn floquet(&self) -> &[Multiplier] {
+        &self.floquet
     }
 
     /// The places of the multiplier that is one because the model does not depend on time; empty for a forced one.

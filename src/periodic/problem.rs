@@ -4,7 +4,8 @@ use super::error::OrbitError;
 use super::phase::Phase;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem};
 use tfe_runtime::condenser::Direction;
-use tfe_runtime::{LegendreError, Model, State, legendre};
+use tfe_runtime::dual::{Dual, duals};
+use tfe_runtime::{Form, LegendreError, Model, State, legendre};
 
 /// What the global unknowns of an orbit are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +103,28 @@ pub(crate) fn orthogonal_to_flow<const N: usize>(
     weights[last * 2 * N..].fill(0.0);
 }
 
+/// ∂H/∂a at fixed coordinates and momenta, which is −∂L/∂a at fixed velocities.
+fn energy_by<M: Model<N>, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+    parameter: usize,
+) -> Result<f64, LegendreError> {
+    let (z, sign) = match M::FORM {
+        Form::Hamiltonian => (state.p, 1.0),
+        Form::Lagrangian => {
+            let view = legendre::hamiltonian_view(model, t, &state.q, &state.p)?;
+            (view.v, -1.0)
+        }
+    };
+    let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
+    let still = |values: &[f64; N]| duals(values, &[0.0; N]);
+    Ok(sign
+        * model
+            .energy_function(time, &still(&state.q), &still(&z))
+            .slope)
+}
+
 impl<M: Model<N>, const N: usize> Problem<N> for Periodic<'_, M, N> {
     type Model = M;
 
@@ -116,13 +139,17 @@ impl<M: Model<N>, const N: usize> Problem<N> for Periodic<'_, M, N> {
     fn directions(&self, element: usize, directions: &mut [Direction]) {
         for (direction, global) in directions.iter_mut().zip(&self.globals) {
             *direction = match global {
-                Global::Period => self.mesh.stretched(element),
+                Global::Period => self.stretched(element),
                 Global::Unfolding => Direction {
                     damping: 1.0,
                     ..Direction::default()
                 },
             };
         }
+    }
+
+    fn stretched(&self, element: usize) -> Direction {
+        self.mesh.stretched(element)
     }
 
     fn damping(&self) -> f64 {
@@ -177,6 +204,21 @@ impl<M: Model<N>, const N: usize> Problem<N> for Periodic<'_, M, N> {
                 closure.first[row * 2 * N + N + a] = view.first.q[a];
             }
             closure.right[row] = energy - view.hamiltonian;
+        }
+        Ok(())
+    }
+
+    fn close_by(
+        &self,
+        parameter: usize,
+        iterate: &Iterate<N>,
+        right: &mut [f64],
+    ) -> Result<(), LegendreError> {
+        // The equation of the energy is the last one.
+        if let (Some(_), Some(right), Some(first)) =
+            (self.energy, right.last_mut(), iterate.nodes.first())
+        {
+            *right = -energy_by(self.model, self.start, first, parameter)?;
         }
         Ok(())
     }

@@ -4,6 +4,7 @@ use crate::error::RunErrorKind;
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
 use crate::motion::{Motion, Node};
+use crate::sensitivity::names::place_of;
 use std::fmt;
 use std::sync::Arc;
 use tfe_runtime::CoordinateName;
@@ -383,10 +384,7 @@ impl<const N: usize, L: Length<N>> LossGradient<N, L> {
     /// Where no parameter has this name; [`get`](Self::get) does not.
     #[track_caller]
     pub fn by(&self, name: &str) -> f64 {
-        self.get(name).unwrap_or_else(|| {
-            let known = self.names.join("`, `");
-            panic!("the model has no parameter `{name}`, only `{known}`")
-        })
+        self.by_parameters[place_of(name, &self.names)]
     }
 
     /// The derivative by a parameter; `None` where none has this name.

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use tfe_runtime::dual::{Dual, duals};
-use tfe_runtime::{First, Form, Model, State};
+use tfe_runtime::{Direction, First, Form, Model, Parameter, State};
 
 /// A place of a motion, with its velocity.
 #[derive(Clone, Copy)]
@@ -101,6 +101,22 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
         self.model.observables(time, &q, &z, &mut values);
         values.iter().map(|value| value.slope).collect()
     }
+}
+
+/// Parameters, by their index among all, as directions: with kernels of their own where the model has them.
+pub(crate) fn directions<M: Model<N>, const N: usize>(
+    model: &M,
+    indices: &[usize],
+) -> Vec<Direction> {
+    let parameter = |&index: &usize| {
+        let name = model.parameter_name(index);
+        let named = M::SENSITIVITIES.iter().position(|own| name.is(own));
+        Direction {
+            parameter: Some(named.map_or(Parameter::Any(index), Parameter::Named)),
+            ..Direction::default()
+        }
+    };
+    indices.iter().map(parameter).collect()
 }
 
 /// What a parameter does to the momentum at fixed coordinates and velocities; NaN where the mass matrix is singular.

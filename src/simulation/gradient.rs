@@ -5,7 +5,6 @@ mod view;
 
 use super::follow::Nobody;
 use super::mesh::Mesh;
-use super::sensitive::directions;
 use super::setup::Simulation;
 use super::trail::is_same;
 use crate::error::{RunError, RunErrorKind};
@@ -13,6 +12,7 @@ use crate::length::FixedLength;
 use crate::motion::{Motion, Node};
 use crate::sensitivity::Sensitive;
 use crate::sensitivity::loss::{Loss, LossGradient, Seen};
+use crate::sensitivity::slopes::directions;
 use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::step::Stepper;

@@ -11,16 +11,14 @@ use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
 use crate::sensitivity::inside::{Before, Inside, Moved};
-use crate::sensitivity::slopes::{Along, Change, Place};
+use crate::sensitivity::slopes::{Along, Change, Place, directions};
 use crate::sensitivity::{Sensitive, Slopes};
 use nalgebra::{DMatrix, RowDVector};
 use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{
-    Direction, Element, First, Form, InsideSlopes, Model, Parameter, Share, State, StepError,
-};
+use tfe_runtime::{Direction, Element, First, Form, InsideSlopes, Model, Share, State, StepError};
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node by all parameters of the model and by the start.
@@ -110,22 +108,6 @@ struct Across {
     more: DMatrix<f64>,
     /// Along it, by its start and all directions, where that is asked for.
     inside: Vec<InsideSlopes>,
-}
-
-/// Parameters, by their index among all, as directions: with kernels of their own where the model has them.
-pub(super) fn directions<M: Model<N>, const N: usize>(
-    model: &M,
-    indices: &[usize],
-) -> Vec<Direction> {
-    let parameter = |&index: &usize| {
-        let name = model.parameter_name(index);
-        let named = M::SENSITIVITIES.iter().position(|own| name.is(own));
-        Direction {
-            parameter: Some(named.map_or(Parameter::Any(index), Parameter::Named)),
-            ..Direction::default()
-        }
-    };
-    indices.iter().map(parameter).collect()
 }
 
 /// The start of an element moves, its end does not.

@@ -118,6 +118,14 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         }
     }
 
+    /// The same of another model.
+    pub(crate) fn of_model(&self, model: Share<'m, M>) -> Self {
+        Self {
+            model,
+            ..self.clone()
+        }
+    }
+
     /// The element: `Mixed::<4>`, `Primal::<3>.reduced()`, `Element::mixed(n)`, …; for models of run-time length without the feature `sparse` those that are Runge–Kutta methods, with
     /// constraints those of them with Gauss points.
     #[must_use]

@@ -265,6 +265,18 @@ macro_rules! calls {
                 other => Ok(other.map(|orbit| assert!(orbit.is_stable()))?),
             }
         });
+        call("`PeriodicOrbit::solve_sensitive`", &|| {
+            let orbit = PeriodicOrbit::of(&model)
+                .elements(10)
+                .period(1.0)
+                .guess_from(rest());
+            match orbit.solve_sensitive() {
+                Err(error) if error.to_string().contains("not supported") => {
+                    refused(true, "models of run-time length with constraints")
+                }
+                other => Ok(other.map(|s| assert!(s.by_period().is_some()))?),
+            }
+        });
         call(
             "`stability::transition_matrix`",
             &|| match stability::transition_matrix(&model, Mixed::<4>, &start(), 0.0, 0.1) {

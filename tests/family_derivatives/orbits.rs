@@ -4,7 +4,8 @@ use crate::largest::larger;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 use tfe::family::FamilyState;
-use tfe::periodic::{OrbitError, Phase, Verdict};
+use tfe::length::RunTimeLength;
+use tfe::periodic::{OrbitError, OrbitSlopes, Phase, Verdict};
 use tfe::prelude::*;
 
 /// A chain with fixed ends, cubic forces, damping, and a driven end.
@@ -312,6 +313,113 @@ fn isolated_orbits_of_unknown_period() {
     assert!((orbit.period() - fixed.period()).abs() < 1e-11);
     let off = apart(orbit.multipliers(), fixed.multipliers());
     assert!(off < 1e-10, "{off:e}");
+}
+
+/// The derivatives of two orbits, one of run-time length, by a parameter or by the period; multipliers in the same order.
+#[track_caller]
+fn compare_slopes<const N: usize>(
+    long: &OrbitSlopes<0, RunTimeLength>,
+    fixed: &OrbitSlopes<N>,
+    allowed: f64,
+) {
+    let (one, other) = (long.start(), fixed.start());
+    assert!((long.period() - fixed.period()).abs() < allowed);
+    for a in 0..N {
+        let (q, p) = (one.q[a] - other.q[a], one.p[a] - other.p[a]);
+        assert!(q.abs() < allowed && p.abs() < allowed, "{a}: {q:e} {p:e}");
+    }
+    let pairs = long.multipliers().iter().zip(fixed.multipliers());
+    for (one, other) in pairs {
+        let off = one.zip(*other).map(|(one, other)| (one - other).norm());
+        assert!(off.is_some_and(|off| off < 100.0 * allowed), "{off:?}");
+    }
+}
+
+#[test]
+fn derivatives_of_orbits_are_those_of_fixed_size() {
+    let (b, c, f, omega) = (0.8, 0.1, 0.4, 0.9);
+    let n = 6;
+    let long = Driven { n, b, c, f, omega };
+    let six = DrivenSix { b, c, f, omega };
+    let one = PeriodicOrbit::of(&long).elements(24).period(TAU / omega);
+    let one = one.solve_sensitive().expect("an orbit");
+    let other = PeriodicOrbit::of(&six).elements(24).period(TAU / omega);
+    let other = other.solve_sensitive().expect("an orbit");
+    assert_eq!(one.parameters(), other.parameters());
+    for name in other.parameters() {
+        compare_slopes(one.by(name), other.by(name), 1e-9);
+    }
+    let (by_period, fixed) = (one.by_period(), other.by_period());
+    compare_slopes(by_period.expect("given"), fixed.expect("given"), 1e-9);
+
+    let four = FourVanDerPol { k: 0.3, mu: 1.0 };
+    let n = 4;
+    let long = VanDerPol { n, k: 0.3, mu: 1.0 };
+    let turning = Phase::Momentum {
+        index: 0,
+        value: 0.0,
+    };
+    let one = PeriodicOrbit::of(&long)
+        .element(Mixed::<6>)
+        .unknown_period(6.66)
+        .phase(turning)
+        .guess_from(long.state(vec![2.0; 4], vec![0.0; 4]));
+    let one = one.solve_sensitive().expect("an orbit");
+    let other = PeriodicOrbit::of(&four)
+        .element(Mixed::<6>)
+        .unknown_period(6.66)
+        .phase(turning)
+        .guess_from(four.state([2.0; 4], [0.0; 4]));
+    let other = other.solve_sensitive().expect("an orbit");
+    assert!(one.by_period().is_none());
+    compare_slopes(one.by("mu"), other.by("mu"), 1e-9);
+    // All move together: springs in between do nothing to the orbit.
+    assert!(one.by("k").period().abs() < 1e-10);
+}
+
+/// T = 2π / agm(√(1 + b a²), √(1 + b a²/2)) of the mode (a, a, 0, −a, −a, 0, …) at its energy of 14 moving masses: 7 a² + 3.5 b a⁴ for each, as of ä = −a − b a³.
+#[test]
+fn a_period_changes_at_one_energy_as_its_closed_form() {
+    let chain = Chain { n: 20, b: 1.0 };
+    let pattern = [1.0, 1.0, 0.0, -1.0, -1.0, 0.0];
+    let q: Vec<f64> = (0..20).map(|i| 0.6 * pattern[i % 6]).collect();
+    let start = chain.state(q, vec![0.0; 20]);
+    let orbit = PeriodicOrbit::of(&chain)
+        .element(Mixed::<6>)
+        .unknown_period(5.5)
+        .guess_from(start)
+        .phase(Phase::Momentum {
+            index: 0,
+            value: 0.0,
+        })
+        .solve_sensitive()
+        .expect("an orbit");
+    let period = |b: f64, a: f64| {
+        let (mut mean, mut geometric) = ((1.0 + b * a * a).sqrt(), (1.0 + b * a * a / 2.0).sqrt());
+        for _ in 0..6 {
+            (mean, geometric) = (f64::midpoint(mean, geometric), (mean * geometric).sqrt());
+        }
+        TAU / mean
+    };
+    // The energy of one oscillator, a²/2 + b a⁴/4, stays: a² = (√(1 + 4 b E) − 1)/b.
+    let energy = 0.18 + 0.36 * 0.36 / 4.0;
+    let at_energy = |b: f64| {
+        let square = ((1.0 + 4.0 * b * energy).sqrt() - 1.0) / b;
+        period(b, square.sqrt())
+    };
+    let (h, weights) = (2e-3, [0.8, -0.2, 4.0 / 105.0, -1.0 / 280.0]);
+    let differences = (1..).zip(weights).map(|(k, weight)| {
+        let step = f64::from(k) * h;
+        weight * (at_energy(1.0 + step) - at_energy(1.0 - step)) / h
+    });
+    let expected: f64 = differences.sum();
+    let off = orbit.by("b").period() - expected;
+    assert!(off.abs() < 1e-9, "{off:e}");
+    // The start is a turning point of amplitude a(b).
+    let square = |b: f64| ((1.0 + 4.0 * b * energy).sqrt() - 1.0) / b;
+    let by_b = (square(1.0 + 1e-5) - square(1.0 - 1e-5)) / (2e-5) / 1.2;
+    let off = orbit.by("b").start().q[0] - by_b;
+    assert!(off.abs() < 1e-8, "{off:e}");
 }
 
 #[test]

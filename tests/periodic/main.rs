@@ -9,3 +9,4 @@ mod convergence;
 mod errors;
 mod models;
 mod orbits;
+mod sensitive;

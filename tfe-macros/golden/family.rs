@@ -74,8 +74,8 @@ const _: () = {
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R]) -> R {
             let __tfe_length = 1usize.saturating_add(self.n);
             let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
-            let a = t.like(self.a);
-            let k = t.like(self.k);
+            let a = t.parameter(self.m.len() + 1, self.a);
+            let k = t.parameter(self.m.len(), self.k);
             let t0 = q[0] - q[1];
             let t1 = z[0] * z[0];
             let t2 = t0 * t0;
@@ -84,7 +84,7 @@ const _: () = {
             let t5 = t.like(0.5) * t4;
             let mut t6 = t5;
             for i in 0..self.n {
-                let t7 = t.like(0.5) * t.like(self.m[i]);
+                let t7 = t.like(0.5) * t.parameter(i, self.m[i]);
                 let t8 = z[i + 1] * z[i + 1];
                 t6 += t7 * t8;
             }

@@ -186,7 +186,7 @@ impl Kernels<'_> {
         };
         let formulas = Formulas::of(self.declared, self.derivation);
         let value_doc = page::kernel(&formulas.value, &self.program(value));
-        let value = self.body(&self.program(value), Given::Nothing);
+        let value = self.sensitive_body(&self.program(value), Given::Nothing);
         let (value_statements, value) = (value.statements, value.value);
         let value = value.unwrap_or_else(|| quote!(t.like(0.0)));
         let first = Request {

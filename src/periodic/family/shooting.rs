@@ -121,31 +121,17 @@ impl<'m, M: family::Model> Shooting<'m, M> {
 
     /// Steps all elements from their nodes and solves for the correction, which is then in the chain.
     fn linearise(&mut self, chain: &mut Chain) -> Result<(), OrbitError> {
-        let n = self.model.len();
         let mut transitions = Vec::with_capacity(self.mesh.elements());
-        let places: Vec<(f64, f64)> = (0..self.mesh.elements())
-            .map(|e| self.mesh.place(e, self.start, self.period))
-            .collect();
+        let places = self.places(self.period);
         let steps = places.iter().zip(&self.nodes);
         let steps = steps.map(|((t, h), node)| (*t, *h, node));
         let each = |transition: family::TransitionOperator| {
             let e = transitions.len();
-            let matrix = transition.matrix();
-            let link = chain.link_mut(e);
-            for (row, entries) in link.matrix.chunks_exact_mut(2 * n).enumerate() {
-                for (column, entry) in entries.iter_mut().enumerate() {
-                    *entry = matrix[(row, column)];
-                }
-            }
+            let matrix = self.link(chain, e, &transition);
             let (end, next) = (transition.end(), &self.nodes[e + 1]);
-            for row in 0..2 * n {
-                for (k, global) in self.globals.iter().enumerate() {
-                    link.global[row * self.globals.len() + k] = match global {
-                        Global::Period => self.mesh.share(e) * transition.by_length()[row],
-                        Global::Unfolding => transition.by_damping()[row],
-                    };
-                }
-                link.right[row] = component(end, row) - component(next, row);
+            let right = chain.link_mut(e).right;
+            for (row, right) in right.iter_mut().enumerate() {
+                *right = component(end, row) - component(next, row);
             }
             transitions.push(matrix);
         };
@@ -156,15 +142,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             steps,
             each,
         );
-        stepped.map_err(|(element, error)| match error {
-            family::OperatorError::Step(source) => AssemblyError::Linearise {
-                element,
-                time: places.get(element).map_or(f64::NAN, |(t, _)| *t),
-                source,
-            }
-            .into(),
-            other => OrbitError::Family(other),
-        })?;
+        stepped.map_err(|failed| step_failed(failed, &places))?;
         self.transitions = transitions;
         self.statistics.iterations += 1;
         self.statistics.newton_iterations += 1;
@@ -177,12 +155,46 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             .map_err(|_| AssemblyError::Singular { iterations }.into())
     }
 
+    /// Start times and lengths of the elements, for a period.
+    pub(super) fn places(&self, period: f64) -> Vec<(f64, f64)> {
+        let elements = 0..self.mesh.elements();
+        let places = elements.map(|e| self.mesh.place(e, self.start, period));
+        places.collect()
+    }
+
+    /// Writes what an element makes of its start and of the globals into its link, and gives its matrix.
+    pub(super) fn link(
+        &self,
+        chain: &mut Chain,
+        e: usize,
+        transition: &family::TransitionOperator,
+    ) -> DMatrix<f64> {
+        let size = transition.size();
+        let matrix = transition.matrix();
+        let link = chain.link_mut(e);
+        for (row, entries) in link.matrix.chunks_exact_mut(size).enumerate() {
+            for (column, entry) in entries.iter_mut().enumerate() {
+                *entry = matrix[(row, column)];
+            }
+        }
+        let globals = self.globals.len();
+        for row in 0..size {
+            for (k, global) in self.globals.iter().enumerate() {
+                link.global[row * globals + k] = match global {
+                    Global::Period => self.mesh.share(e) * transition.by_length()[row],
+                    Global::Unfolding => transition.by_damping()[row],
+                };
+            }
+        }
+        matrix
+    }
+
     fn iterations(&self) -> u32 {
         u32::try_from(self.statistics.newton_iterations).unwrap_or(u32::MAX)
     }
 
     /// Periodicity, phase and energy.
-    fn close(&self, chain: &mut Chain) -> Result<(), OrbitError> {
+    pub(super) fn close(&self, chain: &mut Chain) -> Result<(), OrbitError> {
         let n = self.model.len();
         let size = 2 * n;
         let (first, last) = (&self.nodes[0], &self.nodes[self.nodes.len() - 1]);
@@ -281,8 +293,24 @@ impl<'m, M: family::Model> Shooting<'m, M> {
     }
 }
 
+/// Why an element of an orbit was not stepped.
+pub(super) fn step_failed(
+    (element, error): (usize, family::OperatorError),
+    places: &[(f64, f64)],
+) -> OrbitError {
+    match error {
+        family::OperatorError::Step(source) => AssemblyError::Linearise {
+            element,
+            time: places.get(element).map_or(f64::NAN, |(t, _)| *t),
+            source,
+        }
+        .into(),
+        other => OrbitError::Family(other),
+    }
+}
+
 /// A number of a state, in the order (p, q).
-fn component(state: &FamilyState, k: usize) -> f64 {
+pub(super) fn component(state: &FamilyState, k: usize) -> f64 {
     let n = state.p.len();
     if k < n { state.p[k] } else { state.q[k - n] }
 }

@@ -1,0 +1,507 @@
+//! The problem, its equations and its solution.
+
+use crate::assembly::{
+    Assembly, AssemblyError, ClosureMut, Control, Curve, Iterate, Mesh, MeshError, Problem,
+    Solution,
+};
+use crate::motion::{Motion, Node};
+use crate::periodic::along_motion;
+use crate::simulation::Simulation;
+use nalgebra::DMatrix;
+use std::fmt;
+use std::ops::Range;
+use tfe_runtime::condenser::Direction;
+use tfe_runtime::{Element, LegendreError, Mixed, Model, State, Statistics};
+
+/// A component of the state at one end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Component {
+    /// The coordinate with this index.
+    Coordinate(usize),
+    /// The momentum with this index.
+    Momentum(usize),
+}
+
+impl Component {
+    /// Its place in the order (p, q).
+    pub(crate) fn place<const N: usize>(self) -> Option<usize> {
+        match self {
+            Self::Momentum(index) if index < N => Some(index),
+            Self::Coordinate(index) if index < N => Some(N + index),
+            _ => None,
+        }
+    }
+
+    fn of<const N: usize>(self, state: &State<N>) -> f64 {
+        match self {
+            Self::Coordinate(index) => state.q[index],
+            Self::Momentum(index) => state.p[index],
+        }
+    }
+}
+
+/// A given value of a component at one end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Condition {
+    pub(crate) at_end: bool,
+    pub(crate) component: Component,
+    pub(crate) value: f64,
+}
+
+/// Whether a span has a length.
+pub(crate) fn check_span(span: &Range<f64>) -> Result<(), BoundaryError> {
+    let Range { start, end } = *span;
+    if start.is_finite() && end.is_finite() && start != end {
+        return Ok(());
+    }
+    Err(BoundaryError::Span { start, end })
+}
+
+/// Whether each condition is one by itself.
+pub(crate) fn check_conditions<const N: usize>(
+    conditions: &[Condition],
+) -> Result<(), BoundaryError> {
+    for (at, condition) in conditions.iter().enumerate() {
+        let Condition {
+            component,
+            value,
+            at_end,
+        } = *condition;
+        if component.place::<N>().is_none() {
+            return Err(BoundaryError::Component { component });
+        }
+        if !value.is_finite() {
+            return Err(BoundaryError::Value { component, value });
+        }
+        let same = |other: &Condition| other.component == component && other.at_end == at_end;
+        if conditions[..at].iter().any(same) {
+            return Err(BoundaryError::Twice { component });
+        }
+    }
+    Ok(())
+}
+
+/// The straight line between the coordinates that are given; where only one end is, a constant.
+pub(crate) fn straight<const N: usize>(
+    conditions: &[Condition],
+    span: &Range<f64>,
+) -> impl Fn(f64) -> ([f64; N], [f64; N]) + use<N> {
+    let value = |index: usize, at_end: bool| {
+        let found = conditions.iter().find(|condition| {
+            condition.at_end == at_end && condition.component == Component::Coordinate(index)
+        });
+        found.map(|condition| condition.value)
+    };
+    let mut line = [(0.0, 0.0); N];
+    let Range { start, end } = *span;
+    for (index, entry) in line.iter_mut().enumerate() {
+        let (first, last) = (value(index, false), value(index, true));
+        let from = first.or(last).unwrap_or(0.0);
+        *entry = (from, (last.unwrap_or(from) - from) / (end - start));
+    }
+    move |t| (line.map(|(q, v)| q + v * (t - start)), line.map(|(_, v)| v))
+}
+
+/// A motion with given values at both ends of a span, to be found: 2N conditions in all, coordinates and momenta mixed at will.
+///
+/// ```text
+/// δy_{e+1} − A_e δy_e = r_e ,   e = 0 … E − 1 ;      B₀ y_0 + B_E y_E = b
+/// ```
+///
+/// (`docs/theory.md`, (T-81) with other ends.) All conditions at the start make it the initial-value problem, assembled over the whole
+/// span: the same motion as stepping.
+///
+/// Defaults: `Mixed::<4>` (order 6), 40 equal elements, and as first guess a straight line between the coordinates that are given
+/// (steps of second order where all is given at the start).
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - 9.81*y)]
+/// struct Projectile {}
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let projectile = Projectile {};
+/// let arc = BoundaryValue::of(&projectile)
+///     .element(Mixed::<4>)
+///     .elements(20)
+///     .from_to([0.0, 0.0], [10.0, 0.0], 0.0..2.0)
+///     .solve()?;
+/// assert!((arc.start().p[0] - 5.0).abs() < 1e-12); // 10 m in 2 s
+/// assert!((arc.start().p[1] - 9.81).abs() < 1e-12); // at the top after 1 s
+/// assert!((arc.motion().at(1.0)?.q[1] - 9.81 / 2.0).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
+pub struct BoundaryValue<'m, M, const N: usize> {
+    pub(super) model: &'m M,
+    pub(super) element: Element,
+    elements: usize,
+    weights: Vec<f64>,
+    span: Range<f64>,
+    pub(super) conditions: Vec<Condition>,
+    guess: Option<Curve<'m, N>>,
+    control: Control,
+}
+
+impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
+    /// A problem for `model`, without conditions so far.
+    pub fn of(model: &'m M) -> Self {
+        Self {
+            model,
+            element: Mixed::<4>.into(),
+            elements: 40,
+            weights: Vec::new(),
+            span: f64::NAN..f64::NAN,
+            conditions: Vec::new(),
+            guess: None,
+            control: Control::default(),
+        }
+    }
+
+    /// The element.
+    #[must_use]
+    pub fn element(mut self, element: impl Into<Element>) -> Self {
+        self.element = element.into();
+        self
+    }
+
+    /// The number of elements, equally long unless [`graded`](Self::graded).
+    #[must_use]
+    pub fn elements(mut self, elements: usize) -> Self {
+        self.elements = elements;
+        self
+    }
+
+    /// One element a weight, each as long as its weight says beside the others.
+    #[must_use]
+    pub fn graded(mut self, weights: impl IntoIterator<Item = f64>) -> Self {
+        self.weights = weights.into_iter().collect();
+        self.elements = self.weights.len();
+        self
+    }
+
+    /// From when to when.
+    #[must_use]
+    pub fn span(mut self, span: Range<f64>) -> Self {
+        self.span = span;
+        self
+    }
+
+    /// All coordinates at both ends.
+    #[must_use]
+    pub fn from_to(mut self, start: [f64; N], end: [f64; N], span: Range<f64>) -> Self {
+        for (a, (start, end)) in start.into_iter().zip(end).enumerate() {
+            self = self
+                .start(Component::Coordinate(a), start)
+                .end(Component::Coordinate(a), end);
+        }
+        self.span(span)
+    }
+
+    /// All conditions at the start: the initial-value problem, as one assembled system.
+    #[must_use]
+    pub fn initial(mut self, state: State<N>, span: Range<f64>) -> Self {
+        for a in 0..N {
+            self = self
+                .start(Component::Coordinate(a), state.q[a])
+                .start(Component::Momentum(a), state.p[a]);
+        }
+        self.span(span)
+    }
+
+    /// Gives one component at the start.
+    #[must_use]
+    pub fn start(mut self, component: Component, value: f64) -> Self {
+        self.conditions.push(Condition {
+            at_end: false,
+            component,
+            value,
+        });
+        self
+    }
+
+    /// Gives one component at the end.
+    #[must_use]
+    pub fn end(mut self, component: Component, value: f64) -> Self {
+        self.conditions.push(Condition {
+            at_end: true,
+            component,
+            value,
+        });
+        self
+    }
+
+    /// Where to begin: a curve t ↦ (q, dq/dt). Where a problem has several solutions it decides which one is found.
+    #[must_use]
+    pub fn guess(mut self, curve: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
+        self.guess = Some(Box::new(curve));
+        self
+    }
+
+    /// When the iteration is done: the relative size of the last correction, 10⁻¹³ by default. The correction that meets it is applied.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.control.tolerance = tolerance;
+        self
+    }
+
+    /// The most iterations of Newton's method, 50 by default.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: u32) -> Self {
+        self.control.max_iterations = iterations;
+        self
+    }
+
+    /// Finds the motion.
+    ///
+    /// # Errors
+    /// [`BoundaryError`]: the conditions make no sense, or there is no solution near the guess.
+    pub fn solve(&self) -> Result<BoundaryMotion<'m, M, N>, BoundaryError> {
+        self.check()?;
+        let mut problem = self.problem()?;
+        let mut assembly = Assembly::new::<M>(self.element, self.elements, 0, 0)
+            .map_err(AssemblyError::Element)?;
+        let curve = match (&self.guess, self.stepped()) {
+            (Some(curve), _) => curve,
+            (None, Some(motion)) => {
+                &(Box::new(move |t| along_motion(self.model, &motion, t)) as Curve<'_, N>)
+            }
+            (None, None) => &(Box::new(straight(&self.conditions, &self.span)) as Curve<'_, N>),
+        };
+        let mut iterate = assembly
+            .along(&problem, curve, Vec::new())
+            .map_err(AssemblyError::Legendre)?;
+        assembly.solve(&mut problem, &mut iterate, self.control)?;
+        Ok(BoundaryMotion {
+            solution: Solution {
+                model: self.model,
+                element: self.element,
+                mesh: problem.mesh,
+                start: self.span.start,
+                length: self.span.end - self.span.start,
+                damping: 0.0,
+                transitions: assembly.transitions().to_vec(),
+                statistics: assembly.statistics(),
+                iterate,
+            },
+        })
+    }
+
+    pub(super) fn problem(&self) -> Result<Spanned<'_, M, N>, BoundaryError> {
+        Ok(Spanned {
+            model: self.model,
+            mesh: Mesh::new(self.elements, &self.weights)?,
+            span: self.span.clone(),
+            conditions: &self.conditions,
+        })
+    }
+
+    fn check(&self) -> Result<(), BoundaryError> {
+        check_span(&self.span)?;
+        if self.conditions.len() != 2 * N {
+            return Err(BoundaryError::Count {
+                needed: 2 * N,
+                given: self.conditions.len(),
+            });
+        }
+        check_conditions::<N>(&self.conditions)
+    }
+
+    /// Where all is given at the start, and no guess: the motion that steps of second order give, as long as the elements.
+    fn stepped(&self) -> Option<Motion<N>> {
+        let mut start = State {
+            q: [0.0; N],
+            p: [0.0; N],
+        };
+        for condition in &self.conditions {
+            let value = match condition.component {
+                Component::Coordinate(index) => &mut start.q[index],
+                Component::Momentum(index) => &mut start.p[index],
+            };
+            *value = condition.value;
+        }
+        let Range {
+            start: from,
+            end: to,
+        } = self.span;
+        let initial =
+            self.guess.is_none() && self.conditions.iter().all(|condition| !condition.at_end);
+        let simulation = Simulation::new(self.model)
+            .element(Mixed::<2>)
+            .step((to - from) / self.elements as f64);
+        initial.then(|| simulation.run(start, from..to).ok())?
+    }
+}
+
+/// The chain of elements over a span, closed by conditions at its ends.
+pub(super) struct Spanned<'a, M, const N: usize> {
+    model: &'a M,
+    mesh: Mesh,
+    span: Range<f64>,
+    conditions: &'a [Condition],
+}
+
+impl<M: Model<N>, const N: usize> Problem<N> for Spanned<'_, M, N> {
+    type Model = M;
+
+    fn model(&self) -> &M {
+        self.model
+    }
+
+    fn place(&self, element: usize) -> (f64, f64) {
+        let length = self.span.end - self.span.start;
+        self.mesh.place(element, self.span.start, length)
+    }
+
+    fn directions(&self, _: usize, _: &mut [Direction]) {}
+
+    fn set_globals(&mut self, _: &[f64]) {}
+
+    fn close(
+        &self,
+        iterate: &Iterate<N>,
+        mut closure: ClosureMut<'_>,
+    ) -> Result<(), LegendreError> {
+        closure.clear();
+        let (Some(first), Some(last)) = (iterate.nodes.first(), iterate.nodes.last()) else {
+            return Ok(());
+        };
+        for (row, condition) in self.conditions.iter().enumerate() {
+            let Some(place) = condition.component.place::<N>() else {
+                continue;
+            };
+            let (matrix, state) = if condition.at_end {
+                (&mut closure.last, last)
+            } else {
+                (&mut closure.first, first)
+            };
+            matrix[row * 2 * N + place] = 1.0;
+            closure.right[row] = condition.value - condition.component.of(state);
+        }
+        Ok(())
+    }
+}
+
+/// A solution of a [`BoundaryValue`] problem.
+#[derive(Clone, Debug)]
+pub struct BoundaryMotion<'m, M, const N: usize> {
+    pub(super) solution: Solution<'m, M, N>,
+}
+
+impl<M: Model<N>, const N: usize> BoundaryMotion<'_, M, N> {
+    /// The state at the start of the span.
+    pub fn start(&self) -> State<N> {
+        self.solution.start()
+    }
+
+    /// The state at its end.
+    pub fn end(&self) -> State<N> {
+        self.solution.end()
+    }
+
+    /// The ends of the elements, in order.
+    pub fn nodes(&self) -> Vec<Node<N>> {
+        self.solution.nodes()
+    }
+
+    /// The transition matrices of the elements in order, 2N × 2N, ordered (p, q).
+    pub fn transitions(&self) -> Vec<DMatrix<f64>> {
+        self.solution.matrices()
+    }
+
+    /// What the solution cost.
+    pub fn statistics(&self) -> &Statistics {
+        &self.solution.statistics
+    }
+
+    /// The motion, with dense output.
+    pub fn motion(&self) -> Motion<N> {
+        self.solution.motion()
+    }
+}
+
+/// Why a boundary-value problem has no solution.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum BoundaryError {
+    /// The span was not given, is empty, or not finite.
+    Span {
+        /// Its start.
+        start: f64,
+        /// Its end.
+        end: f64,
+    },
+    /// There must be 2N conditions.
+    Count {
+        /// So many are needed.
+        needed: usize,
+        /// So many were given.
+        given: usize,
+    },
+    /// A component does not exist.
+    Component {
+        /// Which.
+        component: Component,
+    },
+    /// A component is given twice at the same end.
+    Twice {
+        /// Which.
+        component: Component,
+    },
+    /// A value is not finite.
+    Value {
+        /// Of which component.
+        component: Component,
+        /// Its value.
+        value: f64,
+    },
+    /// The mesh makes no sense.
+    Mesh(MeshError),
+    /// The assembled equations were not solved.
+    Assembly(AssemblyError),
+}
+
+impl From<MeshError> for BoundaryError {
+    fn from(error: MeshError) -> Self {
+        Self::Mesh(error)
+    }
+}
+
+impl From<AssemblyError> for BoundaryError {
+    fn from(error: AssemblyError) -> Self {
+        Self::Assembly(error)
+    }
+}
+
+impl fmt::Display for BoundaryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Span { start, end } => write!(
+                f,
+                "the span {start} .. {end} has no length: give it with `.span(t0..t1)` or with the values at both ends"
+            ),
+            Self::Count { needed, given } => {
+                write!(
+                    f,
+                    "{given} conditions at the ends, {needed} are needed: two for each coordinate"
+                )
+            }
+            Self::Component { component } => write!(f, "{component:?} does not exist"),
+            Self::Twice { component } => write!(f, "{component:?} is given twice at one end"),
+            Self::Value { component, value } => write!(f, "{component:?} is to be {value}"),
+            Self::Mesh(error) => error.fmt(f),
+            Self::Assembly(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for BoundaryError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Mesh(error) => Some(error),
+            Self::Assembly(error) => error.source(),
+            _ => None,
+        }
+    }
+}

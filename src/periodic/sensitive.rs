@@ -1,0 +1,247 @@
+//! Orbits with their derivatives by parameters.
+
+use super::error::OrbitError;
+use super::moving;
+use super::orbit::{Orbit, multipliers_of};
+use super::problem::{Global, Periodic};
+use super::setup::PeriodicOrbit;
+use crate::assembly::{By, Iterate, derivatives};
+use crate::length::{FixedLength, Length};
+use crate::numbers::larger;
+use crate::periodic_schur::Multiplier;
+use crate::sensitivity::names::place_of;
+use nalgebra::Complex;
+use tfe_runtime::condenser::{Condensed, Condenser, Placed};
+use tfe_runtime::{Element, Model, State};
+
+impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
+    /// Finds the orbit as [`solve`](Self::solve) does, and how its period, its start and its multipliers change with each parameter of the model.
+    ///
+    /// Period and states are differentiated exactly, as solutions of the equations of the elements (`docs/theory.md`, (T-156)). What was given stays: a known period, the [energy](Self::energy) (that of the
+    /// guess where none was given), the condition of [phase](Self::phase). Multipliers follow from differences of eighth order of the matrices along that change (T-157).
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = m*dot(x)^2/2 - k*x^2/2)]
+    /// struct Oscillator { m: f64, k: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let oscillator = Oscillator { m: 1.0, k: 4.0 };
+    /// let orbit = PeriodicOrbit::of(&oscillator)
+    ///     .unknown_period(3.1)
+    ///     .guess_from(oscillator.state([1.0], [0.0]))
+    ///     .solve_sensitive()?;
+    /// // T = 2π √(m/k)
+    /// let period = orbit.orbit().period();
+    /// assert!((orbit.by("k").period() + period / 8.0).abs() < 1e-7);
+    /// assert!((orbit.by("m").period() - period / 2.0).abs() < 1e-7);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_sensitive(&self) -> Result<SensitiveOrbit<Orbit<'m, M, N>, N>, OrbitError> {
+        let (problem, iterate, assembly) = self.solved()?;
+        let element = self.method().0;
+        let unfolded = problem.globals.contains(&Global::Unfolding);
+        let unfolding = unfolded.then_some(problem.unfolding);
+        let orbit = Orbit::new(element, &problem, iterate.clone(), &assembly, unfolding)?;
+        let indices: Vec<usize> = (0..self.model.parameters()).collect();
+        let mut by: Vec<By> = indices.iter().copied().map(By::Parameter).collect();
+        if !problem.globals.contains(&Global::Period) {
+            by.push(By::Length);
+        }
+        let changes = derivatives(element, &problem, &iterate, problem.dense(), &by)?;
+        let slopes = by.iter().zip(changes).map(|(by, change)| {
+            let period = match by {
+                By::Length => 1.0,
+                By::Parameter(_) | By::Row(_) => global(&problem, &change, Global::Period),
+            };
+            let moving = Moving {
+                element,
+                problem: &problem,
+                iterate: &iterate,
+                change: &change,
+                period,
+            };
+            OrbitSlopes {
+                period,
+                start: change.nodes[0],
+                multipliers: moving.by(*by, &orbit),
+            }
+        });
+        let mut slopes: Vec<_> = slopes.collect();
+        let by_period = slopes.split_off(indices.len()).pop();
+        let names = indices
+            .iter()
+            .map(|index| self.model.parameter_name(*index));
+        Ok(SensitiveOrbit {
+            parameters: names.map(|name| name.to_string()).collect(),
+            orbit,
+            slopes,
+            by_period,
+        })
+    }
+}
+
+/// What a change does to one of the globals; zero where it is given.
+fn global<M, const N: usize>(
+    problem: &Periodic<'_, M, N>,
+    change: &Iterate<N>,
+    global: Global,
+) -> f64 {
+    let place = problem.globals.iter().position(|own| *own == global);
+    place.map_or(0.0, |place| change.globals[place])
+}
+
+/// An orbit that moves with a parameter, or with its period.
+struct Moving<'a, 'm, M, const N: usize> {
+    element: Element,
+    problem: &'a Periodic<'m, M, N>,
+    iterate: &'a Iterate<N>,
+    change: &'a Iterate<N>,
+    /// ∂T/∂a
+    period: f64,
+}
+
+impl<'m, M: Model<N>, const N: usize> Moving<'_, 'm, M, N> {
+    fn by(&self, by: By, orbit: &Orbit<'m, M, N>) -> Vec<Option<Complex<f64>>> {
+        let model = self.problem.model;
+        let value = match by {
+            By::Parameter(index) => model.parameter(index),
+            By::Length | By::Row(_) => self.problem.period,
+        };
+        let distance = moving::distance(value, self.parts());
+        let (own, trivial) = (orbit.floquet(), orbit.trivial());
+        moving::derivatives(own, &trivial, distance, |shift| match by {
+            By::Parameter(index) => {
+                let model = model.with_parameter(index, value + shift)?;
+                self.multipliers(&model, shift)
+            }
+            By::Length | By::Row(_) => self.multipliers(model, shift),
+        })
+    }
+
+    /// What a unit of the parameter does to states and to the period, in parts of their sizes.
+    fn parts(&self) -> [f64; 3] {
+        let largest = |iterate: &Iterate<N>, of: fn(&State<N>) -> &[f64; N]| {
+            let all = iterate.nodes.iter().flat_map(of);
+            all.fold(0.0, |largest, x| larger(largest, x.abs()))
+        };
+        let part = |of: fn(&State<N>) -> &[f64; N]| {
+            let size = largest(self.iterate, of);
+            let change = largest(self.change, of);
+            if size > 0.0 { change / size } else { 0.0 }
+        };
+        [
+            part(|state| &state.q),
+            part(|state| &state.p),
+            self.period.abs() / self.problem.period,
+        ]
+    }
+
+    /// Those of the matrices where the parameter has moved so far, and the orbit with it.
+    fn multipliers(&self, model: &M, shift: f64) -> Option<Vec<Multiplier>> {
+        let moved = self.iterate.plus(shift, self.change);
+        let unfolding = global(self.problem, self.change, Global::Unfolding);
+        let problem = Periodic {
+            model,
+            mesh: self.problem.mesh.clone(),
+            period: self.problem.period + shift * self.period,
+            unfolding: self.problem.unfolding + shift * unfolding,
+            globals: Vec::new(),
+            ..*self.problem
+        };
+        let mut condenser = Condenser::<N>::new::<M>(self.element).ok()?;
+        let (m, columns) = (condenser.interior(), 2 * N + 1);
+        let (mut ends, mut response) = (vec![0.0; 2 * N * columns], vec![0.0; m * columns]);
+        let mut transitions = Vec::new();
+        for element in 0..problem.mesh.elements() {
+            let (time, length) = problem.mesh.place(element, problem.start, problem.period);
+            let placed = Placed {
+                time,
+                length,
+                start: &moved.nodes[element],
+                interior: &moved.interiors[element * m..(element + 1) * m],
+                damping: problem.unfolding,
+            };
+            let condensed = Condensed {
+                ends: &mut ends,
+                response: &mut response,
+            };
+            condenser.linearise(model, placed, &[], condensed).ok()?;
+            transitions.extend(ends.chunks_exact(columns).flat_map(|row| &row[..2 * N]));
+        }
+        multipliers_of(&problem, &moved.nodes, &transitions).ok()
+    }
+}
+
+/// An orbit, an [`Orbit`] or a [`HybridOrbit`](super::HybridOrbit), with its derivatives by the parameters of its model; made by [`PeriodicOrbit::solve_sensitive`] and
+/// [`HybridOrbits::solve_sensitive`](super::HybridOrbits::solve_sensitive).
+#[derive(Clone, Debug)]
+pub struct SensitiveOrbit<O, const N: usize, L: Length<N> = FixedLength> {
+    pub(super) orbit: O,
+    pub(super) parameters: Vec<String>,
+    pub(super) slopes: Vec<OrbitSlopes<N, L>>,
+    pub(super) by_period: Option<OrbitSlopes<N, L>>,
+}
+
+impl<O, const N: usize, L: Length<N>> SensitiveOrbit<O, N, L> {
+    /// The orbit.
+    pub fn orbit(&self) -> &O {
+        &self.orbit
+    }
+
+    /// The names of the parameters, `m` or `k[2]`, in the order of the struct.
+    pub fn parameters(&self) -> &[String] {
+        &self.parameters
+    }
+
+    /// The derivatives by a parameter.
+    ///
+    /// # Panics
+    /// Where no parameter has this name, as an index out of bounds does; [`get`](Self::get) does not.
+    #[track_caller]
+    pub fn by(&self, name: &str) -> &OrbitSlopes<N, L> {
+        &self.slopes[place_of(name, &self.parameters)]
+    }
+
+    /// The derivatives by a parameter; `None` where none has this name.
+    pub fn get(&self, name: &str) -> Option<&OrbitSlopes<N, L>> {
+        let place = self.parameters.iter().position(|own| own == name)?;
+        self.slopes.get(place)
+    }
+
+    /// The derivatives by the period T where it was given. A parameter on which it depends, as the frequency ω of a force that repeats after T(ω), changes the orbit by `by("omega")` and by dT/dω times these.
+    pub fn by_period(&self) -> Option<&OrbitSlopes<N, L>> {
+        self.by_period.as_ref()
+    }
+}
+
+/// The derivatives of an orbit by one parameter a.
+#[derive(Clone, Debug)]
+pub struct OrbitSlopes<const N: usize, L: Length<N> = FixedLength> {
+    pub(super) period: f64,
+    pub(super) start: L::State,
+    pub(super) multipliers: Vec<Option<Complex<f64>>>,
+}
+
+impl<const N: usize, L: Length<N>> OrbitSlopes<N, L> {
+    /// ∂T/∂a; zero where the period is given.
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// ∂q/∂a and ∂p/∂a at the start of the period.
+    pub fn start(&self) -> L::State {
+        self.start.clone()
+    }
+
+    /// ∂μ/∂a in the order of [`Orbit::multipliers`], to some 1e-10 of it. Zero for trivial ones, which stay 1. `None` where differences do not tell it: where two multipliers meet, or where the model cannot be
+    /// made with another parameter.
+    pub fn multipliers(&self) -> &[Option<Complex<f64>>] {
+        &self.multipliers
+    }
+}

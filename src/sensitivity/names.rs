@@ -1,0 +1,16 @@
+//! Parameters by their names.
+
+/// The place of a parameter among those that there are.
+///
+/// # Panics
+/// Where none has this name.
+#[track_caller]
+pub(crate) fn place_of(name: &str, parameters: &[String]) -> usize {
+    let place = parameters.iter().position(|own| own == name);
+    place.unwrap_or_else(|| {
+        panic!(
+            "the model has no parameter `{name}`, only `{}`",
+            parameters.join("`, `")
+        )
+    })
+}

@@ -1,0 +1,497 @@
+//! Derivatives of orbits and of solutions between given ends, beside differences of solutions.
+
+use crate::models::{Duffing, VanDerPol};
+use std::f64::consts::TAU;
+use tfe::boundary::Component::{Coordinate, Momentum};
+use tfe::boundary::SensitiveBoundaryMotion;
+use tfe::periodic::{HybridOrbit, HybridOrbits, OrbitSlopes};
+use tfe::prelude::*;
+
+/// The derivative of a function at `x`: of eighth order, so that the error is that of roundings.
+fn difference<const K: usize>(of: impl Fn(f64) -> [f64; K], x: f64) -> [f64; K] {
+    difference_over(4e-3 * x.abs().max(0.1), of, x)
+}
+
+/// The same over a distance.
+fn difference_over<const K: usize>(
+    distance: f64,
+    of: impl Fn(f64) -> [f64; K],
+    x: f64,
+) -> [f64; K] {
+    let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
+    let mut sum = [0.0; K];
+    for (k, weight) in (1..).zip(weights) {
+        let step = f64::from(k) * distance;
+        let (high, low) = (of(x + step), of(x - step));
+        for a in 0..K {
+            sum[a] += weight * (high[a] - low[a]) / distance;
+        }
+    }
+    sum
+}
+
+#[track_caller]
+fn close(found: f64, expected: f64, allowed: f64) {
+    let error = (found - expected).abs() / expected.abs().max(1.0);
+    assert!(
+        error < allowed,
+        "{found} instead of {expected}: {error:.1e}"
+    );
+}
+
+/// Period, start and the multiplier at a place, as numbers.
+fn of_orbit<M: Model<1>>(orbit: &PeriodicOrbit<'_, M, 1>, place: usize) -> [f64; 5] {
+    let orbit = orbit.solve().expect("an orbit");
+    let (start, multiplier) = (orbit.start(), orbit.multipliers()[place]);
+    [
+        orbit.period(),
+        start.q[0],
+        start.p[0],
+        multiplier.re,
+        multiplier.im,
+    ]
+}
+
+fn of_slopes(slopes: &OrbitSlopes<1>, place: usize) -> [f64; 5] {
+    let start = slopes.start();
+    let multiplier = slopes.multipliers()[place].expect("it stands alone");
+    [
+        slopes.period(),
+        start.q[0],
+        start.p[0],
+        multiplier.re,
+        multiplier.im,
+    ]
+}
+
+/// Tight, so that differences see roundings alone.
+fn tight<'m, M: Model<1>>(model: &'m M, guess: State<1>) -> PeriodicOrbit<'m, M, 1> {
+    PeriodicOrbit::of(model)
+        .element(Mixed::<6>)
+        .elements(40)
+        .guess_from(guess)
+        .tolerance(1e-13)
+}
+
+#[track_caller]
+fn compare<const K: usize>(found: [f64; K], expected: [f64; K], allowed: f64) {
+    for k in 0..K {
+        close(found[k], expected[k], allowed);
+    }
+}
+
+/// A limit cycle of its own period, whose start is a turning point: the condition of phase has a part.
+#[test]
+fn a_limit_cycle_by_its_damping() {
+    fn cycle(model: &VanDerPol) -> PeriodicOrbit<'_, VanDerPol, 1> {
+        let turning = tfe::periodic::Phase::Momentum {
+            index: 0,
+            value: 0.0,
+        };
+        tight(model, model.state([2.0], [0.0]))
+            .unknown_period(6.7)
+            .phase(turning)
+    }
+    let model = VanDerPol { mu: 0.8 };
+    let s = cycle(&model).solve_sensitive().expect("an orbit");
+    let trivial = s.orbit().trivial();
+    assert_eq!(trivial.len(), 1);
+    let other = 1 - trivial[0];
+    let expected = difference(|mu| of_orbit(&cycle(&VanDerPol { mu }), other), 0.8);
+    compare(of_slopes(s.by("mu"), other), expected, 1e-10);
+    let zero = s.by("mu").multipliers()[trivial[0]];
+    assert_eq!(zero.map(nalgebra::Complex::norm), Some(0.0));
+    assert!(s.by_period().is_none() && s.get("nu").is_none());
+}
+
+/// A forced oscillation with complex multipliers, by all parameters; by the frequency the period changes, too.
+#[test]
+fn a_forced_oscillation_by_all_parameters() {
+    fn response(model: &Duffing) -> PeriodicOrbit<'_, Duffing, 1> {
+        tight(model, model.state([0.1], [0.2])).period(TAU / model.omega)
+    }
+    let model = Duffing {
+        alpha: 1.0,
+        beta: 0.7,
+        delta: 0.2,
+        f: 0.4,
+        omega: 1.6,
+    };
+    let s = response(&model).solve_sensitive().expect("an orbit");
+    assert!(s.orbit().multipliers()[0].im != 0.0);
+    assert_eq!(s.parameters(), ["alpha", "beta", "delta", "f", "omega"]);
+    let with = |index: usize, value: f64| model.with_parameter(index, value).expect("numbers");
+    for (index, name) in s.parameters().iter().enumerate().take(4) {
+        let expected = difference(
+            |x| of_orbit(&response(&with(index, x)), 0),
+            model.parameter(index),
+        );
+        compare(of_slopes(s.by(name), 0), expected, 1e-10);
+        assert_eq!(s.by(name).period(), 0.0);
+    }
+    let expected = difference(|x| of_orbit(&response(&with(4, x)), 0), 1.6);
+    let direct = of_slopes(s.by("omega"), 0);
+    let stretched = of_slopes(s.by_period().expect("it is given"), 0);
+    assert_eq!(stretched[0], 1.0);
+    let rate = -TAU / (1.6 * 1.6);
+    compare(
+        std::array::from_fn(|k| direct[k] + rate * stretched[k]),
+        expected,
+        1e-10,
+    );
+}
+
+#[dynamics(coordinates(theta), lagrangian = m*dot(theta)^2/2 + k*cos(theta))]
+#[derive(Clone)]
+struct Swing {
+    m: f64,
+    k: f64,
+}
+
+/// 2π √(m/k) / M(1, cos A/2), with M the arithmetic-geometric mean and k cos A = −E.
+fn period([m, k]: [f64; 2], energy: f64) -> f64 {
+    let (mut a, mut b) = (1.0, (0.5 * (1.0 - energy / k)).sqrt());
+    while a - b > 1e-15 {
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+    }
+    TAU * (m / k).sqrt() / a
+}
+
+/// Orbits of a conservative model come in families: at one energy the period changes, at one period the energy.
+#[test]
+fn a_free_swing_at_one_energy_and_at_one_period() {
+    let (m, k, energy) = (1.1, 1.3, -0.5);
+    let model = Swing { m, k };
+    let swing = || tight(&model, model.state([1.2], [0.0]));
+    let at_energy = swing().energy(energy).unknown_period(7.0);
+    let s = at_energy.solve_sensitive().expect("an orbit");
+    close(s.orbit().period(), period([m, k], energy), 1e-12);
+    let [by_m] = difference(|m| [period([m, k], energy)], m);
+    let [by_k] = difference(|k| [period([m, k], energy)], k);
+    close(s.by("m").period(), by_m, 1e-10);
+    close(s.by("k").period(), by_k, 1e-10);
+    // At its period, of amplitude A(T): the start moves along the flow not at all.
+    let period_then = s.orbit().period();
+    let at_period = swing().period(period_then).solve_sensitive();
+    let at_period = at_period.expect("an orbit");
+    let energy_of = |start: State<1>, slope: State<1>| {
+        k * start.q[0].sin() * slope.q[0] + start.p[0] / m * slope.p[0]
+    };
+    let start = at_period.orbit().start();
+    // E changes with k by what keeps T, and by −cos θ at fixed start.
+    let by_energy = {
+        let [slope] = difference(|energy| [period([m, k], energy)], energy);
+        -by_k / slope
+    };
+    let found = energy_of(start, at_period.by("k").start()) - start.q[0].cos();
+    close(found, by_energy, 1e-9);
+    let by_period = at_period.by_period().expect("it is given");
+    let [slope] = difference(|energy| [period([m, k], energy)], energy);
+    close(energy_of(start, by_period.start()), 1.0 / slope, 1e-9);
+}
+
+/// Two multipliers that meet have no derivative, and none is told.
+#[test]
+fn multipliers_that_meet_are_left_out() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k*x^2/2, force(x) = -c*dot(x) + cos(t))]
+    struct Damped {
+        k: f64,
+        c: f64,
+    }
+    // At its critical damping: both are exp(−2π).
+    let critical = Damped { k: 1.0, c: 2.0 };
+    let s = tight(&critical, critical.state([0.0], [0.5])).period(TAU);
+    let s = s.solve_sensitive().expect("an orbit");
+    assert_eq!(s.by("c").multipliers(), [None, None]);
+    // x = sin t / c
+    assert!((s.by("c").start().p[0] + 0.25).abs() < 1e-10);
+    let other = Damped { k: 1.0, c: 0.5 };
+    let s = tight(&other, other.state([0.0], [2.0])).period(TAU);
+    let s = s.solve_sensitive().expect("an orbit");
+    // |μ| = exp(−cT/2)
+    let (own, slope) = (s.orbit().multipliers()[0], s.by("c").multipliers()[0]);
+    let relative = slope.expect("alone") / own;
+    close(relative.re, -TAU / 2.0, 1e-9);
+}
+
+/// With a constraint, by parameters of forces, of the pivot and of the constraint; beside the twin in one angle.
+#[test]
+fn a_constrained_orbit_beside_its_twin() {
+    #[dynamics(
+        coordinates(x, y),
+        lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
+        force(x) = f*cos(omega*t) - c*dot(x),
+        force(y) = -c*dot(y),
+        constraint(rod) = x^2 + y^2 - l^2,
+    )]
+    struct Rod {
+        g: f64,
+        f: f64,
+        c: f64,
+        l: f64,
+        omega: f64,
+    }
+    #[dynamics(
+        coordinates(phi),
+        lagrangian = l^2*dot(phi)^2/2 + g*l*cos(phi),
+        force(phi) = l*cos(phi)*f*cos(omega*t) - c*l^2*dot(phi),
+    )]
+    struct Angle {
+        g: f64,
+        f: f64,
+        c: f64,
+        l: f64,
+        omega: f64,
+    }
+    let (g, f, c, l, omega) = (1.0, 0.3, 0.15, 1.2, 1.4);
+    let angle = Angle { g, f, c, l, omega };
+    let rod = Rod { g, f, c, l, omega };
+    let twin = tight(&angle, angle.state([0.1], [0.3]))
+        .period(TAU / omega)
+        .solve_sensitive()
+        .expect("an orbit");
+    let start = twin.orbit().start();
+    let (phi, rate) = (start.q[0], start.p[0] / (l * l));
+    let guess = rod.state(
+        [l * phi.sin(), -l * phi.cos()],
+        [l * phi.cos() * rate, l * phi.sin() * rate],
+    );
+    let s = PeriodicOrbit::of(&rod)
+        .element(Mixed::<6>)
+        .elements(40)
+        .tolerance(1e-13)
+        .period(TAU / omega)
+        .guess_from(guess)
+        .solve_sensitive()
+        .expect("an orbit");
+    for name in ["g", "f", "c", "l"] {
+        let (ours, theirs) = (s.by(name), twin.by(name));
+        // φ = atan2(x, −y): elements of tenth order of different models agree to 1e-9.
+        let (found, theirs_start) = (ours.start(), theirs.start());
+        let along = (phi.cos() * found.q[0] + phi.sin() * found.q[1]) / l;
+        close(along, theirs_start.q[0], 1e-8);
+        let across = phi.sin() * found.q[0] - phi.cos() * found.q[1];
+        close(across, f64::from(name == "l"), 1e-9);
+        for place in 0..2 {
+            let found = ours.multipliers()[place].expect("alone");
+            let expected = theirs.multipliers()[place].expect("alone");
+            let own = s.orbit().multipliers()[place];
+            let same = own.im * twin.orbit().multipliers()[place].im >= 0.0;
+            assert!(same && (found - expected).norm() < 1e-7 * expected.norm().max(1.0));
+        }
+    }
+}
+
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) + mu*m/sqrt(x^2 + y^2),
+    force(x) = -c*dot(x),
+)]
+#[derive(Clone)]
+struct Transfer {
+    m: f64,
+    mu: f64,
+    c: f64,
+}
+
+fn transfer(
+    model: &Transfer,
+    [x, y, to, end]: [f64; 4],
+    by_momentum: bool,
+) -> SensitiveBoundaryMotion<'_, Transfer, 2> {
+    let base = BoundaryValue::of(model)
+        .element(Mixed::<6>)
+        .elements(30)
+        .tolerance(1e-13)
+        .guess(|t| {
+            let (sin, cos) = t.sin_cos();
+            ([cos, sin], [-sin, cos])
+        })
+        .span(0.0..1.9)
+        .start(Coordinate(0), x)
+        .start(Coordinate(1), y)
+        .end(Coordinate(0), to);
+    match by_momentum {
+        true => base.end(Momentum(1), end - 1.0),
+        false => base.end(Coordinate(1), end),
+    }
+    .solve_sensitive()
+    .expect("a motion")
+}
+
+/// From place to place around a centre; and one whose momentum at the end is given.
+#[test]
+fn solutions_between_ends_by_parameters_and_by_their_ends() {
+    let model = Transfer {
+        m: 1.2,
+        mu: 1.1,
+        c: 0.05,
+    };
+    let ends = [1.0, 0.1, -0.4, 0.9];
+    for by_momentum in [false, true] {
+        let s = transfer(&model, ends, by_momentum);
+        let nodes = |s: &SensitiveBoundaryMotion<'_, Transfer, 2>| {
+            let nodes = s.solved().nodes();
+            let [a, b, c] = [0, 13, 30].map(|at| nodes[at].state());
+            let all = [a, b, c].map(|one| [one.q[0], one.q[1], one.p[0], one.p[1]]);
+            all.concat().try_into().expect("twelve numbers")
+        };
+        let slopes = |all: &[State<2>]| -> [f64; 12] {
+            let of = [0, 13, 30].map(|at| all[at]);
+            let all = of.map(|one| [one.q[0], one.q[1], one.p[0], one.p[1]]);
+            all.concat().try_into().expect("twelve numbers")
+        };
+        for (index, name) in s.parameters().iter().enumerate() {
+            let expected: [f64; 12] = difference(
+                |x| {
+                    let other = model.with_parameter(index, x).expect("numbers");
+                    nodes(&transfer(&other, ends, by_momentum))
+                },
+                model.parameter(index),
+            );
+            compare(slopes(s.by(name)), expected, 1e-9);
+        }
+        let last = if by_momentum {
+            Momentum(1)
+        } else {
+            Coordinate(1)
+        };
+        let given = [
+            s.by_start(Coordinate(0)),
+            s.by_start(Coordinate(1)),
+            s.by_end(Coordinate(0)),
+            s.by_end(last),
+        ];
+        for (k, found) in given.into_iter().enumerate() {
+            let expected: [f64; 12] = difference(
+                |x| {
+                    let mut ends = ends;
+                    ends[k] = x;
+                    nodes(&transfer(&model, ends, by_momentum))
+                },
+                ends[k],
+            );
+            compare(slopes(found.expect("it was given")), expected, 1e-9);
+        }
+        assert!(s.by_start(Momentum(0)).is_none() && s.get("mass").is_none());
+    }
+}
+
+/// An oscillator that hits a wall once a period, with what the wall does.
+#[dynamics(
+    coordinates(x),
+    lagrangian = (m*dot(x)^2 - k*x^2)/2 + f*cos(omega*t)*x,
+    force(x) = -c*dot(x),
+    event(wall) = w - x,
+)]
+#[derive(Clone)]
+struct Impacting {
+    m: f64,
+    k: f64,
+    c: f64,
+    f: f64,
+    w: f64,
+    omega: f64,
+}
+
+/// A clock: each swing upwards through the middle a kick that depends on how fast it is.
+#[dynamics(coordinates(x), lagrangian = (m*dot(x)^2 - k*x^2)/2 - b*x^4/4, force(x) = -c*dot(x), event(middle) = x)]
+#[derive(Clone)]
+struct Clock {
+    m: f64,
+    k: f64,
+    b: f64,
+    c: f64,
+}
+
+fn of_hybrid(orbit: &HybridOrbit<1>, place: usize) -> [f64; 5] {
+    let (start, multiplier) = (orbit.start(), orbit.multipliers()[place]);
+    [
+        orbit.period(),
+        start.q[0],
+        start.p[0],
+        multiplier.re,
+        multiplier.im,
+    ]
+}
+
+#[test]
+fn orbits_with_impacts_by_all_parameters() {
+    fn orbits(model: &Impacting) -> HybridOrbits<'_, Impacting, 1> {
+        let bounce = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.8));
+        let simulation =
+            Simulation::new(model)
+                .element(Mixed::<8>)
+                .on("wall", Crossing::Falling, bounce);
+        PeriodicOrbit::of_simulation(&simulation)
+            .start_time(0.9)
+            .period(TAU / model.omega)
+            .guess_from(model.state([-0.41], [0.3]))
+    }
+    let model = Impacting {
+        m: 1.1,
+        k: 1.2,
+        c: 0.1,
+        f: 1.0,
+        w: 0.05,
+        omega: 2.6,
+    };
+    let s = orbits(&model).solve_sensitive().expect("an orbit");
+    assert_eq!(s.orbit().motion().events().len(), 1);
+    let with = |index: usize, value: f64| model.with_parameter(index, value).expect("numbers");
+    let by_period = of_slopes(s.by_period().expect("it is given"), 0);
+    for (index, name) in s.parameters().iter().enumerate() {
+        // Over a shorter distance: the multipliers are near where they meet.
+        let expected = difference_over(
+            1e-3 * model.parameter(index),
+            |x| of_hybrid(&orbits(&with(index, x)).solve().expect("an orbit"), 0),
+            model.parameter(index),
+        );
+        let rate = if name == "omega" {
+            -TAU / 2.6_f64.powi(2)
+        } else {
+            0.0
+        };
+        let direct = of_slopes(s.by(name), 0);
+        let found: [f64; 5] = std::array::from_fn(|k| direct[k] + rate * by_period[k]);
+        compare(found, expected, 1e-8);
+    }
+}
+
+#[test]
+fn a_clock_by_all_parameters() {
+    fn orbits(model: &Clock) -> HybridOrbits<'_, Clock, 1> {
+        let kick = |event: &tfe::Occurrence<'_, 1>| Act::Impulse([0.5 / (1.0 + event.v[0])]);
+        let simulation =
+            Simulation::new(model)
+                .element(Mixed::<8>)
+                .on("middle", Crossing::Rising, kick);
+        PeriodicOrbit::of_simulation(&simulation)
+            .unknown_period(6.0)
+            .guess_from(model.state([0.8], [0.1]))
+    }
+    let model = Clock {
+        m: 1.1,
+        k: 1.2,
+        b: 0.3,
+        c: 0.1,
+    };
+    let s = orbits(&model).solve_sensitive().expect("an orbit");
+    assert!(s.by_period().is_none());
+    let other = 1 - s.orbit().trivial()[0];
+    for (index, name) in s.parameters().iter().enumerate() {
+        let with = |value: f64| model.with_parameter(index, value).expect("numbers");
+        let expected = difference(
+            |x| {
+                let orbit = orbits(&with(x)).solve().expect("an orbit");
+                let other = 1 - orbit.trivial()[0];
+                of_hybrid(&orbit, other)
+            },
+            model.parameter(index),
+        );
+        // Where an orbit begins is open: the start may have moved along it.
+        let found = of_slopes(s.by(name), other);
+        close(found[0], expected[0], 1e-9);
+        close(found[3], expected[3], 1e-8);
+    }
+}
