@@ -10,6 +10,7 @@ pub mod charts;
 pub mod constraints;
 pub mod continuation;
 mod csv;
+mod differences;
 mod driven;
 pub mod ensemble;
 pub mod error;

@@ -1,5 +1,6 @@
 //! A motion with its derivatives by parameters and by its start.
 
+pub(crate) mod hessian;
 pub(crate) mod inside;
 pub(crate) mod loss;
 pub(crate) mod names;
@@ -14,6 +15,7 @@ use nalgebra::DMatrix;
 use names::place_of;
 use std::fmt;
 
+pub use hessian::LossHessian;
 pub use loss::{Loss, LossGradient};
 
 /// A motion together with its derivatives by the parameters of its model and by its start, from [`Simulation::run_sensitive`](crate::Simulation::run_sensitive).

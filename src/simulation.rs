@@ -8,6 +8,7 @@ mod events;
 mod follow;
 mod gradient;
 mod held;
+mod hessian;
 mod impulses;
 mod inputs;
 mod kind;

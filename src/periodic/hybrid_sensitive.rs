@@ -6,6 +6,7 @@ use super::moving;
 use super::orbit::sort;
 use super::phase::Period;
 use super::sensitive::{OrbitSlopes, SensitiveOrbit};
+use crate::differences::places;
 use crate::periodic_schur::Multiplier;
 use nalgebra::DVector;
 use tfe_runtime::{Model, Share, State};
@@ -71,11 +72,11 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
     /// What a unit of the period does to the end, ordered (p, q), where all elements become longer: a difference of eighth order.
     fn by_length(&self, start: State<N>, period: f64) -> Result<DVector<f64>, OrbitError> {
         let mut sum = DVector::zeros(2 * N);
-        for (shift, weight) in moving::stencil(moving::EIGHTH, moving::distance(period, [])) {
-            let run = self.run(&start, period + shift)?;
+        for place in places(moving::distance(period, [])) {
+            let run = self.run(&start, period + place.shift)?;
             let last = run.motion().last();
             let end = last.p.iter().chain(&last.q).copied();
-            sum += DVector::from_iterator(2 * N, end) * weight;
+            sum += DVector::from_iterator(2 * N, end) * place.eighth;
         }
         Ok(sum)
     }

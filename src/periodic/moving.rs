@@ -1,17 +1,12 @@
 //! How multipliers move with a parameter (T-157).
 
+use crate::differences::{NEARER, PART, WELL_KNOWN, places};
 use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
 use std::f64::consts::PI;
 
-/// What a difference moves of whatever moves most, as a part of its size: roundings of 1e-15 leave some 1e-12 of a derivative, the ninth power of this less.
-const PART: f64 = 4e-3;
-
 /// The largest difference between two orders of a derivative with which it counts as known; the better one is nearer.
 const KNOWN: f64 = 1e-7;
-
-/// That with which no better one is looked for.
-const WELL_KNOWN: f64 = 1e-9;
 
 /// The distance of differences by a parameter of this value, where unit steps of it move things by such parts of their sizes.
 pub(super) fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 {
@@ -21,18 +16,6 @@ pub(super) fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 
         true => PART / largest,
         false => PART,
     }
-}
-
-/// Weights of central differences of eighth and of sixth order, for ±1 … ±4 distances.
-pub(super) const EIGHTH: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
-const SIXTH: [f64; 4] = [3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0, 0.0];
-
-/// The places of a central difference, and what values there count.
-pub(super) fn stencil(weights: [f64; 4], distance: f64) -> impl Iterator<Item = (f64, f64)> {
-    (1..).zip(weights).flat_map(move |(k, weight)| {
-        let place = f64::from(k) * distance;
-        [(place, weight / distance), (-place, -weight / distance)]
-    })
 }
 
 /// The derivatives of multipliers, from those at places near by, at first `distance` apart, then nearer where that does not tell them; none where it never does, as where multipliers meet.
@@ -51,7 +34,7 @@ pub(super) fn derivatives(
     for place in trivial {
         best[*place].off = 0.0;
     }
-    for nearer in [1.0, 0.25, 0.0625] {
+    for nearer in NEARER {
         let distance = nearer * distance;
         let found = differences(multipliers, distance, &at);
         for (best, found) in best.iter_mut().zip(found) {
@@ -82,12 +65,12 @@ fn differences(
 ) -> Vec<Known> {
     let zero = Complex::new(0.0, 0.0);
     let mut sums = vec![[zero; 2]; multipliers.len()];
-    for ((shift, eighth), sixth) in stencil(EIGHTH, distance).zip(stencil(SIXTH, distance)) {
-        let found = at(shift).unwrap_or_default();
+    for place in places(distance) {
+        let found = at(place.shift).unwrap_or_default();
         for (own, sum) in multipliers.iter().zip(&mut sums) {
             let change = nearest(own, &found);
-            sum[0] += change * eighth;
-            sum[1] += change * sixth.1;
+            sum[0] += change * place.eighth;
+            sum[1] += change * place.sixth;
         }
     }
     let known = |[eighth, sixth]: [Complex<f64>; 2]| Known {

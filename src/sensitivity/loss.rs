@@ -1,5 +1,6 @@
 //! Losses: numbers of a motion that are to be small, and their gradients.
 
+use crate::differences::SIXTH;
 use crate::error::RunErrorKind;
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
@@ -321,7 +322,6 @@ fn partial<const N: usize, L: Length<N>>(
     factor: f64,
     function: &dyn Fn(&Node<N, L>) -> f64,
 ) -> By {
-    const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
     const DISTANCE: f64 = 2e-3;
 
     type Part<const N: usize, L> = fn(&mut Node<N, L>) -> &mut <L as Length<N>>::Vector;
@@ -335,7 +335,7 @@ fn partial<const N: usize, L: Length<N>>(
                 *part(&mut moved) = L::from_fn(&still, with);
                 function(&moved)
             };
-            let differences = (1..).zip(WEIGHTS).map(|(k, weight)| {
+            let differences = (1..).zip(SIXTH).map(|(k, weight)| {
                 let step = f64::from(k) * distance;
                 weight * (at(step) - at(-step)) / distance
             });

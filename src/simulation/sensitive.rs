@@ -5,9 +5,9 @@ mod family;
 use super::checks::check_start;
 use super::events::Severed;
 use super::events::act::{Near, state_after};
-use super::events::value::WEIGHTS;
 use super::follow::{Follow, Passed};
 use super::setup::Simulation;
+use crate::differences::SIXTH;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
 use crate::sensitivity::inside::{Before, Inside, Moved};
@@ -411,7 +411,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
                 found.ok_or(TransitionError::from(StepError::NonFinite))
             };
             after.column_mut(column).fill(0.0);
-            for (k, weight) in (1..).zip(WEIGHTS) {
+            for (k, weight) in (1..).zip(SIXTH) {
                 let s = f64::from(k) * distance;
                 let (high, low) = (moved(s)?, moved(-s)?);
                 for a in 0..N {

@@ -1,6 +1,6 @@
 //! Gradients of losses of models of run-time length, backwards: what derivatives forwards make of them.
 
-use super::sensitive::{Long, LongPendula};
+use super::sensitive::{Five, Long, LongPendula};
 use tfe::RunErrorKind;
 use tfe::family::{FamilyState, Loss, Model, RunError};
 use tfe::length::RunTimeLength;
@@ -218,6 +218,105 @@ fn a_hundred_sites_backwards_and_forwards() {
     let run = Simulation::new(&model).step(0.1).element(Element::mixed(4));
     let off = off(&run, &start, "middle");
     assert!(off < 1e-12, "{off:.1e}");
+}
+
+/// Nodes that are not kept are made again on the way back: the same gradient, and less memory.
+#[test]
+fn runs_that_keep_some_nodes_have_the_gradients_of_those_that_keep_all() {
+    fn all_of<M: Model>(
+        run: &Simulation<'_, M, 0, RunTimeLength>,
+        start: &FamilyState,
+        span: std::ops::Range<f64>,
+        loss: &Loss<'_>,
+    ) -> Vec<f64> {
+        let (value, gradient) = run.gradient(start.clone(), span, loss).expect("a gradient");
+        let by_start = gradient.by_start();
+        let all = gradient.by_parameters().iter().chain(&by_start.q);
+        all.chain(&by_start.p).chain([&value]).copied().collect()
+    }
+    let (model, start) = chain(12);
+    let mut kick = vec![0.0; 12];
+    kick[3] = 0.4;
+    for (element, span) in [
+        (Element::mixed(4), 0.0..1.0),
+        (Element::radau(3), 0.0..1.0),
+        (Element::primal(4).lobatto(), 0.0..1.0),
+        (Element::mixed(3), 1.0..0.0),
+        (Element::mixed(3), 0.5..0.5),
+    ] {
+        let length = span.end - span.start;
+        let times = [0.0, 0.31, 0.5, 0.5, 1.0].map(|part| span.start + part * length);
+        let loss = Loss::of_end(|q, p, v| q[0].sin() + p[11] * v[0])
+            .and(Loss::squares("middle", times, [0.2, -0.1, 0.4, 0.1, 0.3]).times(0.7))
+            .and(Loss::output_at_end("middle"))
+            .and(Loss::integral("middle"));
+        // A kick inside, and one at a node that is kept.
+        let run = Simulation::new(&model).element(element).step(0.05);
+        let run = match length == 0.0 {
+            true => run,
+            false => {
+                let kicked = run.impulse(0.42, kick.clone());
+                kicked.impulse(0.35, kick.clone()).break_at(0.77)
+            }
+        };
+        let expected = all_of(&run, &start, span.clone(), &loss);
+        let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+        for every in [2, 7, usize::MAX] {
+            let run = run.clone().record_every(every);
+            let found = all_of(&run, &start, span.clone(), &loss);
+            for (found, expected) in found.iter().zip(&expected) {
+                let off = (found - expected).abs();
+                assert!(off < 1e-12 * size, "{element}, every {every}: {off:.1e}");
+            }
+        }
+    }
+    let loss = Loss::output_at_end("middle");
+    let most = |every: usize| {
+        let run = Simulation::new(&model).step(0.01).record_every(every);
+        let run = run.impulse(0.42, kick.clone()).impulse(0.3, kick.clone());
+        let run = || {
+            all_of(&run, &start, 0.0..9.0, &loss);
+        };
+        allocation_counter::measure(run).bytes_max
+    };
+    let (all, some) = (most(1), most(30));
+    assert!(8 * some < all, "{some} bytes beside {all}");
+}
+
+/// Those of the same model of fixed size, by a mass, springs and a friction.
+#[test]
+fn second_derivatives_are_those_of_fixed_size() {
+    let (m, s) = ([1.0, 1.5, 0.7, 2.0, 0.4], [1.0, 2.0, 0.5, 3.0]);
+    let five = Five {
+        m,
+        a: 0.3,
+        s,
+        c: 0.2,
+    };
+    let long = Long {
+        n: 5,
+        m: m.to_vec(),
+        a: 0.3,
+        s: s.to_vec(),
+        c: 0.2,
+    };
+    let start = five.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
+    let long_start = FamilyState {
+        q: start.q.to_vec(),
+        p: start.p.to_vec(),
+    };
+    let names = ["m[1]", "s[2]", "c"];
+    let loss = tfe::sensitivity::Loss::output_at_end("power");
+    let fixed = Simulation::new(&five).step(0.05);
+    let fixed = fixed.hessian(start, 0.0..1.0, &loss, names);
+    let fixed = fixed.expect("second derivatives");
+    let loss = Loss::output_at_end("power");
+    let run = Simulation::new(&long).step(0.05);
+    let found = run.hessian(long_start, 0.0..1.0, &loss, names);
+    let found = found.expect("second derivatives");
+    let off = (found.matrix() - fixed.matrix()).amax();
+    assert!(off < 1e-9 * fixed.matrix().amax(), "{off:e}");
+    assert!(found.errors().amax() < 1e-8 * fixed.matrix().amax());
 }
 
 /// A force that jumps at a break where the element has a point: it is that after the break, also where elements are solved once more.

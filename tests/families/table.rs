@@ -214,6 +214,10 @@ macro_rules! calls {
             is_finite(&[loss])?;
             is_finite(gradient.by_parameters())
         });
+        call("`hessian`", &|| {
+            let hessian = run().hessian(start(), span(), &$loss, ["m"])?;
+            is_finite(hessian.matrix().as_slice())
+        });
         call(
             "`Motion`: `states`, `at`, `energies`, `outputs`, `warnings`, `arcs`, `write_csv`",
             &|| {

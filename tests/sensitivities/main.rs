@@ -8,6 +8,7 @@ mod dual_runs;
 mod events;
 mod forwards;
 mod inside;
+mod second;
 
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};

@@ -9,6 +9,7 @@ use super::super::setup::PeriodicOrbit;
 use super::shooting::{Shooting, component, step_failed};
 use super::{floquet_of, orbit_of};
 use crate::assembly::{AssemblyError, Chain};
+use crate::differences::places;
 use crate::length::RunTimeLength;
 use crate::numbers::larger;
 use crate::periodic::phase::Phase;
@@ -129,8 +130,8 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         let size = 2 * self.model.len();
         let mut sums = vec![0.0; size * self.mesh.elements()];
         let distance = moving::distance(self.period, []);
-        for (shift, weight) in moving::stencil(moving::EIGHTH, distance) {
-            let places = self.places(self.period + shift);
+        for place in places(distance) {
+            let places = self.places(self.period + place.shift);
             let mut rows = sums.chunks_exact_mut(size);
             self.stepped(
                 self.model,
@@ -139,7 +140,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
                 |transition| {
                     let row = rows.next().unwrap_or_default();
                     for (k, sum) in row.iter_mut().enumerate() {
-                        *sum += weight * component(transition.end(), k);
+                        *sum += place.eighth * component(transition.end(), k);
                     }
                 },
             )?;

@@ -1,5 +1,6 @@
 //! What changes its sign at an event.
 
+use crate::differences::SIXTH;
 use crate::length::Length;
 use crate::motion::Event;
 use crate::sensitivity::slopes::{Along, Change};
@@ -19,12 +20,9 @@ pub(in crate::simulation) enum Value<'m, V> {
     Function(Function<'m, V>),
 }
 
-/// Weights of the differences over 1, 2 and 3 distances on both sides: a derivative of sixth order.
-pub(in crate::simulation) const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
-
 /// A derivative at zero by differences over a distance.
 fn derivative(distance: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let differences = (1..).zip(WEIGHTS).map(|(k, weight)| {
+    let differences = (1..).zip(SIXTH).map(|(k, weight)| {
         let s = f64::from(k) * distance;
         weight * (f(s) - f(-s))
     });

@@ -10,7 +10,9 @@ use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use {
-    super::super::linearise::family::operator_failed, super::view::View, crate::error::RunErrorKind,
+    super::super::follow::Nobody, super::super::linearise::family::operator_failed,
+    super::super::mesh::within, super::super::trail::is_same, super::view::View,
+    crate::error::RunErrorKind, crate::sensitivity::loss::Seen, std::convert::identity,
 };
 
 /// Why there is no gradient.
@@ -42,6 +44,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Every element is solved once more, from where it began; memory beside that of all nodes is linear in the number of coordinates where the equations are M q̈ = f with a constant diagonal M
     /// (T-150), and so is the time. Functions of nodes of models of run-time length are [`Loss::of_end`].
     ///
+    /// With [`record_every`](Self::record_every) every k-th node is kept, and the motion between two of them is made once more on the way back: about k + n/k of n nodes are in memory, for the time of one more run.
+    ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::NoOutput`](crate::RunErrorKind::NoOutput) and [`RunErrorKind::Loss`](crate::RunErrorKind::Loss) for a loss that does not belong to the model
     /// and the span. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where
@@ -61,8 +65,16 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 return Err(RunError::new(kind, Motion::unasked(span.start, &start)));
             }
         }
-        let mut run = self.clone().record_every(1);
+        let mut run = self.clone();
         run.breaks.extend(loss.nodes());
+        #[cfg(feature = "sparse")]
+        if self.record_every > 1 && self.events.is_empty() && !M::CONSTRAINED {
+            let found = run.by_checkpoints(&start, &span, loss)?;
+            if let Some(found) = found {
+                return Ok(found);
+            }
+        }
+        let run = run.record_every(1);
         let (motion, trail) = run.trailed("gradient", start, &span, Trail::default())?;
         #[cfg(feature = "sparse")]
         return run.pulled(motion, &trail, loss);
@@ -89,12 +101,100 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             Ok(seen) => seen,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
+        let backwards = self.backwards();
+        let gone = backwards.and_then(|mut backwards| {
+            self.back(&mut backwards, (&motion, trail), &seen)?;
+            Ok(backwards)
+        });
+        match gone {
+            Ok(backwards) => Ok((value, self.gathered(motion, &backwards))),
+            Err(kind) => Err(RunError::new(kind, motion)),
+        }
+    }
+
+    /// The same from recorded node to recorded node, between which the motion is made once more; `None` where it ends elsewhere then, or has no derivatives.
+    #[cfg(feature = "sparse")]
+    fn by_checkpoints(
+        &self,
+        start: &FamilyState,
+        span: &Range<f64>,
+        loss: &Loss<'_, 0, RunTimeLength>,
+    ) -> Result<Option<(f64, LossGradient<0, RunTimeLength>)>, RunError<0, RunTimeLength>> {
+        let motion = self.drive(start.clone(), span, identity, Nobody)?;
+        match self.descended(&motion, span, loss) {
+            Ok(Some((value, backwards))) => {
+                let gradient = self.gathered(motion, &backwards);
+                Ok(Some((value, gradient)))
+            }
+            Ok(None) => Ok(None),
+            Err(kind) => Err(RunError::new(kind, motion)),
+        }
+    }
+
+    #[cfg(feature = "sparse")]
+    fn descended(
+        &self,
+        motion: &Motion<0, RunTimeLength>,
+        span: &Range<f64>,
+        loss: &Loss<'_, 0, RunTimeLength>,
+    ) -> Result<Option<(f64, family::Backwards<'_, M>)>, RunErrorKind> {
+        let mesh = self.mesh(span)?;
+        let times: Vec<f64> = mesh.elements().map(|(_, next, _)| next).collect();
+        let segments = times.len().div_ceil(self.record_every);
+        let is_plain = segments > 0 && motion.states().len() == segments + 1;
+        if motion.statistics().cuts > 0 || !is_plain {
+            return Ok(None);
+        }
+        let mut backwards = self.backwards()?;
+        let mut sum = 0.0;
+        for (segment, times) in times.chunks(self.record_every).enumerate().rev() {
+            let [before, after] = [segment, segment + 1].map(|node| &motion.states()[node]);
+            let is_last = segment + 1 == segments;
+            let part = loss.part((before.t, after.t), (segment == 0, is_last));
+            let mut run = self.clone().record_every(1);
+            run.nodes = Some([&[before.t], times].concat());
+            // One at a node belongs to the element that begins there, unless there is none.
+            let (from, to) = (before.t, after.t);
+            run.impulses
+                .retain(|(t, _)| within(*t, from, to) || (is_last && *t == to));
+            let again = run.trailed(
+                "gradient",
+                before.state(),
+                &(before.t..after.t),
+                Trail::default(),
+            );
+            let Ok((again, trail)) = again else {
+                return Ok(None);
+            };
+            if !is_same::<0, RunTimeLength>(&again.last().state(), &after.state()) {
+                return Ok(None);
+            }
+            let (value, seen) = part.seen(&again, &*self.model)?;
+            sum += value;
+            self.back(&mut backwards, (&again, &trail), &seen)?;
+        }
+        Ok(Some((sum, backwards)))
+    }
+
+    #[cfg(feature = "sparse")]
+    fn backwards(&self) -> Result<family::Backwards<'_, M>, RunErrorKind> {
+        let element = self.chosen_element();
+        let made = family::Backwards::new(&*self.model, element, self.control);
+        made.map_err(|error| operator_failed(error, None, "gradient"))
+    }
+
+    /// Goes back over a motion.
+    #[cfg(feature = "sparse")]
+    fn back(
+        &self,
+        backwards: &mut family::Backwards<'_, M>,
+        (motion, trail): (&Motion<0, RunTimeLength>, &Trail),
+        seen: &Seen,
+    ) -> Result<(), RunErrorKind> {
+        let mut view = View::new(&*self.model, seen, &motion.last().v);
         let elements = &trail.elements;
         let mut number = elements.len();
-        let mut view = View::new(&*self.model, &seen, &motion.last().v);
-        let mut pulled = || -> Result<_, Failure> {
-            let element = self.chosen_element();
-            let mut backwards = family::Backwards::new(&*self.model, element, self.control)?;
+        let mut go = || -> Result<(), Failure> {
             loop {
                 let node = &motion.states()[number];
                 if let Some(partials) = view.of_node(number) {
@@ -102,31 +202,34 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                     backwards.see(node.t, (&state, &node.v), &partials)?;
                 }
                 let Some(before) = number.checked_sub(1) else {
-                    return Ok(backwards);
+                    return Ok(());
                 };
                 number = before;
                 let element = &elements[number];
-                let inside = view.of_element(&mut backwards, &motion.elements()[number])?;
+                let inside = view.of_element(backwards, &motion.elements()[number])?;
                 let place = (element.t, element.h);
                 let end = backwards.pass(place, &element.before, inside.first())?;
                 element.check(&end)?;
             }
         };
-        match pulled() {
-            Ok(backwards) => {
-                let names = 0..self.model.parameters();
-                let names = names.map(|at| self.model.parameter_name(at).to_string());
-                let by_parameters = backwards.by_parameters();
-                let by_start = backwards.by_state();
-                let gradient = LossGradient::new(motion, names.collect(), by_parameters, by_start);
-                Ok((value, gradient))
-            }
-            Err(Failure::Element(error)) => {
+        go().map_err(|failure| match failure {
+            Failure::Element(error) => {
                 let element = elements.get(number).map(|element| (number, element));
-                let kind = operator_failed(error, element, "gradient");
-                Err(RunError::new(kind, motion))
+                operator_failed(error, element, "gradient")
             }
-            Err(Failure::Loss(kind)) => Err(RunError::new(kind, motion)),
-        }
+            Failure::Loss(kind) => kind,
+        })
+    }
+
+    #[cfg(feature = "sparse")]
+    fn gathered(
+        &self,
+        motion: Motion<0, RunTimeLength>,
+        backwards: &family::Backwards<'_, M>,
+    ) -> LossGradient<0, RunTimeLength> {
+        let names = 0..self.model.parameters();
+        let names = names.map(|at| self.model.parameter_name(at).to_string());
+        let (by_parameters, by_start) = (backwards.by_parameters(), backwards.by_state());
+        LossGradient::new(motion, names.collect(), by_parameters, by_start)
     }
 }

@@ -1,0 +1,74 @@
+//! Second derivatives of losses.
+
+use crate::length::{FixedLength, Length};
+use crate::sensitivity::loss::LossGradient;
+use crate::sensitivity::names::place_of;
+use nalgebra::DMatrix;
+
+/// The second derivatives of a loss by some parameters, from [`Simulation::hessian`](crate::Simulation::hessian).
+#[derive(Clone, Debug)]
+pub struct LossHessian<const N: usize, L: Length<N> = FixedLength> {
+    value: f64,
+    gradient: LossGradient<N, L>,
+    names: Vec<String>,
+    matrix: DMatrix<f64>,
+    errors: DMatrix<f64>,
+}
+
+impl<const N: usize, L: Length<N>> LossHessian<N, L> {
+    /// From derivatives of the gradient, a column for each parameter, and what is known of their errors.
+    pub(crate) fn new(
+        (value, gradient): (f64, LossGradient<N, L>),
+        names: Vec<String>,
+        columns: &DMatrix<f64>,
+        errors: &DMatrix<f64>,
+    ) -> Self {
+        let size = names.len();
+        let matrix = DMatrix::from_fn(size, size, |i, j| 0.5 * (columns[(i, j)] + columns[(j, i)]));
+        let errors = DMatrix::from_fn(size, size, |i, j| {
+            let apart = (columns[(i, j)] - columns[(j, i)]).abs();
+            apart.max(errors[(i, j)]).max(errors[(j, i)])
+        });
+        Self {
+            value,
+            gradient,
+            names,
+            matrix,
+            errors,
+        }
+    }
+
+    /// The loss.
+    pub fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// Its gradient, by all parameters and by the start, with the motion.
+    pub fn gradient(&self) -> &LossGradient<N, L> {
+        &self.gradient
+    }
+
+    /// The parameters that were asked for, in that order.
+    pub fn parameters(&self) -> &[String] {
+        &self.names
+    }
+
+    /// ∂²ℓ/∂a∂b
+    ///
+    /// # Panics
+    /// Where one of the names was not asked for.
+    #[track_caller]
+    pub fn by(&self, a: &str, b: &str) -> f64 {
+        self.matrix[(place_of(a, &self.names), place_of(b, &self.names))]
+    }
+
+    /// All of them: symmetric, rows and columns in the order of [`parameters`](Self::parameters).
+    pub fn matrix(&self) -> &DMatrix<f64> {
+        &self.matrix
+    }
+
+    /// Estimates of their errors: how far differences of eighth and of sixth order are apart, and ∂²ℓ/∂a∂b and ∂²ℓ/∂b∂a.
+    pub fn errors(&self) -> &DMatrix<f64> {
+        &self.errors
+    }
+}

@@ -1,0 +1,194 @@
+//! Second derivatives of losses: differences of gradients, each of which is exact (T-158).
+
+use super::setup::Simulation;
+use crate::differences::{NEARER, PART, WELL_KNOWN, places};
+use crate::error::{RunError, RunErrorKind};
+use crate::length::{Length, RunTimeLength};
+use crate::sensitivity::{Loss, LossGradient, LossHessian};
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+use tfe_runtime::family::{self, FamilyState};
+use tfe_runtime::{Model, Share, State};
+
+impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
+    /// A loss of a run with its [gradient](Self::gradient) and its second derivatives by some parameters.
+    ///
+    /// They are differences of eighth order of gradients that are exact for the run: to some 1e-11 of what the gradient itself changes by. Each parameter takes eight gradients, sixteen or twenty-four where the loss
+    /// bends so much that the places move nearer. [`LossHessian::errors`] says what is known of them. (For least squares [`Fit`](crate::Fit) needs first derivatives only.)
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    /// use tfe::sensitivity::Loss;
+    ///
+    /// #[dynamics(coordinates(y), lagrangian = m/2*dot(y)^2 - m*g*y, force(y) = f)]
+    /// struct Ball { m: f64, g: f64, f: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let ball = Ball { m: 2.0, g: 9.81, f: 3.0 };
+    /// let loss = Loss::at_end(|node| 0.5 * node.q[0] * node.q[0]);
+    /// let start = State { q: [1.0], p: [0.0] };
+    /// let hessian = Simulation::new(&ball).step(0.1).hessian(start, 0.0..2.0, &loss, ["g", "f"])?;
+    /// // y = 1 − 2 g + 2 f/m
+    /// assert!((hessian.by("g", "g") - 4.0).abs() < 1e-9);
+    /// assert!((hessian.by("g", "f") + 2.0).abs() < 1e-9);
+    /// assert!((hessian.by("f", "f") - 1.0).abs() < 1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`gradient`](Self::gradient); [`RunErrorKind::NoParameter`] for a name that the model does not have, [`RunErrorKind::ParametersFixed`] where it cannot be made with other parameters.
+    pub fn hessian<S: Into<String>>(
+        &self,
+        start: State<N>,
+        span: Range<f64>,
+        loss: &Loss<'_, N>,
+        parameters: impl IntoIterator<Item = S>,
+    ) -> Result<LossHessian<N>, RunError<N>> {
+        let model = &*self.model;
+        let own = self.gradient(start, span.clone(), loss)?;
+        let own = Own::new(own, |index| model.parameter(index));
+        own.differentiated(parameters, |index, value| {
+            let other = model.with_parameter(index, value).map(Share::own);
+            other.map(|other| self.of_model(other).gradient(start, span.clone(), loss))
+        })
+    }
+}
+
+impl<'m, M: family::Model + Send + Sync + 'm> Simulation<'m, M, 0, RunTimeLength> {
+    /// A loss of a run with its [gradient](Self::gradient) and its second derivatives by some parameters, as of models of fixed size.
+    ///
+    /// # Errors
+    /// As [`gradient`](Self::gradient); [`RunErrorKind::NoParameter`] for a name that the model does not have, [`RunErrorKind::ParametersFixed`] where it cannot be made with other parameters.
+    pub fn hessian<S: Into<String>>(
+        &self,
+        start: FamilyState,
+        span: Range<f64>,
+        loss: &Loss<'_, 0, RunTimeLength>,
+        parameters: impl IntoIterator<Item = S>,
+    ) -> Result<LossHessian<0, RunTimeLength>, RunError<0, RunTimeLength>> {
+        let model = &*self.model;
+        let own = self.gradient(start.clone(), span.clone(), loss)?;
+        let own = Own::new(own, |index| model.parameter(index));
+        own.differentiated(parameters, |index, value| {
+            let other = model.with_parameter(index, value).map(Share::own)?;
+            let other = self.of_model(other);
+            Some(other.gradient(start.clone(), span.clone(), loss))
+        })
+    }
+}
+
+/// A loss with its gradient.
+type Found<const N: usize, L> = (f64, LossGradient<N, L>);
+
+/// That of the model itself, and its parameters.
+struct Own<const N: usize, L: Length<N>> {
+    found: Found<N, L>,
+    values: Vec<f64>,
+}
+
+/// Derivatives of a gradient by one parameter, and how far two orders are apart, each and the largest as a part.
+struct Column {
+    slopes: DVector<f64>,
+    errors: DVector<f64>,
+    off: f64,
+}
+
+impl<const N: usize, L: Length<N>> Own<N, L> {
+    fn new(found: Found<N, L>, value: impl Fn(usize) -> f64) -> Self {
+        let values = (0..found.1.parameters().len()).map(value).collect();
+        Self { found, values }
+    }
+
+    fn differentiated<S: Into<String>>(
+        self,
+        parameters: impl IntoIterator<Item = S>,
+        at: impl Fn(usize, f64) -> Option<Result<Found<N, L>, RunError<N, L>>>,
+    ) -> Result<LossHessian<N, L>, RunError<N, L>> {
+        let names: Vec<String> = parameters.into_iter().map(Into::into).collect();
+        let known = self.found.1.parameters();
+        let index = |name: &String| known.iter().position(|own| own == name);
+        let refused = |kind| RunError::new(kind, self.found.1.motion().clone());
+        let mut indices = Vec::with_capacity(names.len());
+        for name in &names {
+            indices.push(index(name).ok_or_else(|| {
+                refused(RunErrorKind::NoParameter {
+                    name: name.clone(),
+                    known: known.to_vec(),
+                })
+            })?);
+        }
+        let size = names.len();
+        let (mut columns, mut errors) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
+        for (j, index) in indices.iter().enumerate() {
+            let mut best: Option<Column> = None;
+            for nearer in NEARER {
+                let gradient = |shift: f64| match at(*index, self.values[*index] + shift) {
+                    Some(found) => {
+                        let (_, gradient) = found?;
+                        let all = gradient.by_parameters();
+                        Ok(DVector::from_fn(size, |i, _| all[indices[i]]))
+                    }
+                    None => Err(refused(RunErrorKind::ParametersFixed)),
+                };
+                let distance = nearer * self.distance(*index);
+                let found = self.column(&indices, distance, gradient)?;
+                let is_enough = found.off < WELL_KNOWN;
+                if best.as_ref().is_none_or(|best| found.off < best.off) {
+                    best = Some(found);
+                }
+                if is_enough {
+                    break;
+                }
+            }
+            if let Some(best) = best {
+                columns.set_column(j, &best.slopes);
+                errors.set_column(j, &best.errors);
+            }
+        }
+        Ok(LossHessian::new(self.found, names, &columns, &errors))
+    }
+
+    /// The first distance of differences: a part of the parameter, or of what would change the loss by as much as it is.
+    fn distance(&self, index: usize) -> f64 {
+        let (value, slope) = (self.values[index], self.found.1.by_parameters()[index]);
+        let scale = match value == 0.0 {
+            true => (self.found.0 / slope).abs(),
+            false => value.abs(),
+        };
+        let is_scale = scale.is_finite() && scale > 0.0;
+        PART * if is_scale { scale } else { 1.0 }
+    }
+
+    fn column(
+        &self,
+        indices: &[usize],
+        distance: f64,
+        gradient: impl Fn(f64) -> Result<DVector<f64>, RunError<N, L>>,
+    ) -> Result<Column, RunError<N, L>> {
+        let size = indices.len();
+        let (mut eighth, mut sixth) = (DVector::zeros(size), DVector::zeros(size));
+        for place in places(distance) {
+            let at = gradient(place.shift)?;
+            eighth += &at * place.eighth;
+            sixth += at * place.sixth;
+        }
+        let errors = (&eighth - &sixth).abs();
+        // Beside what a part of the parameter changes and what there is.
+        let own = self.found.1.by_parameters();
+        let part = distance / PART;
+        let off = (0..size).map(|i| {
+            let sizes = (eighth[i] * part).abs().max(own[indices[i]].abs());
+            if errors[i] == 0.0 {
+                0.0
+            } else {
+                errors[i] * part / sizes
+            }
+        });
+        Ok(Column {
+            off: off.fold(0.0, crate::numbers::larger),
+            slopes: eighth,
+            errors,
+        })
+    }
+}
