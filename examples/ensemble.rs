@@ -44,7 +44,9 @@ struct Links {
     g: f64,
 }
 
-const STARTS: usize = 4096;
+// Times of a program that was not optimised say little.
+const STARTS: usize = if cfg!(debug_assertions) { 256 } else { 4096 };
+const ROUNDS: usize = if cfg!(debug_assertions) { 1 } else { 7 };
 const STEP: f64 = 0.1;
 const END: f64 = 5.0;
 
@@ -66,7 +68,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// As many parameter sets as starts of one model: lanes serve both.
 fn study() -> Result<(), Box<dyn Error>> {
-    const SETS: u32 = 100_000;
+    const SETS: u32 = if cfg!(debug_assertions) {
+        1000
+    } else {
+        100_000
+    };
     let links = |f: f64| Links {
         m1: 1.0,
         m2: 0.5 + f,
@@ -82,7 +88,7 @@ fn study() -> Result<(), Box<dyn Error>> {
     let same = Ensemble::new(&one).element(Mixed::<6>).step(0.02);
     let varied = Ensemble::of_models(&models).element(Mixed::<6>).step(0.02);
     let mut best = [Duration::MAX; 2];
-    for _ in 0..3 {
+    for _ in 0..ROUNDS.min(3) {
         let clock = Instant::now();
         same.run(&starts, 0.0..1.0)?;
         best[0] = best[0].min(clock.elapsed());
@@ -120,7 +126,7 @@ where
     let simulation = simulation.record_every(usize::MAX);
     let mut best = [Duration::MAX; 3];
     let mut difference = 0.0_f64;
-    for _ in 0..7 {
+    for _ in 0..ROUNDS {
         let clock = Instant::now();
         let mut single = Vec::with_capacity(STARTS);
         for start in starts {

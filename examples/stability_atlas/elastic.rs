@@ -115,7 +115,8 @@ pub fn scene() -> Outcome {
 
 /// (h√k, worst relative energy error) of runs with one element.
 fn sweep(element: Element) -> Vec<(f64, f64)> {
-    let steps: Vec<f64> = grid(0.1, 5.0, 295).collect();
+    let count = if cfg!(debug_assertions) { 50 } else { 295 };
+    let steps: Vec<f64> = grid(0.1, 5.0, count).collect();
     let start = STIFF.state([1.01, TAU / 6.0], [0.0, 0.0]);
     let run = |&step: &f64| {
         let simulation = Simulation::new(&STIFF)
@@ -154,8 +155,13 @@ fn errors(sweeps: &[(Element, Vec<(f64, f64)>)]) -> Result<String, Box<dyn Error
 
 /// The growth of the swing over one bounce.
 fn resonance() -> Result<(StabilityMap<FloquetError>, String), Box<dyn Error>> {
+    let (columns, rows) = if cfg!(debug_assertions) {
+        (80, 48)
+    } else {
+        (400, 240)
+    };
     let map = StabilityMap::over(1.0..4.0, 0.0..0.8)
-        .resolution(400, 240)
+        .resolution(columns, rows)
         .floquet(|nu, a| Swing { nu, a }, TAU, Mixed::<5>, 12)?;
     if let Some(failure) = map.first_failure() {
         return Err(failure.to_string().into());

@@ -18,7 +18,7 @@ struct Mathieu {
 }
 
 /// A million points, where the compiler optimises.
-const SIDE: usize = if cfg!(debug_assertions) { 200 } else { 1000 };
+const SIDE: usize = if cfg!(debug_assertions) { 100 } else { 1000 };
 const ELEMENTS: usize = 12;
 
 /// Characteristic values from eigenvalue problems at 45 digits: a₀, b₁, a₁, b₂, a₂, b₃, a₃, b₄, a₄ at a q.

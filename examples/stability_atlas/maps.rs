@@ -23,7 +23,7 @@ struct Blade {
     mu: f64,
 }
 
-const SIDE: usize = 200;
+const SIDE: usize = if cfg!(debug_assertions) { 40 } else { 200 };
 
 pub fn scene() -> Outcome {
     let plan = StabilityMap::over(0.0..24.0, 0.0..2.5).resolution(SIDE, SIDE);
