@@ -26,6 +26,9 @@ pub(crate) fn derivatives<P: Problem<N>, const N: usize>(
     dense: usize,
     by: &[By],
 ) -> Result<Vec<Iterate<N>>, AssemblyError> {
+    if by.is_empty() {
+        return Ok(Vec::new());
+    }
     let (globals, elements) = (iterate.globals.len(), iterate.nodes.len() - 1);
     let model = problem.model();
     // A direction for each but the rows, behind those of the globals.

@@ -214,6 +214,23 @@ fn multipliers_that_meet_are_left_out() {
     close(relative.re, -TAU / 2.0, 1e-9);
 }
 
+/// A model without parameters has nothing to be differentiated by but what is given.
+#[test]
+fn models_without_parameters() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - x^4/4)]
+    struct Bare;
+    let start = Bare.state([1.0], [0.0]);
+    let s = tight(&Bare, start).unknown_period(4.8).solve_sensitive();
+    let s = s.expect("an orbit");
+    assert!(s.parameters().is_empty() && s.by_period().is_none());
+    let s = tight(&Bare, start).period(s.orbit().period());
+    let s = s.solve_sensitive().expect("an orbit");
+    assert!(s.by_period().is_some());
+    let arc = BoundaryValue::of(&Bare).from_to([0.0], [1.0], 0.0..1.0);
+    let arc = arc.solve_sensitive().expect("a motion");
+    assert!(arc.parameters().is_empty() && arc.by_end(Coordinate(0)).is_some());
+}
+
 /// With a constraint, by parameters of forces, of the pivot and of the constraint; beside the twin in one angle.
 #[test]
 fn a_constrained_orbit_beside_its_twin() {

@@ -68,6 +68,9 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         let parameters: Vec<usize> = (0..model.parameters()).collect();
         let by_period = !self.globals.contains(&Global::Period);
         let sides = parameters.len() + usize::from(by_period);
+        if sides == 0 {
+            return Ok(Vec::new());
+        }
         let dense = usize::from(self.phase == Some(Phase::Orthogonal));
         let mut chain = Chain::with_right_sides(2 * n, self.globals.len(), elements, dense, sides);
         let places = self.places(self.period);
