@@ -22,9 +22,9 @@ pub(crate) use control::Control;
 #[cfg(feature = "sparse")]
 pub(crate) use convergence::Convergence;
 pub(crate) use convergence::size;
-pub(crate) use derivative::{By, derivatives};
+pub(crate) use derivative::derivatives;
 pub(crate) use mesh::Mesh;
-pub(crate) use newton::{Assembly, Iterate, Problem};
+pub(crate) use newton::{Assembly, By, Iterate, Problem};
 pub(crate) use solution::Solution;
 
 /// A curve t ↦ (q, dq/dt).

@@ -112,6 +112,7 @@ pub(crate) struct Chain {
 impl Chain {
     /// A chain of `links` ≥ 1 links between nodes of `block` unknowns, with `globals` global unknowns, `dense` ≤ `block` +
     /// `globals` dense rows and one right side.
+    #[cfg(any(test, feature = "sparse"))]
     pub(crate) fn new(block: usize, globals: usize, links: usize, dense: usize) -> Self {
         Self::with_right_sides(block, globals, links, dense, 1)
     }

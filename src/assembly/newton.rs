@@ -16,6 +16,17 @@ use super::error::AssemblyError;
 use tfe_runtime::condenser::{Condensed, Condenser, Direction, Placed};
 use tfe_runtime::{Element, ElementError, LegendreError, Model, State, Statistics};
 
+/// What a solution is differentiated by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum By {
+    /// A parameter of the model, by its index among all.
+    Parameter(usize),
+    /// The number that an equation at the ends asks for, by its row.
+    Row(usize),
+    /// The length of the whole, where it is given.
+    Length,
+}
+
 /// What is to be solved: elements in time, and the equations that close their chain.
 pub(crate) trait Problem<const N: usize> {
     /// The type of the model.
@@ -97,10 +108,13 @@ impl<const N: usize> Iterate<N> {
 pub(crate) struct Assembly<const N: usize> {
     condenser: Condenser<N>,
     chain: Chain,
-    /// [A | C | end] of each element, row by row.
+    /// [A | C | end] of each element, row by row; C has the globals, then what else is differentiated by.
     ends: Vec<f64>,
     responses: Vec<f64>,
     directions: Vec<Direction>,
+    globals: usize,
+    /// Which direction behind the globals is the length of the whole.
+    length: Option<usize>,
     elements: usize,
     dense: usize,
     iterations: u32,
@@ -114,14 +128,28 @@ impl<const N: usize> Assembly<N> {
         globals: usize,
         dense: usize,
     ) -> Result<Self, ElementError> {
+        Self::by::<M>(element, elements, (globals, dense), (&[], None, 1))
+    }
+
+    /// The same that is differentiated by more than the globals, of which one may be the length of the whole, with so many right sides.
+    pub(super) fn by<M: Model<N>>(
+        element: Element,
+        elements: usize,
+        (globals, dense): (usize, usize),
+        (more, length, sides): (&[Direction], Option<usize>, usize),
+    ) -> Result<Self, ElementError> {
         let condenser = Condenser::new::<M>(element)?;
-        let columns = 2 * N + globals + 1;
+        let mut directions = vec![Direction::default(); globals];
+        directions.extend_from_slice(more);
+        let columns = 2 * N + directions.len() + 1;
         let interior = condenser.interior();
         Ok(Self {
-            chain: Chain::new(2 * N, globals, elements, dense),
+            chain: Chain::with_right_sides(2 * N, globals, elements, dense, sides),
             ends: vec![0.0; elements * 2 * N * columns],
             responses: vec![0.0; elements * interior * columns],
-            directions: vec![Direction::default(); globals],
+            directions,
+            globals,
+            length,
             condenser,
             elements,
             dense,
@@ -132,7 +160,7 @@ impl<const N: usize> Assembly<N> {
     /// Lets each linearisation give the tangent as well: how the solution changes with the right side of the last equation over all nodes.
     #[must_use]
     pub(crate) fn with_tangent(mut self) -> Self {
-        let (globals, dense) = (self.directions.len(), self.dense);
+        let (globals, dense) = (self.globals, self.dense);
         self.chain = Chain::with_right_sides(2 * N, globals, self.elements, dense, 2);
         if let Some(right) = self.chain.right_side_mut(1).dense.last_mut() {
             *right = 1.0;
@@ -142,9 +170,78 @@ impl<const N: usize> Assembly<N> {
 
     /// The tangent of the last linearisation, nodes, interiors and globals; see [`with_tangent`](Self::with_tangent).
     pub(crate) fn tangent(&self) -> Iterate<N> {
-        let columns = 2 * N + self.directions.len() + 1;
-        let shape = (self.elements, self.condenser.interior());
-        changes(&self.chain, 1, shape, (&self.responses, columns))
+        self.change(1)
+    }
+
+    /// The solution for one of the right sides, nodes, interiors and globals.
+    fn change(&self, side: usize) -> Iterate<N> {
+        let (m, columns) = (self.condenser.interior(), self.columns());
+        let globals = self.chain.globals_of(side);
+        let mut interiors = vec![0.0; self.elements * m];
+        let mut weights = Vec::with_capacity(columns);
+        for element in 0..self.elements {
+            let response = &self.responses[element * m * columns..(element + 1) * m * columns];
+            let interior = &mut interiors[element * m..(element + 1) * m];
+            weights.clear();
+            weights.extend_from_slice(self.chain.node_of(side, element));
+            weights.extend_from_slice(globals);
+            for (x, row) in interior.iter_mut().zip(response.chunks_exact(columns)) {
+                *x = inner(row, &weights);
+            }
+        }
+        let nodes = (0..=self.elements).map(|e| {
+            let (p, q) = self.chain.node_of(side, e).split_at(N);
+            State {
+                q: std::array::from_fn(|a| q[a]),
+                p: std::array::from_fn(|a| p[a]),
+            }
+        });
+        Iterate {
+            nodes: nodes.collect(),
+            interiors,
+            globals: globals.to_vec(),
+        }
+    }
+
+    /// How the solution changes with each of these, a right side each, after the last [linearisation](Self::link); with the place behind the globals of what it does to elements.
+    pub(super) fn changes<P: Problem<N>>(
+        &mut self,
+        problem: &P,
+        iterate: &Iterate<N>,
+        by: &[(By, Option<usize>)],
+    ) -> Result<Vec<Iterate<N>>, AssemblyError> {
+        let columns = self.columns();
+        for (side, (by, place)) in by.iter().enumerate() {
+            let right = self.chain.right_side_mut(side);
+            let column = place.map(|place| 2 * N + self.globals + place);
+            for (right, end) in right.links.iter_mut().zip(self.ends.chunks_exact(columns)) {
+                *right = column.map_or(0.0, |column| end[column]);
+            }
+            right.closure.fill(0.0);
+            right.dense.fill(0.0);
+            match by {
+                By::Parameter(index) => problem.close_by(*index, iterate, &mut right.closure)?,
+                By::Row(row) => right.closure[*row] = 1.0,
+                By::Length => {}
+            }
+        }
+        self.solve_chain()?;
+        let change = |(side, (_, place)): (usize, &(By, Option<usize>))| {
+            let mut change = self.change(side);
+            if let Some(place) = place {
+                let rows = self.responses.chunks_exact(columns);
+                for (x, row) in change.interiors.iter_mut().zip(rows) {
+                    *x += row[2 * N + self.globals + place];
+                }
+            }
+            change
+        };
+        Ok(by.iter().enumerate().map(change).collect())
+    }
+
+    /// The columns of an element: its start, the globals and what else it is differentiated by, its end.
+    fn columns(&self) -> usize {
+        2 * N + self.directions.len() + 1
     }
 
     /// Iterations so far.
@@ -207,12 +304,26 @@ impl<const N: usize> Assembly<N> {
         problem: &P,
         iterate: &Iterate<N>,
     ) -> Result<(), AssemblyError> {
-        let globals = self.directions.len();
-        let (m, columns) = (self.condenser.interior(), 2 * N + globals + 1);
         self.iterations += 1;
+        self.link(problem, iterate)?;
+        self.solve_chain()
+    }
+
+    /// Linearises everything at the iterate.
+    pub(super) fn link<P: Problem<N>>(
+        &mut self,
+        problem: &P,
+        iterate: &Iterate<N>,
+    ) -> Result<(), AssemblyError> {
+        let globals = self.globals;
+        let (m, columns) = (self.condenser.interior(), self.columns());
         for element in 0..self.elements {
             let (time, length) = problem.place(element);
-            problem.directions(element, &mut self.directions);
+            let (own, more) = self.directions.split_at_mut(globals);
+            problem.directions(element, own);
+            if let Some(length) = self.length.and_then(|place| more.get_mut(place)) {
+                *length = problem.stretched(element);
+            }
             let ends = &mut self.ends[element * 2 * N * columns..(element + 1) * 2 * N * columns];
             let placed = Placed {
                 time,
@@ -250,6 +361,10 @@ impl<const N: usize> Assembly<N> {
         for k in 0..self.dense {
             problem.span(k, iterate, self.chain.dense_mut(k));
         }
+        Ok(())
+    }
+
+    fn solve_chain(&mut self) -> Result<(), AssemblyError> {
         self.chain.solve().map_err(|_| AssemblyError::Singular {
             iterations: self.iterations,
         })
@@ -285,7 +400,7 @@ impl<const N: usize> Assembly<N> {
     /// Adds a fraction of the correction.
     pub(crate) fn correct(&self, iterate: &mut Iterate<N>, fraction: f64) {
         let globals = self.chain.globals();
-        let (m, columns) = (self.condenser.interior(), 2 * N + globals.len() + 1);
+        let (m, columns) = (self.condenser.interior(), self.columns());
         let mut weights = Vec::with_capacity(columns);
         for element in 0..self.elements {
             let response = &self.responses[element * m * columns..(element + 1) * m * columns];
@@ -293,6 +408,7 @@ impl<const N: usize> Assembly<N> {
             weights.clear();
             weights.extend_from_slice(self.chain.node(element));
             weights.extend_from_slice(globals);
+            weights.resize(columns - 1, 0.0);
             weights.push(1.0);
             for (x, row) in interior.iter_mut().zip(response.chunks_exact(columns)) {
                 *x += fraction * inner(row, &weights);
@@ -343,40 +459,6 @@ impl<const N: usize> Assembly<N> {
             problem.set_globals(&iterate.globals);
             self.linearise(problem, iterate)?;
         }
-    }
-}
-
-/// The solution of a chain for one of its right sides, with the interiors of so many unknowns that follow from nodes and globals.
-pub(super) fn changes<const N: usize>(
-    chain: &Chain,
-    side: usize,
-    (elements, m): (usize, usize),
-    (responses, columns): (&[f64], usize),
-) -> Iterate<N> {
-    let globals = chain.globals_of(side);
-    let mut interiors = vec![0.0; elements * m];
-    let mut weights = Vec::with_capacity(columns);
-    for element in 0..elements {
-        let response = &responses[element * m * columns..(element + 1) * m * columns];
-        let interior = &mut interiors[element * m..(element + 1) * m];
-        weights.clear();
-        weights.extend_from_slice(chain.node_of(side, element));
-        weights.extend_from_slice(globals);
-        for (x, row) in interior.iter_mut().zip(response.chunks_exact(columns)) {
-            *x = inner(row, &weights);
-        }
-    }
-    let nodes = (0..=elements).map(|e| {
-        let (p, q) = chain.node_of(side, e).split_at(N);
-        State {
-            q: std::array::from_fn(|a| q[a]),
-            p: std::array::from_fn(|a| p[a]),
-        }
-    });
-    Iterate {
-        nodes: nodes.collect(),
-        interiors,
-        globals: globals.to_vec(),
     }
 }
 
