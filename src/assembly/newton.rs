@@ -310,7 +310,7 @@ impl<const N: usize> Assembly<N> {
     }
 
     /// Linearises everything at the iterate.
-    pub(super) fn link<P: Problem<N>>(
+    pub(crate) fn link<P: Problem<N>>(
         &mut self,
         problem: &P,
         iterate: &Iterate<N>,

@@ -9,7 +9,7 @@ use crate::motion::Motion;
 use crate::periodic_schur::Multiplier;
 use crate::simulation::Simulation;
 use nalgebra::{Complex, DMatrix, DVector};
-use tfe_runtime::{First, Form, Model, Share, State};
+use tfe_runtime::{First, Form, Model, State};
 
 impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// An orbit of a simulation with [events](Simulation::on) that change the state: an oscillator that hits a wall, a machine that switches. The simulation brings model, element and events;
@@ -216,10 +216,10 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         })
     }
 
-    /// The same of another model.
-    pub(super) fn of_model(&self, model: Share<'m, M>) -> Self {
+    /// Those of another simulation.
+    pub(super) fn of(&self, simulation: Simulation<'m, M, N>) -> Self {
         Self {
-            simulation: self.simulation.of_model(model),
+            simulation,
             ..*self
         }
     }

@@ -9,7 +9,7 @@ use super::sensitive::{OrbitSlopes, SensitiveOrbit};
 use crate::differences::places;
 use crate::periodic_schur::Multiplier;
 use nalgebra::DVector;
-use tfe_runtime::{Model, Share, State};
+use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> {
     /// Finds the orbit as [`solve`](Self::solve) does, and how its start, its period and its multipliers change with each parameter of the model.
@@ -103,8 +103,7 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
             let orbits = match parameter {
                 None => self,
                 Some(index) => {
-                    let model = model.with_parameter(index, value + shift)?;
-                    own = self.of_model(Share::own(model));
+                    own = self.of(self.simulation.with_parameter(index, value + shift)?);
                     &own
                 }
             };

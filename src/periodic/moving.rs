@@ -1,6 +1,7 @@
 //! How multipliers move with a parameter (T-157).
 
 use crate::differences::{NEARER, PART, WELL_KNOWN, places};
+use crate::numbers::larger;
 use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
 use std::f64::consts::PI;
@@ -15,6 +16,17 @@ pub(super) fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 
     match largest > 0.0 && largest.is_finite() {
         true => PART / largest,
         false => PART,
+    }
+}
+
+/// The largest of some changes, in parts of the largest of what changes; zero where that is.
+pub(super) fn part(changes: &[f64], of: &[f64]) -> f64 {
+    let largest = |all: &[f64]| all.iter().fold(0.0, |most, x| larger(most, x.abs()));
+    let size = largest(of);
+    if size > 0.0 {
+        largest(changes) / size
+    } else {
+        0.0
     }
 }
 

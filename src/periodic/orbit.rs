@@ -2,7 +2,7 @@
 
 use super::error::OrbitError;
 use super::kind::{Chained, Closed};
-use super::problem::Periodic;
+use super::problem::{Global, Periodic};
 use crate::assembly::{Assembly, Iterate, Solution};
 use crate::constraints::reduced;
 use crate::length::FixedLength;
@@ -92,7 +92,6 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
         problem: &Periodic<'m, M, N>,
         iterate: Iterate<N>,
         assembly: &Assembly<N>,
-        unfolding: Option<f64>,
     ) -> Result<Self, OrbitError> {
         let transitions = assembly.transitions().to_vec();
         let floquet = multipliers_of(problem, &iterate.nodes, &transitions)?;
@@ -107,7 +106,8 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
             transitions,
             statistics: assembly.statistics(),
         };
-        let trivial = problem.trivial();
+        let unfolded = problem.globals.contains(&Global::Unfolding);
+        let (trivial, unfolding) = (problem.trivial(), unfolded.then_some(problem.unfolding));
         Ok(Self::of_solution(solution, floquet, trivial, unfolding))
     }
 }

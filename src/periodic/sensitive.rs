@@ -5,13 +5,11 @@ use super::moving;
 use super::orbit::{Orbit, multipliers_of};
 use super::problem::{Global, Periodic};
 use super::setup::PeriodicOrbit;
-use crate::assembly::{By, Iterate, derivatives};
+use crate::assembly::{Assembly, By, Iterate, derivatives};
 use crate::length::{FixedLength, Length};
-use crate::numbers::larger;
 use crate::periodic_schur::Multiplier;
 use crate::sensitivity::names::place_of;
 use nalgebra::Complex;
-use tfe_runtime::condenser::{Condensed, Condenser, Placed};
 use tfe_runtime::{Element, Model, State};
 
 impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
@@ -45,9 +43,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     pub fn solve_sensitive(&self) -> Result<SensitiveOrbit<Orbit<'m, M, N>, N>, OrbitError> {
         let (problem, iterate, assembly) = self.solved()?;
         let element = self.method().0;
-        let unfolded = problem.globals.contains(&Global::Unfolding);
-        let unfolding = unfolded.then_some(problem.unfolding);
-        let orbit = Orbit::new(element, &problem, iterate.clone(), &assembly, unfolding)?;
+        let orbit = Orbit::new(element, &problem, iterate.clone(), &assembly)?;
         let indices: Vec<usize> = (0..self.model.parameters()).collect();
         let mut by: Vec<By> = indices.iter().copied().map(By::Parameter).collect();
         if !problem.globals.contains(&Global::Period) {
@@ -126,14 +122,11 @@ impl<'m, M: Model<N>, const N: usize> Moving<'_, 'm, M, N> {
 
     /// What a unit of the parameter does to states and to the period, in parts of their sizes.
     fn parts(&self) -> [f64; 3] {
-        let largest = |iterate: &Iterate<N>, of: fn(&State<N>) -> &[f64; N]| {
-            let all = iterate.nodes.iter().flat_map(of);
-            all.fold(0.0, |largest, x| larger(largest, x.abs()))
-        };
         let part = |of: fn(&State<N>) -> &[f64; N]| {
-            let size = largest(self.iterate, of);
-            let change = largest(self.change, of);
-            if size > 0.0 { change / size } else { 0.0 }
+            let all = |iterate: &'_ Iterate<N>| -> Vec<f64> {
+                iterate.nodes.iter().flat_map(of).copied().collect()
+            };
+            moving::part(&all(self.change), &all(self.iterate))
         };
         [
             part(|state| &state.q),
@@ -152,29 +145,14 @@ impl<'m, M: Model<N>, const N: usize> Moving<'_, 'm, M, N> {
             period: self.problem.period + shift * self.period,
             unfolding: self.problem.unfolding + shift * unfolding,
             globals: Vec::new(),
+            phase: None,
+            energy: None,
             ..*self.problem
         };
-        let mut condenser = Condenser::<N>::new::<M>(self.element).ok()?;
-        let (m, columns) = (condenser.interior(), 2 * N + 1);
-        let (mut ends, mut response) = (vec![0.0; 2 * N * columns], vec![0.0; m * columns]);
-        let mut transitions = Vec::new();
-        for element in 0..problem.mesh.elements() {
-            let (time, length) = problem.mesh.place(element, problem.start, problem.period);
-            let placed = Placed {
-                time,
-                length,
-                start: &moved.nodes[element],
-                interior: &moved.interiors[element * m..(element + 1) * m],
-                damping: problem.unfolding,
-            };
-            let condensed = Condensed {
-                ends: &mut ends,
-                response: &mut response,
-            };
-            condenser.linearise(model, placed, &[], condensed).ok()?;
-            transitions.extend(ends.chunks_exact(columns).flat_map(|row| &row[..2 * N]));
-        }
-        multipliers_of(&problem, &moved.nodes, &transitions).ok()
+        let elements = problem.mesh.elements();
+        let mut assembly = Assembly::new::<M>(self.element, elements, 0, 0).ok()?;
+        assembly.link(&problem, &moved).ok()?;
+        multipliers_of(&problem, &moved.nodes, assembly.transitions()).ok()
     }
 }
 

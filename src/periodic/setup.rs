@@ -214,9 +214,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// [`OrbitError`]: what was asked for makes no sense, or there is no solution near the guess.
     pub fn solve(&self) -> Result<Orbit<'m, M, N>, OrbitError> {
         let (problem, iterate, assembly) = self.solved()?;
-        let unfolded = problem.globals.contains(&Global::Unfolding);
-        let unfolding = unfolded.then_some(problem.unfolding);
-        Orbit::new(self.element, &problem, iterate, &assembly, unfolding)
+        Orbit::new(self.element, &problem, iterate, &assembly)
     }
 
     /// The equations and their solution.

@@ -8,7 +8,7 @@ use crate::sensitivity::{Loss, LossGradient, LossHessian};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
-use tfe_runtime::{Model, Share, State};
+use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
     /// A loss of a run with its [gradient](Self::gradient) and its second derivatives by some parameters.
@@ -45,12 +45,11 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
         loss: &Loss<'_, N>,
         parameters: impl IntoIterator<Item = S>,
     ) -> Result<LossHessian<N>, RunError<N>> {
-        let model = &*self.model;
         let own = self.gradient(start, span.clone(), loss)?;
-        let own = Own::new(own, |index| model.parameter(index));
+        let own = Own::new(own, |index| self.model.parameter(index));
         own.differentiated(parameters, |index, value| {
-            let other = model.with_parameter(index, value).map(Share::own);
-            other.map(|other| self.of_model(other).gradient(start, span.clone(), loss))
+            let other = self.with_parameter(index, value)?;
+            Some(other.gradient(start, span.clone(), loss))
         })
     }
 }
@@ -67,12 +66,10 @@ impl<'m, M: family::Model + Send + Sync + 'm> Simulation<'m, M, 0, RunTimeLength
         loss: &Loss<'_, 0, RunTimeLength>,
         parameters: impl IntoIterator<Item = S>,
     ) -> Result<LossHessian<0, RunTimeLength>, RunError<0, RunTimeLength>> {
-        let model = &*self.model;
         let own = self.gradient(start.clone(), span.clone(), loss)?;
-        let own = Own::new(own, |index| model.parameter(index));
+        let own = Own::new(own, |index| self.model.parameter(index));
         own.differentiated(parameters, |index, value| {
-            let other = model.with_parameter(index, value).map(Share::own)?;
-            let other = self.of_model(other);
+            let other = self.with_parameter(index, value)?;
             Some(other.gradient(start.clone(), span.clone(), loss))
         })
     }

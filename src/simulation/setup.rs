@@ -1,7 +1,8 @@
 //! A run to be: a model, an element, a step, and what else is asked for; of models of either kind of length.
 
+use super::events::remodel::remodel;
 use super::events::watching::Watching;
-use super::kind::Chosen;
+use super::kind::{Chosen, Simulated};
 use super::mesh::Grid;
 use super::watch::resolution::Again;
 use crate::error::RunErrorKind;
@@ -115,14 +116,6 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
             at_kinks: None,
             progress: false,
             refusal: None,
-        }
-    }
-
-    /// The same of another model.
-    pub(crate) fn of_model(&self, model: Share<'m, M>) -> Self {
-        Self {
-            model,
-            ..self.clone()
         }
     }
 
@@ -311,5 +304,19 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             value: impulse,
         });
         self
+    }
+}
+
+impl<'m, M, const N: usize, L> Simulation<'m, M, N, L>
+where
+    M: Simulated<N, L> + Send + Sync + 'm,
+    L: Length<N>,
+{
+    /// The same of the model with another value of a parameter, if one can be made.
+    pub(crate) fn with_parameter(&self, index: usize, value: f64) -> Option<Self> {
+        Some(Self {
+            model: remodel(&*self.model, &[(index, value)])?,
+            ..self.clone()
+        })
     }
 }

@@ -11,7 +11,6 @@ use super::{floquet_of, orbit_of};
 use crate::assembly::{AssemblyError, Chain};
 use crate::differences::places;
 use crate::length::RunTimeLength;
-use crate::numbers::larger;
 use crate::periodic::phase::Phase;
 use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
@@ -190,17 +189,11 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         parameter: Option<usize>,
     ) -> Vec<Option<Complex<f64>>> {
         let value = parameter.map_or(self.period, |index| self.model.parameter(index));
-        let largest = |nodes: &[FamilyState], of: fn(&FamilyState) -> &Vec<f64>| {
-            let all = nodes.iter().flat_map(of);
-            all.fold(0.0, |largest, x| larger(largest, x.abs()))
-        };
         let part = |of: fn(&FamilyState) -> &Vec<f64>| {
-            let size = largest(&self.nodes, of);
-            if size > 0.0 {
-                largest(&change.nodes, of) / size
-            } else {
-                0.0
-            }
+            let all = |nodes: &[FamilyState]| -> Vec<f64> {
+                nodes.iter().flat_map(of).copied().collect()
+            };
+            moving::part(&all(&change.nodes), &all(&self.nodes))
         };
         let parts = [
             part(|state| &state.q),
