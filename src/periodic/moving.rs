@@ -47,8 +47,9 @@ pub(super) fn derivatives(
         best[*place].off = 0.0;
     }
     for nearer in NEARER {
-        let distance = nearer * distance;
-        let found = differences(multipliers, distance, &at);
+        // By the first distance, so that nearer ones are not judged more mildly.
+        let unit = PART / distance;
+        let found = differences(multipliers, (nearer * distance, unit), &at);
         for (best, found) in best.iter_mut().zip(found) {
             if found.off < best.off {
                 *best = found;
@@ -72,7 +73,7 @@ struct Known {
 
 fn differences(
     multipliers: &[Multiplier],
-    distance: f64,
+    (distance, unit): (f64, f64),
     at: &impl Fn(f64) -> Option<Vec<Multiplier>>,
 ) -> Vec<Known> {
     let zero = Complex::new(0.0, 0.0);
@@ -87,7 +88,7 @@ fn differences(
     }
     let known = |[eighth, sixth]: [Complex<f64>; 2]| Known {
         logarithm: eighth,
-        off: (eighth - sixth).norm() / eighth.norm().max(PART / distance),
+        off: (eighth - sixth).norm() / eighth.norm().max(unit),
     };
     sums.into_iter().map(known).collect()
 }

@@ -128,8 +128,8 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
                     }
                     None => Err(refused(RunErrorKind::ParametersFixed)),
                 };
-                let distance = nearer * self.distance(*index);
-                let found = self.column(&indices, distance, gradient)?;
+                let distance = self.distance(*index);
+                let found = self.column(&indices, (distance, nearer), gradient)?;
                 let is_enough = found.off < WELL_KNOWN;
                 if best.as_ref().is_none_or(|best| found.off < best.off) {
                     best = Some(found);
@@ -160,18 +160,18 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
     fn column(
         &self,
         indices: &[usize],
-        distance: f64,
+        (distance, nearer): (f64, f64),
         gradient: impl Fn(f64) -> Result<DVector<f64>, RunError<N, L>>,
     ) -> Result<Column, RunError<N, L>> {
         let size = indices.len();
         let (mut eighth, mut sixth) = (DVector::zeros(size), DVector::zeros(size));
-        for place in places(distance) {
+        for place in places(nearer * distance) {
             let at = gradient(place.shift)?;
             eighth += &at * place.eighth;
             sixth += at * place.sixth;
         }
         let errors = (&eighth - &sixth).abs();
-        // Beside what a part of the parameter changes and what there is.
+        // Beside what the parameter changes and what there is: by the first distance, so that nearer ones are not judged more mildly.
         let own = self.found.1.by_parameters();
         let part = distance / PART;
         let off = (0..size).map(|i| {
