@@ -4,7 +4,7 @@ use crate::constraints::ConstraintResidual;
 use crate::length::{FixedLength, Length, RunTimeLength};
 use crate::numbers::larger;
 use tfe_runtime::family::{self, FamilyState};
-use tfe_runtime::{CoordinateName, Form, Model, State, constrained, legendre};
+use tfe_runtime::{Constraint, CoordinateName, Form, Model, State, constrained, legendre};
 
 /// Evaluates a model at points of phase space: every [`Model`] and every [`family::Model`], and nothing else.
 pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
@@ -48,20 +48,29 @@ pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
     const NEEDS_VELOCITY: bool;
 }
 
+/// So many names.
+pub(crate) fn names(count: usize, name: &dyn Fn(usize) -> CoordinateName) -> Vec<CoordinateName> {
+    (0..count).map(name).collect()
+}
+
+fn declared_names(constraints: &[Constraint]) -> Vec<&'static str> {
+    constraints.iter().map(|one| one.name).collect()
+}
+
 impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
     const IS_CONSTRAINED: bool = !M::CONSTRAINTS.is_empty();
     const NEEDS_VELOCITY: bool = matches!(M::FORM, Form::Lagrangian);
 
     fn coordinate_names(&self) -> Vec<CoordinateName> {
-        (0..N).map(M::coordinate_name).collect()
+        names(N, &M::coordinate_name)
     }
 
     fn output_names(&self) -> Vec<CoordinateName> {
-        (0..self.columns()).map(|at| self.column_name(at)).collect()
+        names(self.columns(), &|at| self.column_name(at))
     }
 
     fn constraint_names(&self) -> Vec<&'static str> {
-        M::CONSTRAINTS.iter().map(|one| one.name).collect()
+        declared_names(M::CONSTRAINTS)
     }
 
     fn velocity(&self, t: f64, state: &State<N>, guess: &[f64; N]) -> Option<[f64; N]> {
@@ -116,16 +125,15 @@ impl<M: family::Model> Evaluate<0, RunTimeLength> for M {
     const NEEDS_VELOCITY: bool = matches!(M::FORM, Form::Lagrangian);
 
     fn coordinate_names(&self) -> Vec<CoordinateName> {
-        (0..self.len()).map(|a| self.coordinate_name(a)).collect()
+        names(self.len(), &|a| self.coordinate_name(a))
     }
 
     fn output_names(&self) -> Vec<CoordinateName> {
-        (0..self.columns()).map(|at| self.column_name(at)).collect()
+        names(self.columns(), &|at| self.column_name(at))
     }
 
     fn constraint_names(&self) -> Vec<CoordinateName> {
-        let rows = 0..self.constraints();
-        rows.map(|row| self.constraint_name(row)).collect()
+        names(self.constraints(), &|row| self.constraint_name(row))
     }
 
     fn velocity(&self, t: f64, state: &FamilyState, _: &Vec<f64>) -> Option<Vec<f64>> {

@@ -1,6 +1,5 @@
 //! Runs that go on where others ended.
 
-use super::follow::Nobody;
 use super::kind::Simulated;
 use super::mesh::Mesh;
 use super::setup::Simulation;
@@ -115,7 +114,7 @@ where
             Ok(((mesh, done, origin), stepper)) => {
                 let node = Node::of(time, state, checkpoint.velocity.clone());
                 let motion = Motion::starting(&*self.model, node);
-                self.drive_on(motion, state, (&mesh, done, origin), stepper, Nobody)
+                self.drive_on(motion, state, (&mesh, done, origin), stepper, None)
             }
             Err(kind) => {
                 let motion = self.model.first_node((time, state), None);

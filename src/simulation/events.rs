@@ -9,6 +9,7 @@ pub(super) mod settings;
 pub(super) mod value;
 pub(super) mod watching;
 
+use super::impulses;
 use super::kind::{Chosen, Simulated};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length, Polynomial};
@@ -382,8 +383,7 @@ where
         place: &Place,
         goes_on: bool,
     ) -> Severed<'c, 'm, N, L> {
-        let before = |impulse: &&Impulse<N>| (impulse.time - arc.t).abs() < place.length.abs();
-        let count = arc.impulses.iter().take_while(before).count();
+        let count = impulses::within(arc.impulses, arc.t, place.length);
         Severed {
             start: arc.t,
             length: place.length,

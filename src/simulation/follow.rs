@@ -62,51 +62,5 @@ pub trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     fn recorded(&mut self, _node: &Node<N, L>) {}
 }
 
-/// Nobody goes along.
-pub(super) struct Nobody;
-
-impl<'m, M: 'm, const N: usize, L: Length<N>> Follow<'m, M, N, L> for Nobody {}
-
-impl<'m, M, F, const N: usize, L> Follow<'m, M, N, L> for &mut F
-where
-    M: 'm,
-    F: Follow<'m, M, N, L>,
-    L: Length<N>,
-{
-    fn passed(
-        &mut self,
-        stepper: &mut L::Stepper<'m, M>,
-        passed: &Passed<'_, N, L>,
-    ) -> Result<(), TransitionError> {
-        (**self).passed(stepper, passed)
-    }
-
-    fn met(&mut self, severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
-        (**self).met(severed)
-    }
-
-    fn cut(&mut self, severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
-        (**self).cut(severed)
-    }
-
-    fn acted(&mut self) {
-        (**self).acted();
-    }
-
-    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
-        (**self).set(model)
-    }
-
-    fn reached(
-        &mut self,
-        stepper: &mut L::Stepper<'m, M>,
-        t: f64,
-        state: &L::State,
-    ) -> ControlFlow<()> {
-        (**self).reached(stepper, t, state)
-    }
-
-    fn recorded(&mut self, node: &Node<N, L>) {
-        (**self).recorded(node);
-    }
-}
+/// Who goes along, if anybody does.
+pub(super) type Follower<'f, 'm, M, const N: usize, L> = Option<&'f mut dyn Follow<'m, M, N, L>>;

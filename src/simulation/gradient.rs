@@ -3,7 +3,6 @@
 mod family;
 mod view;
 
-use super::follow::Nobody;
 use super::mesh::Mesh;
 use super::setup::Simulation;
 use super::trail::is_same;
@@ -77,7 +76,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         if !run.events.is_empty() {
             return run.record_every(1).forwards(start, span, loss);
         }
-        let motion = run.drive(start, &span, identity, Nobody)?;
+        let motion = run.drive(start, &span, identity, None)?;
         match run.descended(&motion, &span, loss) {
             Ok(Some((value, sums))) => Ok((value, run.gathered(motion, sums))),
             // A long step that was cut, or not, where it now is not, or is.

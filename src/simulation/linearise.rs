@@ -47,7 +47,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             transitions: Vec::new(),
             starts: Vec::new(),
         };
-        let motion = self.drive(start, &span, identity, &mut matrices)?;
+        let motion = self.drive(start, &span, identity, Some(&mut matrices))?;
         matrices.close();
         let Matrices {
             transitions,

@@ -4,6 +4,7 @@ use super::events::act::After;
 use super::events::remodel::Changed;
 use super::events::{Cut, Events, Passage};
 use super::follow::{Follow, Passed};
+use super::impulses;
 use super::kind::Simulated;
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
@@ -133,11 +134,11 @@ where
         // What is left of the element behind its last event.
         let (mut from, mut length) = (t, h);
         loop {
-            let ahead =
-                |impulse: &&Impulse<N>| from == t || h.signum() * impulse.time >= h.signum() * from;
-            let behind = (planned.impulses.iter())
-                .take_while(|one| !ahead(one))
-                .count();
+            let behind = if from == t {
+                0
+            } else {
+                impulses::behind(planned.impulses, from, h)
+            };
             let piece = Planned {
                 t: from,
                 h: length,

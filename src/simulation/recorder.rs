@@ -1,7 +1,7 @@
 //! Keeps what a run passes as a motion, and notices what is doubtful about it.
 
 use super::events::Severed;
-use super::follow::{Follow, Passed};
+use super::follow::{Follow, Follower, Passed};
 use super::kind::Simulated;
 use super::pieces::{Broken, Observe, Piece, Side};
 use super::setup::Simulation;
@@ -15,9 +15,9 @@ use tfe_runtime::Share;
 use tfe_runtime::transition::TransitionError;
 
 /// Keeps what a run passes, and shows it to a follower.
-pub(super) struct Recorder<'m, M, F, const N: usize, L: Length<N>> {
+pub(super) struct Recorder<'f, 'm, M, const N: usize, L: Length<N>> {
     motion: Motion<N, L>,
-    follower: F,
+    follower: Follower<'f, 'm, M, N, L>,
     watch: Watch,
     resolution: Option<Resolution<'m, M, N>>,
     record_every: usize,
@@ -25,19 +25,20 @@ pub(super) struct Recorder<'m, M, F, const N: usize, L: Length<N>> {
     is_conserved: bool,
 }
 
-impl<'m, M, F, const N: usize, L> Recorder<'m, M, F, N, L>
+impl<'f, 'm, M, const N: usize, L> Recorder<'f, 'm, M, N, L>
 where
     M: Simulated<N, L>,
-    F: Follow<'m, M, N, L>,
     L: Length<N>,
 {
     /// Goes on from the only node of `motion`.
     pub(super) fn new(
         simulation: &Simulation<'m, M, N, L>,
         motion: Motion<N, L>,
-        mut follower: F,
+        mut follower: Follower<'f, 'm, M, N, L>,
     ) -> Self {
-        follower.recorded(motion.last());
+        if let Some(follower) = &mut follower {
+            follower.recorded(motion.last());
+        }
         let mut watch = Watch::new(simulation.chosen_element());
         watch.pass(Recorded::last_of(&motion, false));
         watch.add(simulation.model.weigh(motion.last()));
@@ -77,7 +78,7 @@ where
         }
         if self.motion.last().t != t {
             self.record(stepper, model, (t, state));
-            self.follower.recorded(self.motion.last());
+            self.tell();
         }
         let recorded = Recorded::last_of(&self.motion, self.is_conserved);
         self.watch.pass(recorded);
@@ -105,6 +106,13 @@ where
         M::record(&mut self.motion, stepper, model, at);
     }
 
+    /// Shows the last node to the follower.
+    fn tell(&mut self) {
+        if let Some(follower) = &mut self.follower {
+            follower.recorded(self.motion.last());
+        }
+    }
+
     pub(super) fn into_motion(
         mut self,
         stepper: &L::Stepper<'m, M>,
@@ -117,10 +125,9 @@ where
     }
 }
 
-impl<'m, M, F, const N: usize, L> Follow<'m, M, N, L> for Recorder<'m, M, F, N, L>
+impl<'m, M, const N: usize, L> Follow<'m, M, N, L> for Recorder<'_, 'm, M, N, L>
 where
     M: Simulated<N, L>,
-    F: Follow<'m, M, N, L>,
     L: Length<N>,
 {
     fn passed(
@@ -128,23 +135,37 @@ where
         stepper: &mut L::Stepper<'m, M>,
         passed: &Passed<'_, N, L>,
     ) -> Result<(), TransitionError> {
-        self.follower.passed(stepper, passed)
+        match &mut self.follower {
+            Some(follower) => follower.passed(stepper, passed),
+            None => Ok(()),
+        }
     }
 
     fn met(&mut self, severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
-        self.follower.met(severed)
+        match &mut self.follower {
+            Some(follower) => follower.met(severed),
+            None => Ok(()),
+        }
     }
 
     fn cut(&mut self, severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
-        self.follower.cut(severed)
+        match &mut self.follower {
+            Some(follower) => follower.cut(severed),
+            None => Ok(()),
+        }
     }
 
     fn acted(&mut self) {
-        self.follower.acted();
+        if let Some(follower) = &mut self.follower {
+            follower.acted();
+        }
     }
 
     fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
-        self.follower.set(model)
+        match &mut self.follower {
+            Some(follower) => follower.set(model),
+            None => Ok(()),
+        }
     }
 
     fn reached(
@@ -153,18 +174,22 @@ where
         t: f64,
         state: &L::State,
     ) -> ControlFlow<()> {
-        self.follower.reached(stepper, t, state)
+        match &mut self.follower {
+            Some(follower) => follower.reached(stepper, t, state),
+            None => ControlFlow::Continue(()),
+        }
     }
 
     fn recorded(&mut self, node: &Node<N, L>) {
-        self.follower.recorded(node);
+        if let Some(follower) = &mut self.follower {
+            follower.recorded(node);
+        }
     }
 }
 
-impl<'m, M, F, const N: usize, L> Observe<'m, M, N, L> for Recorder<'m, M, F, N, L>
+impl<'m, M, const N: usize, L> Observe<'m, M, N, L> for Recorder<'_, 'm, M, N, L>
 where
     M: Simulated<N, L>,
-    F: Follow<'m, M, N, L>,
     L: Length<N>,
 {
     fn keeps(&self) -> bool {
@@ -202,7 +227,7 @@ where
         if side == Side::After {
             self.motion.begin_arc(*M::statistics(stepper));
         }
-        self.follower.recorded(self.motion.last());
+        self.tell();
     }
 
     fn changed(&mut self, model: &Share<'m, M>, values: &[(usize, f64)]) {

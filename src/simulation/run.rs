@@ -1,7 +1,7 @@
 //! Runs: from a start over a span, or without an end.
 
 use super::events::Events;
-use super::follow::{Follow, Nobody};
+use super::follow::Follower;
 use super::kind::{Chosen, Simulated};
 use super::mesh::{Endless, Mesh};
 use super::pieces::{Broken, Left, Pieces, Planned};
@@ -50,7 +50,7 @@ where
             true => M::ends_only(stepper),
             false => stepper,
         };
-        self.drive(start, &span, ready, Nobody)
+        self.drive(start, &span, ready, None)
     }
 
     /// Runs over the span, followed by `follower`.
@@ -59,7 +59,7 @@ where
         start: L::State,
         span: &Range<f64>,
         ready: impl FnOnce(L::Stepper<'m, M>) -> L::Stepper<'m, M>,
-        follower: impl Follow<'m, M, N, L>,
+        follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
         let prepared = self.model.guarded(|| {
             let mut prepared = self.prepare(&start, span);
@@ -86,7 +86,7 @@ where
         start: &L::State,
         (mesh, done, origin): (&Mesh<N>, usize, f64),
         mut stepper: L::Stepper<'m, M>,
-        follower: impl Follow<'m, M, N, L>,
+        follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
         let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, follower)?;
         let last = motion.last();
@@ -110,7 +110,7 @@ where
         (t0, start): (f64, &L::State),
         mesh: &Mesh<N>,
         stepper: &mut L::Stepper<'m, M>,
-        follower: impl Follow<'m, M, N, L>,
+        follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
         let motion = self.model.first_node((t0, start), Some(stepper));
         self.drive_from(motion, start, (mesh, 0), stepper, follower)
@@ -123,7 +123,7 @@ where
         start: &L::State,
         (mesh, done): (&Mesh<N>, usize),
         stepper: &mut L::Stepper<'m, M>,
-        follower: impl Follow<'m, M, N, L>,
+        follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
         let mut pieces = match self.pieces(stepper) {
             Ok(pieces) => pieces,

@@ -76,7 +76,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
         mut tangents: Tangents<'m, M, N>,
     ) -> Result<Sensitive<N>, RunError<N>> {
-        let motion = self.drive(start, &span, identity, &mut tangents)?;
+        let motion = self.drive(start, &span, identity, Some(&mut tangents))?;
         Ok(tangents.into_sensitive(motion))
     }
 }

@@ -109,7 +109,7 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
         if const { M::CONSTRAINED } {
             return Err(refused("models of run-time length with constraints"));
         }
-        let motion = self.drive(start, span, identity, &mut trail)?;
+        let motion = self.drive(start, span, identity, Some(&mut trail))?;
         match trail.refusal(&motion, call) {
             Some(kind) => Err(RunError::new(kind, motion)),
             None => Ok((motion, trail)),

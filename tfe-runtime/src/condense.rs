@@ -15,7 +15,7 @@ use crate::lu;
 use crate::model::{By, First, Form, Model, Second};
 use crate::phase_form::PhaseForm;
 use crate::scheme::SchemeRef;
-use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm};
+use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm, add_row};
 
 /// What a unit of a global unknown γ changes in one element, beside its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -183,7 +183,7 @@ impl System<'_> {
             equations.add_to_tangent(l, &by, self.tangent);
             let end = h * scheme.weights[l];
             for (a, row) in ends.by_interior.chunks_exact_mut(x.len()).enumerate() {
-                equations.add_row(l, &by, a, 0.0, end, row);
+                add_row(&equations.scheme, l, &by, a, 0.0, end, row);
             }
             let second = &point.second;
             let mut by_q = [[0.0; N]; N];

@@ -268,9 +268,9 @@ impl<const N: usize> Condenser<N> {
             }
             parts.momenta.fill(start.p);
             let mut rows = Rows::at_start(parts.rows, model, time, &start.q);
-            rows.choose::<M>(parts.active);
-            let mut form = ConstrainedForm {
-                inner: VelocityForm {
+            rows.choose(M::CONSTRAINTS, parts.active);
+            let mut form = ConstrainedForm::new(
+                VelocityForm {
                     model,
                     scheme,
                     span,
@@ -281,11 +281,11 @@ impl<const N: usize> Condenser<N> {
                     constant_mass: &mut self.memory.mass,
                     statistics: &mut self.memory.statistics,
                 },
-                layout: Layout::new(&element, N, M::CONSTRAINTS.len()),
+                Layout::new(&element, N, M::CONSTRAINTS.len()),
                 rows,
-                active: parts.active,
-                impulse: [0.0; N],
-            };
+                parts.active,
+                [0.0; N],
+            );
             linearise(&mut form, interior, directions, true, system, ends)?;
             form.end_state(interior)?.0
         } else if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {

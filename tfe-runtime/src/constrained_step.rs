@@ -62,7 +62,7 @@ where
     if !warm {
         parts.active.fill(0);
     }
-    rows.choose::<M>(parts.active);
+    rows.choose(M::CONSTRAINTS, parts.active);
     let mean = mean_rate(&scheme, parts.unknowns[..layout.rates()].as_chunks().0);
     combine(
         method.model,
@@ -123,8 +123,8 @@ where
         tangent: parts.tangent,
         pivots: parts.tangent_pivots,
     };
-    let mut form = ConstrainedForm {
-        inner: VelocityForm {
+    let mut form = ConstrainedForm::new(
+        VelocityForm {
             model: method.model,
             scheme,
             span: Span {
@@ -144,9 +144,9 @@ where
         },
         layout,
         rows,
-        active: parts.active,
-        impulse: total(impulses),
-    };
+        parts.active,
+        total(impulses),
+    );
     let control = method.control.with_constraints();
     let beginning = if warm {
         Beginning::Near
@@ -159,14 +159,14 @@ where
         Err(error) if !warm => return Err(error),
         Err(_) => {
             // The continued polynomial may be a worse start than none.
-            form.rows.evaluate(method.model, t, &state.q);
+            form.constraints.rows.evaluate(method.model, t, &state.q);
             cold(
                 scratch.unknowns,
                 scratch.tangent,
                 scratch.step,
                 scratch.pivots,
-                &form.rows,
-                form.active,
+                &form.constraints.rows,
+                form.constraints.active,
             )?;
             newton(&mut form, &control, &mut scratch, Beginning::Far, false)?
         }
@@ -176,20 +176,22 @@ where
         return Err(StepError::NonFinite);
     }
     form.check_end(scratch.unknowns)?;
-    let end_rows = form.rows.independence();
+    let end_rows = form.constraints.rows.independence();
     // Constraints that move do work.
     let is_conserved = conserves_energy::<M, N>()
         && impulses.is_empty()
-        && form.rows.drift.iter().all(|a| *a == 0.0);
+        && form.constraints.rows.drift.iter().all(|a| *a == 0.0);
     let energy = is_conserved.then(|| {
         let velocities = [start_velocity, form.end_place(scratch.unknowns).2];
         Energy::with(method.model, (t, h), [state, &end], &velocities)
     });
     evidence.check_with(method.control.solve, energy, element)?;
     // Between steps they are those of the constraints as declared.
-    if form.rows.is_combined() {
+    if form.constraints.rows.is_combined() {
         for place in layout.multipliers() {
-            form.rows.declared_multipliers(&mut scratch.unknowns[place]);
+            form.constraints
+                .rows
+                .declared_multipliers(&mut scratch.unknowns[place]);
         }
     }
     memory.last = Some(Last {

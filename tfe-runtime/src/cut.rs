@@ -22,19 +22,19 @@ impl Instant for Infallible {
 /// Some of what acts.
 pub(crate) trait Kicks<K>: AsRef<[K]> {
     /// Those that are chosen.
-    fn chosen(from: &[K], choice: impl Fn(&K) -> bool) -> Self;
+    fn chosen(from: &[K], choice: &dyn Fn(&K) -> bool) -> Self;
 }
 
 #[cfg(feature = "alloc")]
 impl<K: Clone> Kicks<K> for alloc::vec::Vec<K> {
-    fn chosen(from: &[K], choice: impl Fn(&K) -> bool) -> Self {
+    fn chosen(from: &[K], choice: &dyn Fn(&K) -> bool) -> Self {
         from.iter().filter(|kick| choice(kick)).cloned().collect()
     }
 }
 
 /// None, without an allocator.
 impl Kicks<Infallible> for [Infallible; 0] {
-    fn chosen(_: &[Infallible], _: impl Fn(&Infallible) -> bool) -> Self {
+    fn chosen(_: &[Infallible], _: &dyn Fn(&Infallible) -> bool) -> Self {
         []
     }
 }
@@ -93,8 +93,8 @@ pub(crate) fn in_halves<S: Halving>(
             kick.time() <= middle
         }
     };
-    let early = S::Kicks::chosen(kicks, |kick| !is_late(kick));
-    let late = S::Kicks::chosen(kicks, is_late);
+    let early = S::Kicks::chosen(kicks, &|kick| !is_late(kick));
+    let late = S::Kicks::chosen(kicks, &is_late);
     for (start, kicks) in [(t, early), (middle, late)] {
         let done = match stepper.whole(start, half, state, kicks.as_ref()) {
             Ok(()) => {

@@ -14,7 +14,7 @@ use crate::dense::DenseElement;
 use crate::error::StepError;
 use crate::model::{Model, State};
 use crate::scheme::SchemeRef;
-use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm};
+use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm, add_row};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -152,7 +152,7 @@ impl Seeds {
             let by = PointTangent::of(h, &point.second);
             let by_q = force_by_q(&point);
             for a in 0..N {
-                equations.add_row(l, &by, a, 0.0, seed[a], weights);
+                add_row(&equations.scheme, l, &by, a, 0.0, seed[a], weights);
                 add_multiple(&mut lambda[N..], seed[a], &by_q[a]);
             }
             for (sum, direction) in by_direction.iter_mut().zip(directions) {

@@ -139,7 +139,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
             forces: List::filled([[0.0; 4]; N], groups),
             rates: List::filled([[0.0; 4]; N], first),
             velocity: [0.0; N],
-            work: Keep::keep(|| Work::new::<M>(groups)),
+            work: Keep::keep(|| Work::new(&Needed::by::<M, N>(groups))),
             tables,
             is_warm: false,
             last_step: 0.0,
@@ -298,24 +298,25 @@ impl<M: Model<N>, S: Storage, const N: usize> Apart for Velocities<'_, M, S, N> 
 
 impl<const N: usize, S: Storage> Work<N, S> {
     #[inline(always)]
-    fn new<M>(groups: usize) -> Self
-    where
-        M: Model<N>,
-    {
+    fn new(needed: &Needed) -> Self {
         let zero = [[0.0; 4]; N];
-        // Short runs notice how much memory is asked for.
-        let first = if is_second_order::<M, N>() { 0 } else { groups };
+        let Needed {
+            groups,
+            first,
+            phase,
+            masses,
+        } = *needed;
         Self {
             forces: List::filled(zero, groups),
             rates: List::filled(zero, first),
             momenta: List::filled(zero, first),
-            velocities: List::filled(zero, if is_phase::<M, N>() { first } else { 0 }),
+            velocities: List::filled(zero, phase),
             products: List::filled(zero, groups),
             more_products: List::filled(zero, groups),
             drift: List::filled(zero, groups - first),
             low_position: List::filled(zero, first),
             low_momentum: List::filled(zero, first),
-            masses: List::filled([zero; N], if M::FACTS.constant_mass { 0 } else { groups }),
+            masses: List::filled([zero; N], masses),
             velocity: [0.0; N],
             velocity_low: [0.0; N],
             distance: 0.0,
@@ -335,7 +336,31 @@ impl<const N: usize, S: Storage> Work<N, S> {
     {
         match kept.kept() {
             Some(work) => work,
-            None => local.insert(Self::new::<M>(groups)),
+            None => local.insert(Self::new(&Needed::by::<M, N>(groups))),
+        }
+    }
+}
+
+/// How many groups of each kind a model needs: short runs notice how much memory is asked for.
+struct Needed {
+    groups: usize,
+    /// Of equations of first order.
+    first: usize,
+    /// Of phase space.
+    phase: usize,
+    /// Of mass matrices that vary.
+    masses: usize,
+}
+
+impl Needed {
+    #[inline(always)]
+    fn by<M: Model<N>, const N: usize>(groups: usize) -> Self {
+        let first = if is_second_order::<M, N>() { 0 } else { groups };
+        Self {
+            groups,
+            first,
+            phase: if is_phase::<M, N>() { first } else { 0 },
+            masses: if M::FACTS.constant_mass { 0 } else { groups },
         }
     }
 }

@@ -306,8 +306,8 @@ where
                     rows.combine_multipliers(&mut parts.unknowns[place]);
                 }
             }
-            let mut form = ConstrainedForm {
-                inner: VelocityForm {
+            let mut form = ConstrainedForm::new(
+                VelocityForm {
                     model: self.model,
                     scheme,
                     span,
@@ -320,9 +320,9 @@ where
                 },
                 layout,
                 rows,
-                active: parts.active,
-                impulse: total(impulses),
-            };
+                parts.active,
+                total(impulses),
+            );
             let x = &*parts.unknowns;
             let linearised = match asked {
                 Asked::Matrix(matrix) => {
@@ -347,7 +347,9 @@ where
             };
             if is_combined {
                 for place in layout.multipliers() {
-                    form.rows.declared_multipliers(&mut parts.unknowns[place]);
+                    form.constraints
+                        .rows
+                        .declared_multipliers(&mut parts.unknowns[place]);
                 }
             }
             return Ok(linearised?);

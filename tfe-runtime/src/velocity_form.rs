@@ -272,54 +272,7 @@ where
             let momentum = self.scheme.momentum[i * points + l];
             let force = -self.span.h * self.scheme.force[i * points + l];
             for (a, row) in rows.chunks_exact_mut(size).enumerate() {
-                self.add_row(l, by, a, momentum, force, row);
-            }
-        }
-    }
-
-    /// Adds the derivative by all unknown rates of component a of weighted momentum and force at a point.
-    #[inline(always)]
-    pub(crate) fn add_row(
-        &self,
-        l: usize,
-        by: &PointTangent<N>,
-        a: usize,
-        momentum: f64,
-        force: f64,
-        row: &mut [f64],
-    ) {
-        let unknowns = self.scheme.unknowns();
-        let weights = l * unknowns..(l + 1) * unknowns;
-        let (mut by_v, mut by_q) = ([0.0; N], [0.0; N]);
-        for b in 0..N {
-            by_v[b] = force * by.force_v[a][b];
-            by_q[b] = force * by.force_q[a][b];
-        }
-        // Of a collocation method a row has the momentum of one point only.
-        if momentum != 0.0 {
-            for b in 0..N {
-                by_v[b] += momentum * by.momentum_v[a][b];
-                by_q[b] += momentum * by.momentum_q[a][b];
-            }
-        }
-        let blocks = row.as_chunks_mut::<N>().0;
-        for (block, weight) in blocks
-            .iter_mut()
-            .zip(&self.scheme.position[weights.clone()])
-        {
-            for b in 0..N {
-                block[b] += weight * by_q[b];
-            }
-        }
-        if self.scheme.collocated {
-            for b in 0..N {
-                blocks[l][b] += by_v[b];
-            }
-        } else {
-            for (block, weight) in blocks.iter_mut().zip(&self.scheme.velocity[weights]) {
-                for b in 0..N {
-                    block[b] += weight * by_v[b];
-                }
+                add_row(&self.scheme, l, by, a, momentum, force, row);
             }
         }
     }
@@ -427,5 +380,49 @@ where
 
     fn statistics(&mut self) -> &mut Statistics {
         self.statistics
+    }
+}
+
+/// Adds the derivative by all unknown rates of component a of weighted momentum and force at a point.
+#[inline(always)]
+pub(crate) fn add_row<const N: usize>(
+    scheme: &SchemeRef<'_>,
+    l: usize,
+    by: &PointTangent<N>,
+    a: usize,
+    momentum: f64,
+    force: f64,
+    row: &mut [f64],
+) {
+    let unknowns = scheme.unknowns();
+    let weights = l * unknowns..(l + 1) * unknowns;
+    let (mut by_v, mut by_q) = ([0.0; N], [0.0; N]);
+    for b in 0..N {
+        by_v[b] = force * by.force_v[a][b];
+        by_q[b] = force * by.force_q[a][b];
+    }
+    // Of a collocation method a row has the momentum of one point only.
+    if momentum != 0.0 {
+        for b in 0..N {
+            by_v[b] += momentum * by.momentum_v[a][b];
+            by_q[b] += momentum * by.momentum_q[a][b];
+        }
+    }
+    let blocks = row.as_chunks_mut::<N>().0;
+    for (block, weight) in blocks.iter_mut().zip(&scheme.position[weights.clone()]) {
+        for b in 0..N {
+            block[b] += weight * by_q[b];
+        }
+    }
+    if scheme.collocated {
+        for b in 0..N {
+            blocks[l][b] += by_v[b];
+        }
+    } else {
+        for (block, weight) in blocks.iter_mut().zip(&scheme.velocity[weights]) {
+            for b in 0..N {
+                block[b] += weight * by_v[b];
+            }
+        }
     }
 }

@@ -136,12 +136,11 @@ where
         }
         let checked = self.check(run, &start, &span);
         checked.map_err(|kind| run.refused(kind, (span.start, &start)))?;
-        let impulses = run.impulses.iter().map(|one| M::time_of(one));
         let asked = Asked {
             accuracy: self.accuracy,
             span: span.clone(),
             // An impulse inside an element costs it its order.
-            breaks: run.breaks.iter().copied().chain(impulses).collect(),
+            breaks: with_times(&run.breaks, &run.impulses, M::time_of),
             element: run.element,
             longest: run.step,
             may_iterate: run.control.solve == Solve::Auto && M::MAY_ITERATE,
@@ -310,7 +309,7 @@ where
             goes_on: ControlFlow::Continue(()),
         };
         let mut motion = self
-            .drive_over((t, start), mesh, stepper, &mut compared)
+            .drive_over((t, start), mesh, stepper, Some(&mut compared))
             .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))?;
         if const { !M::CUTS_AT_KINKS } && self.crosses_kinks() {
             motion.add_warning(Warning::KinksCrossed);
@@ -359,6 +358,12 @@ where
     fn nodes(&self) -> Option<&[f64]> {
         self.nodes.as_deref()
     }
+}
+
+/// Breaks, and the times of impulses.
+fn with_times<K>(breaks: &[f64], impulses: &[K], time: fn(&K) -> f64) -> Vec<f64> {
+    let times = impulses.iter().map(time);
+    breaks.iter().copied().chain(times).collect()
 }
 
 /// Shows what a run is compared by.

@@ -10,8 +10,7 @@ use crate::length::{FixedLength, Length};
 use crate::simulation::kind::{Chosen, Simulated};
 use std::fmt;
 use std::sync::Arc;
-use tfe_runtime::Model;
-use tfe_runtime::Share;
+use tfe_runtime::{CoordinateName, Model, Share};
 
 /// What runs are asked to look for.
 pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
@@ -100,6 +99,31 @@ impl<'m, M, const N: usize> Watching<'m, M, N> {
     }
 }
 
+/// What is to be looked for, in the outputs of these names.
+fn watched<'m, const N: usize, L: Length<N>>(
+    on: &[On<'m, N, L>],
+    names: &[CoordinateName],
+) -> Result<Vec<Watched<'m, N, L>>, RunErrorKind> {
+    let known = || names.iter().map(ToString::to_string);
+    let watched = |one: &On<'m, N, L>| {
+        let value = match &one.function {
+            Some(function) => Value::Function(function.clone()),
+            None => match known().position(|name| name == one.name) {
+                Some(column) => Value::Column(column),
+                None => {
+                    return Err(RunErrorKind::NoEvent {
+                        name: one.name.clone(),
+                        known: known().collect(),
+                    });
+                }
+            },
+        };
+        let on = one.clone();
+        Ok(Watched { on, value })
+    };
+    on.iter().map(watched).collect()
+}
+
 /// A model whose events may set parameters: it may go to other threads.
 pub trait Settable<'m, const N: usize, L: Length<N>>: Simulated<N, L> + Send + Sync + 'm {}
 
@@ -123,24 +147,7 @@ where
             true => Vec::new(),
             false => model.output_names(),
         };
-        let known = || names.iter().map(ToString::to_string);
-        let watched = |one: &On<'m, N, L>| {
-            let value = match &one.function {
-                Some(function) => Value::Function(function.clone()),
-                None => match known().position(|name| name == one.name) {
-                    Some(column) => Value::Column(column),
-                    None => {
-                        return Err(RunErrorKind::NoEvent {
-                            name: one.name.clone(),
-                            known: known().collect(),
-                        });
-                    }
-                },
-            };
-            let on = one.clone();
-            Ok(Watched { on, value })
-        };
-        let watched: Vec<_> = watching.on.iter().map(watched).collect::<Result<_, _>>()?;
+        let watched = watched(&watching.on, &names)?;
         let columns = names.len();
         Ok(Self {
             model,

@@ -10,9 +10,9 @@ use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use {
-    super::super::follow::Nobody, super::super::linearise::family::operator_failed,
-    super::super::mesh::within, super::super::trail::is_same, super::view::View,
-    crate::error::RunErrorKind, crate::sensitivity::loss::Seen, std::convert::identity,
+    super::super::linearise::family::operator_failed, super::super::mesh::within,
+    super::super::trail::is_same, super::view::View, crate::error::RunErrorKind,
+    crate::sensitivity::loss::Seen, std::convert::identity,
 };
 
 /// Why there is no gradient.
@@ -120,7 +120,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         span: &Range<f64>,
         loss: &Loss<'_, 0, RunTimeLength>,
     ) -> Result<Option<(f64, LossGradient<0, RunTimeLength>)>, RunError<0, RunTimeLength>> {
-        let motion = self.drive(start.clone(), span, identity, Nobody)?;
+        let motion = self.drive(start.clone(), span, identity, None)?;
         match self.descended(&motion, span, loss) {
             Ok(Some((value, backwards))) => {
                 let gradient = self.gathered(motion, &backwards);

@@ -6,6 +6,7 @@ use super::super::watch::resolution::{Again, Examined, Resolution};
 use super::super::watch::{Watch, mass_signs};
 use super::{Chosen, Simulated, second};
 use crate::error::RunErrorKind;
+use crate::evaluate::names;
 use crate::length::FixedLength;
 use crate::motion::{Motion, Node, Warning};
 use crate::sensitivity::slopes::momentum_by;
@@ -336,8 +337,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     }
 
     fn parameter_names(&self) -> Vec<CoordinateName> {
-        let numbers = 0..self.parameters();
-        numbers.map(|number| self.parameter_name(number)).collect()
+        names(self.parameters(), &|number| self.parameter_name(number))
     }
 
     fn with_value(&self, number: usize, value: f64) -> Option<Self> {

@@ -6,6 +6,7 @@ use super::super::watch::Watch;
 use super::super::watch::resolution::{Again, Examined, Resolution};
 use super::{Chosen, Simulated, second};
 use crate::error::RunErrorKind;
+use crate::evaluate::names;
 use crate::length::RunTimeLength;
 use crate::motion::{Motion, Node, Warning};
 use std::ops::Range;
@@ -323,8 +324,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     }
 
     fn parameter_names(&self) -> Vec<CoordinateName> {
-        let numbers = 0..self.parameters();
-        numbers.map(|number| self.parameter_name(number)).collect()
+        names(self.parameters(), &|number| self.parameter_name(number))
     }
 
     fn with_value(&self, number: usize, value: f64) -> Option<Self> {

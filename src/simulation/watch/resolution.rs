@@ -77,10 +77,7 @@ impl<'m, M: Model<N>, const N: usize> Resolution<'m, M, N> {
             work: (0, 0),
             beside: None,
             compared: Vec::new(),
-            bounds: [f64::INFINITY, f64::NEG_INFINITY].map(|bound| State {
-                q: [bound; N],
-                p: [bound; N],
-            }),
+            bounds: nowhere(),
         }
     }
 
@@ -232,6 +229,15 @@ impl<'m, M> Again<'m, M> {
             stepper
         })
     }
+}
+
+/// Room for no state at all.
+fn nowhere<const N: usize>() -> [State<N>; 2] {
+    let all = |bound: f64| State {
+        q: [bound; N],
+        p: [bound; N],
+    };
+    [all(f64::INFINITY), all(f64::NEG_INFINITY)]
 }
 
 /// Makes room for a state.

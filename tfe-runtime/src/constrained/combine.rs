@@ -1,10 +1,9 @@
 //! Redundant holonomic constraints in an element: as many combinations of them as are independent (T-118, T-132).
 
 use super::rows::{
-    COMBINED, DEPENDENT, Rows, add_row, dot, longest, norm, scaled, subtract_part, unit,
+    COMBINED, Constrains, DEPENDENT, Rows, add_row, dot, longest, norm, scaled, subtract_part, unit,
 };
 use crate::legendre::largest;
-use crate::model::Model;
 
 /// Functions whose gradients vanish in the middle of an element, and turn there by less than this part of what others do, are not combined with these: the weights would be large.
 const STILL: f64 = 0.01;
@@ -15,15 +14,16 @@ impl<const N: usize> Rows<'_, N> {
     /// way. So the others stay independent for as long as can be, and which rows are given, or how they are scaled or combined, makes no difference.
     ///
     /// `places` are time and position at the start and in the middle, as far as that is known, and `rate` is the velocity there.
-    pub(crate) fn combine<M: Model<N>>(
+    pub(crate) fn combine(
         &mut self,
-        model: &M,
+        model: &dyn Constrains<N>,
         places: [(f64, &[f64; N]); 2],
         rate: &[f64; N],
         active: &mut [usize],
     ) {
-        let count = M::CONSTRAINTS.len();
-        let holonomic = || (0..count).filter(|&c| M::CONSTRAINTS[c].kind.is_holonomic());
+        let declared = model.declared();
+        let count = declared.len();
+        let holonomic = || (0..count).filter(|&c| declared[c].kind.is_holonomic());
         if holonomic().all(|c| active[c] != 0) {
             return;
         }
@@ -54,7 +54,7 @@ impl<const N: usize> Rows<'_, N> {
         self.basis.copy_from_slice(self.weights);
         self.turn_least(model, middle, rate, active);
         for c in 0..count {
-            if !M::CONSTRAINTS[c].kind.is_holonomic() {
+            if !declared[c].kind.is_holonomic() {
                 self.weights[c * count + c] = 1.0;
                 self.basis[c * count + c] = 1.0;
                 self.squares[c] = 1.0;
@@ -74,9 +74,9 @@ impl<const N: usize> Rows<'_, N> {
     /// The point of the holonomic constraints, `rank` of which are independent there, that is nearest to a position: q ← q₀ − A⁺ (φ + A (q₀ − q)) (T-151).
     ///
     /// The position itself where that leads nowhere.
-    fn nearest<M: Model<N>>(
+    fn nearest(
         &mut self,
-        model: &M,
+        model: &dyn Constrains<N>,
         (t, from): (f64, &[f64; N]),
         rank: usize,
     ) -> [f64; N] {
@@ -98,9 +98,9 @@ impl<const N: usize> Rows<'_, N> {
     }
 
     /// q₀ − A⁺ (φ + A (q₀ − q)), with `rank` rows.
-    fn moved_to_tangents<M: Model<N>>(
+    fn moved_to_tangents(
         &mut self,
-        model: &M,
+        model: &dyn Constrains<N>,
         t: f64,
         [from, at]: [&[f64; N]; 2],
         rank: usize,
@@ -109,7 +109,7 @@ impl<const N: usize> Rows<'_, N> {
         // Rows of length one, and what they are to take away.
         for (c, row) in self.rows.iter().enumerate() {
             let length = norm(row);
-            if !M::CONSTRAINTS[c].kind.is_holonomic() || length == 0.0 {
+            if !model.declared()[c].kind.is_holonomic() || length == 0.0 {
                 (self.spare[c], self.values[c]) = ([0.0; N], 0.0);
                 continue;
             }
@@ -138,15 +138,16 @@ impl<const N: usize> Rows<'_, N> {
     /// Adds combinations of constraints whose gradients vanish in the middle to those that were chosen, so that the gradients of these turn least.
     ///
     /// With B the rates of the scaled rows and R = (1 − U Uᵀ) B, the least |(u + v)ᵀ B| over all v ⊥ U, for each column u of U: v in the space of columns of R.
-    fn turn_least<M: Model<N>>(
+    fn turn_least(
         &mut self,
-        model: &M,
+        model: &dyn Constrains<N>,
         (t, q): (f64, &[f64; N]),
         rate: &[f64; N],
         active: &[usize],
     ) {
-        let count = M::CONSTRAINTS.len();
-        let holonomic = |c: usize| M::CONSTRAINTS[c].kind.is_holonomic();
+        let declared = model.declared();
+        let count = declared.len();
+        let holonomic = |c: usize| declared[c].kind.is_holonomic();
         // Kernels write only what can be non-zero.
         self.is_combined = false;
         self.psi_q.fill([0.0; N]);

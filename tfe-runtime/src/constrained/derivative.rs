@@ -31,7 +31,7 @@ pub(crate) fn linearise<'s, M, const N: usize>(
 where
     M: Model<N>,
 {
-    let layout = form.layout;
+    let layout = form.constraints.layout;
     let size = layout.size();
     let columns = system.sides.len() / size;
     // The first N columns of the sides serve as memory for the derivatives by the coordinates until they are spread out.
@@ -144,7 +144,7 @@ fn along<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let layout = form.layout;
+    let layout = form.constraints.layout;
     let (scheme, h) = (form.inner.scheme, form.inner.span.h);
     let (points, unknowns) = (scheme.points(), scheme.unknowns());
     let parameter = match direction.parameter {
@@ -170,11 +170,16 @@ where
         for a in 0..N {
             force[a] += direction.damping * v[a];
         }
-        rows.evaluate_like(&form.rows, form.inner.model, (time, &q_dual), &v);
+        rows.evaluate_like(
+            &form.constraints.rows,
+            form.inner.model,
+            (time, &q_dual),
+            &v,
+        );
         let slopes = slopes(node, layout.degree());
         for holonomic in [true, false] {
-            form.set_mu(l, x, &slopes, holonomic);
-            for (c, mu) in form.rows.mu.iter().enumerate() {
+            form.constraints.set_mu(l, x, &slopes, holonomic);
+            for (c, mu) in form.constraints.rows.mu.iter().enumerate() {
                 for a in 0..N {
                     let (row, rate) = (rows.rows[c][a], rows.rates[c][a]);
                     if holonomic {
@@ -195,7 +200,7 @@ where
                     - scheme.force[i * points + l] * impulse;
             }
         }
-        for (c, holonomic) in form.active() {
+        for (c, holonomic) in form.constraints.active() {
             if holonomic {
                 for j in 1..layout.degree() {
                     residual[layout.inside(j, c)] +=
@@ -209,9 +214,14 @@ where
     let span = form.inner.span;
     let still = duals(&span.start.q, &[0.0; N]);
     let start = Dual::new(span.t, direction.time).by_parameter(parameter);
-    rows.evaluate_like(&form.rows, form.inner.model, (start, &still), &[0.0; N]);
-    form.set_node_mu(x, true);
-    let kick = rows.stretched(form.rows.mu, stretch);
+    rows.evaluate_like(
+        &form.constraints.rows,
+        form.inner.model,
+        (start, &still),
+        &[0.0; N],
+    );
+    form.constraints.set_node_mu(x, true);
+    let kick = rows.stretched(form.constraints.rows.mu, stretch);
     for row in residual[..layout.rates()].as_chunks_mut::<N>().0 {
         for a in 0..N {
             row[a] -= kick[a];
@@ -221,13 +231,18 @@ where
     let (time, q_dual) = moving(direction, 1.0, t, &q, scheme.advance, rates);
     let time = time.by_parameter(parameter);
     let (momentum, _) = explicit(form.inner.model, time, &q_dual, &v, &span.start.p)?;
-    rows.evaluate_like(&form.rows, form.inner.model, (time, &q_dual), &v);
-    form.set_node_mu(x, false);
-    let reaction = rows.stretched(form.rows.mu, stretch);
+    rows.evaluate_like(
+        &form.constraints.rows,
+        form.inner.model,
+        (time, &q_dual),
+        &v,
+    );
+    form.constraints.set_node_mu(x, false);
+    let reaction = rows.stretched(form.constraints.rows.mu, stretch);
     for a in 0..N {
         residual[layout.end(a)] = momentum[a] + reaction[a] - kick[a] - end_force[a];
     }
-    for (c, holonomic) in form.active() {
+    for (c, holonomic) in form.constraints.active() {
         residual[layout.node(c)] = rows.psi_slope(c, &v);
         if holonomic {
             residual[layout.inside(0, c)] = rows.value_over(c, h, stretch);

@@ -17,20 +17,30 @@ use crate::control::START_TOLERANCE;
 use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
 use crate::error::{ConstraintError, StepError};
 use crate::legendre::{conjugate, lagrangian_view_from};
-use crate::model::{First, Form, Model, Second, State};
-use crate::scheme::MAX_RATES;
+use crate::model::{Constraint, First, Form, Model, Second, State};
+use crate::scheme::{MAX_RATES, SchemeRef};
 use crate::statistics::Statistics;
 use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm};
 
 pub(crate) struct ConstrainedForm<'a, M, const N: usize> {
     /// The element; its `momenta` become L_v at the points, its `forces` all forces there.
     pub(crate) inner: VelocityForm<'a, M, N>,
+    pub(crate) constraints: ElementConstraints<'a, N>,
+    /// What impulses give to the momentum at the end.
+    pub(crate) impulse: [f64; N],
+}
+
+/// What constraints add to an element, of whichever model.
+pub(crate) struct ElementConstraints<'a, const N: usize> {
+    /// As they are declared.
+    declared: &'static [Constraint],
+    pub(super) scheme: SchemeRef<'a>,
+    /// The length of the element.
+    pub(super) h: f64,
     pub(crate) layout: Layout,
     pub(crate) rows: Rows<'a, N>,
     /// One for each constraint that counts.
     pub(crate) active: &'a [usize],
-    /// What impulses give to the momentum at the end.
-    pub(crate) impulse: [f64; N],
 }
 
 /// The end of the element, as far as the unknowns say.
@@ -63,13 +73,10 @@ pub(crate) fn slopes(node: f64, degree: usize) -> [f64; MAX_RATES] {
     slopes
 }
 
-impl<M, const N: usize> ConstrainedForm<'_, M, N>
-where
-    M: Model<N>,
-{
+impl<const N: usize> ElementConstraints<'_, N> {
     /// The constraints that count, with their kinds: true for holonomic ones.
-    pub(crate) fn active(&self) -> impl Iterator<Item = (usize, bool)> + use<'_, M, N> {
-        let marked = M::CONSTRAINTS.iter().zip(self.active).enumerate();
+    pub(crate) fn active(&self) -> impl Iterator<Item = (usize, bool)> + use<'_, N> {
+        let marked = self.declared.iter().zip(self.active).enumerate();
         marked
             .filter(|(_, (_, active))| **active != 0)
             .map(|(c, (constraint, _))| (c, constraint.kind.is_holonomic()))
@@ -82,7 +89,7 @@ where
     /// Sets the multipliers at a point for one kind of constraint, others to zero.
     pub(crate) fn set_mu(&mut self, l: usize, x: &[f64], slopes: &[f64], holonomic: bool) {
         self.rows.mu.fill(0.0);
-        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+        for (c, constraint) in self.declared.iter().enumerate() {
             if self.active[c] == 0 || constraint.kind.is_holonomic() != holonomic {
                 continue;
             }
@@ -90,15 +97,15 @@ where
                 let coefficients = (1..self.layout.degree()).map(|j| x[self.layout.inside(j, c)]);
                 coefficients.zip(&slopes[1..]).map(|(m, p)| m * p).sum()
             } else {
-                self.inner.span.h * x[self.layout.inside(l, c)]
+                self.h * x[self.layout.inside(l, c)]
             };
         }
     }
 
     /// Sets the multipliers of the node at the end, or those with which the start momentum is changed.
     pub(crate) fn set_node_mu(&mut self, x: &[f64], at_start: bool) {
-        let h = self.inner.span.h;
-        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+        let h = self.h;
+        for (c, constraint) in self.declared.iter().enumerate() {
             let node = h * x[self.layout.node(c)];
             self.rows.mu[c] = match (
                 self.active[c] != 0,
@@ -113,28 +120,67 @@ where
         }
     }
 
-    /// Σ rows_c μ_c
-    pub(crate) fn transposed(rows: &[[f64; N]], mu: &[f64]) -> [f64; N] {
-        let mut sum = [0.0; N];
-        for (row, mu) in rows.iter().zip(mu) {
-            if *mu != 0.0 {
-                for a in 0..N {
-                    sum[a] += row[a] * mu;
+    /// The equations of constraints that do not count: their multipliers vanish.
+    fn hold_dependent(
+        &self,
+        x: &[f64],
+        residual: &mut [f64],
+        mut derivatives: Option<Derivatives<'_>>,
+    ) {
+        let size = self.layout.size();
+        for (c, _) in self
+            .active
+            .iter()
+            .enumerate()
+            .filter(|(_, mark)| **mark == 0)
+        {
+            let inside = (0..self.layout.degree()).map(|j| self.layout.inside(j, c));
+            for at in inside.chain([self.layout.node(c)]) {
+                residual[at] = x[at];
+                if let Some(derivatives) = &mut derivatives {
+                    derivatives.tangent[at * size + at] = 1.0;
                 }
             }
         }
-        sum
+    }
+}
+
+impl<'a, M, const N: usize> ConstrainedForm<'a, M, N>
+where
+    M: Model<N>,
+{
+    /// An element with the constraints that `active` marks.
+    pub(crate) fn new(
+        inner: VelocityForm<'a, M, N>,
+        layout: Layout,
+        rows: Rows<'a, N>,
+        active: &'a [usize],
+        impulse: [f64; N],
+    ) -> Self {
+        let constraints = ElementConstraints {
+            declared: M::CONSTRAINTS,
+            scheme: inner.scheme,
+            h: inner.span.h,
+            layout,
+            rows,
+            active,
+        };
+        Self {
+            inner,
+            constraints,
+            impulse,
+        }
     }
 
     /// Time, coordinates and velocity at the end.
     pub(crate) fn end_place(&self, x: &[f64]) -> (f64, [f64; N], [f64; N]) {
         let span = &self.inner.span;
         let scheme = &self.inner.scheme;
-        let rates = x[..self.layout.rates()].as_chunks::<N>().0;
+        let rates = x[..self.constraints.layout.rates()].as_chunks::<N>().0;
         let rate = weighted(scheme.advance, scheme.advance_low, rates);
         let q = moved(&span.start.q, &span.low.q, span.h, &rate);
         let mut v = [0.0; N];
-        v.copy_from_slice(&x[self.layout.end(0)..self.layout.node(0)]);
+        v.copy_from_slice(&x[self.constraints.layout.end(0)..self.constraints.layout.node(0)]);
         (span.t + span.h, q, v)
     }
 
@@ -169,7 +215,7 @@ where
     pub(crate) fn end_state(&self, x: &[f64]) -> Result<(State<N>, State<N>), StepError> {
         let end = self.end(x, false)?;
         let span = &self.inner.span;
-        let rates = x[..self.layout.rates()].as_chunks::<N>().0;
+        let rates = x[..self.constraints.layout.rates()].as_chunks::<N>().0;
         let rate = weighted(
             self.inner.scheme.advance,
             self.inner.scheme.advance_low,
@@ -187,9 +233,12 @@ where
     /// Whether all constraints hold at the end, those that were left out as dependent too.
     pub(crate) fn check_end(&mut self, x: &[f64]) -> Result<(), StepError> {
         let (t, q, v) = self.end_place(x);
-        self.rows.evaluate_declared(self.inner.model, t, &q);
+        self.constraints
+            .rows
+            .evaluate_declared(self.inner.model, t, &q);
         for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
-            let (position, velocity) = relative_residual(&self.rows, c, &q, &v, self.inner.span.h);
+            let (position, velocity) =
+                relative_residual(&self.constraints.rows, c, &q, &v, self.inner.span.h);
             for residual in [position, velocity] {
                 if !(residual <= START_TOLERANCE) {
                     return Err(ConstraintError::Dependent {
@@ -210,12 +259,12 @@ where
         residual: &mut [f64],
         mut derivatives: Option<Derivatives<'_>>,
     ) -> Result<(), StepError> {
-        let layout = self.layout;
+        let layout = self.constraints.layout;
         let (scheme, h) = (self.inner.scheme, self.inner.span.h);
         let (points, unknowns) = (scheme.points(), scheme.unknowns());
         let rates = x[..layout.rates()].as_chunks::<N>().0;
-        let velocities = self.has(false);
-        let positions = self.has(true) && layout.degree() > 1;
+        let velocities = self.constraints.has(false);
+        let positions = self.constraints.has(true) && layout.degree() > 1;
         residual.fill(0.0);
         if let Some(derivatives) = &mut derivatives {
             derivatives.tangent.fill(0.0);
@@ -231,13 +280,16 @@ where
             }
             self.inner.momenta[l] = point.p;
             let mut by = PointTangent::of(h, &point.second);
-            self.rows.evaluate(self.inner.model, t, &q);
+            self.constraints.rows.evaluate(self.inner.model, t, &q);
             let slopes = slopes(scheme.nodes[l], layout.degree());
             if velocities {
-                self.set_mu(l, x, &slopes, false);
-                let bend = self.rows.differentiate(self.inner.model, t, &q, &v);
-                let momentum = Self::transposed(self.rows.rows, self.rows.mu);
-                let force = Self::transposed(self.rows.rates, self.rows.mu);
+                self.constraints.set_mu(l, x, &slopes, false);
+                let bend = self
+                    .constraints
+                    .rows
+                    .differentiate(self.inner.model, t, &q, &v);
+                let momentum = transposed(self.constraints.rows.rows, self.constraints.rows.mu);
+                let force = transposed(self.constraints.rows.rates, self.constraints.rows.mu);
                 for a in 0..N {
                     point.p[a] += momentum[a];
                     point.force[a] += force[a];
@@ -249,13 +301,16 @@ where
                 }
             }
             if positions {
-                self.set_mu(l, x, &slopes, true);
-                let force = Self::transposed(self.rows.rows, self.rows.mu);
+                self.constraints.set_mu(l, x, &slopes, true);
+                let force = transposed(self.constraints.rows.rows, self.constraints.rows.mu);
                 for a in 0..N {
                     point.force[a] -= force[a];
                 }
                 if derivatives.is_some() {
-                    let bend = self.rows.differentiate(self.inner.model, t, &q, &v);
+                    let bend = self
+                        .constraints
+                        .rows
+                        .differentiate(self.inner.model, t, &q, &v);
                     for a in 0..N {
                         for b in 0..N {
                             by.force_q[a][b] -= h * bend.bend[a][b];
@@ -270,28 +325,28 @@ where
                     residual[i * N + a] += weight * point.p[a];
                 }
             }
-            for (c, holonomic) in self.active() {
+            for (c, holonomic) in self.constraints.active() {
                 if holonomic {
                     for j in 1..layout.degree() {
                         residual[layout.inside(j, c)] +=
-                            scheme.weights[l] * slopes[j] * self.rows.values[c] / h;
+                            scheme.weights[l] * slopes[j] * self.constraints.rows.values[c] / h;
                     }
                 } else {
-                    residual[layout.inside(l, c)] = self.rows.psi(c, &v);
+                    residual[layout.inside(l, c)] = self.constraints.rows.psi(c, &v);
                 }
             }
             if let Some(Derivatives { tangent, by_start }) = &mut derivatives {
-                self.add_element(l, &by, tangent);
-                self.add_point(l, &slopes, tangent);
+                self.constraints.add_element(l, &by, tangent);
+                self.constraints.add_point(l, &slopes, tangent);
                 if !by_start.is_empty() {
-                    self.add_start(l, &by, &slopes, by_start);
+                    self.constraints.add_start(l, &by, &slopes, by_start);
                 }
             }
         }
         let rows = residual[..layout.rates()].as_chunks_mut::<N>().0;
         self.inner.subtract_impulse(rows);
-        self.set_node_mu(x, true);
-        let kick = Self::transposed(self.rows.start, self.rows.mu);
+        self.constraints.set_node_mu(x, true);
+        let kick = transposed(self.constraints.rows.start, self.constraints.rows.mu);
         for row in rows {
             for a in 0..N {
                 row[a] -= kick[a];
@@ -301,9 +356,10 @@ where
             && !by_start.is_empty()
         {
             let Span { t, start, .. } = self.inner.span;
-            let bend = self
-                .rows
-                .differentiate(self.inner.model, t, &start.q, &[0.0; N]);
+            let bend =
+                self.constraints
+                    .rows
+                    .differentiate(self.inner.model, t, &start.q, &[0.0; N]);
             for row in (0..unknowns * N).chain(layout.end(0)..layout.node(0)) {
                 let a = if row < layout.rates() {
                     row % N
@@ -316,57 +372,36 @@ where
             }
         }
         let end = self.end(x, derivatives.is_some())?;
-        self.rows.evaluate(self.inner.model, end.t, &end.q);
-        self.set_node_mu(x, false);
-        let reaction = Self::transposed(self.rows.rows, self.rows.mu);
+        self.constraints
+            .rows
+            .evaluate(self.inner.model, end.t, &end.q);
+        self.constraints.set_node_mu(x, false);
+        let reaction = transposed(self.constraints.rows.rows, self.constraints.rows.mu);
         let force = weighted(scheme.weights, scheme.weights_low, self.inner.forces);
         let span = &self.inner.span;
         for a in 0..N {
             let impulse = h * force[a] + (span.low.p[a] + self.impulse[a] + kick[a]);
             residual[layout.end(a)] = (end.p[a] - span.start.p[a]) + (reaction[a] - impulse);
         }
-        for (c, holonomic) in self.active() {
-            residual[layout.node(c)] = self.rows.psi(c, &end.v);
+        for (c, holonomic) in self.constraints.active() {
+            residual[layout.node(c)] = self.constraints.rows.psi(c, &end.v);
             if holonomic {
-                residual[layout.inside(0, c)] = self.rows.values[c] / h;
+                residual[layout.inside(0, c)] = self.constraints.rows.values[c] / h;
             }
         }
         if let Some(Derivatives { tangent, by_start }) = &mut derivatives {
             let bend = self
+                .constraints
                 .rows
                 .differentiate(self.inner.model, end.t, &end.q, &end.v);
-            self.add_ends(&end, &bend, tangent);
+            self.constraints.add_ends(&end, &bend, tangent);
             if !by_start.is_empty() {
-                self.add_end_by_start(&end, &bend, by_start);
+                self.constraints.add_end_by_start(&end, &bend, by_start);
             }
         }
-        self.hold_dependent(x, residual, derivatives);
+        self.constraints.hold_dependent(x, residual, derivatives);
         self.inner.statistics.residual_evaluations += 1;
         Ok(())
-    }
-
-    /// The equations of constraints that do not count: their multipliers vanish.
-    fn hold_dependent(
-        &self,
-        x: &[f64],
-        residual: &mut [f64],
-        mut derivatives: Option<Derivatives<'_>>,
-    ) {
-        let size = self.layout.size();
-        for (c, _) in self
-            .active
-            .iter()
-            .enumerate()
-            .filter(|(_, mark)| **mark == 0)
-        {
-            let inside = (0..self.layout.degree()).map(|j| self.layout.inside(j, c));
-            for at in inside.chain([self.layout.node(c)]) {
-                residual[at] = x[at];
-                if let Some(derivatives) = &mut derivatives {
-                    derivatives.tangent[at * size + at] = 1.0;
-                }
-            }
-        }
     }
 }
 
@@ -395,7 +430,10 @@ where
     }
 
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
-        let (rates, end) = (self.layout.rates(), self.layout.end(0)..self.layout.node(0));
+        let (rates, end) = (
+            self.constraints.layout.rates(),
+            self.constraints.layout.end(0)..self.constraints.layout.node(0),
+        );
         let inner = self.inner.measure(&x[..rates], &step[..rates]);
         let end = 0.25 * relative(1.0, &[], &x[end.clone()], &step[end]);
         let relative = if end.is_nan() {
@@ -414,4 +452,17 @@ where
     fn statistics(&mut self) -> &mut Statistics {
         self.inner.statistics
     }
+}
+
+/// Σ rows_c μ_c
+fn transposed<const N: usize>(rows: &[[f64; N]], mu: &[f64]) -> [f64; N] {
+    let mut sum = [0.0; N];
+    for (row, mu) in rows.iter().zip(mu) {
+        if *mu != 0.0 {
+            for a in 0..N {
+                sum[a] += row[a] * mu;
+            }
+        }
+    }
+    sum
 }

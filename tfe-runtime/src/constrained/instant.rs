@@ -1,7 +1,8 @@
 //! What constraints say at one instant of a motion: reactions, and the gradients that span what they allow.
 
 use crate::constrained::derivative::{DualRows, explicit};
-use crate::constrained::rows::{Rows, dot, rows_len};
+use crate::constrained::rows::{Constrains, dot, rows_len};
+use crate::constrained::states::chosen;
 use crate::dual::{Dual, duals};
 use crate::error::{ConstraintError, StepError};
 use crate::legendre::lagrangian_view_from;
@@ -36,19 +37,24 @@ pub fn gradients<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let count = M::CONSTRAINTS.len();
-    let mut memory = vec![0.0; rows_len(N, count)];
-    let mut rows = Rows::of(&mut memory, count);
-    rows.evaluate(model, t, &state.q);
-    let mut active = vec![0; count];
-    rows.choose::<M>(&mut active);
-    rows.differentiate(model, t, &state.q, v);
-    Ok(Gradients {
+    let second = lagrangian_view_from(model, t, &state.q, v, &state.p)?.second;
+    Ok(gradients_with(second, model, (t, &state.q, v)))
+}
+
+fn gradients_with<const N: usize>(
+    second: Second<f64, N>,
+    model: &dyn Constrains<N>,
+    (t, q, v): (f64, &[f64; N], &[f64; N]),
+) -> Gradients<N> {
+    let mut memory = vec![0.0; rows_len(N, model.declared().len())];
+    let (mut rows, active) = chosen(model, (t, q), &mut memory);
+    rows.differentiate(model, t, q, v);
+    Gradients {
         rows: rows.rows.to_vec(),
         psi_q: rows.psi_q.to_vec(),
         independent: active.into_iter().map(|mark| mark != 0).collect(),
-        second: lagrangian_view_from(model, t, &state.q, v, &state.p)?.second,
-    })
+        second,
+    }
 }
 
 /// The reactions λ of the constraints, one for each: the forces on the coordinates are Aᵀλ (T-77).
@@ -70,23 +76,38 @@ pub fn reactions<M, const N: usize>(
 where
     M: Model<N>,
 {
+    let view = lagrangian_view_from(model, t, &state.q, v, &state.p)?;
+    let gradients = gradients_with(view.second, model, (t, &state.q, v));
+    let moving = duals(&state.q, v);
+    let (momentum, _) = explicit(model, Dual::new(t, 1.0), &moving, v, &state.p)?;
+    let mut along = DualRows::<N>::new(M::CONSTRAINTS.len());
+    along.evaluate(model, Dual::new(t, 1.0), &moving, v);
+    let mut force = [0.0; N];
+    for a in 0..N {
+        force[a] = view.first.q[a] + view.first.force[a] - momentum[a];
+    }
+    balance(&gradients, &force, &along, v)
+}
+
+/// The reactions that leave of a force what accelerates.
+fn balance<const N: usize>(
+    gradients: &Gradients<N>,
+    force: &[f64; N],
+    along: &DualRows<N>,
+    v: &[f64; N],
+) -> Result<Vec<f64>, StepError> {
     let Gradients {
         rows,
         independent,
         second,
         ..
-    } = gradients(model, t, state, v)?;
-    let view = lagrangian_view_from(model, t, &state.q, v, &state.p)?;
-    let moving = duals(&state.q, v);
-    let (momentum, _) = explicit(model, Dual::new(t, 1.0), &moving, v, &state.p)?;
-    let mut along = DualRows::<N>::new(rows.len());
-    along.evaluate(model, Dual::new(t, 1.0), &moving, v);
+    } = gradients;
     let chosen: Vec<usize> = (0..rows.len()).filter(|c| independent[*c]).collect();
     let size = N + chosen.len();
     let (mut matrix, mut vector) = (vec![0.0; size * size], vec![0.0; size]);
     for a in 0..N {
         matrix[a * size..a * size + N].copy_from_slice(&second.zz[a]);
-        vector[a] = view.first.q[a] + view.first.force[a] - momentum[a];
+        vector[a] = force[a];
     }
     for (k, c) in chosen.iter().enumerate() {
         for a in 0..N {
@@ -101,7 +122,7 @@ where
     if !vector.iter().all(|value| value.is_finite()) {
         return Err(StepError::NonFinite);
     }
-    Ok(spread(&rows, &chosen, &vector[N..]))
+    Ok(spread(rows, &chosen, &vector[N..]))
 }
 
 /// The multipliers of all rows with the least Σ λ² that give the same Aᵀλ as those of the independent ones.

@@ -1,6 +1,6 @@
 //! Constraints evaluated at a point, on the caller's memory.
 
-use crate::model::{ConstraintSecond, Model};
+use crate::model::{Constraint, ConstraintSecond, Model};
 
 /// The numbers that [`Rows`] need.
 pub(crate) const fn rows_len(coordinates: usize, constraints: usize) -> usize {
@@ -20,6 +20,59 @@ pub(super) const DEPENDENT: f64 = 1e-10;
 
 /// A row that was chosen before stays chosen while it has so much of its own.
 const KEPT: f64 = 0.1;
+
+/// The constraints of a model, whichever it is: what is rarely done with them is compiled for all models at once.
+pub(crate) trait Constrains<const N: usize> {
+    /// The constraints, in order.
+    fn declared(&self) -> &'static [Constraint];
+
+    /// A, a and φ.
+    fn values_at(
+        &self,
+        t: f64,
+        q: &[f64; N],
+        rows: &mut [[f64; N]],
+        numbers: (&mut [f64], &mut [f64]),
+    );
+
+    /// ψ_q, Ȧ and what multipliers bend.
+    fn second_at(
+        &self,
+        t: f64,
+        q: &[f64; N],
+        v: &[f64; N],
+        mu: &[f64],
+        second: &mut ConstraintSecond<'_, f64, N>,
+    );
+}
+
+impl<M: Model<N>, const N: usize> Constrains<N> for M {
+    fn declared(&self) -> &'static [Constraint] {
+        M::CONSTRAINTS
+    }
+
+    fn values_at(
+        &self,
+        t: f64,
+        q: &[f64; N],
+        rows: &mut [[f64; N]],
+        (drift, values): (&mut [f64], &mut [f64]),
+    ) {
+        self.constraint_rows(t, q, rows, drift);
+        self.constraint_values(t, q, values);
+    }
+
+    fn second_at(
+        &self,
+        t: f64,
+        q: &[f64; N],
+        v: &[f64; N],
+        mu: &[f64],
+        second: &mut ConstraintSecond<'_, f64, N>,
+    ) {
+        self.constraint_second(t, q, v, mu, second);
+    }
+}
 
 /// The constraints at the point that was evaluated last; a row, or a number, for each.
 pub(crate) struct Rows<'a, const N: usize> {
@@ -91,22 +144,22 @@ impl<'a, const N: usize> Rows<'a, N> {
     }
 
     /// Evaluated at the start of an element, with A kept as that of the start.
-    pub(crate) fn at_start<M: Model<N>>(
+    pub(crate) fn at_start(
         memory: &'a mut [f64],
-        model: &M,
+        model: &dyn Constrains<N>,
         t: f64,
         q: &[f64; N],
     ) -> Self {
-        let mut rows = Self::of(memory, M::CONSTRAINTS.len());
+        let mut rows = Self::of(memory, model.declared().len());
         rows.evaluate(model, t, q);
         rows.start.copy_from_slice(rows.rows);
         rows
     }
 
     /// The same for an element whose rows were [combined](Self::combine) before, as the marks tell.
-    pub(crate) fn at_start_again<M: Model<N>>(
+    pub(crate) fn at_start_again(
         memory: &'a mut [f64],
-        model: &M,
+        model: &dyn Constrains<N>,
         (t, q): (f64, &[f64; N]),
         active: &[usize],
     ) -> Self {
@@ -120,11 +173,19 @@ impl<'a, const N: usize> Rows<'a, N> {
     }
 
     /// Evaluates A, a and φ.
-    pub(crate) fn evaluate<M: Model<N>>(&mut self, model: &M, t: f64, q: &[f64; N]) {
-        if !self.is_combined {
-            return self.evaluate_declared(model, t, q);
-        }
+    pub(crate) fn evaluate<C>(&mut self, model: &C, t: f64, q: &[f64; N])
+    where
+        C: Constrains<N> + ?Sized,
+    {
         self.evaluate_declared(model, t, q);
+        if self.is_combined {
+            self.combine_evaluated();
+        }
+    }
+
+    /// Combines what was evaluated.
+    #[inline(never)]
+    fn combine_evaluated(&mut self) {
         combine(self.weights, self.rows, self.spare);
         for numbers in [&mut *self.drift, &mut *self.values] {
             for (spare, weights) in self
@@ -141,15 +202,17 @@ impl<'a, const N: usize> Rows<'a, N> {
     }
 
     /// The same of the constraints as they were declared.
-    pub(crate) fn evaluate_declared<M: Model<N>>(&mut self, model: &M, t: f64, q: &[f64; N]) {
+    pub(crate) fn evaluate_declared<C>(&mut self, model: &C, t: f64, q: &[f64; N])
+    where
+        C: Constrains<N> + ?Sized,
+    {
         if self.is_combined {
             // Kernels write only what can be non-zero.
             self.rows.fill([0.0; N]);
             self.drift.fill(0.0);
             self.values.fill(0.0);
         }
-        model.constraint_rows(t, q, self.rows, self.drift);
-        model.constraint_values(t, q, self.values);
+        model.values_at(t, q, self.rows, (self.drift, self.values));
     }
 
     /// Whether rows are combinations.
@@ -164,26 +227,19 @@ impl<'a, const N: usize> Rows<'a, N> {
     }
 
     /// Evaluates ψ_q and Ȧ, and what the multipliers `mu` bend.
-    pub(crate) fn differentiate<M: Model<N>>(
+    pub(crate) fn differentiate<C>(
         &mut self,
-        model: &M,
+        model: &C,
         t: f64,
         q: &[f64; N],
         v: &[f64; N],
-    ) -> Bend<N> {
+    ) -> Bend<N>
+    where
+        C: Constrains<N> + ?Sized,
+    {
         let zero = [[0.0; N]; N];
         if self.is_combined {
-            self.psi_q.fill([0.0; N]);
-            self.rates.fill([0.0; N]);
-            let count = self.mu.len();
-            for (c, spare) in self.spare.iter_mut().enumerate() {
-                spare[0] = (0..count)
-                    .map(|place| self.weights[place * count + c] * self.mu[place])
-                    .sum();
-            }
-            for (mu, spare) in self.mu.iter_mut().zip(self.spare.iter_mut()) {
-                core::mem::swap(mu, &mut spare[0]);
-            }
+            self.declare_multipliers();
         }
         let mut second = ConstraintSecond {
             psi_q: self.psi_q,
@@ -192,20 +248,44 @@ impl<'a, const N: usize> Rows<'a, N> {
             rate_q: zero,
             rate_v: zero,
         };
-        model.constraint_second(t, q, v, self.mu, &mut second);
+        model.second_at(t, q, v, self.mu, &mut second);
         let bend = Bend {
             bend: second.bend,
             rate_q: second.rate_q,
             rate_v: second.rate_v,
         };
         if self.is_combined {
-            for (mu, spare) in self.mu.iter_mut().zip(self.spare.iter_mut()) {
-                core::mem::swap(mu, &mut spare[0]);
-            }
-            combine(self.weights, self.psi_q, self.spare);
-            combine(self.weights, self.rates, self.spare);
+            self.combine_differentiated();
         }
         bend
+    }
+
+    /// Before constraints as declared are differentiated: their multipliers, with room for what is written.
+    #[inline(never)]
+    fn declare_multipliers(&mut self) {
+        self.psi_q.fill([0.0; N]);
+        self.rates.fill([0.0; N]);
+        let count = self.mu.len();
+        for (c, spare) in self.spare.iter_mut().enumerate() {
+            spare[0] = (0..count)
+                .map(|place| self.weights[place * count + c] * self.mu[place])
+                .sum();
+        }
+        self.exchange_multipliers();
+    }
+
+    /// After that: the multipliers that were, and what was differentiated combined.
+    #[inline(never)]
+    fn combine_differentiated(&mut self) {
+        self.exchange_multipliers();
+        combine(self.weights, self.psi_q, self.spare);
+        combine(self.weights, self.rates, self.spare);
+    }
+
+    fn exchange_multipliers(&mut self) {
+        for (mu, spare) in self.mu.iter_mut().zip(self.spare.iter_mut()) {
+            core::mem::swap(mu, &mut spare[0]);
+        }
     }
 
     /// How independent the rows are that were evaluated last.
@@ -245,7 +325,7 @@ impl<'a, const N: usize> Rows<'a, N> {
     /// Gram–Schmidt with the row next that has most of its own, relative to its length; holonomic rows come before others, because a
     /// constraint on velocities may follow from one on positions. Rows that were marked stay so while they can, so that the choice does not
     /// flicker from element to element.
-    pub(crate) fn choose<M: Model<N>>(&mut self, active: &mut [usize]) -> usize {
+    pub(crate) fn choose(&mut self, declared: &[Constraint], active: &mut [usize]) -> usize {
         for (spare, row) in self.spare.iter_mut().zip(&*self.rows) {
             let length = norm(row);
             for a in 0..N {
@@ -265,7 +345,7 @@ impl<'a, const N: usize> Rows<'a, N> {
         ] {
             loop {
                 let mut best = (least, None);
-                for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+                for (c, constraint) in declared.iter().enumerate() {
                     // Marks: 0 dependent, 1 marked before, 2 chosen.
                     let open = if least == KEPT {
                         active[c] == 1

@@ -2,7 +2,7 @@
 
 use super::node::{Bordered, own_velocity, solve_velocity};
 use crate::constrained::residual::relative_residual;
-use crate::constrained::rows::{Rows, rows_len};
+use crate::constrained::rows::{Constrains, Rows, rows_len};
 use crate::error::StepError;
 use crate::model::Model;
 use alloc::vec;
@@ -50,9 +50,18 @@ pub fn residuals<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let count = M::CONSTRAINTS.len();
-    let mut memory = vec![0.0; rows_len(N, count)];
-    let mut rows = Rows::of(&mut memory, count);
+    residuals_of(model, t, (q, v), h)
+}
+
+fn residuals_of<const N: usize>(
+    model: &dyn Constrains<N>,
+    t: f64,
+    (q, v): (&[f64; N], &[f64; N]),
+    h: f64,
+) -> Vec<Residual> {
+    let declared = model.declared();
+    let mut memory = vec![0.0; rows_len(N, declared.len())];
+    let mut rows = Rows::of(&mut memory, declared.len());
     rows.evaluate(model, t, q);
     let of = |(c, constraint): (usize, &crate::model::Constraint)| {
         let (relative_position, relative_velocity) = relative_residual(&rows, c, q, v, h);
@@ -64,7 +73,7 @@ where
             relative_velocity,
         }
     };
-    M::CONSTRAINTS.iter().enumerate().map(of).collect()
+    declared.iter().enumerate().map(of).collect()
 }
 
 /// Which constraints are independent at a position: the others follow from them there.
@@ -73,13 +82,27 @@ pub fn independent<M, const N: usize>(model: &M, t: f64, q: &[f64; N]) -> Vec<bo
 where
     M: Model<N>,
 {
-    let count = M::CONSTRAINTS.len();
-    let mut memory = vec![0.0; rows_len(N, count)];
-    let mut rows = Rows::of(&mut memory, count);
-    rows.evaluate(model, t, q);
-    let mut active = vec![0; count];
-    rows.choose::<M>(&mut active);
+    independent_of(model, t, q)
+}
+
+fn independent_of<const N: usize>(model: &dyn Constrains<N>, t: f64, q: &[f64; N]) -> Vec<bool> {
+    let mut memory = vec![0.0; rows_len(N, model.declared().len())];
+    let (_, active) = chosen(model, (t, q), &mut memory);
     active.into_iter().map(|mark| mark != 0).collect()
+}
+
+/// The rows at a position, and marks of those that are independent there; in memory of [`rows_len`] numbers.
+pub(super) fn chosen<'a, const N: usize>(
+    model: &dyn Constrains<N>,
+    (t, q): (f64, &[f64; N]),
+    memory: &'a mut [f64],
+) -> (Rows<'a, N>, Vec<usize>) {
+    let declared = model.declared();
+    let mut rows = Rows::of(memory, declared.len());
+    rows.evaluate(model, t, q);
+    let mut active = vec![0; declared.len()];
+    rows.choose(declared, &mut active);
+    (rows, active)
 }
 
 /// The velocity that belongs to a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, the Legendre transform.
@@ -102,10 +125,7 @@ where
     let count = M::CONSTRAINTS.len();
     let size = N + count;
     let mut numbers = vec![0.0; rows_len(N, count)];
-    let mut rows = Rows::of(&mut numbers, count);
-    rows.evaluate(model, t, q);
-    let mut active = vec![0; count];
-    rows.choose::<M>(&mut active);
+    let (rows, active) = chosen(model, (t, q), &mut numbers);
     let mut memory = Bordered {
         matrix: &mut vec![0.0; size * size],
         vector: &mut vec![0.0; size],

@@ -1,17 +1,13 @@
 //! The derivative of the equations of a constrained element, piece by piece.
 
-use crate::constrained::element::{ConstrainedForm, End};
+use crate::constrained::element::{ElementConstraints, End};
 use crate::constrained::rows::Bend;
-use crate::model::Model;
-use crate::velocity_form::PointTangent;
+use crate::velocity_form::{PointTangent, add_row};
 
-impl<M, const N: usize> ConstrainedForm<'_, M, N>
-where
-    M: Model<N>,
-{
+impl<const N: usize> ElementConstraints<'_, N> {
     /// Adds the multiplier columns and the rows of constraints at a point.
     pub(super) fn add_point(&self, l: usize, slopes: &[f64], tangent: &mut [f64]) {
-        let (scheme, h, size) = (&self.inner.scheme, self.inner.span.h, self.layout.size());
+        let (scheme, h, size) = (&self.scheme, self.h, self.layout.size());
         let (points, unknowns) = (scheme.points(), scheme.unknowns());
         let (weight, position) = (
             scheme.weights[l],
@@ -55,7 +51,7 @@ where
 
     /// Adds what start and end give to the tangent; the rows are those of the end.
     pub(super) fn add_ends(&self, end: &End<N>, bend: &Bend<N>, tangent: &mut [f64]) {
-        let (scheme, h, size) = (&self.inner.scheme, self.inner.span.h, self.layout.size());
+        let (scheme, h, size) = (&self.scheme, self.h, self.layout.size());
         let layout = &self.layout;
         for a in 0..N {
             let row = &mut tangent[layout.end(a) * size..][..size];
@@ -96,7 +92,7 @@ where
 
     /// Adds what momentum and forces at a point give to the tangent.
     pub(super) fn add_element(&self, l: usize, by: &PointTangent<N>, tangent: &mut [f64]) {
-        let (scheme, h, size) = (&self.inner.scheme, self.inner.span.h, self.layout.size());
+        let (scheme, h, size) = (&self.scheme, self.h, self.layout.size());
         let (points, rates) = (scheme.points(), self.layout.rates());
         for (i, rows) in tangent[..rates * size]
             .chunks_exact_mut(N * size)
@@ -105,14 +101,12 @@ where
             let momentum = scheme.momentum[i * points + l];
             let force = -h * scheme.force[i * points + l];
             for (a, row) in rows.chunks_exact_mut(size).enumerate() {
-                self.inner
-                    .add_row(l, by, a, momentum, force, &mut row[..rates]);
+                add_row(scheme, l, by, a, momentum, force, &mut row[..rates]);
             }
         }
         for a in 0..N {
             let row = &mut tangent[self.layout.end(a) * size..][..rates];
-            self.inner
-                .add_row(l, by, a, 0.0, -h * scheme.weights[l], row);
+            add_row(scheme, l, by, a, 0.0, -h * scheme.weights[l], row);
         }
     }
 
@@ -124,7 +118,7 @@ where
         slopes: &[f64],
         by_start: &mut [f64],
     ) {
-        let (scheme, h) = (&self.inner.scheme, self.inner.span.h);
+        let (scheme, h) = (&self.scheme, self.h);
         let (points, weight) = (scheme.points(), scheme.weights[l]);
         for a in 0..N {
             for i in 0..scheme.unknowns() {
@@ -164,8 +158,7 @@ where
             for (c, holonomic) in self.active() {
                 by_start[layout.node(c) * N + b] = self.rows.psi_q[c][b];
                 if holonomic {
-                    by_start[layout.inside(0, c) * N + b] =
-                        self.rows.rows[c][b] / self.inner.span.h;
+                    by_start[layout.inside(0, c) * N + b] = self.rows.rows[c][b] / self.h;
                 }
             }
         }

@@ -182,6 +182,9 @@ where
 
     /// Rates and forces of the last step to where an ordinary step has them; false if there is none.
     pub(super) fn write_back(&mut self) -> bool {
+        if !Self::MAY_HAVE_POINTS {
+            return false;
+        }
         self.make_room();
         let points = self.points.as_mut();
         points.is_some_and(|points| points.write_back::<M>(&self.table, &mut self.numbers))

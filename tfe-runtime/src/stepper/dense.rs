@@ -15,6 +15,9 @@ where
 {
     /// The workspace of the last step, where it was gone past.
     pub(super) fn retrace(&self) -> Option<Vec<f64>> {
+        if !(Self::MAY_HAVE_POINTS || Self::MAY_BE_PROPAGATED) {
+            return None;
+        }
         let last = self.memory.last.filter(|_| self.skipped)?;
         let (mut numbers, mut pivots) = self.room();
         let mut state = last.start;
@@ -29,7 +32,7 @@ where
     #[must_use]
     #[inline(always)]
     pub fn reach(&mut self) -> Option<Reach<N>> {
-        if !(self.is_of_points && self.pieces.is_empty()) {
+        if !(Self::MAY_HAVE_POINTS && self.is_of_points && self.pieces.is_empty()) {
             return None;
         }
         if self.weights.is_none() {

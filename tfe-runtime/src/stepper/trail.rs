@@ -12,6 +12,9 @@ where
 {
     /// Adds the last step to a trail, for models with constraints and elements of Gauss points; a step that was cut is left out.
     pub fn leave(&self, trail: &mut Trail) {
+        if !Self::HAS_CONSTRAINTS {
+            return;
+        }
         let scheme = self.table.view();
         if let Some(last) = &self.memory.last
             && self.may_foresee()
@@ -22,7 +25,7 @@ where
 
     /// Has the iteration of the step from t to t + h start from what another run has found there, if a trail reaches that far and the last step is continued.
     pub fn foresee(&mut self, trail: &Trail, (t, h): (f64, f64)) {
-        if self.may_foresee() {
+        if Self::HAS_CONSTRAINTS && self.may_foresee() {
             let scheme = self.table.view();
             self.foreseen.look::<M, N>(trail, &scheme, (t, h));
         }
@@ -31,6 +34,6 @@ where
     fn may_foresee(&self) -> bool {
         let element = self.table.element();
         let is_gauss = element == Element::mixed(element.nodes());
-        Self::HAS_CONSTRAINTS && is_gauss && self.ahead.is_none() && self.pieces.is_empty()
+        is_gauss && self.ahead.is_none() && self.pieces.is_empty()
     }
 }
