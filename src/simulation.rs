@@ -1,6 +1,7 @@
 //! Runs: a model, an element, a step, a span.
 
 mod accurate;
+mod acting;
 mod checkpoint;
 mod checks;
 mod course;

@@ -9,7 +9,7 @@ pub(super) mod settings;
 pub(super) mod value;
 pub(super) mod watching;
 
-use super::impulses;
+use super::acting;
 use super::kind::{Chosen, Simulated};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length, Polynomial};
@@ -225,8 +225,8 @@ where
         let mut values = self.rooms.bounds.borrow_mut();
         self.clear.look(
             element,
-            |reached| M::reach(stepper, reached),
-            |bounds, sides| {
+            &mut |reached| M::reach(stepper, reached),
+            &mut |bounds, sides| {
                 if !model.outputs_within(bounds, &mut values) {
                     return false;
                 }
@@ -275,10 +275,10 @@ where
             let v = v.unwrap_or_else(|| L::unknown(q));
             self.outputs(time, state, &v, row);
         };
-        let course = |function, part| self.course(dense, function, part);
+        let mut course = |function, part| self.course(dense, function, part);
         let resolution_of_tau = resolution / h.abs();
         let (found, sides) =
-            search::crossings(&self.sides, samples, resolution_of_tau, value, course);
+            search::crossings(&self.sides, samples, resolution_of_tau, &value, &mut course);
         for (number, root) in found.iter().enumerate() {
             let on = &self.watched[root.function].on;
             if !on.crossing.counts(root.rises) {
@@ -383,7 +383,7 @@ where
         place: &Place,
         goes_on: bool,
     ) -> Severed<'c, 'm, N, L> {
-        let count = impulses::within(arc.impulses, arc.t, place.length);
+        let count = acting::within(arc.impulses, arc.t, place.length);
         Severed {
             start: arc.t,
             length: place.length,

@@ -1,10 +1,10 @@
 //! One element of the grid of a run, in the pieces into which events cut it.
 
+use super::acting;
 use super::events::act::After;
 use super::events::remodel::Changed;
 use super::events::{Cut, Events, Passage};
 use super::follow::{Follow, Passed};
-use super::impulses;
 use super::kind::Simulated;
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
@@ -137,7 +137,7 @@ where
             let behind = if from == t {
                 0
             } else {
-                impulses::behind(planned.impulses, from, h)
+                acting::behind(planned.impulses, from, h)
             };
             let piece = Planned {
                 t: from,

@@ -58,6 +58,10 @@ impl Watch {
         (t, h): (f64, f64),
         state: &State<N>,
     ) {
+        if const { !M::CONSTRAINTS.is_empty() } {
+            // Nothing is known of these from the state alone.
+            return;
+        }
         let Some(element) = self.element else { return };
         if self.last == Some(number) {
             return;

@@ -137,11 +137,7 @@ impl<const N: usize> LinearModel<N> {
     /// One step of an element; none where it has no transition matrix.
     pub(super) fn transition(&self, element: Element, h: f64) -> Option<DMatrix<f64>> {
         let mut entries = vec![0.0; 4 * N * N];
-        let rest = State {
-            q: [0.0; N],
-            p: [0.0; N],
-        };
-        transition::of_step(self, element, &rest, 0.0, h, &mut entries).ok()?;
+        transition::of_rest(self, element, h, &mut entries).ok()?;
         let matrix = DMatrix::from_row_slice(2 * N, 2 * N, &entries);
         matrix
             .iter()

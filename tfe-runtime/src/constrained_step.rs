@@ -237,6 +237,10 @@ fn combine<M, const N: usize>(
 ) where
     M: Model<N>,
 {
+    let mut marks = M::CONSTRAINTS.iter().zip(&*active);
+    if marks.all(|(one, mark)| !one.kind.is_holonomic() || *mark != 0) {
+        return;
+    }
     let mut middle = *start;
     for a in 0..N {
         middle[a] += 0.5 * h * rate[a];

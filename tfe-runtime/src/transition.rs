@@ -3,20 +3,21 @@
 //! Rows are solved for the unknown rates given (p₀, q₀); the interior block of a primal element,
 //! singular at isolated steps, is never inverted.
 
+mod wanted;
+
 #[cfg(feature = "alloc")]
 use crate::backwards::Backwards;
-use crate::condense::{
-    Direction, EndForces, System, phase_ends, phase_weights, velocity_ends, velocity_weights,
-};
+use crate::condense::{Direction, EndForces, System};
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
-use crate::constrained::linearise;
 use crate::constrained::rows::Rows;
 use crate::equations::Span;
 use crate::error::StepError;
 pub use crate::error::TransitionError;
 #[cfg(feature = "alloc")]
-use crate::inside::{Columns, InsideLoss, Seeds};
+use crate::inside::InsideLoss;
+#[cfg(feature = "alloc")]
+use crate::method::Last;
 use crate::method::{Impulse, Interval, Memory, Method, may_be_phase, set_kicks, total};
 use crate::model::Model;
 #[cfg(feature = "alloc")]
@@ -26,7 +27,12 @@ use crate::scheme::Tables;
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Workspace, linearised_len};
 #[cfg(feature = "alloc")]
+use crate::workspace::{numbers_len, pivots_len, transition_len};
+#[cfg(feature = "alloc")]
 use alloc::{vec, vec::Vec};
+#[cfg(feature = "alloc")]
+use wanted::MatrixInside;
+use wanted::{Matrix, Product, Wanted};
 
 /// Writes the transition matrix of one step from `state`, 2N × 2N, row by row, ordered (p, q);
 /// returns the end of the step.
@@ -53,33 +59,44 @@ where
     Ok(end)
 }
 
-/// What is made of the linear system of an element.
-enum Asked<'a, const N: usize> {
-    /// The derivatives of the end, row by row, with the columns of the sides.
-    Matrix(Matrix<'a>),
-    /// Their product with λ, from the left: that with the columns of the start takes the place of λ, those of the directions are added to others.
-    Product(Product<'a, N>),
-}
-
-/// Where derivatives go.
-struct Matrix<'a> {
-    ends: &'a mut [f64],
-    /// Those of the polynomials of the element, where they are asked for.
-    #[cfg(feature = "alloc")]
-    inside: Option<&'a mut Vec<f64>>,
-}
-
-/// What is multiplied, and where the product goes.
-struct Product<'a, const N: usize> {
-    /// λ
-    lambda: &'a mut [f64],
-    by_direction: &'a mut [f64],
-    /// For all parameters at once, which are no directions then.
-    #[cfg(feature = "alloc")]
-    at_once: Option<&'a mut Backwards<N>>,
-    /// What else is asked for: a loss of the inside of the element.
-    #[cfg(feature = "alloc")]
-    inside: Option<&'a InsideLoss>,
+/// Writes the transition matrix of one step of length h of a linear model without forces of its own, 2N × 2N, row by row, ordered (p, q): it is that of a step at rest at
+/// the origin, which need not be solved.
+///
+/// # Errors
+/// [`TransitionError`] if the element is none, its tangent is singular, or `matrix` is shorter than 4N².
+#[cfg(feature = "alloc")]
+pub fn of_rest<M, const N: usize>(
+    model: &M,
+    element: crate::element::Element,
+    h: f64,
+    matrix: &mut [f64],
+) -> Result<(), TransitionError>
+where
+    M: Model<N>,
+{
+    let tables = crate::scheme::SchemeTable::new(element)?;
+    let constraints = M::CONSTRAINTS.len();
+    let mut numbers = vec![0.0; numbers_len(element, M::FORM, N, constraints)];
+    let mut pivots = vec![0; pivots_len(element, M::FORM, N, constraints)];
+    let mut extra = vec![0.0; transition_len(element, M::FORM, N, constraints)];
+    let mut memory = Memory::new();
+    memory.last = Some(Last {
+        t: 0.0,
+        h,
+        start: State::ZERO,
+        start_low: State::ZERO,
+        end: State::ZERO,
+    });
+    let method = Method {
+        model,
+        tables: &tables,
+        control: crate::newton::Control::default(),
+    };
+    let workspace = Workspace {
+        numbers: &mut numbers,
+        pivots: &mut pivots,
+    };
+    method.transition(&mut memory, workspace, &mut extra, &[], matrix)
 }
 
 /// Refuses sums that are not as many as the columns.
@@ -143,12 +160,10 @@ where
             let given = matrix.len();
             return Err(TransitionError::Shape { needed, given });
         }
-        let asked = Asked::Matrix(Matrix {
+        let wanted = Matrix {
             ends: &mut matrix[..needed],
-            #[cfg(feature = "alloc")]
-            inside: None,
-        });
-        self.differentiate(memory, workspace, extra, (impulses, directions), asked)
+        };
+        self.differentiate(memory, workspace, extra, (impulses, directions), wanted)
     }
 
     /// The same, and the derivatives of the Legendre coefficients of the element's polynomials.
@@ -164,11 +179,8 @@ where
     where
         M: Model<N>,
     {
-        let asked = Asked::Matrix(Matrix {
-            ends,
-            inside: Some(inside),
-        });
-        self.differentiate(memory, workspace, extra, given, asked)
+        let wanted = MatrixInside { ends, inside };
+        self.differentiate(memory, workspace, extra, given, wanted)
     }
 
     /// Multiplies that matrix with `lambda`, 2N numbers, from the left: its first 2N columns take the place of `lambda`, the others are added to the g numbers `by_direction`. Without
@@ -188,15 +200,15 @@ where
         M: Model<N>,
     {
         check_sums::<N>(directions, lambda, by_direction)?;
-        let asked = Asked::Product(Product {
+        let wanted = Product {
             lambda,
             by_direction,
             #[cfg(feature = "alloc")]
             at_once: None,
             #[cfg(feature = "alloc")]
             inside: None,
-        });
-        self.differentiate(memory, workspace, extra, (impulses, directions), asked)
+        };
+        self.differentiate(memory, workspace, extra, (impulses, directions), wanted)
     }
 
     /// The same with a loss of the inside of the element.
@@ -213,13 +225,13 @@ where
         M: Model<N>,
     {
         check_sums::<N>(given.1, lambda, by_direction)?;
-        let asked = Asked::Product(Product {
+        let wanted = Product {
             lambda,
             by_direction,
             at_once: None,
             inside,
-        });
-        self.differentiate(memory, workspace, extra, given, asked)
+        };
+        self.differentiate(memory, workspace, extra, given, wanted)
     }
 
     /// The same by all parameters at once, of a model without constraints.
@@ -235,13 +247,13 @@ where
     where
         M: Model<N>,
     {
-        let asked = Asked::Product(Product {
+        let wanted = Product {
             lambda,
             by_direction: &mut [],
             at_once: Some(backwards),
             inside,
-        });
-        self.differentiate(memory, workspace, extra, (impulses, &[]), asked)
+        };
+        self.differentiate(memory, workspace, extra, (impulses, &[]), wanted)
     }
 
     fn differentiate<const N: usize>(
@@ -250,7 +262,7 @@ where
         workspace: Workspace<'_>,
         extra: &mut [f64],
         (impulses, directions): (&[Impulse<N>], &[Direction]),
-        asked: Asked<'_, N>,
+        mut wanted: impl Wanted<N>,
     ) -> Result<(), TransitionError>
     where
         M: Model<N>,
@@ -324,27 +336,7 @@ where
                 total(impulses),
             );
             let x = &*parts.unknowns;
-            let linearised = match asked {
-                Asked::Matrix(matrix) => {
-                    let solved = linearise(&mut form, x, directions, false, system, matrix.ends);
-                    #[cfg(feature = "alloc")]
-                    let solved = solved.and_then(|sides| {
-                        let Some(inside) = matrix.inside else {
-                            return Ok(sides);
-                        };
-                        let columns = Columns {
-                            scheme,
-                            h: last.h,
-                            directions,
-                            sides,
-                        };
-                        *inside = columns.of_constrained(&mut form.inner, x, matrix.ends)?;
-                        Ok(sides)
-                    });
-                    solved.map(|_| ())
-                }
-                Asked::Product(product) => multiply(&mut form, x, directions, system, product),
-            };
+            let linearised = wanted.of_constrained(&mut form, x, directions, system);
             if is_combined {
                 for place in layout.multipliers() {
                     form.constraints
@@ -366,38 +358,7 @@ where
                 statistics: &mut memory.statistics,
             };
             system.of_phase(&mut equations, parts.unknowns, directions);
-            let (scheme, x) = (&equations.scheme, &*parts.unknowns);
-            match asked {
-                Asked::Matrix(matrix) => {
-                    let sides = &*system.solve()?.sides;
-                    phase_ends::<N>(scheme, span.h, x, directions, sides, matrix.ends);
-                    #[cfg(feature = "alloc")]
-                    if let Some(inside) = matrix.inside {
-                        let columns: Columns<'_, N> = Columns {
-                            scheme: *scheme,
-                            h: span.h,
-                            directions,
-                            sides,
-                        };
-                        *inside = columns.of_phase(x);
-                    }
-                }
-                Asked::Product(product) => {
-                    let (lambda, by_direction) = (product.lambda, product.by_direction);
-                    let sums = (&*lambda, &mut *by_direction, &mut *system.residual);
-                    phase_weights::<N>(scheme, span.h, x, directions, sums);
-                    #[cfg(feature = "alloc")]
-                    {
-                        let seeds = Seeds::of(product.inside, scheme, span.h);
-                        seeds.add_to_phase(x, (directions, span.h), by_direction, system.residual);
-                    }
-                    let _mu = system.product(lambda, by_direction)?;
-                    #[cfg(feature = "alloc")]
-                    if let Some(backwards) = product.at_once {
-                        backwards.of_phase(&equations, x, _mu);
-                    }
-                }
-            }
+            wanted.of_phase(&equations, parts.unknowns, directions, system)?;
         } else {
             let mut equations = VelocityForm {
                 model: self.model,
@@ -410,113 +371,14 @@ where
                 constant_mass: &mut memory.mass,
                 statistics: &mut memory.statistics,
             };
-            #[cfg(feature = "alloc")]
-            let mut asked = asked;
-            #[cfg(feature = "alloc")]
-            if let Asked::Product(product) = &mut asked
-                && let Some(backwards) = &mut product.at_once
-                && backwards.try_iteration(
-                    &mut equations,
-                    parts.unknowns,
-                    (product.inside, product.lambda),
-                )?
-            {
+            if wanted.by_iteration(&mut equations, parts.unknowns)? {
                 return Ok(());
             }
             let mut forces = EndForces::of(forces, m);
             system.of_velocities(&mut equations, parts.unknowns, directions, &mut forces)?;
-            let (x, h) = (&*parts.unknowns, span.h);
-            match asked {
-                Asked::Matrix(matrix) => {
-                    let sides = &*system.solve()?.sides;
-                    velocity_ends(&scheme, h, x, directions, &forces, sides, matrix.ends);
-                    #[cfg(feature = "alloc")]
-                    if let Some(inside) = matrix.inside {
-                        let columns = Columns {
-                            scheme,
-                            h,
-                            directions,
-                            sides,
-                        };
-                        *inside = columns.of_velocities(&mut equations, x)?;
-                    }
-                }
-                Asked::Product(product) => {
-                    let (lambda, by_direction) = (product.lambda, product.by_direction);
-                    let mut _of_p = [0.0; N];
-                    _of_p.copy_from_slice(&lambda[..N]);
-                    let sums = (&mut *lambda, &mut *by_direction, &mut *system.residual);
-                    velocity_weights(&scheme, h, x, (directions, &forces), sums);
-                    #[cfg(feature = "alloc")]
-                    let seeds = Seeds::of(product.inside, &scheme, h);
-                    #[cfg(feature = "alloc")]
-                    {
-                        let sums = (&mut *lambda, &mut *by_direction, &mut *system.residual);
-                        seeds.add_to_velocities(&mut equations, x, directions, sums)?;
-                    }
-                    let _mu = system.product(lambda, by_direction)?;
-                    #[cfg(feature = "alloc")]
-                    if let Some(backwards) = product.at_once {
-                        let sums = (&_of_p, _mu);
-                        backwards.of_velocities(&mut equations, x, sums, &seeds.forces)?;
-                    }
-                }
-            }
+            let given = (directions, &forces);
+            wanted.of_velocities(&mut equations, parts.unknowns, given, system)?;
         }
         Ok(())
     }
-}
-
-/// The product of the derivatives of a constrained element with λ, from the left.
-#[cfg(feature = "alloc")]
-fn multiply<M: Model<N>, const N: usize>(
-    form: &mut ConstrainedForm<'_, M, N>,
-    x: &[f64],
-    directions: &[Direction],
-    system: System<'_>,
-    product: Product<'_, N>,
-) -> Result<(), StepError> {
-    let columns = 2 * N + directions.len();
-    let mut ends = vec![0.0; 2 * N * columns];
-    let sides = linearise(form, x, directions, false, system, &mut ends)?;
-    let Product {
-        lambda,
-        by_direction,
-        inside,
-        ..
-    } = product;
-    let weights = lambda.to_vec();
-    lambda.fill(0.0);
-    let mut add = |weights: &[f64], rows: &[f64]| {
-        for (weight, row) in weights.iter().zip(rows.chunks_exact(columns)) {
-            let sums = lambda.iter_mut().chain(by_direction.iter_mut());
-            for (sum, entry) in sums.zip(row) {
-                *sum += weight * entry;
-            }
-        }
-    };
-    add(&weights, &ends);
-    if let Some(inside) = inside {
-        let own = Columns {
-            scheme: form.inner.scheme,
-            h: form.inner.span.h,
-            directions,
-            sides,
-        };
-        let rows = own.of_constrained(&mut form.inner, x, &ends)?;
-        add(&inside.coefficients, &rows);
-    }
-    Ok(())
-}
-
-#[cfg(not(feature = "alloc"))]
-fn multiply<M: Model<N>, const N: usize>(
-    _: &mut ConstrainedForm<'_, M, N>,
-    _: &[f64],
-    _: &[Direction],
-    _: System<'_>,
-    _: Product<'_, N>,
-) -> Result<(), StepError> {
-    // Gradients are asked for where there is an allocator.
-    Err(StepError::NonFinite)
 }

@@ -2,6 +2,12 @@
 
 use tfe_runtime::enclosure::Enclosure;
 
+/// Writes bounds of coordinates and velocities along a step, if it can.
+type Reach<'a> = dyn FnMut(&mut Vec<(f64, f64)>) -> bool + 'a;
+
+/// Writes the sides of what is watched over a box, if it can.
+type Outputs<'a> = dyn FnMut(&[Enclosure], &mut Vec<f64>) -> bool + 'a;
+
 /// Such a box, if one is known.
 #[derive(Debug)]
 pub(super) struct Clear {
@@ -65,8 +71,8 @@ impl Clear {
     pub(super) fn look(
         &mut self,
         (t, h): (f64, f64),
-        reach: impl FnOnce(&mut Vec<(f64, f64)>) -> bool,
-        mut outputs: impl FnMut(&[Enclosure], &mut Vec<f64>) -> bool,
+        reach: &mut Reach<'_>,
+        outputs: &mut Outputs<'_>,
     ) -> bool {
         self.bounds.clear();
         if self.wait > 0 {
@@ -78,7 +84,7 @@ impl Clear {
         if !reach(&mut self.reached) {
             return false;
         }
-        while !self.try_growth(h, &mut outputs) {
+        while !self.try_growth(h, outputs) {
             if self.growth == 1.0 {
                 self.wait = Self::PATIENCE;
                 return false;
@@ -93,11 +99,7 @@ impl Clear {
     }
 
     /// Whether the box is clear that is so many times as wide as what the step has reached.
-    fn try_growth(
-        &mut self,
-        h: f64,
-        outputs: &mut impl FnMut(&[Enclosure], &mut Vec<f64>) -> bool,
-    ) -> bool {
+    fn try_growth(&mut self, h: f64, outputs: &mut Outputs<'_>) -> bool {
         let more = 0.5 * (self.growth - 1.0);
         self.bounds.clear();
         for (low, high) in &self.reached {

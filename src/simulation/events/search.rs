@@ -38,7 +38,7 @@ pub(super) enum Course {
 
 /// The ends of parts of an element in each of which a function changes its sign once at most: that is proved for all but the narrowest, and for those that are left when
 /// too many questions have been asked. These are no wider than one of `samples` equal parts.
-fn places(samples: usize, course: &mut impl FnMut((f64, f64)) -> Course) -> Vec<f64> {
+fn places(samples: usize, course: &mut dyn FnMut((f64, f64)) -> Course) -> Vec<f64> {
     let wide = 1.0 / samples as f64;
     let (mut ends, mut level) = (Vec::new(), vec![(0.0, 1.0)]);
     let mut questions = MAX_QUESTIONS;
@@ -76,8 +76,8 @@ pub(super) fn crossings(
     sides: &[f64],
     samples: usize,
     resolution: f64,
-    values: impl Fn(f64, &mut Vec<f64>),
-    mut course: impl FnMut(usize, (f64, f64)) -> Course,
+    values: &dyn Fn(f64, &mut Vec<f64>),
+    course: &mut dyn FnMut(usize, (f64, f64)) -> Course,
 ) -> (Vec<Root>, Vec<f64>) {
     let row = |tau: &f64| {
         let mut row = Vec::with_capacity(sides.len());
@@ -168,7 +168,7 @@ mod tests {
 
     fn taus(side: f64, f: impl Fn(f64) -> f64) -> Vec<f64> {
         let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
-        let (roots, _) = crossings(&[side], 8, 1e-15, values, |_, _| Course::Unknown);
+        let (roots, _) = crossings(&[side], 8, 1e-15, &values, &mut |_, _| Course::Unknown);
         roots.iter().map(|root| root.tau).collect()
     }
 
@@ -215,7 +215,7 @@ mod tests {
         let f = |tau: f64| (tau - 0.3) * (tau - near);
         let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
         let mut questions = 0;
-        let course = |_, (from, to): (f64, f64)| {
+        let mut course = |_, (from, to): (f64, f64)| {
             questions += 1;
             let turn = 0.5 * (0.3 + near);
             if to < turn || from > turn {
@@ -224,7 +224,7 @@ mod tests {
                 Course::Bent
             }
         };
-        let (roots, sides) = crossings(&[1.0], 8, 1e-15, values, course);
+        let (roots, sides) = crossings(&[1.0], 8, 1e-15, &values, &mut course);
         let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
         assert!(is_near(&found, &[0.3, near]), "{found:?}");
         assert_eq!((sides, questions), (vec![1.0], 39));

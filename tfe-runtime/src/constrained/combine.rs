@@ -9,7 +9,7 @@ use crate::legendre::largest;
 const STILL: f64 = 0.01;
 
 impl<const N: usize> Rows<'_, N> {
-    /// Replaces the rows of holonomic constraints that depend on one another by as many combinations as are independent, functions W φ with W constant in the element
+    /// Replaces the rows of holonomic constraints, some of which depend on others, by as many combinations as are independent, functions W φ with W constant in the element
     /// (T-118): for each gradient that the rows span in the middle of the element, of all combinations with this gradient there the one whose gradient turns least on the
     /// way. So the others stay independent for as long as can be, and which rows are given, or how they are scaled or combined, makes no difference.
     ///
@@ -24,9 +24,6 @@ impl<const N: usize> Rows<'_, N> {
         let declared = model.declared();
         let count = declared.len();
         let holonomic = || (0..count).filter(|&c| declared[c].kind.is_holonomic());
-        if holonomic().all(|c| active[c] != 0) {
-            return;
-        }
         let rank = holonomic().filter(|&c| active[c] != 0).count();
         let [start, (time, middle)] = places;
         // The middle is known but to the order h², and off the constraints there are more independent rows: which are given would be seen.

@@ -178,7 +178,8 @@ where
         );
         let slopes = slopes(node, layout.degree());
         for holonomic in [true, false] {
-            form.constraints.set_mu(l, x, &slopes, holonomic);
+            form.constraints
+                .set_mu(M::CONSTRAINTS, l, x, &slopes, holonomic);
             for (c, mu) in form.constraints.rows.mu.iter().enumerate() {
                 for a in 0..N {
                     let (row, rate) = (rows.rows[c][a], rows.rates[c][a]);
@@ -200,7 +201,7 @@ where
                     - scheme.force[i * points + l] * impulse;
             }
         }
-        for (c, holonomic) in form.constraints.active() {
+        for (c, holonomic) in form.constraints.active(M::CONSTRAINTS) {
             if holonomic {
                 for j in 1..layout.degree() {
                     residual[layout.inside(j, c)] +=
@@ -220,7 +221,7 @@ where
         (start, &still),
         &[0.0; N],
     );
-    form.constraints.set_node_mu(x, true);
+    form.constraints.set_node_mu(M::CONSTRAINTS, x, true);
     let kick = rows.stretched(form.constraints.rows.mu, stretch);
     for row in residual[..layout.rates()].as_chunks_mut::<N>().0 {
         for a in 0..N {
@@ -237,12 +238,12 @@ where
         (time, &q_dual),
         &v,
     );
-    form.constraints.set_node_mu(x, false);
+    form.constraints.set_node_mu(M::CONSTRAINTS, x, false);
     let reaction = rows.stretched(form.constraints.rows.mu, stretch);
     for a in 0..N {
         residual[layout.end(a)] = momentum[a] + reaction[a] - kick[a] - end_force[a];
     }
-    for (c, holonomic) in form.constraints.active() {
+    for (c, holonomic) in form.constraints.active(M::CONSTRAINTS) {
         residual[layout.node(c)] = rows.psi_slope(c, &v);
         if holonomic {
             residual[layout.inside(0, c)] = rows.value_over(c, h, stretch);

@@ -30,10 +30,11 @@ pub(crate) struct ConstrainedForm<'a, M, const N: usize> {
     pub(crate) impulse: [f64; N],
 }
 
-/// What constraints add to an element, of whichever model.
+/// Constraints as they are declared.
+pub(super) type Declared = &'static [Constraint];
+
+/// What constraints add to an element, of whichever model: they are given as they are declared, so that a model by itself is compiled with their number.
 pub(crate) struct ElementConstraints<'a, const N: usize> {
-    /// As they are declared.
-    declared: &'static [Constraint],
     pub(super) scheme: SchemeRef<'a>,
     /// The length of the element.
     pub(super) h: f64,
@@ -75,21 +76,32 @@ pub(crate) fn slopes(node: f64, degree: usize) -> [f64; MAX_RATES] {
 
 impl<const N: usize> ElementConstraints<'_, N> {
     /// The constraints that count, with their kinds: true for holonomic ones.
-    pub(crate) fn active(&self) -> impl Iterator<Item = (usize, bool)> + use<'_, N> {
-        let marked = self.declared.iter().zip(self.active).enumerate();
+    pub(crate) fn active(
+        &self,
+        declared: Declared,
+    ) -> impl Iterator<Item = (usize, bool)> + use<'_, N> {
+        let marked = declared.iter().zip(self.active).enumerate();
         marked
             .filter(|(_, (_, active))| **active != 0)
             .map(|(c, (constraint, _))| (c, constraint.kind.is_holonomic()))
     }
 
-    fn has(&self, holonomic: bool) -> bool {
-        self.active().any(|(_, kind)| kind == holonomic)
+    fn has(&self, declared: Declared, holonomic: bool) -> bool {
+        self.active(declared).any(|(_, kind)| kind == holonomic)
     }
 
     /// Sets the multipliers at a point for one kind of constraint, others to zero.
-    pub(crate) fn set_mu(&mut self, l: usize, x: &[f64], slopes: &[f64], holonomic: bool) {
+    #[inline]
+    pub(crate) fn set_mu(
+        &mut self,
+        declared: Declared,
+        l: usize,
+        x: &[f64],
+        slopes: &[f64],
+        holonomic: bool,
+    ) {
         self.rows.mu.fill(0.0);
-        for (c, constraint) in self.declared.iter().enumerate() {
+        for (c, constraint) in declared.iter().enumerate() {
             if self.active[c] == 0 || constraint.kind.is_holonomic() != holonomic {
                 continue;
             }
@@ -103,9 +115,10 @@ impl<const N: usize> ElementConstraints<'_, N> {
     }
 
     /// Sets the multipliers of the node at the end, or those with which the start momentum is changed.
-    pub(crate) fn set_node_mu(&mut self, x: &[f64], at_start: bool) {
+    #[inline]
+    pub(crate) fn set_node_mu(&mut self, declared: Declared, x: &[f64], at_start: bool) {
         let h = self.h;
-        for (c, constraint) in self.declared.iter().enumerate() {
+        for (c, constraint) in declared.iter().enumerate() {
             let node = h * x[self.layout.node(c)];
             self.rows.mu[c] = match (
                 self.active[c] != 0,
@@ -158,7 +171,6 @@ where
         impulse: [f64; N],
     ) -> Self {
         let constraints = ElementConstraints {
-            declared: M::CONSTRAINTS,
             scheme: inner.scheme,
             h: inner.span.h,
             layout,
@@ -263,8 +275,8 @@ where
         let (scheme, h) = (self.inner.scheme, self.inner.span.h);
         let (points, unknowns) = (scheme.points(), scheme.unknowns());
         let rates = x[..layout.rates()].as_chunks::<N>().0;
-        let velocities = self.constraints.has(false);
-        let positions = self.constraints.has(true) && layout.degree() > 1;
+        let velocities = self.constraints.has(M::CONSTRAINTS, false);
+        let positions = self.constraints.has(M::CONSTRAINTS, true) && layout.degree() > 1;
         residual.fill(0.0);
         if let Some(derivatives) = &mut derivatives {
             derivatives.tangent.fill(0.0);
@@ -283,7 +295,8 @@ where
             self.constraints.rows.evaluate(self.inner.model, t, &q);
             let slopes = slopes(scheme.nodes[l], layout.degree());
             if velocities {
-                self.constraints.set_mu(l, x, &slopes, false);
+                self.constraints
+                    .set_mu(M::CONSTRAINTS, l, x, &slopes, false);
                 let bend = self
                     .constraints
                     .rows
@@ -301,7 +314,7 @@ where
                 }
             }
             if positions {
-                self.constraints.set_mu(l, x, &slopes, true);
+                self.constraints.set_mu(M::CONSTRAINTS, l, x, &slopes, true);
                 let force = transposed(self.constraints.rows.rows, self.constraints.rows.mu);
                 for a in 0..N {
                     point.force[a] -= force[a];
@@ -325,7 +338,7 @@ where
                     residual[i * N + a] += weight * point.p[a];
                 }
             }
-            for (c, holonomic) in self.constraints.active() {
+            for (c, holonomic) in self.constraints.active(M::CONSTRAINTS) {
                 if holonomic {
                     for j in 1..layout.degree() {
                         residual[layout.inside(j, c)] +=
@@ -337,15 +350,17 @@ where
             }
             if let Some(Derivatives { tangent, by_start }) = &mut derivatives {
                 self.constraints.add_element(l, &by, tangent);
-                self.constraints.add_point(l, &slopes, tangent);
+                self.constraints
+                    .add_point(M::CONSTRAINTS, l, &slopes, tangent);
                 if !by_start.is_empty() {
-                    self.constraints.add_start(l, &by, &slopes, by_start);
+                    self.constraints
+                        .add_start(M::CONSTRAINTS, l, &by, &slopes, by_start);
                 }
             }
         }
         let rows = residual[..layout.rates()].as_chunks_mut::<N>().0;
         self.inner.subtract_impulse(rows);
-        self.constraints.set_node_mu(x, true);
+        self.constraints.set_node_mu(M::CONSTRAINTS, x, true);
         let kick = transposed(self.constraints.rows.start, self.constraints.rows.mu);
         for row in rows {
             for a in 0..N {
@@ -375,7 +390,7 @@ where
         self.constraints
             .rows
             .evaluate(self.inner.model, end.t, &end.q);
-        self.constraints.set_node_mu(x, false);
+        self.constraints.set_node_mu(M::CONSTRAINTS, x, false);
         let reaction = transposed(self.constraints.rows.rows, self.constraints.rows.mu);
         let force = weighted(scheme.weights, scheme.weights_low, self.inner.forces);
         let span = &self.inner.span;
@@ -383,7 +398,7 @@ where
             let impulse = h * force[a] + (span.low.p[a] + self.impulse[a] + kick[a]);
             residual[layout.end(a)] = (end.p[a] - span.start.p[a]) + (reaction[a] - impulse);
         }
-        for (c, holonomic) in self.constraints.active() {
+        for (c, holonomic) in self.constraints.active(M::CONSTRAINTS) {
             residual[layout.node(c)] = self.constraints.rows.psi(c, &end.v);
             if holonomic {
                 residual[layout.inside(0, c)] = self.constraints.rows.values[c] / h;
@@ -394,9 +409,11 @@ where
                 .constraints
                 .rows
                 .differentiate(self.inner.model, end.t, &end.q, &end.v);
-            self.constraints.add_ends(&end, &bend, tangent);
+            self.constraints
+                .add_ends(M::CONSTRAINTS, &end, &bend, tangent);
             if !by_start.is_empty() {
-                self.constraints.add_end_by_start(&end, &bend, by_start);
+                self.constraints
+                    .add_end_by_start(M::CONSTRAINTS, &end, &bend, by_start);
             }
         }
         self.constraints.hold_dependent(x, residual, derivatives);

@@ -1,19 +1,25 @@
 //! The derivative of the equations of a constrained element, piece by piece.
 
-use crate::constrained::element::{ElementConstraints, End};
+use crate::constrained::element::{Declared, ElementConstraints, End};
 use crate::constrained::rows::Bend;
 use crate::velocity_form::{PointTangent, add_row};
 
 impl<const N: usize> ElementConstraints<'_, N> {
     /// Adds the multiplier columns and the rows of constraints at a point.
-    pub(super) fn add_point(&self, l: usize, slopes: &[f64], tangent: &mut [f64]) {
+    pub(super) fn add_point(
+        &self,
+        declared: Declared,
+        l: usize,
+        slopes: &[f64],
+        tangent: &mut [f64],
+    ) {
         let (scheme, h, size) = (&self.scheme, self.h, self.layout.size());
         let (points, unknowns) = (scheme.points(), scheme.unknowns());
         let (weight, position) = (
             scheme.weights[l],
             &scheme.position[l * unknowns..][..unknowns],
         );
-        for (c, holonomic) in self.active() {
+        for (c, holonomic) in self.active(declared) {
             let (row, rate) = (&self.rows.rows[c], &self.rows.rates[c]);
             if holonomic {
                 for j in 1..self.layout.degree() {
@@ -50,7 +56,13 @@ impl<const N: usize> ElementConstraints<'_, N> {
     }
 
     /// Adds what start and end give to the tangent; the rows are those of the end.
-    pub(super) fn add_ends(&self, end: &End<N>, bend: &Bend<N>, tangent: &mut [f64]) {
+    pub(super) fn add_ends(
+        &self,
+        declared: Declared,
+        end: &End<N>,
+        bend: &Bend<N>,
+        tangent: &mut [f64],
+    ) {
         let (scheme, h, size) = (&self.scheme, self.h, self.layout.size());
         let layout = &self.layout;
         for a in 0..N {
@@ -63,7 +75,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
                 }
             }
         }
-        for (c, holonomic) in self.active() {
+        for (c, holonomic) in self.active(declared) {
             let (start, row) = (&self.rows.start[c], &self.rows.rows[c]);
             let node = layout.node(c);
             let (first, sign) = if holonomic {
@@ -113,6 +125,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
     /// Adds what a point gives to the derivative by the coordinates at the start.
     pub(super) fn add_start(
         &self,
+        declared: Declared,
         l: usize,
         by: &PointTangent<N>,
         slopes: &[f64],
@@ -134,7 +147,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
                 row[b] -= weight * by.force_q[a][b];
             }
         }
-        for (c, holonomic) in self.active() {
+        for (c, holonomic) in self.active(declared) {
             for b in 0..N {
                 if holonomic {
                     for j in 1..self.layout.degree() {
@@ -149,13 +162,19 @@ impl<const N: usize> ElementConstraints<'_, N> {
     }
 
     /// Adds what the end gives to the derivative by the coordinates at the start.
-    pub(super) fn add_end_by_start(&self, end: &End<N>, bend: &Bend<N>, by_start: &mut [f64]) {
+    pub(super) fn add_end_by_start(
+        &self,
+        declared: Declared,
+        end: &End<N>,
+        bend: &Bend<N>,
+        by_start: &mut [f64],
+    ) {
         let layout = &self.layout;
         for b in 0..N {
             for a in 0..N {
                 by_start[layout.end(a) * N + b] += end.second.zq[a][b] + bend.bend[a][b];
             }
-            for (c, holonomic) in self.active() {
+            for (c, holonomic) in self.active(declared) {
                 by_start[layout.node(c) * N + b] = self.rows.psi_q[c][b];
                 if holonomic {
                     by_start[layout.inside(0, c) * N + b] = self.rows.rows[c][b] / self.h;
