@@ -44,11 +44,9 @@ impl<I> Grid<'_, I> {
 /// All elements of a span.
 #[derive(Clone, Debug)]
 pub struct Mesh<const N: usize> {
-    segments: Vec<Segment>,
+    times: Times,
     /// In the order in which the run meets them.
     impulses: Vec<Impulse<N>>,
-    direction: f64,
-    has_breaks: bool,
 }
 
 impl<const N: usize> Mesh<N> {
@@ -59,55 +57,10 @@ impl<const N: usize> Mesh<N> {
         breaks: &[f64],
         impulses: &[Impulse<N>],
     ) -> Result<Self, RunErrorKind> {
-        let Range { start, end } = *span;
-        if !(start.is_finite() && end.is_finite()) {
-            return Err(RunErrorKind::Span { start, end });
-        }
-        if !(step.is_finite() && step != 0.0) && start != end {
-            return Err(RunErrorKind::Step { step });
-        }
-        let direction = if end < start { -1.0 } else { 1.0 };
-        let within = |time: f64| {
-            direction * start <= direction * time && direction * time <= direction * end
-        };
-
-        let is_inside = |&time: &f64| within(time) && !is_same(time, start) && !is_same(time, end);
-        let mut cuts: Vec<f64> = breaks.iter().copied().filter(is_inside).collect();
-        sort(&mut cuts, direction);
-        cuts.dedup_by(|a, b| is_same(*a, *b));
-        for impulse in impulses {
-            if !(within(impulse.time) && impulse.value.iter().all(|value| value.is_finite())) {
-                return Err(RunErrorKind::Impulse { time: impulse.time });
-            }
-        }
-        let times: Vec<f64> = impulses.iter().map(|impulse| impulse.time).collect();
-        let impulses = order(&times, direction)
-            .into_iter()
-            .map(|place| impulses[place])
-            .collect();
-
-        let mut segments = Vec::new();
-        let mut from = start;
-        for to in cuts.into_iter().chain([end]) {
-            if to != from {
-                let mut segment = Segment::new(from, to, direction * step.abs())?;
-                segment.at_break = (from != start, to != end);
-                segments.push(segment);
-            }
-            from = to;
-        }
-        let is_at = |time: f64| breaks.iter().any(|one| is_same(*one, time));
-        if let Some(first) = segments.first_mut() {
-            first.at_break.0 = is_at(start);
-        }
-        if let Some(last) = segments.last_mut() {
-            last.at_break.1 = is_at(end);
-        }
+        check_span(span, step)?;
         Ok(Self {
-            segments,
-            impulses,
-            direction,
-            has_breaks: !breaks.is_empty(),
+            impulses: in_order(impulses, span)?,
+            times: Times::new(span, step, breaks)?,
         })
     }
 
@@ -130,23 +83,12 @@ impl<const N: usize> Mesh<N> {
         impulses: &[Impulse<N>],
     ) -> Result<Self, RunErrorKind> {
         let (start, end) = ends(cuts);
-        let impulses = acting(start, end, impulses);
-        let mut mesh = Self::new(&(start..end), end - start, &[], &impulses)?;
-        let mut breaks = breaks.to_vec();
-        sort(&mut breaks, mesh.direction);
-        mesh.has_breaks = !breaks.is_empty();
-        // Elsewhere nothing may be lost: a rounding at each of many cuts would add up.
-        let is_break = |time: f64| is_among(&breaks, time, mesh.direction);
-        let parts = cuts.windows(2);
-        mesh.segments = parts
-            .map(|pair| {
-                let steps = ((pair[1] - pair[0]).abs() / step).ceil().max(1.0);
-                let mut segment = Segment::new(pair[0], pair[1], (pair[1] - pair[0]) / steps)?;
-                segment.at_break = (is_break(pair[0]), is_break(pair[1]));
-                Ok(segment)
-            })
-            .collect::<Result<_, RunErrorKind>>()?;
-        Ok(mesh)
+        let span = start..end;
+        check_span(&span, end - start)?;
+        Ok(Self {
+            impulses: in_order(&acting(start, end, impulses), &span)?,
+            times: Times::even(cuts, step, breaks)?,
+        })
     }
 
     /// The elements between given nodes, which begin and end with the span, cut at every break besides.
@@ -156,12 +98,170 @@ impl<const N: usize> Mesh<N> {
         breaks: &[f64],
         impulses: &[Impulse<N>],
     ) -> Result<Self, RunErrorKind> {
+        check_span(span, span.end - span.start)?;
+        Ok(Self {
+            impulses: in_order(impulses, span)?,
+            times: Times::through(span, nodes, breaks)?,
+        })
+    }
+
+    /// The end of the last element.
+    pub(crate) fn end(&self) -> Option<f64> {
+        self.times.segments.last().map(|segment| segment.end)
+    }
+
+    /// How many elements there are.
+    pub(crate) fn steps(&self) -> usize {
+        self.times.steps()
+    }
+
+    /// Start, end and length of each element. One ends where the next one starts, to the bit; lengths are equal to the bit, which differences of times
+    /// are not, so that what was factored for one element serves the next.
+    pub(crate) fn elements(&self) -> Elements<'_> {
+        Elements {
+            segments: &self.times.segments,
+            done: 0,
+        }
+    }
+
+    /// Where the force is first felt in the element that begins at `t` and has the length `h`: at `t`, or beyond it by roundings where that is a break, so that an
+    /// element with a point at its start finds the force after the break there.
+    pub(crate) fn begin(&self, t: f64, h: f64) -> f64 {
+        if self.times.has_breaks {
+            self.times.begin(t, h)
+        } else {
+            t
+        }
+    }
+
+    /// The impulses that act in the element from `t` to `next`: one at a node belongs to the element that it starts, at the end of the span to the last.
+    pub(crate) fn impulses_in(&self, t: f64, next: f64, last: bool) -> &[Impulse<N>] {
+        if self.impulses.is_empty() {
+            return &[];
+        }
+        let direction = self.times.direction;
+        let before = |limit: f64| {
+            self.impulses
+                .partition_point(|impulse| direction * impulse.time < direction * limit)
+        };
+        let end = if last {
+            self.impulses.len()
+        } else {
+            before(next)
+        };
+        &self.impulses[before(t)..end]
+    }
+}
+
+/// Refuses a span that is none, and a step with which it cannot be cut.
+fn check_span(span: &Range<f64>, step: f64) -> Result<(), RunErrorKind> {
+    let Range { start, end } = *span;
+    if !(start.is_finite() && end.is_finite()) {
+        return Err(RunErrorKind::Span { start, end });
+    }
+    if !(step.is_finite() && step != 0.0) && start != end {
+        return Err(RunErrorKind::Step { step });
+    }
+    Ok(())
+}
+
+/// One, or minus one where a run goes back in time.
+fn direction_of(span: &Range<f64>) -> f64 {
+    if span.end < span.start { -1.0 } else { 1.0 }
+}
+
+/// Impulses in the order in which a run meets them.
+fn in_order<const N: usize>(
+    impulses: &[Impulse<N>],
+    span: &Range<f64>,
+) -> Result<Vec<Impulse<N>>, RunErrorKind> {
+    let direction = direction_of(span);
+    let within = |time: f64| {
+        direction * span.start <= direction * time && direction * time <= direction * span.end
+    };
+    for impulse in impulses {
+        if !(within(impulse.time) && impulse.value.iter().all(|value| value.is_finite())) {
+            return Err(RunErrorKind::Impulse { time: impulse.time });
+        }
+    }
+    let times: Vec<f64> = impulses.iter().map(|impulse| impulse.time).collect();
+    let places = order(&times, direction).into_iter();
+    Ok(places.map(|place| impulses[place]).collect())
+}
+
+/// When the elements of a span begin and end, whatever they are of.
+#[derive(Clone, Debug)]
+struct Times {
+    segments: Vec<Segment>,
+    direction: f64,
+    has_breaks: bool,
+}
+
+impl Times {
+    fn new(span: &Range<f64>, step: f64, breaks: &[f64]) -> Result<Self, RunErrorKind> {
         let Range { start, end } = *span;
-        // Of span, breaks and impulses.
-        let mut mesh = Self::new(span, end - start, &[], impulses)?;
-        mesh.has_breaks = !breaks.is_empty();
-        check_nodes(span, nodes, mesh.direction)?;
-        let direction = mesh.direction;
+        let direction = direction_of(span);
+        let within = |time: f64| {
+            direction * start <= direction * time && direction * time <= direction * end
+        };
+        let is_inside = |&time: &f64| within(time) && !is_same(time, start) && !is_same(time, end);
+        let mut cuts: Vec<f64> = breaks.iter().copied().filter(is_inside).collect();
+        sort(&mut cuts, direction);
+        cuts.dedup_by(|a, b| is_same(*a, *b));
+        let mut segments = Vec::new();
+        let mut from = start;
+        for to in cuts.into_iter().chain([end]) {
+            if to != from {
+                let mut segment = Segment::new(from, to, direction * step.abs())?;
+                segment.at_break = (from != start, to != end);
+                segments.push(segment);
+            }
+            from = to;
+        }
+        let is_at = |time: f64| breaks.iter().any(|one| is_same(*one, time));
+        if let Some(first) = segments.first_mut() {
+            first.at_break.0 = is_at(start);
+        }
+        if let Some(last) = segments.last_mut() {
+            last.at_break.1 = is_at(end);
+        }
+        Ok(Self {
+            segments,
+            direction,
+            has_breaks: !breaks.is_empty(),
+        })
+    }
+
+    fn even(cuts: &[f64], step: f64, breaks: &[f64]) -> Result<Self, RunErrorKind> {
+        let (start, end) = ends(cuts);
+        let direction = direction_of(&(start..end));
+        let mut breaks = breaks.to_vec();
+        sort(&mut breaks, direction);
+        // Elsewhere nothing may be lost: a rounding at each of many cuts would add up.
+        let is_break = |time: f64| is_among(&breaks, time, direction);
+        let segment = |pair: &[f64]| {
+            let steps = ((pair[1] - pair[0]).abs() / step).ceil().max(1.0);
+            let mut segment = Segment::new(pair[0], pair[1], (pair[1] - pair[0]) / steps)?;
+            segment.at_break = (is_break(pair[0]), is_break(pair[1]));
+            Ok(segment)
+        };
+        Ok(Self {
+            segments: cuts
+                .windows(2)
+                .map(segment)
+                .collect::<Result<_, RunErrorKind>>()?,
+            direction,
+            has_breaks: !breaks.is_empty(),
+        })
+    }
+
+    fn through(span: &Range<f64>, nodes: &[f64], breaks: &[f64]) -> Result<Self, RunErrorKind> {
+        let Range { start, end } = *span;
+        let direction = direction_of(span);
+        let has_breaks = !breaks.is_empty();
+        // A span of roundings is none.
+        Self::new(span, end - start, &[])?;
+        check_nodes(span, nodes, direction)?;
         let mut nodes = nodes.to_vec();
         let ahead =
             |time: &f64| direction * start < direction * time && direction * time < direction * end;
@@ -173,8 +273,8 @@ impl<const N: usize> Mesh<N> {
         nodes.extend(new);
         sort(&mut nodes, direction);
         nodes.dedup();
-        mesh.segments = single_steps(&nodes);
-        for segment in &mut mesh.segments {
+        let mut segments = single_steps(&nodes);
+        for segment in &mut segments {
             let Segment { start, end, .. } = *segment;
             segment.at_break = (
                 is_among(&breaks, start, direction),
@@ -182,33 +282,19 @@ impl<const N: usize> Mesh<N> {
             );
             segment.check_resolution()?;
         }
-        Ok(mesh)
-    }
-
-    /// The end of the last element.
-    pub(crate) fn end(&self) -> Option<f64> {
-        self.segments.last().map(|segment| segment.end)
-    }
-
-    /// How many elements there are.
-    pub(crate) fn steps(&self) -> usize {
-        self.segments.iter().map(|segment| segment.steps).sum()
-    }
-
-    /// Start, end and length of each element. One ends where the next one starts, to the bit; lengths are equal to the bit, which differences of times
-    /// are not, so that what was factored for one element serves the next.
-    pub(crate) fn elements(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
-        self.segments.iter().flat_map(|segment| {
-            (0..segment.steps).map(|k| (segment.node(k), segment.node(k + 1), segment.length(k)))
+        Ok(Self {
+            segments,
+            direction,
+            has_breaks,
         })
     }
 
-    /// Where the force is first felt in the element that begins at `t` and has the length `h`: at `t`, or beyond it by roundings where that is a break, so that an
-    /// element with a point at its start finds the force after the break there.
-    pub(crate) fn begin(&self, t: f64, h: f64) -> f64 {
-        if !self.has_breaks {
-            return t;
-        }
+    fn steps(&self) -> usize {
+        self.segments.iter().map(|segment| segment.steps).sum()
+    }
+
+    /// [`Mesh::begin`], where there are breaks.
+    fn begin(&self, t: f64, h: f64) -> f64 {
         let is_before = |segment: &Segment| self.direction * segment.start < self.direction * t;
         let segment = self.segments.get(self.segments.partition_point(is_before));
         match segment {
@@ -216,22 +302,38 @@ impl<const N: usize> Mesh<N> {
             _ => t,
         }
     }
+}
 
-    /// The impulses that act in the element from `t` to `next`: one at a node belongs to the element that it starts, at the end of the span to the last.
-    pub(crate) fn impulses_in(&self, t: f64, next: f64, last: bool) -> &[Impulse<N>] {
-        if self.impulses.is_empty() {
-            return &[];
+/// Elements one after the other: [`Mesh::elements`].
+#[derive(Clone)]
+pub(crate) struct Elements<'a> {
+    /// With those to come.
+    segments: &'a [Segment],
+    /// Elements of the first of them that are behind.
+    done: usize,
+}
+
+impl Iterator for Elements<'_> {
+    type Item = (f64, f64, f64);
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        self.nth(0)
+    }
+
+    #[inline]
+    fn nth(&mut self, mut left_out: usize) -> Option<Self::Item> {
+        while let [segment, rest @ ..] = self.segments {
+            let k = self.done;
+            if left_out < segment.steps - k {
+                let k = k + left_out;
+                self.done = k + 1;
+                return Some((segment.node(k), segment.node(k + 1), segment.length(k)));
+            }
+            left_out -= segment.steps - k;
+            (self.segments, self.done) = (rest, 0);
         }
-        let before = |limit: f64| {
-            self.impulses
-                .partition_point(|impulse| self.direction * impulse.time < self.direction * limit)
-        };
-        let end = if last {
-            self.impulses.len()
-        } else {
-            before(next)
-        };
-        &self.impulses[before(t)..end]
+        None
     }
 }
 
@@ -257,7 +359,9 @@ impl Endless {
         let mut ahead: Vec<f64> = breaks.iter().copied().filter(is_ahead).collect();
         sort(&mut ahead, direction);
         let last = ahead.last().copied().unwrap_or(start);
-        let mut segments = Mesh::<0>::new(&(start..last), step, breaks, &[])?.segments;
+        let span = start..last;
+        check_span(&span, step)?;
+        let mut segments = Times::new(&span, step, breaks)?.segments;
         segments.push(Segment {
             start: last,
             end: direction * f64::INFINITY,

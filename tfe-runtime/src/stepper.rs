@@ -1,6 +1,7 @@
 //! A stepper that owns its memory.
 
 mod advance;
+mod carried;
 mod dense;
 mod matrices;
 mod over;

@@ -34,7 +34,7 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        self.pieces.clear();
+        self.carried.pieces.clear();
         if Self::MAY_HAVE_KINKS && self.at_kinks && self.has_kinks(t, state) {
             return self.advance_in_arcs(t, h, state, impulses);
         }
@@ -56,16 +56,20 @@ where
             Err(error) if may_be_cut(&error, M::FACTS.linear, self.control.solve) => error,
             outcome => return outcome,
         };
-        let (start, low, steps) = (*state, self.memory.low, self.memory.statistics.steps);
+        let (start, low, steps) = (
+            *state,
+            self.carried.memory.low,
+            self.carried.memory.statistics.steps,
+        );
         let arrived = in_halves(self, (t, h), state, impulses, 1);
-        self.memory.statistics.steps = steps;
+        self.carried.memory.statistics.steps = steps;
         if !arrived {
-            (*state, self.memory.low, self.memory.last) = (start, low, None);
-            self.pieces.clear();
+            (*state, self.carried.memory.low, self.carried.memory.last) = (start, low, None);
+            self.carried.pieces.clear();
             return Err(error);
         }
-        self.memory.statistics.steps += 1;
-        self.memory.statistics.cuts += 1;
+        self.carried.memory.statistics.steps += 1;
+        self.carried.memory.statistics.cuts += 1;
         Ok(())
     }
 
@@ -75,7 +79,7 @@ where
         self.switches(t, state, &mut switches);
         self.at_kinks = !switches.is_empty();
         // The inside of every step is looked at.
-        self.ends_only &= !self.at_kinks;
+        self.carried.ends_only &= !self.at_kinks;
         self.at_kinks
     }
 
@@ -87,46 +91,55 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        let (start, low, steps) = (*state, self.memory.low, self.memory.statistics.steps);
+        let (start, low, steps) = (
+            *state,
+            self.carried.memory.low,
+            self.carried.memory.statistics.steps,
+        );
         let outcome = in_arcs(self, (t, h), state, impulses);
         self.trust(false);
-        self.memory.statistics.steps = steps + u64::from(outcome.is_ok());
+        self.carried.memory.statistics.steps = steps + u64::from(outcome.is_ok());
         if outcome.is_err() {
-            (*state, self.memory.low, self.memory.last) = (start, low, None);
-            self.pieces.clear();
+            (*state, self.carried.memory.low, self.carried.memory.last) = (start, low, None);
+            self.carried.pieces.clear();
         }
         outcome
     }
 
     /// Whether a matrix is asked for.
     fn is_propagated(&self) -> bool {
-        self.ends_only && !matches!(self.control.solve, Solve::FixedPoint)
+        self.carried.ends_only && !matches!(self.control.solve, Solve::FixedPoint)
     }
 
     /// Moves `state` by the matrix of a linear model; false where an ordinary step is to be done.
     ///
     /// The matrix costs 2N + 1 steps: it is made after as many of the same length.
     fn propagate(&mut self, t: f64, h: f64, state: &mut State<N>) -> bool {
-        self.alike = if self.alike.0 == h {
-            (h, self.alike.1.saturating_add(1))
+        self.carried.alike = if self.carried.alike.0 == h {
+            (h, self.carried.alike.1.saturating_add(1))
         } else {
             (h, 1)
         };
-        if self.alike.1 <= 2 * N + 1 {
+        if self.carried.alike.1 <= 2 * N + 1 {
             return false;
         }
-        if !self.propagator.as_ref().is_some_and(|one| one.is_of(h)) {
+        if !self
+            .carried
+            .propagator
+            .as_ref()
+            .is_some_and(|one| one.is_of(h))
+        {
             let Ok(made) = Propagator::of(h, |start| self.increment(h, start)) else {
                 return false;
             };
-            self.propagator = Some(made);
+            self.carried.propagator = Some(made);
         }
-        let Some(propagator) = &self.propagator else {
+        let Some(propagator) = &self.carried.propagator else {
             return false;
         };
         let start = *state;
-        let mut low = match &self.memory.last {
-            Some(last) if last.end.is_same(&start) => self.memory.low,
+        let mut low = match &self.carried.memory.last {
+            Some(last) if last.end.is_same(&start) => self.carried.memory.low,
             _ => State::ZERO,
         };
         let start_low = low;
@@ -134,37 +147,37 @@ where
             // The ordinary step says why.
             return false;
         }
-        self.memory.last = Some(Last {
+        self.carried.memory.last = Some(Last {
             t,
             h,
             start,
             start_low,
             end: *state,
         });
-        self.memory.low = low;
-        self.memory.statistics.steps += 1;
-        self.memory.statistics.products += 1;
-        self.skipped = true;
+        self.carried.memory.low = low;
+        self.carried.memory.statistics.steps += 1;
+        self.carried.memory.statistics.products += 1;
+        self.carried.skipped = true;
         true
     }
 
     /// Moves `state` with all points of the element at once.
     fn together(&mut self, t: f64, h: f64, state: &mut State<N>) -> Together {
-        let Some(points) = &mut self.points else {
+        let Some(points) = &mut self.carried.points else {
             return Together::LeftToOthers;
         };
         let method = (&*self.model, &self.table, &self.control);
-        let outcome = points.step(method, &mut self.memory, (t, h), state);
+        let outcome = points.step(method, &mut self.carried.memory, (t, h), state);
         match outcome {
-            Together::Arrived if self.ends_only => self.skipped = true,
+            Together::Arrived if self.carried.ends_only => self.carried.skipped = true,
             Together::Arrived => {
                 self.write_back();
-                self.skipped = false;
+                self.carried.skipped = false;
             }
             Together::LeftToOthers => {
                 // An ordinary step continues what is in its workspace.
-                if self.skipped && !self.write_back() {
-                    self.memory.last = None;
+                if self.carried.skipped && !self.write_back() {
+                    self.carried.memory.last = None;
                 }
                 self.forget_points();
             }
@@ -175,7 +188,7 @@ where
 
     /// Says that the next step with all points at once continues nothing.
     fn forget_points(&mut self) {
-        if let Some(points) = &mut self.points {
+        if let Some(points) = &mut self.carried.points {
             points.forget();
         }
     }
@@ -186,15 +199,15 @@ where
             return false;
         }
         self.make_room();
-        let points = self.points.as_mut();
-        points.is_some_and(|points| points.write_back::<M>(&self.table, &mut self.numbers))
+        let points = self.carried.points.as_mut();
+        points.is_some_and(|points| points.write_back::<M>(&self.table, &mut self.carried.numbers))
     }
 
     /// By how much an ordinary step moves a state, rounding included.
     fn increment(&self, h: f64, start: &State<N>) -> Result<State<N>, StepError> {
         let mut memory = Memory::new();
         let mut end = *start;
-        let (mut numbers, mut pivots) = (self.numbers.clone(), self.pivots.clone());
+        let (mut numbers, mut pivots) = (self.carried.numbers.clone(), self.carried.pivots.clone());
         self.ordinary(&mut memory, (&mut numbers, &mut pivots), (0.0, h), &mut end)?;
         for a in 0..N {
             end.p[a] = (end.p[a] - start.p[a]) + memory.low.p[a];
@@ -243,8 +256,8 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        self.impulses.clear();
-        self.impulses.extend_from_slice(impulses);
+        self.carried.impulses.clear();
+        self.carried.impulses.extend_from_slice(impulses);
         self.is_of_points = false;
         if Self::MAY_BE_PROPAGATED
             && self.is_propagated()
@@ -263,7 +276,7 @@ where
                 Together::LeftToOthers => {}
             }
         }
-        self.skipped = false;
+        self.carried.skipped = false;
         self.make_room();
         let interval = Interval {
             start: t,
@@ -271,31 +284,31 @@ where
             impulses,
         };
         let workspace = Workspace {
-            numbers: &mut self.numbers,
-            pivots: &mut self.pivots,
+            numbers: &mut self.carried.numbers,
+            pivots: &mut self.carried.pivots,
         };
         let method = Method {
             model: &*self.model,
             tables: &self.table,
             control: self.control,
         };
-        method.advance(&mut self.memory, workspace, interval, state)
+        method.advance(&mut self.carried.memory, workspace, interval, state)
     }
 
     fn passed(&mut self, t: f64, h: f64, kicks: Vec<Impulse<N>>) {
         if let Some(numbers) = self.retrace() {
-            self.numbers = numbers;
-            self.skipped = false;
+            self.carried.numbers = numbers;
+            self.carried.skipped = false;
         }
         let dense = self.dense_of_last(None, t, t + h);
-        if let Some(last) = self.memory.last {
-            self.pieces.push(Piece {
+        if let Some(last) = self.carried.memory.last {
+            self.carried.pieces.push(Piece {
                 last,
                 impulses: kicks,
                 dense,
-                independence: self.memory.independence,
-                numbers: self.numbers.clone(),
-                pivots: self.pivots.clone(),
+                independence: self.carried.memory.independence,
+                numbers: self.carried.numbers.clone(),
+                pivots: self.carried.pivots.clone(),
             });
         }
     }
@@ -316,7 +329,7 @@ where
     }
 
     fn forget(&mut self) {
-        self.memory.last = None;
+        self.carried.memory.last = None;
     }
 
     fn switches(&self, t: f64, state: &State<N>, values: &mut Vec<f64>) {
@@ -330,7 +343,7 @@ where
     }
 
     fn crossed(&mut self) {
-        self.memory.statistics.kinks += 1;
+        self.carried.memory.statistics.kinks += 1;
     }
 
     fn cuts(&self) -> bool {

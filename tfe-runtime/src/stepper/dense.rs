@@ -18,7 +18,7 @@ where
         if !(Self::MAY_HAVE_POINTS || Self::MAY_BE_PROPAGATED) {
             return None;
         }
-        let last = self.memory.last.filter(|_| self.skipped)?;
+        let last = self.carried.memory.last.filter(|_| self.carried.skipped)?;
         let (mut numbers, mut pivots) = self.room();
         let mut state = last.start;
         let (mut memory, place) = (Memory::new(), (last.t, last.h));
@@ -32,13 +32,16 @@ where
     #[must_use]
     #[inline(always)]
     pub fn reach(&mut self) -> Option<Reach<N>> {
-        if !(Self::MAY_HAVE_POINTS && self.is_of_points && self.pieces.is_empty()) {
+        if !(Self::MAY_HAVE_POINTS && self.is_of_points && self.carried.pieces.is_empty()) {
             return None;
         }
         if self.weights.is_none() {
             self.weigh();
         }
-        let (points, last) = (self.points.as_ref()?, self.memory.last.as_ref()?);
+        let (points, last) = (
+            self.carried.points.as_ref()?,
+            self.carried.memory.last.as_ref()?,
+        );
         let weights = self.weights.as_ref()?;
         points.reach::<M>(weights, last.h, &last.start)
     }
@@ -50,8 +53,8 @@ where
 
     /// Makes the inside of the last step ready to be looked at, where [`ends_only`](Self::ends_only) has left it out.
     pub fn look_inside(&mut self) {
-        if self.skipped && self.is_of_points && self.write_back() {
-            self.skipped = false;
+        if self.carried.skipped && self.is_of_points && self.write_back() {
+            self.carried.skipped = false;
         }
     }
 
@@ -71,7 +74,7 @@ where
         start: f64,
         end: f64,
     ) -> DenseElement<N> {
-        let pieces = self.pieces.iter().map(|piece| piece.dense.clone());
+        let pieces = self.carried.pieces.iter().map(|piece| piece.dense.clone());
         DenseElement::of_pieces((start, end), pieces.collect())
             .unwrap_or_else(|| self.dense_of_last(spare, start, end))
     }
@@ -83,11 +86,11 @@ where
         end: f64,
     ) -> DenseElement<N> {
         let scheme = self.table.view();
-        let Some(last) = self.memory.last else {
+        let Some(last) = self.carried.memory.last else {
             return DenseElement::constant(start, end, State::ZERO);
         };
         let retraced = self.retrace();
-        let numbers = retraced.as_ref().unwrap_or(&self.numbers);
+        let numbers = retraced.as_ref().unwrap_or(&self.carried.numbers);
         if const { !M::CONSTRAINTS.is_empty() } {
             let m = interior_len(&scheme.element, M::FORM, N, M::CONSTRAINTS.len());
             let points = scheme.points() * N;
@@ -113,7 +116,7 @@ where
         let interval = Interval {
             start: last.t,
             length: last.h,
-            impulses: &self.impulses,
+            impulses: &self.carried.impulses,
         };
         let times = (start, end);
         DenseElement::of(&scheme, times, &last, rates, forces, &interval, spare)

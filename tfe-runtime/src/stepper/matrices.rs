@@ -79,11 +79,11 @@ where
         matrix: &mut [f64],
         mut inside: Option<&mut Vec<InsideSlopes>>,
     ) -> Result<(), TransitionError> {
-        if self.passes_node {
+        if self.carried.passes_node {
             // Where constraints lose rank the tangents of the motion are open.
             return Err(StepError::from(ConstraintError::RankChanged).into());
         }
-        if self.pieces.is_empty() && inside.is_none() {
+        if self.carried.pieces.is_empty() && inside.is_none() {
             return self.linearise_last(directions, matrix, None);
         }
         let width = 2 * N;
@@ -99,9 +99,9 @@ where
         }
         let (mut factor, mut next) = (vec![0.0; needed], vec![0.0; needed]);
         // The last one leaves the stepper as the step has left it.
-        for piece in 0..self.pieces.len().max(1) {
+        for piece in 0..self.carried.pieces.len().max(1) {
             let mut own = directions.to_vec();
-            if !self.pieces.is_empty() {
+            if !self.carried.pieces.is_empty() {
                 own = self.of_piece(directions, piece);
                 self.recall(piece);
             }
@@ -118,7 +118,7 @@ where
                     coefficients,
                 });
             }
-            if self.pieces.is_empty() {
+            if self.carried.pieces.is_empty() {
                 core::mem::swap(&mut product, &mut factor);
                 break;
             }
@@ -154,31 +154,31 @@ where
         lambda: &mut [f64],
         by_direction: &mut [f64],
     ) -> Result<(), TransitionError> {
-        if self.passes_node {
+        if self.carried.passes_node {
             return Err(StepError::from(ConstraintError::RankChanged).into());
         }
-        let (needed, given) = (self.pieces.len().max(1), inside.len());
+        let (needed, given) = (self.carried.pieces.len().max(1), inside.len());
         if !inside.is_empty() && given != needed {
             return Err(TransitionError::Shape { needed, given });
         }
-        if self.pieces.is_empty() {
+        if self.carried.pieces.is_empty() {
             return self.adjoint_of_last(directions, inside.first(), lambda, by_direction);
         }
-        for piece in (0..self.pieces.len()).rev() {
+        for piece in (0..self.carried.pieces.len()).rev() {
             let own = self.of_piece(directions, piece);
             self.recall(piece);
             self.adjoint_of_last(&own, inside.get(piece), lambda, by_direction)?;
         }
         // The stepper is where the step has left it.
-        self.recall(self.pieces.len() - 1);
+        self.recall(self.carried.pieces.len() - 1);
         Ok(())
     }
 
     /// The directions of a piece of the last step, as parts of those of the whole.
     fn of_piece(&self, directions: &[Direction], piece: usize) -> Vec<Direction> {
-        let begin = self.pieces[0].last.t;
-        let length: f64 = self.pieces.iter().map(|piece| piece.last.h).sum();
-        let Last { t, h, .. } = self.pieces[piece].last;
+        let begin = self.carried.pieces[0].last.t;
+        let length: f64 = self.carried.pieces.iter().map(|piece| piece.last.h).sum();
+        let Last { t, h, .. } = self.carried.pieces[piece].last;
         let own = |direction: &Direction| Direction {
             time: direction.time + (t - begin) / length * direction.length,
             length: h / length * direction.length,
@@ -189,13 +189,13 @@ where
 
     /// Goes back to where a piece of the last step has ended.
     fn recall(&mut self, piece: usize) {
-        let piece = &self.pieces[piece];
-        self.memory.last = Some(piece.last);
-        self.memory.forget_factors();
-        self.numbers.clone_from(&piece.numbers);
-        self.pivots.clone_from(&piece.pivots);
-        self.impulses.clone_from(&piece.impulses);
-        self.skipped = false;
+        let piece = &self.carried.pieces[piece];
+        self.carried.memory.last = Some(piece.last);
+        self.carried.memory.forget_factors();
+        self.carried.numbers.clone_from(&piece.numbers);
+        self.carried.pivots.clone_from(&piece.pivots);
+        self.carried.impulses.clone_from(&piece.impulses);
+        self.carried.skipped = false;
     }
 
     fn linearise_last(
@@ -270,19 +270,25 @@ where
         }
         self.make_room();
         if let Some(numbers) = self.retrace() {
-            self.numbers = numbers;
-            self.skipped = false;
+            self.carried.numbers = numbers;
+            self.carried.skipped = false;
         }
         let workspace = Workspace {
-            numbers: &mut self.numbers,
-            pivots: &mut self.pivots,
+            numbers: &mut self.carried.numbers,
+            pivots: &mut self.carried.pivots,
         };
         let method = Method {
             model: &*self.model,
             tables: &self.table,
             control: self.control,
         };
-        let given = (self.impulses.as_slice(), directions);
-        differentiate(method, &mut self.memory, workspace, &mut self.extra, given)
+        let given = (self.carried.impulses.as_slice(), directions);
+        differentiate(
+            method,
+            &mut self.carried.memory,
+            workspace,
+            &mut self.extra,
+            given,
+        )
     }
 }

@@ -61,14 +61,15 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        self.passes_node = false;
-        let ahead = self.ahead.take().filter(|_| impulses.is_empty());
+        self.carried.passes_node = false;
+        let ahead = self.carried.ahead.take().filter(|_| impulses.is_empty());
         if let Some(ahead) = ahead.filter(|one| one.serves(t, h, state)) {
             return self.go_on(ahead, (t, h), state);
         }
         let (foreseen, scheme) = (&mut self.foreseen, self.table.view());
-        self.memory.is_foreseen = foreseen.take::<M, N>(&scheme, (t, h), &mut self.numbers);
-        let (start, cuts) = (*state, self.memory.statistics.cuts);
+        self.carried.memory.is_foreseen =
+            foreseen.take::<M, N>(&scheme, (t, h), &mut self.carried.numbers);
+        let (start, cuts) = (*state, self.carried.memory.statistics.cuts);
         let outcome = self.advance_plainly(t, h, state, impulses);
         if !(impulses.is_empty() && matches!(self.control.solve, Solve::Auto | Solve::Newton)) {
             return outcome;
@@ -77,8 +78,8 @@ where
             Ok(()) if self.loses_rank() => {
                 let done = self.clone();
                 let mut moved = start;
-                self.memory.statistics.cuts = cuts;
-                self.memory.statistics.steps -= 1;
+                self.carried.memory.statistics.cuts = cuts;
+                self.carried.memory.statistics.steps -= 1;
                 if self.over((t, h), &mut moved) {
                     *state = moved;
                 } else {
@@ -93,8 +94,9 @@ where
 
     /// Whether the constraints are much less independent where the last step has ended than where it began.
     fn loses_rank(&self) -> bool {
-        let start = (self.pieces.first()).map_or(self.memory.independence, |one| one.independence);
-        match (start, self.memory.independence) {
+        let start = (self.carried.pieces.first())
+            .map_or(self.carried.memory.independence, |one| one.independence);
+        match (start, self.carried.memory.independence) {
             (Some([start, _]), Some([_, end])) => is_lost(&start, &end),
             _ => false,
         }
@@ -115,11 +117,11 @@ where
             *state = start;
             return Err(error);
         }
-        if self.pieces.is_empty() {
+        if self.carried.pieces.is_empty() {
             self.passed(ahead.t, rest, Vec::new());
         }
-        self.pieces.insert(0, ahead.piece);
-        self.passes_node = true;
+        self.carried.pieces.insert(0, ahead.piece);
+        self.carried.passes_node = true;
         Ok(())
     }
 
@@ -127,26 +129,26 @@ where
     /// changed, where that fails.
     #[cold]
     fn over(&mut self, (t, h): (f64, f64), state: &mut State<N>) -> bool {
-        let (start, steps) = (*state, self.memory.statistics.steps);
+        let (start, steps) = (*state, self.carried.memory.statistics.steps);
         let passes = REACHES
             .iter()
             .any(|reach| self.over_from((t, h), reach * h, state));
-        self.memory.statistics.steps = steps;
+        self.carried.memory.statistics.steps = steps;
         if !passes {
-            (*state, self.memory.last) = (start, None);
-            self.pieces.clear();
+            (*state, self.carried.memory.last) = (start, None);
+            self.carried.pieces.clear();
             return false;
         }
-        self.memory.statistics.steps += 1;
-        self.memory.statistics.cuts += 1;
-        self.passes_node = true;
+        self.carried.memory.statistics.steps += 1;
+        self.carried.memory.statistics.cuts += 1;
+        self.carried.passes_node = true;
         true
     }
 
     fn over_from(&mut self, (t, h): (f64, f64), reach: f64, state: &mut State<N>) -> bool {
         let start = *state;
-        self.pieces.clear();
-        self.memory.last = None;
+        self.carried.pieces.clear();
+        self.carried.memory.last = None;
         let (before, length) = (h - reach, reach + BEHIND * reach);
         let mut moved = start;
         if self.whole(t, before, &mut moved, &[]).is_err() {
@@ -159,17 +161,17 @@ where
         }
         let ends = begins + length;
         self.passed(begins, length, Vec::new());
-        let Some(mut piece) = self.pieces.pop() else {
+        let Some(mut piece) = self.carried.pieces.pop() else {
             return false;
         };
         let (to_node, from_node) = piece.dense.split(t + h);
         let node = to_node.at(1.0);
-        self.pieces.push(Piece {
+        self.carried.pieces.push(Piece {
             dense: to_node,
             ..piece.clone()
         });
         piece.dense = from_node;
-        self.ahead = Some(Ahead {
+        self.carried.ahead = Some(Ahead {
             node,
             t: ends,
             state: moved,

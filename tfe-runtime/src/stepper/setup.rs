@@ -1,17 +1,14 @@
 //! A stepper and its memory.
 
-use super::piece::{Ahead, Piece};
+use super::carried::Carried;
 use crate::backwards::Backwards;
 use crate::constrained::Foreseen;
 use crate::element::{Element, ElementError};
-use crate::method::{Impulse, Memory};
 use crate::model::Model;
 use crate::newton::{Control, Solve};
 use crate::points::reach::Weights;
 use crate::points::tables;
 use crate::points::{Points, are_possible};
-use crate::propagator::Propagator;
-use crate::registers::storage::Heap;
 use crate::scheme::{SchemeTable, Tables};
 use crate::share::Share;
 use crate::statistics::Statistics;
@@ -68,30 +65,11 @@ pub struct Stepper<'m, M, const N: usize> {
     pub(super) model: Share<'m, M>,
     pub(super) table: SchemeTable,
     pub(super) control: Control,
-    pub(super) memory: Memory<N>,
-    pub(super) numbers: Vec<f64>,
-    pub(super) pivots: Vec<usize>,
-    pub(super) impulses: Vec<Impulse<N>>,
-    /// Nobody asks for the inside of every element.
-    pub(super) ends_only: bool,
-    /// Of a linear model, once it has paid.
-    pub(super) propagator: Option<Propagator<N>>,
-    /// All points at once, where model and element allow it.
-    pub(super) points: Option<Points<N, Heap>>,
-    /// Steps of one length so far.
-    pub(super) alike: (f64, usize),
+    pub(super) carried: Carried<N>,
     /// What the numbers at points weigh for the reach of a step, once that was asked for.
     pub(super) weights: Option<Weights>,
     /// The last step was made with all points at once.
     pub(super) is_of_points: bool,
-    /// The workspace does not hold the last step.
-    pub(super) skipped: bool,
-    /// Of a last step that was cut.
-    pub(super) pieces: Vec<Piece<N>>,
-    /// Where the last element has ended, if that was behind the node.
-    pub(super) ahead: Option<Ahead<N>>,
-    /// An element of the last step went over one of its nodes.
-    pub(super) passes_node: bool,
     /// Steps are cut at kinks, if there are any.
     pub(super) at_kinks: bool,
     /// What was asked for; what is in use may trust more.
@@ -111,20 +89,9 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
             model: self.model.clone(),
             table: self.table.clone(),
             control: self.control,
-            memory: self.memory.clone(),
-            numbers: self.numbers.clone(),
-            pivots: self.pivots.clone(),
-            impulses: self.impulses.clone(),
-            ends_only: self.ends_only,
-            propagator: self.propagator.clone(),
-            points: self.points.clone(),
-            alike: self.alike,
+            carried: self.carried.clone(),
             weights: self.weights.clone(),
             is_of_points: self.is_of_points,
-            skipped: self.skipped,
-            pieces: self.pieces.clone(),
-            ahead: self.ahead.clone(),
-            passes_node: self.passes_node,
             at_kinks: self.at_kinks,
             solve: self.solve,
             foreseen: self.foreseen.clone(),
@@ -178,27 +145,16 @@ where
             model,
             table,
             control,
-            memory: Memory::new(),
-            numbers: Vec::new(),
-            pivots: Vec::new(),
-            impulses: Vec::new(),
-            ends_only: false,
-            propagator: None,
-            points,
-            alike: (0.0, 0),
+            carried: Carried::at_rest(points),
             weights: None,
             is_of_points: false,
-            skipped: false,
-            pieces: Vec::new(),
-            ahead: None,
-            passes_node: false,
             at_kinks: false,
             solve: control.solve,
             foreseen: Foreseen::default(),
             extra: Vec::new(),
             backwards: None,
         };
-        if stepper.points.is_none() {
+        if stepper.carried.points.is_none() {
             stepper.make_room();
         }
         Ok(stepper)
@@ -206,8 +162,8 @@ where
 
     /// Memory for the tangent of an element, if there is none yet: megabytes for thirty coordinates, and no use while a fixed point contracts.
     pub(super) fn make_room(&mut self) {
-        if self.numbers.is_empty() {
-            (self.numbers, self.pivots) = self.room();
+        if self.carried.numbers.is_empty() {
+            (self.carried.numbers, self.carried.pivots) = self.room();
         }
     }
 
@@ -228,8 +184,8 @@ where
             ..self.control
         };
         let mut other = Self::sharing(model, self.table.element(), control)?;
-        (other.ends_only, other.at_kinks) = (self.ends_only, self.at_kinks);
-        other.memory.statistics = self.memory.statistics;
+        (other.carried.ends_only, other.at_kinks) = (self.carried.ends_only, self.at_kinks);
+        other.carried.memory.statistics = self.carried.memory.statistics;
         *self = other;
         Ok(())
     }
@@ -244,11 +200,9 @@ where
     /// Linear models with constant coefficients then step by a matrix, y₁ = y₀ + D y₀ + c, made after 2N + 1 steps of one length: a product of a
     /// 2N × 2N matrix and a vector a step. Afterwards the inside of an element costs a step of its own.
     #[must_use]
-    pub fn ends_only(self) -> Self {
-        Self {
-            ends_only: true,
-            ..self
-        }
+    pub fn ends_only(mut self) -> Self {
+        self.carried.ends_only = true;
+        self
     }
 
     /// Cuts steps where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the arguments of a `min` or `max` changes its sign, so that
@@ -285,11 +239,11 @@ where
     /// What the steps so far have cost.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
-        &self.memory.statistics
+        &self.carried.memory.statistics
     }
 
     /// The same since the last call.
     pub fn take_statistics(&mut self) -> Statistics {
-        core::mem::take(&mut self.memory.statistics)
+        core::mem::take(&mut self.carried.memory.statistics)
     }
 }

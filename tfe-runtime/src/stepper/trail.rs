@@ -16,10 +16,10 @@ where
             return;
         }
         let scheme = self.table.view();
-        if let Some(last) = &self.memory.last
+        if let Some(last) = &self.carried.memory.last
             && self.may_foresee()
         {
-            trail.push::<M, N>(&scheme, (last.t, last.h), &self.numbers);
+            trail.push::<M, N>(&scheme, (last.t, last.h), &self.carried.numbers);
         }
     }
 
@@ -34,6 +34,6 @@ where
     fn may_foresee(&self) -> bool {
         let element = self.table.element();
         let is_gauss = element == Element::mixed(element.nodes());
-        is_gauss && self.ahead.is_none() && self.pieces.is_empty()
+        is_gauss && self.carried.ahead.is_none() && self.carried.pieces.is_empty()
     }
 }

@@ -1,0 +1,53 @@
+//! What a stepper carries from step to step.
+
+use super::piece::{Ahead, Piece};
+use crate::method::{Impulse, Memory};
+use crate::points::Points;
+use crate::propagator::Propagator;
+use crate::registers::storage::Heap;
+use alloc::vec::Vec;
+
+/// The same whichever model it steps.
+#[derive(Clone, Debug)]
+pub(super) struct Carried<const N: usize> {
+    pub(super) memory: Memory<N>,
+    pub(super) numbers: Vec<f64>,
+    pub(super) pivots: Vec<usize>,
+    pub(super) impulses: Vec<Impulse<N>>,
+    /// Nobody asks for the inside of every element.
+    pub(super) ends_only: bool,
+    /// Of a linear model, once it has paid.
+    pub(super) propagator: Option<Propagator<N>>,
+    /// All points at once, where model and element allow it.
+    pub(super) points: Option<Points<N, Heap>>,
+    /// Steps of one length so far.
+    pub(super) alike: (f64, usize),
+    /// The workspace does not hold the last step.
+    pub(super) skipped: bool,
+    /// Of a last step that was cut.
+    pub(super) pieces: Vec<Piece<N>>,
+    /// Where the last element has ended, if that was behind the node.
+    pub(super) ahead: Option<Ahead<N>>,
+    /// An element of the last step went over one of its nodes.
+    pub(super) passes_node: bool,
+}
+
+impl<const N: usize> Carried<N> {
+    /// Nothing yet.
+    pub(super) fn at_rest(points: Option<Points<N, Heap>>) -> Self {
+        Self {
+            memory: Memory::new(),
+            numbers: Vec::new(),
+            pivots: Vec::new(),
+            impulses: Vec::new(),
+            ends_only: false,
+            propagator: None,
+            points,
+            alike: (0.0, 0),
+            skipped: false,
+            pieces: Vec::new(),
+            ahead: None,
+            passes_node: false,
+        }
+    }
+}
