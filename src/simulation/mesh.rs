@@ -321,6 +321,12 @@ impl Iterator for Elements<'_> {
         self.nth(0)
     }
 
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let steps: usize = self.segments.iter().map(|segment| segment.steps).sum();
+        let left = steps - self.done;
+        (left, Some(left))
+    }
+
     #[inline]
     fn nth(&mut self, mut left_out: usize) -> Option<Self::Item> {
         while let [segment, rest @ ..] = self.segments {
@@ -590,6 +596,12 @@ mod tests {
         let mesh = Mesh::<1>::new(&span, step, breaks, &[]).expect("a good mesh");
         let elements: Vec<_> = mesh.elements().collect();
         assert_eq!(elements.len(), mesh.steps());
+        for k in 0..=elements.len() {
+            let mut rest = mesh.elements();
+            assert_eq!(rest.size_hint().0, elements.len());
+            assert_eq!(rest.nth(k), elements.get(k).copied());
+            assert_eq!(rest.size_hint().0, elements.len().saturating_sub(k + 1));
+        }
         for pair in elements.windows(2) {
             assert_eq!(pair[0].1.to_bits(), pair[1].0.to_bits());
         }

@@ -60,7 +60,7 @@ where
 }
 
 /// Writes the transition matrix of one step of length h of a linear model without forces of its own, 2N × 2N, row by row, ordered (p, q): it is that of a step at rest at
-/// the origin, which need not be solved.
+/// the origin (T-30), which need not be solved.
 ///
 /// # Errors
 /// [`TransitionError`] if the element is none, its tangent is singular, or `matrix` is shorter than 4N².
