@@ -515,9 +515,8 @@ where
             let mut state = arc.before.clone();
             let mut inside = None;
             if length.abs() > resolution {
-                let before = |impulse: &&Impulse<N>| (impulse.time - t).abs() < length.abs();
-                let impulses: Vec<_> = arc.impulses.iter().filter(before).copied().collect();
-                M::advance(&mut probe, (t, length), &mut state, &impulses).ok()?;
+                let impulses = &arc.impulses[..acting::within(arc.impulses, t, length)];
+                M::advance(&mut probe, (t, length), &mut state, impulses).ok()?;
                 inside = Some(M::inside(&mut probe, None, (t, t + length)));
             }
             let guess = dense.velocity_at_time(t + length);
