@@ -24,6 +24,7 @@ mod section;
 mod sensitive;
 mod setup;
 mod steps;
+mod times;
 mod trail;
 mod watch;
 

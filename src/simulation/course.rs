@@ -1,6 +1,6 @@
 //! Step after step until one fails: what the endless sequences of both kinds of models have in common.
 
-use super::mesh::Endless;
+use super::times::Endless;
 use crate::error::RunErrorKind;
 
 /// A stepper on its way, or the error that it ended with, until that is told.

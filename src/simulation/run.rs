@@ -3,12 +3,13 @@
 use super::events::Events;
 use super::follow::Follower;
 use super::kind::{Chosen, Simulated};
-use super::mesh::{Endless, Mesh};
+use super::mesh::Mesh;
 use super::pieces::{Broken, Left, Pieces, Planned};
 use super::progress;
 use super::recorder::Recorder;
 use super::setup::Simulation;
 use super::steps::{Beginning, Steps};
+use super::times::Endless;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::Length;
 use crate::motion::{Checkpoint, Motion, Reached};

@@ -3,8 +3,8 @@
 use super::course::{Course, Leg};
 use super::follow::Follow;
 use super::kind::Simulated;
-use super::mesh::Endless;
 use super::pieces::{Left, Observe, Piece, Pieces, Planned, Side};
+use super::times::Endless;
 use super::watch::resolution::{Again, Examined, Resolution};
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;

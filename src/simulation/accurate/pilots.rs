@@ -1,6 +1,7 @@
 //! Two elements over the same steps, for a pilot run.
 
-use super::super::mesh::{Mesh, up_to_break};
+use super::super::mesh::Mesh;
+use super::super::times::up_to_break;
 use super::repeatable::Repeatable;
 use super::runs::MOST_ITERATIONS;
 use crate::accuracy::{Course, Pair, Trace, next};

@@ -1,7 +1,8 @@
 //! Models of run-time length.
 
 use super::super::checks::{check_finite, conserves_energies};
-use super::super::mesh::{Grid, Mesh, is_same};
+use super::super::mesh::{Grid, Mesh};
+use super::super::times::is_same;
 use super::super::watch::Watch;
 use super::super::watch::resolution::{Again, Examined, Resolution};
 use super::{Chosen, Simulated, second};

@@ -1,0 +1,434 @@
+//! When elements begin and end: equal steps between breaks, or between given nodes.
+
+use crate::error::RunErrorKind;
+use std::ops::Range;
+
+/// Times between two breaks, cut into equal steps; the last one may be shorter.
+#[derive(Clone, Debug, PartialEq)]
+struct Segment {
+    start: f64,
+    end: f64,
+    /// Signed.
+    step: f64,
+    steps: usize,
+    /// Whether the last step is as long as the others.
+    whole: bool,
+    /// Whether it begins and ends at a break.
+    at_break: (bool, bool),
+}
+
+/// Refuses a span that is none, and a step with which it cannot be cut.
+pub(super) fn check_span(span: &Range<f64>, step: f64) -> Result<(), RunErrorKind> {
+    let Range { start, end } = *span;
+    if !(start.is_finite() && end.is_finite()) {
+        return Err(RunErrorKind::Span { start, end });
+    }
+    if !(step.is_finite() && step != 0.0) && start != end {
+        return Err(RunErrorKind::Step { step });
+    }
+    Ok(())
+}
+
+/// One, or minus one where a run goes back in time.
+pub(super) fn direction_of(span: &Range<f64>) -> f64 {
+    if span.end < span.start { -1.0 } else { 1.0 }
+}
+
+/// When the elements of a span begin and end, whatever they are of.
+#[derive(Clone, Debug)]
+pub(super) struct Times {
+    segments: Vec<Segment>,
+    /// One, or minus one where the run goes back in time.
+    pub(super) direction: f64,
+    has_breaks: bool,
+}
+
+impl Times {
+    /// Steps of size `|step|` that end at every break inside the span.
+    pub(super) fn new(span: &Range<f64>, step: f64, breaks: &[f64]) -> Result<Self, RunErrorKind> {
+        let Range { start, end } = *span;
+        let direction = direction_of(span);
+        let within = |time: f64| {
+            direction * start <= direction * time && direction * time <= direction * end
+        };
+        let is_inside = |&time: &f64| within(time) && !is_same(time, start) && !is_same(time, end);
+        let mut cuts: Vec<f64> = breaks.iter().copied().filter(is_inside).collect();
+        sort(&mut cuts, direction);
+        cuts.dedup_by(|a, b| is_same(*a, *b));
+        let mut segments = Vec::new();
+        let mut from = start;
+        for to in cuts.into_iter().chain([end]) {
+            if to != from {
+                let mut segment = Segment::new(from, to, direction * step.abs())?;
+                segment.at_break = (from != start, to != end);
+                segments.push(segment);
+            }
+            from = to;
+        }
+        let is_at = |time: f64| breaks.iter().any(|one| is_same(*one, time));
+        if let Some(first) = segments.first_mut() {
+            first.at_break.0 = is_at(start);
+        }
+        if let Some(last) = segments.last_mut() {
+            last.at_break.1 = is_at(end);
+        }
+        Ok(Self {
+            segments,
+            direction,
+            has_breaks: !breaks.is_empty(),
+        })
+    }
+
+    /// The parts between `cuts`, each in equal steps of at most `step`. Some of the cuts may be `breaks`.
+    pub(super) fn even(cuts: &[f64], step: f64, breaks: &[f64]) -> Result<Self, RunErrorKind> {
+        let (start, end) = ends(cuts);
+        let direction = direction_of(&(start..end));
+        let mut breaks = breaks.to_vec();
+        sort(&mut breaks, direction);
+        // Elsewhere nothing may be lost: a rounding at each of many cuts would add up.
+        let is_break = |time: f64| is_among(&breaks, time, direction);
+        let segment = |pair: &[f64]| {
+            let steps = ((pair[1] - pair[0]).abs() / step).ceil().max(1.0);
+            let mut segment = Segment::new(pair[0], pair[1], (pair[1] - pair[0]) / steps)?;
+            segment.at_break = (is_break(pair[0]), is_break(pair[1]));
+            Ok(segment)
+        };
+        Ok(Self {
+            segments: cuts
+                .windows(2)
+                .map(segment)
+                .collect::<Result<_, RunErrorKind>>()?,
+            direction,
+            has_breaks: !breaks.is_empty(),
+        })
+    }
+
+    /// The elements between nodes that begin and end with the span, cut at every break besides.
+    pub(super) fn through(
+        span: &Range<f64>,
+        nodes: &[f64],
+        breaks: &[f64],
+    ) -> Result<Self, RunErrorKind> {
+        let Range { start, end } = *span;
+        let direction = direction_of(span);
+        let has_breaks = !breaks.is_empty();
+        // A span of roundings is none.
+        Self::new(span, end - start, &[])?;
+        check_nodes(span, nodes, direction)?;
+        let mut nodes = nodes.to_vec();
+        let ahead =
+            |time: &f64| direction * start < direction * time && direction * time < direction * end;
+        let mut breaks: Vec<f64> = breaks.iter().copied().filter(ahead).collect();
+        sort(&mut breaks, direction);
+        breaks.dedup_by(|a, b| is_same(*a, *b));
+        let is_new = |time: &&f64| !is_among(&nodes, **time, direction);
+        let new: Vec<f64> = breaks.iter().filter(is_new).copied().collect();
+        nodes.extend(new);
+        sort(&mut nodes, direction);
+        nodes.dedup();
+        let mut segments = single_steps(&nodes);
+        for segment in &mut segments {
+            let Segment { start, end, .. } = *segment;
+            segment.at_break = (
+                is_among(&breaks, start, direction),
+                is_among(&breaks, end, direction),
+            );
+            segment.check_resolution()?;
+        }
+        Ok(Self {
+            segments,
+            direction,
+            has_breaks,
+        })
+    }
+
+    /// The end of the last element.
+    pub(super) fn end(&self) -> Option<f64> {
+        self.segments.last().map(|segment| segment.end)
+    }
+
+    /// Start, end and length of each element. One ends where the next one starts, to the bit; lengths are equal to the bit, which differences of times
+    /// are not, so that what was factored for one element serves the next.
+    pub(super) fn elements(&self) -> Elements<'_> {
+        Elements {
+            segments: &self.segments,
+            done: 0,
+        }
+    }
+
+    /// Where the force is first felt in the element that begins at `t` and has the length `h`: at `t`, or beyond it by roundings where that is a break, so that an
+    /// element with a point at its start finds the force after the break there.
+    pub(super) fn begin(&self, t: f64, h: f64) -> f64 {
+        if !self.has_breaks {
+            return t;
+        }
+        let is_before = |segment: &Segment| self.direction * segment.start < self.direction * t;
+        let segment = self.segments.get(self.segments.partition_point(is_before));
+        match segment {
+            Some(segment) if segment.start == t && segment.at_break.0 => t + rounding(t, h),
+            _ => t,
+        }
+    }
+}
+
+/// Elements one after the other: [`Times::elements`].
+#[derive(Clone)]
+pub(crate) struct Elements<'a> {
+    /// With those to come.
+    segments: &'a [Segment],
+    /// Elements of the first of them that are behind.
+    done: usize,
+}
+
+impl ExactSizeIterator for Elements<'_> {}
+
+impl Iterator for Elements<'_> {
+    type Item = (f64, f64, f64);
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        self.nth(0)
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let steps: usize = self.segments.iter().map(|segment| segment.steps).sum();
+        let left = steps - self.done;
+        (left, Some(left))
+    }
+
+    #[inline]
+    fn nth(&mut self, mut left_out: usize) -> Option<Self::Item> {
+        while let [segment, rest @ ..] = self.segments {
+            let k = self.done;
+            if left_out < segment.steps - k {
+                let k = k + left_out;
+                self.done = k + 1;
+                return Some((segment.node(k), segment.node(k + 1), segment.length(k)));
+            }
+            left_out -= segment.steps - k;
+            (self.segments, self.done) = (rest, 0);
+        }
+        None
+    }
+}
+
+/// The elements of a run without an end.
+#[derive(Clone, Debug)]
+pub(crate) struct Endless {
+    /// Up to the last break, and a last one beyond it.
+    segments: Vec<Segment>,
+    segment: usize,
+    /// Elements of this segment that are behind.
+    done: usize,
+}
+
+impl Endless {
+    pub(crate) fn new(start: f64, step: f64, breaks: &[f64]) -> Result<Self, RunErrorKind> {
+        if !(step.is_finite() && step != 0.0) {
+            return Err(RunErrorKind::Step { step });
+        }
+        let direction = step.signum();
+        let is_ahead = |time: &f64| {
+            time.is_finite() && direction * start < direction * time && !is_same(*time, start)
+        };
+        let mut ahead: Vec<f64> = breaks.iter().copied().filter(is_ahead).collect();
+        sort(&mut ahead, direction);
+        let last = ahead.last().copied().unwrap_or(start);
+        let span = start..last;
+        check_span(&span, step)?;
+        let mut segments = Times::new(&span, step, breaks)?.segments;
+        segments.push(Segment {
+            start: last,
+            end: direction * f64::INFINITY,
+            step,
+            steps: usize::MAX,
+            whole: true,
+            at_break: (breaks.iter().any(|one| is_same(*one, last)), false),
+        });
+        Ok(Self {
+            segments,
+            segment: 0,
+            done: 0,
+        })
+    }
+
+    /// Start, end and length of the next element, and where the force is first felt in it.
+    pub(crate) fn element(&self) -> (f64, f64, f64, f64) {
+        let (segment, k) = (&self.segments[self.segment], self.done);
+        let (t, next, h) = (segment.node(k), segment.node(k + 1), segment.length(k));
+        let is_after_break = segment.at_break.0 && k == 0;
+        let begin = if is_after_break {
+            t + rounding(t, h)
+        } else {
+            t
+        };
+        (t, next, h, begin)
+    }
+
+    pub(crate) fn advance(&mut self) {
+        self.done += 1;
+        if self.done == self.segments[self.segment].steps {
+            (self.segment, self.done) = (self.segment + 1, 0);
+        }
+    }
+}
+
+pub(super) fn ends(times: &[f64]) -> (f64, f64) {
+    match times {
+        [start, .., end] => (*start, *end),
+        _ => (0.0, 0.0),
+    }
+}
+
+/// The length of an element that ends at a break: shorter by roundings, so that an element with a point at its end finds the force before the break there.
+pub(crate) fn up_to_break(start: f64, end: f64) -> f64 {
+    (end - start) - rounding(end, end - start)
+}
+
+/// Whether two times are one but for rounding.
+pub(super) fn is_same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 8.0 * f64::EPSILON * a.abs().max(b.abs())
+}
+
+/// Whether a time is one of some in the order of a run, but for rounding.
+fn is_among(times: &[f64], time: f64, direction: f64) -> bool {
+    let after = times.partition_point(|one| direction * one < direction * time);
+    let near = &times[after.saturating_sub(1)..times.len().min(after + 1)];
+    near.iter().any(|one| is_same(*one, time))
+}
+
+/// Some roundings of the time, in the direction of the run.
+fn rounding(t: f64, h: f64) -> f64 {
+    h.signum() * 4.0 * f64::EPSILON * t.abs().max(h.abs())
+}
+
+/// Refuses nodes that are not those of a run over the span.
+fn check_nodes(span: &Range<f64>, nodes: &[f64], direction: f64) -> Result<(), RunErrorKind> {
+    let Range { start, end } = *span;
+    let follows = |k: usize| k == 0 || direction * nodes[k - 1] < direction * nodes[k];
+    let bad = (0..nodes.len()).find(|&k| !(nodes[k].is_finite() && follows(k)));
+    if let Some(node) = bad {
+        let time = nodes[node];
+        return Err(RunErrorKind::NodeOrder { node, time });
+    }
+    let (first, last) = (nodes.first().copied(), nodes.last().copied());
+    if (first, last) == (Some(start), Some(end)) {
+        Ok(())
+    } else {
+        Err(RunErrorKind::NodeEnds {
+            first,
+            last,
+            start,
+            end,
+        })
+    }
+}
+
+/// A segment for each element. Where lengths in a row differ by roundings alone they are made equal to the bit, without changing their sum.
+fn single_steps(nodes: &[f64]) -> Vec<Segment> {
+    let mut segments: Vec<Segment> = Vec::with_capacity(nodes.len().saturating_sub(1));
+    let mut from = 0;
+    while from + 1 < nodes.len() {
+        let first = nodes[from + 1] - nodes[from];
+        let alike = |pair: &&[f64]| {
+            let rounding = 2.0 * f64::EPSILON * pair[0].abs().max(pair[1].abs());
+            (pair[1] - pair[0] - first).abs() <= 2.0 * rounding
+        };
+        let count = nodes[from..].windows(2).take_while(alike).count().max(1);
+        let step = (nodes[from + count] - nodes[from]) / count as f64;
+        segments.extend(nodes[from..=from + count].windows(2).map(|pair| Segment {
+            start: pair[0],
+            end: pair[1],
+            step,
+            steps: 1,
+            whole: true,
+            at_break: (false, false),
+        }));
+        from += count;
+    }
+    segments
+}
+
+impl Segment {
+    /// A count of steps beyond this is a mistake in units rather than a run: it would take years.
+    const MOST_STEPS: f64 = 1e15;
+
+    /// A step of fewer roundings of the time has points that share times.
+    const LEAST_ROUNDINGS: f64 = 64.0;
+
+    fn new(start: f64, end: f64, step: f64) -> Result<Self, RunErrorKind> {
+        let ratio = (end - start) / step;
+        if !(ratio <= Self::MOST_STEPS) {
+            return Err(RunErrorKind::TooManySteps {
+                span: end - start,
+                step,
+            });
+        }
+        // 10 / 0.01 is 1000 steps although the quotient may be 1000.0000000000001.
+        let nearest = ratio.round();
+        let whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0);
+        let steps = if whole { nearest } else { ratio.ceil() }.max(1.0);
+        // A step that leads to the end but for rounding stays as it was given, so that runs to different ends have the same nodes.
+        let rounding = 4.0 * f64::EPSILON * start.abs().max(end.abs());
+        let is_exact = ((end - start) - steps * step).abs() <= rounding;
+        let step = if whole && !is_exact {
+            (end - start) / steps
+        } else {
+            step
+        };
+        let segment = Self {
+            start,
+            end,
+            step,
+            steps: steps as usize,
+            whole,
+            at_break: (false, false),
+        };
+        segment.check_resolution()?;
+        Ok(segment)
+    }
+
+    /// Refuses steps that are roundings of the time: nodes would share times, and points of an element, too.
+    fn check_resolution(&self) -> Result<(), RunErrorKind> {
+        let time = self.start.abs().max(self.end.abs());
+        let least = Self::LEAST_ROUNDINGS * f64::EPSILON * time;
+        if self.step.abs() < least {
+            return Err(RunErrorKind::StepUnresolved {
+                time,
+                step: self.step,
+                least,
+            });
+        }
+        Ok(())
+    }
+
+    /// The length of the k-th element.
+    fn length(&self, k: usize) -> f64 {
+        let mut length = if self.whole || k + 1 < self.steps {
+            self.step
+        } else {
+            self.end - self.node(k)
+        };
+        if self.at_break.0 && k == 0 {
+            length -= rounding(self.start, length);
+        }
+        if self.at_break.1 && k + 1 == self.steps {
+            length -= rounding(self.end, length);
+        }
+        length
+    }
+
+    /// The k-th node: a product, not a sum, and the end of the segment exactly.
+    fn node(&self, k: usize) -> f64 {
+        if k == self.steps {
+            self.end
+        } else {
+            self.start + k as f64 * self.step
+        }
+    }
+}
+
+/// Puts times in the order in which a run meets them. Not generic, so that it is compiled once.
+fn sort(times: &mut [f64], direction: f64) {
+    times.sort_by(|a, b| (direction * a).total_cmp(&(direction * b)));
+}
