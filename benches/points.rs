@@ -58,6 +58,21 @@ struct Friction {
 )]
 struct Logarithms {}
 
+/// A central force of any power of the distance.
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + (x^2 + y^2)^(-k/2))]
+struct Power {
+    k: f64,
+}
+
+/// A spring wound about an axis.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - k/2*atan2(y, x)^2 - (x^2 + y^2)/2,
+)]
+struct WoundSpring {
+    k: f64,
+}
+
 const STEPS: u32 = 2_000;
 const ELEMENT: Element = Mixed::<9>.element();
 
@@ -157,5 +172,10 @@ fn main() -> Result<(), Failure> {
     let friction = Friction { mu: 0.1, eps: 0.5 };
     measure("friction", &friction, friction.state([1.0], [0.0]), 0.05)?;
     let start = Logarithms {}.state([0.5, 0.0], [0.0, 0.5]);
-    measure("logarithms", &Logarithms {}, start, 0.1)
+    measure("logarithms", &Logarithms {}, start, 0.1)?;
+    let power = Power { k: 1.3 };
+    measure("power", &power, power.state([1.0, 0.0], [0.0, 0.9]), 0.1)?;
+    let wound = WoundSpring { k: 1.0 };
+    let start = wound.state([1.0, 0.5], [0.0, 0.2]);
+    measure("wound spring", &wound, start, 0.1)
 }

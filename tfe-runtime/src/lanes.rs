@@ -1,8 +1,8 @@
 //! Numbers that kernels compute with: single ones, and several side by side.
 
-use crate::exponential;
 use crate::real::{Real, integer_power};
 use crate::trigonometry;
+use crate::{arctangent, exponential};
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// W numbers side by side: one kernel evaluates W instants, or W trajectories, at once.
@@ -58,17 +58,17 @@ impl<const W: usize> SubAssign for Lanes<W> {
 /// The elementary functions of `f64` and `f32`: from `std`, or from `libm` without it.
 macro_rules! elementary {
     (
-        in lanes { $($own:ident = $own_std:ident, $own_libm:ident, $own_libm32:ident;)* }
+        in lanes { $($own:ident($($other:ident),*) = $own_std:ident, $own_libm:ident, $own_libm32:ident of $module:ident;)* }
         lane by lane { $($name:ident($($argument:ident),*) = $std:ident, $libm:ident, $libm32:ident;)* }
     ) => {
         impl Real for f64 {
             scalar_items!(f64);
             $(#[inline]
-            fn $own(self) -> Self {
+            fn $own(self $(, $other: Self)*) -> Self {
                 #[cfg(feature = "std")]
-                { f64::$own_std(self) }
+                { f64::$own_std(self $(, $other)*) }
                 #[cfg(not(feature = "std"))]
-                { libm::$own_libm(self) }
+                { libm::$own_libm(self $(, $other)*) }
             })*
             $(#[inline]
             fn $name(self $(, $argument: Self)*) -> Self {
@@ -89,11 +89,11 @@ macro_rules! elementary {
         impl Real for f32 {
             scalar_items!(f32);
             $(#[inline]
-            fn $own(self) -> Self {
+            fn $own(self $(, $other: Self)*) -> Self {
                 #[cfg(feature = "std")]
-                { f32::$own_std(self) }
+                { f32::$own_std(self $(, $other)*) }
                 #[cfg(not(feature = "std"))]
-                { libm::$own_libm32(self) }
+                { libm::$own_libm32(self $(, $other)*) }
             })*
             $(#[inline]
             fn $name(self $(, $argument: Self)*) -> Self {
@@ -122,8 +122,8 @@ macro_rules! elementary {
                 Self(trigonometry::cos(&self.0))
             }
             $(#[inline]
-            fn $own(self) -> Self {
-                Self(exponential::$own(&self.0))
+            fn $own(self $(, $other: Self)*) -> Self {
+                Self($module::$own(&self.0 $(, &$other.0)*))
             })*
             $(lane_function!($name $($argument)*);)*
         }
@@ -328,16 +328,17 @@ macro_rules! lane_items {
 
 elementary! {
     in lanes {
-        exp = exp, exp, expf;
-        ln = ln, log, logf;
-        tanh = tanh, tanh, tanhf;
+        exp() = exp, exp, expf of exponential;
+        ln() = ln, log, logf of exponential;
+        tanh() = tanh, tanh, tanhf of exponential;
+        powf(exponent) = powf, pow, powf of exponential;
+        atan() = atan, atan, atanf of arctangent;
+        atan2(x) = atan2, atan2, atan2f of arctangent;
     }
     lane by lane {
         tan() = tan, tan, tanf;
         asin() = asin, asin, asinf;
         acos() = acos, acos, acosf;
-        atan() = atan, atan, atanf;
-        atan2(x) = atan2, atan2, atan2f;
         sinh() = sinh, sinh, sinhf;
         cosh() = cosh, cosh, coshf;
         asinh() = asinh, asinh, asinhf;
@@ -345,7 +346,6 @@ elementary! {
         atanh() = atanh, atanh, atanhf;
         sqrt() = sqrt, sqrt, sqrtf;
         hypot(other) = hypot, hypot, hypotf;
-        powf(exponent) = powf, pow, powf;
     }
 }
 

@@ -14,6 +14,7 @@
 #[cfg(feature = "alloc")]
 extern crate alloc;
 
+mod arctangent;
 #[cfg(feature = "alloc")]
 mod backwards;
 pub mod basis;

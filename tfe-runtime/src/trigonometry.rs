@@ -122,6 +122,22 @@ pub(crate) fn replace_outside<const W: usize>(
     }
 }
 
+/// Puts a function of two arguments where one of two numbers is outside of its limits.
+#[inline(always)]
+pub(crate) fn replace_outside_of_two<const W: usize>(
+    [(first, (low, high)), (second, (least, most))]: [(&[f64; W], (f64, f64)); 2],
+    (x, y): (&[f64; W], &[f64; W]),
+    values: &mut [f64; W],
+    function: impl Fn(f64, f64) -> f64,
+) {
+    for lane in 0..W {
+        let (first, second) = (first[lane], second[lane]);
+        if !(low <= first && first <= high && least <= second && second <= most) {
+            values[lane] = function(x[lane], y[lane]);
+        }
+    }
+}
+
 /// sin x and cos x of W numbers.
 #[inline]
 pub(crate) fn sin_cos<const W: usize>(x: &[f64; W]) -> ([f64; W], [f64; W]) {

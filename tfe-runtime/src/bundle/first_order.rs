@@ -66,13 +66,13 @@ where
             Some(projection) => &projection.position,
         };
         apply(like, to_positions, rates, products);
+        let mut first = no_derivatives(like);
         for l in 0..points {
             let mut q = start_q;
             for a in 0..N {
                 q[a] += h * like.with(products[l][a]) + like.with(low_position[l][a]);
             }
             let v = load(like, &rates[l]);
-            let mut first = no_derivatives(like);
             let t = like.like(self.t + self.h * nodes[l]);
             if const { !M::FACTS.constant_mass } && refresh {
                 let mut mass = [[zero; N]; N];
@@ -184,13 +184,13 @@ where
         let none = Largest::none(like);
         let (mut force_changed, mut force_size) = (none, none);
         let (mut rate_changed, mut rate_size) = (none, none);
+        let mut first = no_derivatives(like);
         for l in 0..points {
             let mut q = start_q;
             for a in 0..N {
                 q[a] += h * like.with(products[l][a]) + like.with(low_position[l][a]);
             }
             let p = load(like, &momenta[l]);
-            let mut first = no_derivatives(like);
             let t = like.like(self.t + self.h * nodes[l]);
             if const { !M::FACTS.constant_mass } && refresh {
                 let mut mass = [[zero; N]; N];

@@ -137,6 +137,7 @@ where
         let products = &work.products[..points];
         let more_products = &work.more_products[..points];
         let nodes = &self.tables.nodes.as_flattened()[..points];
+        let mut first = no_derivatives(like);
         for l in 0..points {
             let (mut q, mut z) = (load(like, &drift[l]), [zero; N]);
             if self.inertia.diagonal.is_some() {
@@ -161,7 +162,6 @@ where
                     z[a] = start_z[a] + h * rate[a];
                 }
             }
-            let mut first = no_derivatives(like);
             let t = like.like(self.t + self.h * nodes[l]);
             self.model.first_inline(t, &q, &z, &mut first);
             for a in 0..N {

@@ -1,6 +1,6 @@
 //! M q̈ = f(q, q̇): forces are the only unknowns.
 
-use super::sweep::{Magnitude, larger, no_derivatives};
+use super::sweep::{Evaluation, Magnitude, larger};
 use super::{Leg, Work};
 use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
@@ -90,6 +90,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         like: V,
         model: &M,
         leg: &Leg<'_, N, S>,
+        at: &mut Evaluation<'_, V, N>,
     ) -> Increment
     where
         M: Model<N>,
@@ -99,7 +100,6 @@ impl<const N: usize, S: Storage> Work<N, S> {
         }
         let (h, square) = (like.like(leg.h), like.like(leg.h * leg.h));
         let (mut changed, mut size) = (Magnitude::none(like), Magnitude::none(like));
-        let zero = like.like(0.0);
         let count = self.forces.len();
         let forces = &mut self.forces[..count];
         let products = &self.products[..count];
@@ -107,17 +107,15 @@ impl<const N: usize, S: Storage> Work<N, S> {
         let drift = &self.drift[..count];
         let nodes = &leg.tables.nodes[..count];
         for c in 0..count {
-            let moved = if leg.inertia.diagonal.is_some() {
-                leg.inertia
-                    .moved::<V, true>(square, &products[c], &drift[c])
+            let Evaluation { q, z, first } = at;
+            let (start, far) = (&leg.start.q, (&products[c], &drift[c]));
+            if leg.inertia.diagonal.is_some() {
+                (leg.inertia).positions::<V, true>(square, start, far, q);
             } else {
-                leg.inertia
-                    .moved::<V, false>(square, &products[c], &drift[c])
-            };
-            let (mut q, mut z) = ([zero; N], [zero; N]);
-            for a in 0..N {
-                q[a] = like.like(leg.start.q[a]) + moved[a];
-                if const { M::FACTS.forced } {
+                (leg.inertia).positions::<V, false>(square, start, far, q);
+            }
+            if const { M::FACTS.forced } {
+                for a in 0..N {
                     z[a] = match M::FORM {
                         Form::Lagrangian => {
                             let rate = leg.inertia.row(like, &more_products[c], a);
@@ -131,8 +129,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
                 }
             }
             let t = like.like(leg.t) + h * like.with(nodes[c]);
-            let mut first = no_derivatives(like);
-            V::first(model, t, &q, &z, &mut first);
+            V::first(model, t, q, z, first);
             for a in 0..N {
                 let given = match M::FORM {
                     Form::Lagrangian => first.q[a],

@@ -1,12 +1,13 @@
 //! A step of one trajectory: start of the iteration, the iteration, the end.
 
+use super::sweep::{Evaluation, no_derivatives};
 use super::{Leg, Outcome, Points, Together, Work, is_finite, is_phase, is_second_order, largest};
 use crate::error::StepError;
 use crate::method::{Last, Memory};
 use crate::model::{Model, State};
 use crate::newton::{Asked, Control, Monitor, PATIENCE, Solve, Verdict};
 use crate::registers::four::Four;
-use crate::registers::storage::Storage;
+use crate::registers::storage::{List, Storage};
 use crate::scheme;
 use crate::statistics::Contraction;
 
@@ -220,14 +221,21 @@ where
         } else if !is_rough {
             work.set_low(like, &leg);
         }
+        let zero = [like.like(0.0); N];
+        let (mut q, mut z, mut first) = (zero, zero, no_derivatives(like));
+        let mut at = Evaluation {
+            q: &mut q,
+            z: &mut z,
+            first: &mut first,
+        };
         while iterations < most {
             // Constant conditions, so that of the three iterations one is compiled.
             let increment = if const { is_second_order::<M, N>() } {
-                work.sweep_second_order::<V, M>(like, model, &leg)
+                work.sweep_second_order::<V, M>(like, model, &leg, &mut at)
             } else if const { is_phase::<M, N>() } {
-                work.sweep_phase::<V, M>(like, model, &leg, iterations == 0, refresh)
+                work.sweep_phase::<V, M>(like, model, &leg, &mut at, iterations == 0, refresh)
             } else {
-                work.sweep_velocity::<V, M>(like, model, &leg, refresh)
+                work.sweep_velocity::<V, M>(like, model, &leg, &mut at, refresh)
             };
             iterations += 1;
             match monitor.judge(increment) {
@@ -266,8 +274,8 @@ where
             };
             if is_finite(&state) {
                 // What a failed step would have to start from is kept until here.
-                core::mem::swap(&mut points.forces, &mut work.forces);
-                core::mem::swap(&mut points.rates, &mut work.rates);
+                points.forces.take(&mut work.forces);
+                points.rates.take(&mut work.rates);
                 points.velocity = work.velocity;
                 Ok((state, low))
             } else {

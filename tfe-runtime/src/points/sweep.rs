@@ -130,6 +130,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         like: V,
         model: &M,
         leg: &Leg<'_, N, S>,
+        at: &mut Evaluation<'_, V, N>,
         refresh: bool,
     ) -> Increment
     where
@@ -152,7 +153,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
             Some(projection) => projection.position.apply(like, rates, products),
         }
         for c in 0..count {
-            let (mut q, mut v) = ([zero; N], [zero; N]);
+            let Evaluation { q, z: v, first } = at;
             for a in 0..N {
                 let low = like.with(low_position[c][a]);
                 let moved = h.times_plus(like.with(products[c][a]), low);
@@ -160,14 +161,13 @@ impl<const N: usize, S: Storage> Work<N, S> {
                 v[a] = like.with(rates[c][a]);
             }
             let t = like.like(leg.t) + h * like.with(nodes[c]);
-            let mut first = no_derivatives(like);
             if const { !M::FACTS.constant_mass } && refresh {
                 let mut mass = [[zero; N]; N];
-                V::first_and_mass(model, t, &q, &v, &mut first, &mut mass);
+                V::first_and_mass(model, t, q, v, first, &mut mass);
                 factor(like, &mut mass);
                 store(&mut masses[c], &mass);
             } else {
-                V::first(model, t, &q, &v, &mut first);
+                V::first(model, t, q, v, first);
             }
             for a in 0..N {
                 momenta[c][a] = (first.z[a] - like.like(leg.start.p[a])).lanes();
@@ -232,6 +232,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         like: V,
         model: &M,
         leg: &Leg<'_, N, S>,
+        at: &mut Evaluation<'_, V, N>,
         is_first: bool,
         refresh: bool,
     ) -> Increment
@@ -280,7 +281,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         let (mut force_changed, mut force_size) = (none, none);
         let (mut rate_changed, mut rate_size) = (none, none);
         for c in 0..count {
-            let (mut q, mut p) = ([zero; N], [zero; N]);
+            let Evaluation { q, z: p, first } = at;
             for a in 0..N {
                 let low = like.with(low_position[c][a]);
                 let moved = h.times_plus(like.with(products[c][a]), low);
@@ -288,13 +289,12 @@ impl<const N: usize, S: Storage> Work<N, S> {
                 p[a] = like.with(momenta[c][a]);
             }
             let t = like.like(leg.t) + h * like.with(nodes[c]);
-            let mut first = no_derivatives(like);
             if const { !M::FACTS.constant_mass } && refresh {
                 let mut mass = [[zero; N]; N];
-                V::first_and_mass(model, t, &q, &p, &mut first, &mut mass);
+                V::first_and_mass(model, t, q, p, first, &mut mass);
                 store(&mut masses[c], &mass);
             } else {
-                V::first(model, t, &q, &p, &mut first);
+                V::first(model, t, q, p, first);
             }
             for a in 0..N {
                 let force = first.force[a] - first.q[a];
@@ -364,24 +364,24 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         product
     }
 
-    /// How far four points have moved: drift + h² M⁻¹ · products.
+    /// Coordinates at four points: start + drift + h² M⁻¹ · products.
     #[inline(always)]
-    pub(super) fn moved<V: Four, const DIAGONAL: bool>(
+    pub(super) fn positions<V: Four, const DIAGONAL: bool>(
         &self,
         square: V,
-        products: &Row<N>,
-        drift: &Row<N>,
-    ) -> [V; N] {
-        let mut moved = [square; N];
+        start: &[f64; N],
+        (products, drift): (&Row<N>, &Row<N>),
+        q: &mut [V; N],
+    ) {
         for a in 0..N {
             let rate = if const { DIAGONAL } {
                 square.like(self.inverse_diagonal[a]) * square.with(products[a])
             } else {
                 self.row(square, products, a)
             };
-            moved[a] = square.times_plus(rate, square.with(drift[a]));
+            let moved = square.times_plus(rate, square.with(drift[a]));
+            q[a] = square.like(start[a]) + moved;
         }
-        moved
     }
 
     /// One line of it times the numbers at four points.
@@ -420,6 +420,14 @@ fn store<V: Four, const N: usize>(to: &mut [Row<N>; N], matrix: &[[V; N]; N]) {
             to[a][b] = matrix[a][b].lanes();
         }
     }
+}
+
+/// Where a kernel is evaluated, and what it writes there. Entries that are always zero are never written, so one serves for all points of a step: with many coordinates it takes as
+/// long to fill them with zeros as to evaluate a kernel.
+pub(super) struct Evaluation<'a, V, const N: usize> {
+    pub(super) q: &'a mut [V; N],
+    pub(super) z: &'a mut [V; N],
+    pub(super) first: &'a mut First<V, N>,
 }
 
 #[inline(always)]

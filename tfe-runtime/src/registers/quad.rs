@@ -2,7 +2,7 @@
 //!
 //! The operations are those of IEEE 754, so that a kernel gives the same digits as with plain numbers. Products with tables and the polynomials of sines and exponentials are fused with
 //! the sums that follow, and so they are without these registers ([`fused`](crate::real::fused)), where that is a call of a function on old processors; sine
-//! and cosine are those of [`trigonometry`](crate::trigonometry), exponential, logarithm and hyperbolic tangent those of [`exponential`](crate::exponential). Code that computes with these numbers has to be compiled for that
+//! and cosine are those of [`trigonometry`](crate::trigonometry), exponential, logarithm, hyperbolic tangent and power those of [`exponential`](crate::exponential), angles those of [`arctangent`](crate::arctangent). Code that computes with these numbers has to be compiled for that
 //! instruction set, hence everything is written into the place of its call, and the outermost call goes through [`pulp`].
 
 use crate::real::Real;
@@ -70,6 +70,28 @@ macro_rules! register {
                 let (x, mut found) = (self.lanes(), found.lanes());
                 crate::trigonometry::replace_outside(&x, &mut found, limits, function);
                 self.with(found)
+            }
+
+            /// What was found where two numbers are within limits, and a function of the lanes that are outside.
+            #[inline(always)]
+            fn or_by_lanes_of_two(
+                self,
+                other: Self,
+                found: Self,
+                [(first, limits), (second, more_limits)]: [(Self, (f64, f64)); 2],
+                function: impl Fn(f64, f64) -> f64,
+            ) -> Self {
+                if first.is_within(limits) & second.is_within(more_limits) {
+                    return found;
+                }
+                let mut values = found.lanes();
+                crate::trigonometry::replace_outside_of_two(
+                    [(&first.lanes(), limits), (&second.lanes(), more_limits)],
+                    (&self.lanes(), &other.lanes()),
+                    &mut values,
+                    function,
+                );
+                self.with(values)
             }
 
             #[inline(always)]
@@ -219,8 +241,28 @@ macro_rules! register {
             }
 
             crate::registers::quad::lane_by_lane! {
-                tan(); asin(); acos(); atan(); atan2(x); sinh(); cosh(); asinh(); acosh(); atanh(); hypot(other);
-                powf(exponent);
+                tan(); asin(); acos(); sinh(); cosh(); asinh(); acosh(); atanh(); hypot(other);
+            }
+
+            #[inline(always)]
+            fn atan(self) -> Self {
+                crate::real::Real::atan2(self, self.like(1.0))
+            }
+
+            #[inline(always)]
+            fn atan2(self, x: Self) -> Self {
+                use crate::arctangent::{FINITE, ORDINARY, atan2_of_ordinary};
+                let found = atan2_of_ordinary(self, x);
+                let limits = [(crate::real::Real::abs(self), ORDINARY), (x, FINITE)];
+                self.or_by_lanes_of_two(x, found, limits, <f64 as crate::real::Real>::atan2)
+            }
+
+            #[inline(always)]
+            fn powf(self, exponent: Self) -> Self {
+                use crate::exponential::{EXP_LIMIT, LN_LIMITS, power_of_ordinary};
+                let (found, product) = power_of_ordinary(self, exponent);
+                let limits = [(self, LN_LIMITS), (product, (-EXP_LIMIT, EXP_LIMIT))];
+                self.or_by_lanes_of_two(exponent, found, limits, <f64 as crate::real::Real>::powf)
             }
 
             /// A NaN stays one, and a zero what it is.
@@ -508,6 +550,11 @@ mod tests {
                 (register.sign(), lanes.sign()),
                 (register.min(in_register), lanes.min(second)),
                 (register.max(in_register), lanes.max(second)),
+                (register.atan(), lanes.atan()),
+                (register.atan2(in_register), lanes.atan2(second)),
+                (in_register.atan2(register), second.atan2(lanes)),
+                (register.powf(in_register), lanes.powf(second)),
+                (register.abs().powf(in_register), lanes.abs().powf(second)),
             ] {
                 assert_eq!(bits(found.lanes()), bits(expected.0), "{given:?}");
             }

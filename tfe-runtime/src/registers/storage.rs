@@ -84,6 +84,9 @@ pub struct Fixed<S: Storage> {
 pub trait List<T>: Deref<Target = [T]> + DerefMut + Clone + Debug {
     /// As many entries as asked for, or as many as the type has.
     fn filled(value: T, count: usize) -> Self;
+
+    /// Takes the numbers of another as long, which may hold any afterwards.
+    fn take(&mut self, other: &mut Self);
 }
 
 /// Room for something that may be made anew where it is needed.
@@ -117,6 +120,10 @@ impl Storage for Heap {
 impl<T: Clone + Debug> List<T> for alloc::vec::Vec<T> {
     fn filled(value: T, count: usize) -> Self {
         alloc::vec![value; count]
+    }
+
+    fn take(&mut self, other: &mut Self) {
+        core::mem::swap(self, other);
     }
 }
 
@@ -208,6 +215,11 @@ impl<T: Copy + Debug, const C: usize> List<T> for Array<T, C> {
     fn filled(value: T, _: usize) -> Self {
         Self([value; C])
     }
+
+    #[inline(always)]
+    fn take(&mut self, other: &mut Self) {
+        *self = *other;
+    }
 }
 
 /// The lines of a table.
@@ -233,5 +245,10 @@ impl<const K: usize, const C: usize> List<[f64; 4]> for Lines<K, C> {
     #[inline(always)]
     fn filled(value: [f64; 4], _: usize) -> Self {
         Self([[value; C]; K])
+    }
+
+    #[inline(always)]
+    fn take(&mut self, other: &mut Self) {
+        *self = *other;
     }
 }
