@@ -31,10 +31,10 @@ where
         let low_momentum = &mut work.low_momentum[..points];
         for l in 0..points {
             for a in 0..N {
-                let moved = h * like.with(products[l][a]);
-                low_position[l][a] = (like.with(group.low.q[a]) + moved).lanes();
-                let moved = h * like.with(more_products[l][a]);
-                low_momentum[l][a] = (like.with(group.low.p[a]) + moved).lanes();
+                let low = like.with(group.low.q[a]);
+                low_position[l][a] = h.times_plus(like.with(products[l][a]), low).lanes();
+                let low = like.with(group.low.p[a]);
+                low_momentum[l][a] = h.times_plus(like.with(more_products[l][a]), low).lanes();
             }
         }
     }
@@ -70,7 +70,8 @@ where
         for l in 0..points {
             let mut q = start_q;
             for a in 0..N {
-                q[a] += h * like.with(products[l][a]) + like.with(low_position[l][a]);
+                let low = like.with(low_position[l][a]);
+                q[a] += h.times_plus(like.with(products[l][a]), low);
             }
             let v = load(like, &rates[l]);
             let t = like.like(self.t + self.h * nodes[l]);
@@ -96,7 +97,8 @@ where
         for l in 0..points {
             let mut step = [zero; N];
             for a in 0..N {
-                let wanted = h * like.with(products[l][a]) + like.with(low_momentum[l][a]);
+                let low = like.with(low_momentum[l][a]);
+                let wanted = h.times_plus(like.with(products[l][a]), low);
                 step[a] = wanted - like.with(momenta[l][a]);
             }
             if const { M::FACTS.constant_mass } {
@@ -160,8 +162,8 @@ where
         for l in 0..points {
             let mut change = [zero; N];
             for a in 0..N {
-                let moved = h * like.with(products[l][a]) + like.with(low_momentum[l][a]);
-                let p = start_p[a] + moved;
+                let low = like.with(low_momentum[l][a]);
+                let p = start_p[a] + h.times_plus(like.with(products[l][a]), low);
                 change[a] = p - like.with(momenta[l][a]);
                 momenta[l][a] = p.lanes();
             }
@@ -172,7 +174,7 @@ where
                 let mass = &work.masses[l];
                 for a in 0..N {
                     for b in 0..N {
-                        by_change[a] += like.with(mass[a][b]) * change[b];
+                        by_change[a] = like.with(mass[a][b]).times_plus(change[b], by_change[a]);
                     }
                 }
             }
@@ -188,7 +190,8 @@ where
         for l in 0..points {
             let mut q = start_q;
             for a in 0..N {
-                q[a] += h * like.with(products[l][a]) + like.with(low_position[l][a]);
+                let low = like.with(low_position[l][a]);
+                q[a] += h.times_plus(like.with(products[l][a]), low);
             }
             let p = load(like, &momenta[l]);
             let t = like.like(self.t + self.h * nodes[l]);

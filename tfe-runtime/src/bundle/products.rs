@@ -78,11 +78,11 @@ impl<const N: usize> Product<'_, N> {
             for j in 0..K {
                 let (column, value) = (columns[j].as_flattened(), like.with(rows[j][a]));
                 for line in 0..B {
-                    let product = like.like(column[FROM + line]) * value;
+                    let entry = like.like(column[FROM + line]);
                     sums[line] = if j == 0 {
-                        product
+                        entry * value
                     } else {
-                        sums[line] + product
+                        entry.times_plus(value, sums[line])
                     };
                 }
             }
@@ -100,7 +100,7 @@ impl<const N: usize> Product<'_, N> {
             for (column, row) in self.matrix.columns().zip(self.rows) {
                 let (column, value) = (&column[from..from + B], like.with(row[a]));
                 for line in 0..B {
-                    sums[line] += like.like(column[line]) * value;
+                    sums[line] = like.like(column[line]).times_plus(value, sums[line]);
                 }
             }
             for line in 0..B {
@@ -123,13 +123,13 @@ pub(super) fn sum<V: Eight, const N: usize, const EXACT: bool>(
         let (weight, weight_low) = weights.of(l);
         let value = like.with(row[a]);
         if const { !EXACT } {
-            high += like.like(weight) * value;
+            high = like.like(weight).times_plus(value, high);
             continue;
         }
         let (product, rest) = like.like(weight).product(value);
         let (sum, lost) = high.exact_sum(product);
         high = sum;
-        low += (rest + like.like(weight_low) * value) + lost;
+        low += like.like(weight_low).times_plus(value, rest) + lost;
     }
     (high, low)
 }

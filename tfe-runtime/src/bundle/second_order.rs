@@ -73,22 +73,23 @@ where
             let mut low = [like; N];
             if self.inertia.diagonal.is_some() {
                 for a in 0..N {
-                    low[a] = like.like(self.reach[a]) * like.with(more_products[l][a])
-                        + like.like(self.reach_low[a]) * like.with(products[l][a]);
+                    let by_square = like.like(self.reach_low[a]) * like.with(products[l][a]);
+                    let more = like.with(more_products[l][a]);
+                    low[a] = like.like(self.reach[a]).times_plus(more, by_square);
                 }
             } else {
                 let rate_low = self.accelerations(like, &more_products[l]);
                 let rate = self.accelerations(like, &products[l]);
                 for a in 0..N {
-                    low[a] = square * rate_low[a] + square_low * rate[a];
+                    low[a] = square.times_plus(rate_low[a], square_low * rate[a]);
                 }
             }
             let (reach, reach_low) = (like.like(reach[l]), like.like(reach_low[l]));
             for a in 0..N {
                 let (v, v_low) = (like.with(work.velocity[a]), like.with(work.velocity_low[a]));
-                let v_low = reach * v_low + reach_low * v;
-                let low = like.with(group.low.q[a]) + (h * v_low + low[a]);
-                drift[l][a] = (h * (reach * v) + low).lanes();
+                let v_low = reach.times_plus(v_low, reach_low * v);
+                let low = like.with(group.low.q[a]) + h.times_plus(v_low, low[a]);
+                drift[l][a] = h.times_plus(reach * v, low).lanes();
             }
         }
     }
@@ -142,12 +143,13 @@ where
             let (mut q, mut z) = (load(like, &drift[l]), [zero; N]);
             if self.inertia.diagonal.is_some() {
                 for a in 0..N {
-                    q[a] += like.like(self.reach[a]) * like.with(products[l][a]);
+                    let reach = like.like(self.reach[a]);
+                    q[a] = reach.times_plus(like.with(products[l][a]), q[a]);
                 }
             } else {
                 let rate = self.accelerations(like, &products[l]);
                 for a in 0..N {
-                    q[a] += square * rate[a];
+                    q[a] = square.times_plus(rate[a], q[a]);
                 }
             }
             for a in 0..N {
@@ -159,7 +161,7 @@ where
                     Form::Hamiltonian => load(like, &more_products[l]),
                 };
                 for a in 0..N {
-                    z[a] = start_z[a] + h * rate[a];
+                    z[a] = h.times_plus(rate[a], start_z[a]);
                 }
             }
             let t = like.like(self.t + self.h * nodes[l]);
