@@ -38,10 +38,10 @@ pub(super) fn product<V: Four, const G: usize>(
     row: &[[V; 4]; G],
     values: &[[f64; 4]; G],
 ) -> V {
-    let mut sum = like.like(0.0);
-    for (row, values) in row.iter().zip(values) {
-        for lane in 0..4 {
-            sum += row[lane] * like.like(values[lane]);
+    let mut sum = row[0][0] * like.like(values[0][0]);
+    for group in 0..G {
+        for lane in if group == 0 { 1 } else { 0 }..4 {
+            sum = row[group][lane].times_plus(like.like(values[group][lane]), sum);
         }
     }
     sum
@@ -52,6 +52,6 @@ pub(super) fn product<V: Four, const G: usize>(
 pub(super) fn add_exactly<V: Four>(sum: &mut (V, V), (weight, weight_low): (f64, f64), value: V) {
     let (product, rest) = value.like(weight).product(value);
     let (high, lost) = sum.0.exact_sum(product);
-    let rest = (rest + value.like(weight_low) * value) + lost;
+    let rest = value.like(weight_low).times_plus(value, rest) + lost;
     *sum = (high, sum.1 + rest);
 }

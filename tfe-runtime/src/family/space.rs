@@ -172,6 +172,8 @@ impl Pass<'_> {
 #[derive(Clone, Copy)]
 struct Placement<V, const G: usize> {
     h: V,
+    /// h²
+    square: V,
     /// A
     once: [[V; 4]; G],
     /// A²
@@ -183,6 +185,7 @@ impl<V: Four, const G: usize> Placement<V, G> {
     fn of(like: V, tables: &Tables<Heap>, h: f64, group: usize) -> Self {
         Self {
             h: like.like(h),
+            square: like.like(h * h),
             once: rows::<V, G>(like, &tables.once)[group],
             twice: rows::<V, G>(like, &tables.twice)[group],
         }
@@ -190,14 +193,15 @@ impl<V: Four, const G: usize> Placement<V, G> {
 
     #[inline(always)]
     fn position(&self, start: f64, drift: V, accelerations: &[[f64; 4]; G]) -> V {
-        let h = self.h;
-        h.like(start) + (drift + h * h * product(h, &self.twice, accelerations))
+        let reach = product(self.h, &self.twice, accelerations);
+        self.h.like(start) + self.square.times_plus(reach, drift)
     }
 
     /// Velocity, or momentum.
     #[inline(always)]
     fn rate(&self, start: f64, rates: &[[f64; 4]; G]) -> V {
-        self.h.like(start) + self.h * product(self.h, &self.once, rates)
+        let change = product(self.h, &self.once, rates);
+        self.h.times_plus(change, self.h.like(start))
     }
 }
 
@@ -366,9 +370,9 @@ impl<V: Four> Space<V> {
                 let by_masses = product(like, &rows[group], &missing);
                 let reach = like.with(problem.tables.reach[group]);
                 let reach_low = like.with(problem.tables.reach_low[group]);
-                let by_velocity = reach * low_v + reach_low * v;
-                let low = low_q + h * (by_velocity + h * (by_tables + by_masses));
-                drift[group * n + a] = h * reach * v + low;
+                let by_velocity = reach.times_plus(low_v, reach_low * v);
+                let rate = h.times_plus(by_tables + by_masses, by_velocity);
+                drift[group * n + a] = (h * reach).times_plus(v, h.times_plus(rate, low_q));
             }
             q[a] = first.position(start[a], drift[a], &accelerations);
         }
@@ -493,7 +497,7 @@ impl<V: Four> Space<V> {
             let inverse = block(like, &inertia.inverse, at);
             let inverse_low = block(like, &inertia.inverse_low, at);
             let (acceleration, rest) = inverse.product(lever.0);
-            let rest = rest + (inverse * lever.1 + inverse_low * lever.0);
+            let rest = inverse.times_plus(lever.1, inverse_low.times_plus(lever.0, rest));
             let start = (
                 block(like, &problem.velocity, at),
                 block(like, &problem.velocity_low, at),
