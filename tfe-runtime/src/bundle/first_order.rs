@@ -263,12 +263,12 @@ fn store<V: Eight, const N: usize>(to: &mut [Row<N>; N], matrix: &[[V; N]; N]) {
 fn solve<V: Eight, const N: usize>(like: V, factors: &[Row<N>; N], vector: &mut [V; N]) {
     for row in 0..N {
         for j in 0..row {
-            vector[row] -= like.with(factors[row][j]) * vector[j];
+            vector[row] = (-like.with(factors[row][j])).times_plus(vector[j], vector[row]);
         }
     }
     for row in (0..N).rev() {
         for j in row + 1..N {
-            vector[row] -= like.with(factors[row][j]) * vector[j];
+            vector[row] = (-like.with(factors[row][j])).times_plus(vector[j], vector[row]);
         }
         vector[row] = vector[row] * like.with(factors[row][row]);
     }

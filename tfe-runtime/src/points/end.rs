@@ -56,7 +56,8 @@ impl<const N: usize, S: Storage> Work<N, S> {
                 let inverse_low = block(like, &leg.inertia.inverse_low, at);
                 if const { EXACT } {
                     let (product, rest) = inverse.product(acceleration.0);
-                    let rest = rest + (inverse * acceleration.1 + inverse_low * acceleration.0);
+                    let rest = inverse_low.times_plus(acceleration.0, rest);
+                    let rest = inverse.times_plus(acceleration.1, rest);
                     acceleration = (product, rest);
                 } else {
                     acceleration.0 = inverse * acceleration.0;
@@ -94,7 +95,7 @@ pub(crate) fn moved<V: Precise, const EXACT: bool>(h: V, rate: (V, V), start: (V
 #[inline(always)]
 fn moved_exactly<V: Precise>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
     let (product, rest) = h.product(rate.0);
-    let rest = (rest + h * rate.1) + start.1;
+    let rest = h.times_plus(rate.1, rest) + start.1;
     let (sum, lost) = start.0.exact_sum(product);
     sum.exact_sum(lost + rest)
 }

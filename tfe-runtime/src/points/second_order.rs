@@ -64,15 +64,16 @@ impl<const N: usize, S: Storage> Work<N, S> {
             let reach_low = like.with(leg.tables.reach_low[c]);
             for a in 0..N {
                 let v = like.like(self.velocity[a]);
-                let v_low = reach * like.like(self.velocity_low[a]) + reach_low * v;
+                let v_low = reach.times_plus(like.like(self.velocity_low[a]), reach_low * v);
                 let mut rate = leg.inertia.row(like, &products_low[c], a);
                 if leg.inertia.diagonal.is_some() {
                     // What the one rounding of 1/m takes from all accelerations.
-                    rate += like.like(leg.inertia.inverse_low[a]) * like.with(products[c][a]);
+                    let inverse_low = like.like(leg.inertia.inverse_low[a]);
+                    rate = inverse_low.times_plus(like.with(products[c][a]), rate);
                 }
-                let low = like.like(leg.low.q[a]) + h * (v_low + h * rate);
-                let low = low + square_low * leg.inertia.row(like, &products[c], a);
-                drift[c][a] = (h * (reach * v) + low).lanes();
+                let low = h.times_plus(h.times_plus(rate, v_low), like.like(leg.low.q[a]));
+                let low = square_low.times_plus(leg.inertia.row(like, &products[c], a), low);
+                drift[c][a] = h.times_plus(reach * v, low).lanes();
             }
         }
     }

@@ -5,9 +5,7 @@ use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
 use crate::model::{First, Model};
 use crate::real::Real;
-use crate::registers::four::Four;
-#[cfg(feature = "alloc")]
-use crate::registers::four::Precise;
+use crate::registers::four::{Four, Precise};
 use crate::registers::storage::Storage;
 
 /// The largest magnitude so far in each lane. NaN is left out: the end of a step is not finite where one of its forces is not, and that is looked at once a step.
@@ -111,14 +109,14 @@ impl<const N: usize, S: Storage> Work<N, S> {
         let h = like.like(leg.h);
         for (low, product) in self.low_position.iter_mut().zip(products.iter()) {
             for a in 0..N {
-                let moved = h * like.with(product[a]);
-                low[a] = (like.like(leg.low.q[a]) + moved).lanes();
+                let product = like.with(product[a]);
+                low[a] = h.times_plus(product, like.like(leg.low.q[a])).lanes();
             }
         }
         for (low, product) in self.low_momentum.iter_mut().zip(more_products.iter()) {
             for a in 0..N {
-                let moved = h * like.with(product[a]);
-                low[a] = (like.like(leg.low.p[a]) + moved).lanes();
+                let product = like.with(product[a]);
+                low[a] = h.times_plus(product, like.like(leg.low.p[a])).lanes();
             }
         }
     }
@@ -268,7 +266,8 @@ impl<const N: usize, S: Storage> Work<N, S> {
             } else if !is_first {
                 for a in 0..N {
                     for b in 0..N {
-                        by_change[a] += like.with(masses[c][a][b]) * change[b];
+                        let mass = like.with(masses[c][a][b]);
+                        by_change[a] = mass.times_plus(change[b], by_change[a]);
                     }
                 }
             }
@@ -348,7 +347,7 @@ impl<const N: usize, S: Storage> Leg<'_, N, S> {
 impl<const N: usize, S: Storage> Inertia<N, S> {
     /// The constant M⁻¹ (or H_pp) times a vector for each of several points.
     #[inline(always)]
-    pub(crate) fn times<V: Real>(&self, like: V, vector: &[V; N]) -> [V; N] {
+    pub(crate) fn times<V: Precise>(&self, like: V, vector: &[V; N]) -> [V; N] {
         let mut product = [like.like(0.0); N];
         if self.diagonal.is_some() {
             for a in 0..N {
@@ -358,7 +357,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         }
         for (a, row) in self.inverse.iter().enumerate() {
             for b in 0..N {
-                product[a] += like.like(row[b]) * vector[b];
+                product[a] = like.like(row[b]).times_plus(vector[b], product[a]);
             }
         }
         product
@@ -392,7 +391,9 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         }
         let mut sum = like.like(0.0);
         for b in 0..N {
-            sum += like.like(self.inverse[a][b]) * like.with(row[b]);
+            sum = like
+                .like(self.inverse[a][b])
+                .times_plus(like.with(row[b]), sum);
         }
         sum
     }
@@ -443,7 +444,7 @@ pub(crate) fn no_derivatives<V: Real, const N: usize>(like: V) -> First<V, N> {
 /// Factors without exchanging rows: a mass matrix is positive definite, and where it is not the iteration does not converge and the step is
 /// left to another method. The diagonal holds the inverse pivots.
 #[inline(always)]
-pub(crate) fn factor<V: Real, const N: usize>(like: V, matrix: &mut [[V; N]; N]) {
+pub(crate) fn factor<V: Precise, const N: usize>(like: V, matrix: &mut [[V; N]; N]) {
     for column in 0..N {
         let inverse = like.like(1.0) / matrix[column][column];
         matrix[column][column] = inverse;
@@ -451,7 +452,7 @@ pub(crate) fn factor<V: Real, const N: usize>(like: V, matrix: &mut [[V; N]; N])
             let factor = matrix[row][column] * inverse;
             matrix[row][column] = factor;
             for j in column + 1..N {
-                matrix[row][j] -= factor * matrix[column][j];
+                matrix[row][j] = (-factor).times_plus(matrix[column][j], matrix[row][j]);
             }
         }
     }
@@ -461,12 +462,12 @@ pub(crate) fn factor<V: Real, const N: usize>(like: V, matrix: &mut [[V; N]; N])
 fn solve<V: Four, const N: usize>(like: V, factors: &[Row<N>; N], vector: &mut [V; N]) {
     for row in 0..N {
         for j in 0..row {
-            vector[row] -= like.with(factors[row][j]) * vector[j];
+            vector[row] = (-like.with(factors[row][j])).times_plus(vector[j], vector[row]);
         }
     }
     for row in (0..N).rev() {
         for j in row + 1..N {
-            vector[row] -= like.with(factors[row][j]) * vector[j];
+            vector[row] = (-like.with(factors[row][j])).times_plus(vector[j], vector[row]);
         }
         vector[row] = vector[row] * like.with(factors[row][row]);
     }
