@@ -109,7 +109,11 @@ impl<const N: usize> Mesh<N> {
 
     /// Where the force is first felt in an element, see [`Times::begin`].
     pub(crate) fn begin(&self, t: f64, h: f64) -> f64 {
-        self.times.begin(t, h)
+        if self.times.has_breaks {
+            self.times.begin(t, h)
+        } else {
+            t
+        }
     }
 
     /// The impulses that act in the element from `t` to `next`: one at a node belongs to the element that it starts, at the end of the span to the last.

@@ -40,7 +40,7 @@ pub(super) struct Times {
     segments: Vec<Segment>,
     /// One, or minus one where the run goes back in time.
     pub(super) direction: f64,
-    has_breaks: bool,
+    pub(super) has_breaks: bool,
 }
 
 impl Times {
@@ -157,11 +157,8 @@ impl Times {
     }
 
     /// Where the force is first felt in the element that begins at `t` and has the length `h`: at `t`, or beyond it by roundings where that is a break, so that an
-    /// element with a point at its start finds the force after the break there.
+    /// element with a point at its start finds the force after the break there. Without breaks it is `t`.
     pub(super) fn begin(&self, t: f64, h: f64) -> f64 {
-        if !self.has_breaks {
-            return t;
-        }
         let is_before = |segment: &Segment| self.direction * segment.start < self.direction * t;
         let segment = self.segments.get(self.segments.partition_point(is_before));
         match segment {

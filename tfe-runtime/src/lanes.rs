@@ -7,7 +7,12 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// W numbers side by side: one kernel evaluates W instants, or W trajectories, at once.
 ///
-/// The loops over lanes are plain, so that the compiler turns them into vector instructions.
+/// The loops over lanes are plain, so that the compiler turns them into vector instructions. So are the elementary functions below, which give the same digits on every processor; the others
+/// are those of the system, one lane after the other. In units in the last place, judged in double-double arithmetic, they are off by less than
+///
+/// | `exp`, `ln` | `powf` | `sin`, `cos`, `atan`, `atan2` | `sin_cos` | `tanh` |
+/// |---|---|---|---|---|
+/// | 1 | 1.2 | 1.5 | 2 | 3 |
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(32))]
 pub struct Lanes<const W: usize>(pub [f64; W]);

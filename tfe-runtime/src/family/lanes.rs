@@ -40,7 +40,7 @@ pub(super) fn product<V: Four, const G: usize>(
 ) -> V {
     let mut sum = row[0][0] * like.like(values[0][0]);
     for group in 0..G {
-        for lane in if group == 0 { 1 } else { 0 }..4 {
+        for lane in usize::from(group == 0)..4 {
             sum = row[group][lane].times_plus(like.like(values[group][lane]), sum);
         }
     }
