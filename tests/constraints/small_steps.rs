@@ -288,15 +288,20 @@ fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
     );
 }
 
-// Two, for two processors.
+// Parts of one test, so that they run side by side.
 #[test]
 fn long_steps_of_few_nodes_run_or_are_too_long() {
     long_steps_run_or_are_too_long(3..=5);
 }
 
 #[test]
+fn long_steps_of_some_nodes_run_or_are_too_long() {
+    long_steps_run_or_are_too_long(6..=7);
+}
+
+#[test]
 fn long_steps_of_many_nodes_run_or_are_too_long() {
-    long_steps_run_or_are_too_long(6..=8);
+    long_steps_run_or_are_too_long(8..=8);
 }
 
 /// What all runs of an accuracy take, beside a run with the fewest equal steps of the same element from which on the accuracy is met: kernels evaluated. Three times at most on six
