@@ -34,19 +34,15 @@ const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
 /// 1/2!, 1/3!, …, 1/13!
-const TAYLOR: [f64; 12] = [
-    0.5,
-    1.0 / 6.0,
-    1.0 / 24.0,
-    1.0 / 120.0,
-    1.0 / 720.0,
-    1.0 / 5040.0,
-    1.0 / 40320.0,
-    1.0 / 362_880.0,
-    1.0 / 3_628_800.0,
-    1.0 / 39_916_800.0,
-    1.0 / 479_001_600.0,
-    1.0 / 6_227_020_800.0,
+const TAYLOR: [[f64; 4]; 3] = [
+    [0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0],
+    [1.0 / 720.0, 1.0 / 5040.0, 1.0 / 40320.0, 1.0 / 362_880.0],
+    [
+        1.0 / 3_628_800.0,
+        1.0 / 39_916_800.0,
+        1.0 / 479_001_600.0,
+        1.0 / 6_227_020_800.0,
+    ],
 ];
 
 /// (ln m − 2s)/s in powers of s².
@@ -104,22 +100,11 @@ fn reduced<R: Scale>(x: R, x_low: Option<R>) -> (R, R) {
     let r = high - part;
     let low = (high - r) - part;
     // By halves (Estrin), so that no chain of operations is long.
-    let c = &TAYLOR;
     let z = r * r;
     let square = z * z;
-    let first = z.fused(
-        r.fused(x.like(c[3]), x.like(c[2])),
-        r.fused(x.like(c[1]), x.like(c[0])),
-    );
-    let second = z.fused(
-        r.fused(x.like(c[7]), x.like(c[6])),
-        r.fused(x.like(c[5]), x.like(c[4])),
-    );
-    let third = z.fused(
-        r.fused(x.like(c[11]), x.like(c[10])),
-        r.fused(x.like(c[9]), x.like(c[8])),
-    );
-    let series = square.fused(square.fused(third, second), first);
+    let [first, second, third] = &TAYLOR;
+    let upper = square.fused(cubic(r, z, third), cubic(r, z, second));
+    let series = square.fused(upper, cubic(r, z, first));
     let mut rest = z.fused(series, low);
     if let Some(x_low) = x_low {
         // A rounding of 700 is so large that its product with e^r counts.
@@ -128,10 +113,23 @@ fn reduced<R: Scale>(x: R, x_low: Option<R>) -> (R, R) {
     (shifted, r + rest)
 }
 
+/// c₀ + c₁ x + x² (c₂ + c₃ x)
+#[inline(always)]
+fn cubic<R: Turn>(x: R, square: R, c: &[f64; 4]) -> R {
+    let upper = x.fused(x.like(c[3]), x.like(c[2]));
+    square.fused(upper, x.fused(x.like(c[1]), x.like(c[0])))
+}
+
 /// eˣ for |x| ≤ [`EXP_LIMIT`].
 #[inline(always)]
 pub(crate) fn exp_of_small<R: Scale>(x: R) -> R {
-    let (shifted, less_one) = reduced(x, None);
+    exp_of_two(x, None)
+}
+
+/// The same of a number and what rounding took from it.
+#[inline(always)]
+fn exp_of_two<R: Scale>(x: R, x_low: Option<R>) -> R {
+    let (shifted, less_one) = reduced(x, x_low);
     (x.like(1.0) + less_one).times_power_of_two(shifted)
 }
 
@@ -174,19 +172,11 @@ pub(crate) fn ln_of_normal<R: Scale>(x: R) -> R {
 }
 
 /// (artanh s − s)/s³ beyond the first term, in powers of s²: 1/5, 1/7, …
-const ARTANH: [f64; 11] = [
-    1.0 / 5.0,
-    1.0 / 7.0,
-    1.0 / 9.0,
-    1.0 / 11.0,
-    1.0 / 13.0,
-    1.0 / 15.0,
-    1.0 / 17.0,
-    1.0 / 19.0,
-    1.0 / 21.0,
-    1.0 / 23.0,
-    1.0 / 25.0,
+const ARTANH: [[f64; 4]; 2] = [
+    [1.0 / 5.0, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0],
+    [1.0 / 13.0, 1.0 / 15.0, 1.0 / 17.0, 1.0 / 19.0],
 ];
+const ARTANH_END: [f64; 3] = [1.0 / 21.0, 1.0 / 23.0, 1.0 / 25.0];
 
 const THIRD: f64 = 1.0 / 3.0;
 const THIRD_LOW: f64 = 1.850_371_707_708_594e-17;
@@ -209,19 +199,12 @@ fn ln_in_two<R: Scale>(x: R) -> (R, R) {
     let third = x.like(THIRD);
     let first = z * third;
     let first_low = z.fused(third, -first) + z.fused(x.like(THIRD_LOW), z_low * third);
-    let c = &ARTANH;
     let w = z * z;
     let square = w * w;
-    let lower = w.fused(
-        z.fused(x.like(c[3]), x.like(c[2])),
-        z.fused(x.like(c[1]), x.like(c[0])),
-    );
-    let upper = w.fused(
-        z.fused(x.like(c[7]), x.like(c[6])),
-        z.fused(x.like(c[5]), x.like(c[4])),
-    );
-    let last = w.fused(x.like(c[10]), z.fused(x.like(c[9]), x.like(c[8])));
-    let rest = w * square.fused(square.fused(last, upper), lower);
+    let ([lower, upper], c) = (&ARTANH, &ARTANH_END);
+    let last = w.fused(x.like(c[2]), z.fused(x.like(c[1]), x.like(c[0])));
+    let upper = square.fused(last, cubic(z, w, upper));
+    let rest = w * square.fused(upper, cubic(z, w, lower));
     let series = first + rest;
     let series_low = ((first - series) + rest) + first_low;
     let (s, s_low) = (s + s, s_low + s_low);
@@ -245,9 +228,7 @@ pub(crate) fn power_of_ordinary<R: Scale>(x: R, y: R) -> (R, R) {
     let (ln, ln_low) = ln_in_two(x);
     let exponent = y * ln;
     let exponent_low = y.fused(ln_low, y.fused(ln, -exponent));
-    let (shifted, less_one) = reduced(exponent, Some(exponent_low));
-    let power = (x.like(1.0) + less_one).times_power_of_two(shifted);
-    (power, exponent)
+    (exp_of_two(exponent, Some(exponent_low)), exponent)
 }
 
 /// A function of W numbers, those outside of the limits left to another.

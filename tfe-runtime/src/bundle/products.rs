@@ -1,6 +1,7 @@
 //! Products of the tables with numbers of eight trajectories.
 
 use super::group::Row;
+use crate::registers::four::{add_exactly, exact_term};
 use crate::registers::pair::{Apart, Eight};
 use crate::registers::storage::{Heap, Matrix, Weights};
 
@@ -118,20 +119,18 @@ pub(super) fn sum<V: Eight, const N: usize, const EXACT: bool>(
     rows: &[Row<N>],
     a: usize,
 ) -> (V, V) {
-    let (mut high, mut low) = (like.like(0.0), like.like(0.0));
+    let mut sum = (like.like(0.0), like.like(0.0));
     for (l, row) in rows.iter().enumerate() {
         let (weight, weight_low) = weights.of(l);
-        let value = like.with(row[a]);
+        let (weight, value) = (like.like(weight), like.with(row[a]));
         if const { !EXACT } {
-            high = like.like(weight).times_plus(value, high);
+            sum.0 = weight.times_plus(value, sum.0);
             continue;
         }
-        let (product, rest) = like.like(weight).product(value);
-        let (sum, lost) = high.exact_sum(product);
-        high = sum;
-        low += like.like(weight_low).times_plus(value, rest) + lost;
+        let term = exact_term((weight, like.like(weight_low)), value);
+        add_exactly(&mut sum, term);
     }
-    (high, low)
+    sum
 }
 
 #[cfg(test)]

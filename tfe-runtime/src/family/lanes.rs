@@ -46,12 +46,3 @@ pub(super) fn product<V: Four, const G: usize>(
     }
     sum
 }
-
-/// sum + weight · value
-#[inline(always)]
-pub(super) fn add_exactly<V: Four>(sum: &mut (V, V), (weight, weight_low): (f64, f64), value: V) {
-    let (product, rest) = value.like(weight).product(value);
-    let (high, lost) = sum.0.exact_sum(product);
-    let rest = value.like(weight_low).times_plus(value, rest) + lost;
-    *sum = (high, sum.1 + rest);
-}

@@ -9,14 +9,14 @@
 //! group of points too, while they are at hand, and follows a kernel that runs through its sites in strides.
 
 use super::inertia::Inertia;
-use super::lanes::{add_exactly, at_points, product, rows};
+use super::lanes::{at_points, product, rows};
 use super::model::{FamilyState, Gradient, Model};
 use crate::double_double::DoubleDouble;
 use crate::model::Form;
 use crate::points::end::moved;
 use crate::points::sweep::Largest;
 use crate::points::tables::Tables;
-use crate::registers::four::{Four, block, put};
+use crate::registers::four::{Four, add_exactly, block, exact_term, put};
 use crate::registers::storage::Heap;
 use crate::registers::storage::MAX_GROUPS;
 use alloc::vec;
@@ -541,8 +541,11 @@ impl<V: Four> Space<V> {
             }
             for l in 0..4.min(tables.points - 4 * group) {
                 let value = self.like.with(by_point[l]);
-                add_exactly(&mut force, tables.weights.of(4 * group + l), value);
-                add_exactly(&mut lever, tables.lever.of(4 * group + l), value);
+                for (sum, weights) in [(&mut force, &tables.weights), (&mut lever, &tables.lever)] {
+                    let (weight, low) = weights.of(4 * group + l);
+                    let term = exact_term((value.like(weight), value.like(low)), value);
+                    add_exactly(sum, term);
+                }
             }
         }
         (force, lever)

@@ -29,6 +29,20 @@ pub trait Precise: Real {
     }
 }
 
+/// weight · value, and what rounding takes from it and took from the weight.
+#[inline(always)]
+pub(crate) fn exact_term<V: Precise>((weight, weight_low): (V, V), value: V) -> (V, V) {
+    let (product, rest) = weight.product(value);
+    (product, weight_low.times_plus(value, rest))
+}
+
+/// Adds a term, each a number and what rounding took from it.
+#[inline(always)]
+pub(crate) fn add_exactly<V: Precise>(sum: &mut (V, V), (term, term_low): (V, V)) {
+    let (high, lost) = sum.0.exact_sum(term);
+    *sum = (high, sum.1 + (term_low + lost));
+}
+
 /// Work that is compiled apart from the places where it is called, for the instruction set of the numbers with which it computes.
 pub(crate) trait Apart {
     fn run<V: Four>(self, like: V);

@@ -1,6 +1,6 @@
 //! Products of the tables of an element with numbers at its points.
 
-use super::four::{Four, Precise};
+use super::four::{Four, Precise, add_exactly, exact_term};
 use super::storage::{MAX_GROUPS, Matrix, Row, Storage, Weights};
 
 impl<S: Storage> Matrix<S> {
@@ -185,14 +185,14 @@ impl<S: Storage> Weights<S> {
                     high[a] = weight.times_plus(value, high[a]);
                     continue;
                 }
-                let (product, rest) = weight.product(value);
-                let rest = weight_low.times_plus(value, rest);
+                let term = exact_term((weight, weight_low), value);
+                let mut sum = (high[a], low[a]);
                 if group == 0 {
-                    (high[a], low[a]) = (product, rest);
+                    sum = term;
                 } else {
-                    let (sum, lost) = high[a].exact_sum(product);
-                    (high[a], low[a]) = (sum, low[a] + (rest + lost));
+                    add_exactly(&mut sum, term);
                 }
+                (high[a], low[a]) = sum;
             }
         }
         if const { N == 1 } {

@@ -86,7 +86,13 @@ pub trait List<T>: Deref<Target = [T]> + DerefMut + Clone + Debug {
     fn filled(value: T, count: usize) -> Self;
 
     /// Takes the numbers of another as long, which may hold any afterwards.
-    fn take(&mut self, other: &mut Self);
+    #[inline(always)]
+    fn take(&mut self, other: &mut Self)
+    where
+        T: Copy,
+    {
+        self.copy_from_slice(other);
+    }
 }
 
 /// Room for something that may be made anew where it is needed.
@@ -122,7 +128,10 @@ impl<T: Clone + Debug> List<T> for alloc::vec::Vec<T> {
         alloc::vec![value; count]
     }
 
-    fn take(&mut self, other: &mut Self) {
+    fn take(&mut self, other: &mut Self)
+    where
+        T: Copy,
+    {
         core::mem::swap(self, other);
     }
 }
@@ -215,11 +224,6 @@ impl<T: Copy + Debug, const C: usize> List<T> for Array<T, C> {
     fn filled(value: T, _: usize) -> Self {
         Self([value; C])
     }
-
-    #[inline(always)]
-    fn take(&mut self, other: &mut Self) {
-        *self = *other;
-    }
 }
 
 /// The lines of a table.
@@ -245,10 +249,5 @@ impl<const K: usize, const C: usize> List<[f64; 4]> for Lines<K, C> {
     #[inline(always)]
     fn filled(value: [f64; 4], _: usize) -> Self {
         Self([[value; C]; K])
-    }
-
-    #[inline(always)]
-    fn take(&mut self, other: &mut Self) {
-        *self = *other;
     }
 }
