@@ -163,6 +163,54 @@ fn ensembles_are_single_runs() {
     agree(&model, Mixed::<4>, &starts);
 }
 
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*k*((x^2 + y^2)/2 + x^2*y/l),
+)]
+struct Scaled {
+    m: f64,
+    k: f64,
+    l: f64,
+}
+
+/// One motion in units of mass, length and time that are powers of two, which change no digit.
+#[test]
+fn units_of_all_sizes_are_alike() {
+    let end = |[mass, length, time]: [i32; 3]| {
+        let [mass, length, time] = [mass, length, time].map(|power| 2.0_f64.powi(power));
+        let model = Scaled {
+            m: mass,
+            k: 1.0 / (time * time),
+            l: length,
+        };
+        let (h, speed) = (0.25 * time, length / time);
+        let start = model.state([0.3 * length, -0.2 * length], [0.1 * speed, 0.3 * speed]);
+        let span = 0.0..200.0 * h;
+        let motion = Simulation::new(&model).step(h).run(start, span.clone());
+        let single = motion.expect("a regular motion").last().q;
+        let ends = Ensemble::new(&model).step(h).run(&[start; 9], span);
+        let several = ends.expect("a good plan").into_results().swap_remove(8);
+        let several = several.expect("a regular motion").q;
+        [single, several].map(|q| q.map(|x| x / length))
+    };
+    let expected = end([0, 0, 0]);
+    for units in [
+        [900, 0, 0],
+        [-900, 0, 0],
+        [100, 100, -100],
+        [-300, 200, 100],
+        [930, -80, -40],
+    ] {
+        for (end, expected) in end(units).iter().zip(&expected) {
+            for a in 0..2 {
+                let error = (end[a] - expected[a]).abs();
+                // Roundings of two hundred steps.
+                assert!(error <= 1e-13, "{units:?}: {error:.1e}");
+            }
+        }
+    }
+}
+
 #[test]
 fn one_failure_leaves_the_others() {
     let mut starts: Vec<_> = fractions(12)

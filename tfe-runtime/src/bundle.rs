@@ -16,6 +16,7 @@ mod products;
 mod second_order;
 mod step;
 mod together;
+mod trajectories;
 mod varied;
 
 use crate::element::{Element, ElementError};

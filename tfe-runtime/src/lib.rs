@@ -55,6 +55,7 @@ pub mod model;
 mod newton;
 mod phase_form;
 mod points;
+mod precise;
 #[cfg(feature = "alloc")]
 mod propagator;
 #[cfg(feature = "alloc")]

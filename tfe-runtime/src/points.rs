@@ -20,12 +20,14 @@
 //! rounding took from the tables is summed once a step, at the start of the iteration. A step whose iteration contracts badly is left to
 //! the other forms.
 
+pub(crate) mod arrangement;
 #[cfg(feature = "alloc")]
 mod computed;
 pub(crate) mod end;
+pub(crate) mod first_order;
 #[cfg(feature = "alloc")]
 pub(crate) mod reach;
-mod second_order;
+pub(crate) mod second_order;
 mod step;
 pub(crate) mod sweep;
 pub(crate) mod tables;
@@ -97,6 +99,10 @@ pub(crate) struct Inertia<const N: usize, S: Storage> {
     pub(crate) inverse_low: [f64; N],
     /// M⁻¹ (or H_pp), row by row; of no meaning where it is not constant, or diagonal.
     pub(crate) inverse: S::Square<N>,
+    /// The length of the step for which these are: h²/m where there is nothing beside the diagonal, and what rounding took from it.
+    step: f64,
+    reach: [f64; N],
+    reach_low: [f64; N],
 }
 
 /// Where and from where, and by what.
@@ -410,6 +416,9 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
                 inverse_diagonal: [1.0; N],
                 inverse_low: [0.0; N],
                 inverse: List::filled([0.0; N], 0),
+                step: 0.0,
+                reach: [0.0; N],
+                reach_low: [0.0; N],
             });
         }
         let (mut first, mut mass) = (First::ZERO, [[0.0; N]; N]);
@@ -434,6 +443,9 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
             inverse_diagonal,
             inverse_low: [0.0; N],
             inverse: rows,
+            step: 0.0,
+            reach: [0.0; N],
+            reach_low: [0.0; N],
         })
     }
 
@@ -457,6 +469,9 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
             inverse_diagonal: inverse,
             inverse_low,
             inverse: List::filled([0.0; N], 0),
+            step: 0.0,
+            reach: [0.0; N],
+            reach_low: [0.0; N],
         })
     }
 }

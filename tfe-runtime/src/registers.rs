@@ -10,4 +10,5 @@ mod products;
 pub(crate) mod quad;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 mod quads;
+pub(crate) mod side;
 pub(crate) mod storage;

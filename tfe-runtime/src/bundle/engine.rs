@@ -3,7 +3,7 @@
 use super::group::{Group, Work};
 use super::step::Step;
 use super::together::Together;
-use crate::double_double::DoubleDouble;
+use crate::lanes::Lanes;
 use crate::model::Model;
 use crate::newton::Control;
 use crate::points::Inertia;
@@ -115,16 +115,7 @@ impl<const N: usize> Engine<N> {
         self.last_step = h;
         // The slowest one of this step.
         statistics.contraction = Contraction::NONE;
-        let (mut reach, mut reach_low) = ([0.0; N], [0.0; N]);
-        let square = DoubleDouble::product(h, h);
-        for a in 0..N {
-            let inverse = DoubleDouble {
-                high: self.inertia.inverse_diagonal[a],
-                low: self.inertia.inverse_low[a],
-            };
-            let product = square.times(inverse);
-            (reach[a], reach_low[a]) = (product.high, product.low);
-        }
+        self.inertia.set_step(Lanes([0.0; 4]), h);
         let step = Step {
             model: models.kernels(),
             tables: &self.tables,
@@ -132,8 +123,6 @@ impl<const N: usize> Engine<N> {
             control,
             t,
             h,
-            reach,
-            reach_low,
         };
         for (group, lanes) in groups.iter_mut().zip(lanes.chunks(LANES)) {
             if group.warm != [true; LANES] {

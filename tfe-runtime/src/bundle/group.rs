@@ -106,16 +106,6 @@ impl<const N: usize> Work<N> {
     }
 }
 
-/// A row in registers.
-#[inline(always)]
-pub(super) fn load<V: Eight, const N: usize>(like: V, row: &Row<N>) -> [V; N] {
-    let mut loaded = [like; N];
-    for a in 0..N {
-        loaded[a] = like.with(row[a]);
-    }
-    loaded
-}
-
 /// `new` in the lanes of the mask.
 #[inline(always)]
 pub(super) fn replace<V: Eight>(mask: V::Mask, old: &mut [f64; LANES], new: V) {

@@ -1,7 +1,7 @@
 //! Products of the tables with numbers of eight trajectories.
 
 use super::group::Row;
-use crate::registers::four::{add_exactly, exact_term};
+use crate::precise::{add_exactly, exact_term};
 use crate::registers::pair::{Apart, Eight};
 use crate::registers::storage::{Heap, Matrix, Weights};
 

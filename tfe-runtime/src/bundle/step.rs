@@ -21,9 +21,6 @@ pub(super) struct Step<'a, M, const N: usize> {
     pub(super) control: &'a Control,
     pub(super) t: f64,
     pub(super) h: f64,
-    /// h²/m of coordinates with constant masses and nothing beside the diagonal, and what rounding took from it.
-    pub(super) reach: [f64; N],
-    pub(super) reach_low: [f64; N],
 }
 
 /// After these iterations mass matrices are evaluated anew. The start is good to a few digits, so that one evaluation mostly serves; that
@@ -44,13 +41,14 @@ where
         lanes: &mut [bool],
         statistics: &mut Statistics,
     ) {
+        let wanted = like.with(flags(lanes));
         self.continue_last(like, group, work);
         if const { is_second_order::<M, N>() } {
             self.begin_second_order(like, group, work);
         } else if !self.control.is_rough() {
-            self.begin(like, group, work);
+            self.begin(like, group, work, like.like(0.0).less(wanted));
         }
-        let mut arrived = self.iterate(like, group, work, like.with(flags(lanes)), statistics);
+        let mut arrived = self.iterate(like, group, work, wanted, statistics);
 
         if const { is_second_order::<M, N>() } {
             self.prepare_end(like, group, work);

@@ -6,9 +6,10 @@
 use super::together::{Together, Trajectories};
 use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
 use crate::points::constant_rates;
+use crate::precise::Precise;
 use crate::real::Real;
-use crate::registers::four::Precise;
 use crate::registers::pair::{Apart, Eight, LANES};
+use crate::registers::side::Side;
 use alloc::vec::Vec;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -164,7 +165,7 @@ impl<V> Parametrised<'_, V> {
     }
 }
 
-impl<V: Eight> Eight for Parametrised<'_, V> {
+impl<V: Eight> Side<LANES> for Parametrised<'_, V> {
     #[inline(always)]
     fn with(self, lanes: [f64; LANES]) -> Self {
         Self {
@@ -177,7 +178,9 @@ impl<V: Eight> Eight for Parametrised<'_, V> {
     fn lanes(self) -> [f64; LANES] {
         self.value.lanes()
     }
+}
 
+impl<V: Eight> Eight for Parametrised<'_, V> {
     #[inline(always)]
     fn any_positive(self) -> bool {
         self.value.any_positive()

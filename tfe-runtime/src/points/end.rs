@@ -2,7 +2,8 @@
 
 use super::{Leg, Work};
 use crate::model::State;
-use crate::registers::four::{Four, Precise, block, put};
+use crate::precise::Precise;
+use crate::registers::four::{Four, block, put};
 use crate::registers::storage::Storage;
 
 impl<const N: usize, S: Storage> Work<N, S> {

@@ -1,136 +1,132 @@
-//! M q̈ = f(q, q̇): forces are the only unknowns.
+//! M q̈ = f(q, q̇), forces as the only unknowns: one text for four points of a trajectory side by side and for eight trajectories.
 
-use super::sweep::{Evaluation, Magnitude, larger};
-use super::{Leg, Work};
-use crate::double_double::DoubleDouble;
-use crate::equations::Increment;
+use super::arrangement::{Arrangement, Evaluation, Row, Size};
 use crate::model::{Form, Model};
-use crate::registers::four::{Four, block, put};
-use crate::registers::storage::Storage;
+use crate::precise::Precise;
+use crate::registers::side::Side;
 
-impl<const N: usize, S: Storage> Work<N, S> {
-    /// Velocity at the start, and what it lost by rounding.
-    #[inline(always)]
-    pub(super) fn begin_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
-        let inertia = &leg.inertia;
-        if let Some(mass) = &inertia.diagonal {
-            for at in (0..N).step_by(4) {
-                let p = block(like, &leg.start.p, at);
-                let inverse = block(like, &inertia.inverse_diagonal, at);
-                let v = p * inverse;
-                // The momentum belongs to no rounded velocity; the rest counts as low word.
-                let (product, rest) = v.product(block(like, mass, at));
-                let missing = block(like, &leg.low.p, at) + ((p - product) - rest);
-                put(v, &mut self.velocity, at);
-                put(missing * inverse, &mut self.velocity_low, at);
-            }
-            return;
-        }
-        for (a, row) in inertia.inverse.iter().enumerate() {
-            let (mut v, mut low) = (0.0, 0.0);
-            for b in 0..N {
-                v += row[b] * leg.start.p[b];
-                low += row[b] * leg.low.p[b];
-            }
-            (self.velocity[a], self.velocity_low[a]) = (v, low);
-        }
-    }
-
+/// The unknowns and what their iteration needs; rows for each point or each group of points.
+pub(crate) struct Forces<'a, X, const L: usize, const N: usize> {
+    /// L_q + Q, or π: rates of the momenta.
+    pub(crate) forces: &'a mut [Row<L, N>],
+    /// A² f
+    pub(crate) products: &'a mut [Row<L, N>],
+    pub(crate) more_products: &'a mut [Row<L, N>],
     /// How far the velocity at the start reaches.
+    pub(crate) drift: &'a mut [Row<L, N>],
+    /// At the start, and what it lost by rounding.
+    pub(crate) velocity: &'a [X; N],
+    pub(crate) velocity_low: &'a [X; N],
+}
+
+impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
+    /// How far the velocity at the start reaches, to the working precision.
     #[inline(always)]
-    pub(super) fn set_drift<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
-        let h = like.like(leg.h);
-        for (drift, reach) in self.drift.iter_mut().zip(leg.tables.reach.iter()) {
-            let reach = h * like.with(*reach);
+    pub(crate) fn set_drift<V, A>(self, like: V, at: &A)
+    where
+        V: Side<L>,
+        A: Arrangement<V, L, N, Number = X>,
+    {
+        let h = like.like(at.h());
+        let reach = A::entries(&at.tables().reach);
+        for (drift, reach) in self.drift.iter_mut().zip(reach) {
+            let reach = h * A::entry(like, *reach);
             for a in 0..N {
-                drift[a] = (reach * like.like(self.velocity[a])).lanes();
+                drift[a] = (reach * at.number(like, self.velocity[a])).lanes();
             }
         }
     }
 
     /// The same with what low words of state and tables add. The products are A² f, those with its low part follow here.
     #[inline(always)]
-    pub(super) fn set_exact_drift<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
-        let products = &mut self.more_products;
-        (leg.tables.twice_low).apply(like, &self.forces, products);
-        let (groups, h) = (leg.tables.groups, like.like(leg.h));
+    pub(crate) fn set_exact_drift<V, A>(self, like: V, at: &A)
+    where
+        V: Side<L>,
+        A: Arrangement<V, L, N, Number = X>,
+    {
+        let (tables, inertia) = (at.tables(), at.inertia());
+        let is_diagonal = inertia.diagonal.is_some();
+        at.apply(like, &tables.twice_low, self.forces, self.more_products);
+        let h = like.like(at.h());
         // What the one rounding of h² takes, the same in every step.
-        let square_low = like.like(DoubleDouble::product(leg.h, leg.h).low);
-        let drift = &mut self.drift[..groups];
-        let products_low = &self.more_products[..groups];
-        let products = &self.products[..groups];
-        for c in 0..groups {
-            let reach = like.with(leg.tables.reach[c]);
-            let reach_low = like.with(leg.tables.reach_low[c]);
+        let (square, square_low) = h.product(h);
+        let count = self.drift.len();
+        let drift = &mut self.drift[..count];
+        let products = &self.products[..count];
+        let products_low = &self.more_products[..count];
+        let reach = &A::entries(&tables.reach)[..count];
+        let reach_low = &A::entries(&tables.reach_low)[..count];
+        for c in 0..count {
+            let (reach, reach_low) = (A::entry(like, reach[c]), A::entry(like, reach_low[c]));
             for a in 0..N {
-                let v = like.like(self.velocity[a]);
-                let v_low = reach.times_plus(like.like(self.velocity_low[a]), reach_low * v);
-                let mut rate = leg.inertia.row(like, &products_low[c], a);
-                if leg.inertia.diagonal.is_some() {
-                    // What the one rounding of 1/m takes from all accelerations.
-                    let inverse_low = like.like(leg.inertia.inverse_low[a]);
-                    rate = inverse_low.times_plus(like.with(products[c][a]), rate);
-                }
-                let low = h.times_plus(h.times_plus(rate, v_low), like.like(leg.low.q[a]));
-                let low = square_low.times_plus(leg.inertia.row(like, &products[c], a), low);
+                let low = if is_diagonal {
+                    let by_square = like.like(inertia.reach_low[a]) * like.with(products[c][a]);
+                    let more = like.with(products_low[c][a]);
+                    like.like(inertia.reach[a]).times_plus(more, by_square)
+                } else {
+                    let rate_low = inertia.row(like, &products_low[c], a);
+                    let rate = inertia.row(like, &products[c], a);
+                    square.times_plus(rate_low, square_low * rate)
+                };
+                let v = at.number(like, self.velocity[a]);
+                let v_low = at.number(like, self.velocity_low[a]);
+                let v_low = reach.times_plus(v_low, reach_low * v);
+                let low = at.low(like, a).0 + h.times_plus(v_low, low);
                 drift[c][a] = h.times_plus(reach * v, low).lanes();
             }
         }
     }
 
-    /// A² f
+    /// One iteration: coordinates from products with the forces, forces at the coordinates. How much accelerations have changed, and how large they are.
     #[inline(always)]
-    pub(super) fn integrate_twice<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
-        (leg.tables.twice).apply(like, &self.forces, &mut self.products);
-    }
-
-    /// One iteration: coordinates from products with the forces, forces at the coordinates.
-    #[inline(always)]
-    pub(super) fn sweep_second_order<V: Four, M>(
-        &mut self,
+    pub(crate) fn sweep<V, A, M>(
+        self,
         like: V,
         model: &M,
-        leg: &Leg<'_, N, S>,
-        at: &mut Evaluation<'_, V, N>,
-    ) -> Increment
+        at: &A,
+        evaluation: &mut Evaluation<V, N>,
+    ) -> (A::Size, A::Size)
     where
+        V: Side<L>,
+        A: Arrangement<V, L, N, Number = X>,
         M: Model<N>,
     {
+        let inertia = at.inertia();
+        let is_diagonal = inertia.diagonal.is_some();
         if const { M::FACTS.forced } {
-            (leg.tables.once).apply(like, &self.forces, &mut self.more_products);
+            at.apply(like, &at.tables().once, self.forces, self.more_products);
         }
-        let (h, square) = (like.like(leg.h), like.like(leg.h * leg.h));
-        let (mut changed, mut size) = (Magnitude::none(like), Magnitude::none(like));
-        let count = self.forces.len();
-        let forces = &mut self.forces[..count];
+        let h = like.like(at.h());
+        let (mut changed, mut size) = (A::Size::none(like), A::Size::none(like));
+        let forces = self.forces;
+        let count = forces.len();
         let products = &self.products[..count];
         let more_products = &self.more_products[..count];
         let drift = &self.drift[..count];
-        let nodes = &leg.tables.nodes[..count];
+        let nodes = &A::entries(&at.tables().nodes)[..count];
         for c in 0..count {
-            let Evaluation { q, z, first } = at;
-            let (start, far) = (&leg.start.q, (&products[c], &drift[c]));
-            if leg.inertia.diagonal.is_some() {
-                (leg.inertia).positions::<V, true>(square, start, far, q);
+            let Evaluation { q, z, first } = evaluation;
+            let far = (&products[c], &drift[c]);
+            if is_diagonal {
+                positions::<V, A, true, L, N>(like, at, far, q);
             } else {
-                (leg.inertia).positions::<V, false>(square, start, far, q);
+                positions::<V, A, false, L, N>(like, at, far, q);
             }
             if const { M::FACTS.forced } {
                 for a in 0..N {
                     z[a] = match M::FORM {
                         Form::Lagrangian => {
-                            let rate = leg.inertia.row(like, &more_products[c], a);
-                            h.times_plus(rate, like.like(self.velocity[a]))
+                            let rate = inertia.row(like, &more_products[c], a);
+                            h.times_plus(rate, at.number(like, self.velocity[a]))
                         }
                         Form::Hamiltonian => {
                             let rate = like.with(more_products[c][a]);
-                            h.times_plus(rate, like.like(leg.start.p[a]))
+                            h.times_plus(rate, at.start(like, a).1)
                         }
                     };
                 }
             }
-            let t = like.like(leg.t) + h * like.with(nodes[c]);
-            V::first(model, t, q, z, first);
+            A::first(model, at.time(like, nodes[c]), (q, z), first, None);
             for a in 0..N {
                 let given = match M::FORM {
                     Form::Lagrangian => first.q[a],
@@ -142,23 +138,46 @@ impl<const N: usize, S: Storage> Work<N, S> {
                     given
                 };
                 // As accelerations: momenta of light and heavy bodies say nothing beside each other.
-                let inverse = like.like(leg.inertia.inverse_diagonal[a]);
+                let inverse = like.like(inertia.inverse_diagonal[a]);
                 changed.raise(inverse * (force - like.with(forces[c][a])));
-                size.raise(inverse * force);
-                forces[c][a] = force.lanes();
+                // What is not finite shows in the change.
+                size.raise_finite(inverse * force);
+                at.set(&mut forces[c][a], force);
             }
         }
-        let (changed, size) = (changed.get(), size.get());
-        if changed == 0.0 {
-            return Increment::NONE;
-        }
-        let h = leg.h.abs();
-        let speed = larger(self.speed, h * size);
-        let distance = larger(self.distance, h * (self.speed + h * size));
-        let velocity = h * changed / speed;
-        let position = h * (0.5 * h * changed) / distance;
-        // Both are NaN, or none is.
-        let relative = larger(velocity, position);
-        Increment { relative, position }
+        (changed, size)
     }
+}
+
+/// Coordinates: start + drift + h² M⁻¹ · products.
+#[inline(always)]
+fn positions<V, A, const DIAGONAL: bool, const L: usize, const N: usize>(
+    like: V,
+    at: &A,
+    (products, drift): (&Row<L, N>, &Row<L, N>),
+    q: &mut [V; N],
+) where
+    V: Side<L>,
+    A: Arrangement<V, L, N>,
+{
+    let (inertia, square) = (at.inertia(), like.like(at.h() * at.h()));
+    for a in 0..N {
+        let drift = like.with(drift[a]);
+        let moved = if const { DIAGONAL } {
+            like.like(inertia.reach[a])
+                .times_plus(like.with(products[a]), drift)
+        } else {
+            square.times_plus(inertia.row(like, products, a), drift)
+        };
+        q[a] = at.start(like, a).0 + moved;
+    }
+}
+
+/// The velocity of a momentum, and what it lost by rounding: the momentum belongs to no rounded velocity, and the rest counts as low word.
+#[inline(always)]
+pub(crate) fn velocity_of<V: Precise>((p, p_low): (V, V), mass: V, inverse: V) -> (V, V) {
+    let v = p * inverse;
+    let (product, rest) = v.product(mass);
+    let missing = p_low + ((p - product) - rest);
+    (v, missing * inverse)
 }

@@ -1,6 +1,6 @@
 //! A step of one trajectory: start of the iteration, the iteration, the end.
 
-use super::sweep::{Evaluation, no_derivatives};
+use super::arrangement::Evaluation;
 use super::{Leg, Outcome, Points, Together, Work, is_finite, is_phase, is_second_order, largest};
 use crate::error::StepError;
 use crate::method::{Last, Memory};
@@ -188,6 +188,9 @@ where
             work.forces.copy_from_slice(&points.forces);
             work.rates.copy_from_slice(&points.rates);
         }
+        if const { is_second_order::<M, N>() } {
+            points.inertia.set_step(like, self.place.1);
+        }
         let leg = Leg {
             t: self.place.0,
             h: self.place.1,
@@ -214,26 +217,20 @@ where
         if const { is_second_order::<M, N>() } {
             work.integrate_twice(like, &leg);
             if is_rough {
-                work.set_drift(like, &leg);
+                work.accelerated().set_drift(like, &leg);
             } else {
-                work.set_exact_drift(like, &leg);
+                work.accelerated().set_exact_drift(like, &leg);
             }
         } else if !is_rough {
-            work.set_low(like, &leg);
+            work.rows().set_low(like, &leg);
         }
-        let zero = [like.like(0.0); N];
-        let (mut q, mut z, mut first) = (zero, zero, no_derivatives(like));
-        let mut at = Evaluation {
-            q: &mut q,
-            z: &mut z,
-            first: &mut first,
-        };
+        let mut at = Evaluation::zero(like);
         while iterations < most {
             // Constant conditions, so that of the three iterations one is compiled.
             let increment = if const { is_second_order::<M, N>() } {
                 work.sweep_second_order::<V, M>(like, model, &leg, &mut at)
             } else if const { is_phase::<M, N>() } {
-                work.sweep_phase::<V, M>(like, model, &leg, &mut at, iterations == 0, refresh)
+                work.sweep_phase::<V, M>(like, model, &leg, &mut at, (iterations == 0, refresh))
             } else {
                 work.sweep_velocity::<V, M>(like, model, &leg, &mut at, refresh)
             };

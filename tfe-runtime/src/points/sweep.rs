@@ -1,28 +1,39 @@
-//! First-order equations, and what all iterations share.
+//! What all iterations share, and how points of one trajectory lie side by side.
 
+use super::arrangement::{Arrangement, Evaluation, Size};
+use super::first_order::Rows;
+use super::second_order::{Forces, velocity_of};
 use super::{Inertia, Leg, Row, Work};
 use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
 use crate::model::{First, Model};
-use crate::real::Real;
-use crate::registers::four::{Four, Precise};
-use crate::registers::storage::Storage;
+use crate::precise::Precise;
+use crate::registers::four::{Four, block, put};
+use crate::registers::side::Side;
+use crate::registers::storage::{Fixed, Matrix, Storage};
 
 /// The largest magnitude so far in each lane. NaN is left out: the end of a step is not finite where one of its forces is not, and that is looked at once a step.
 #[derive(Clone, Copy)]
 pub(crate) struct Magnitude<V>(V);
 
-impl<V: Four> Magnitude<V> {
+impl<V: Four> Size<V> for Magnitude<V> {
     #[inline(always)]
-    pub(crate) fn none(like: V) -> Self {
+    fn none(like: V) -> Self {
         Self(like.like(0.0))
     }
 
     #[inline(always)]
-    pub(crate) fn raise(&mut self, value: V) {
+    fn raise(&mut self, value: V) {
         self.0 = value.abs().larger(self.0);
     }
 
+    #[inline(always)]
+    fn raise_finite(&mut self, value: V) {
+        self.raise(value);
+    }
+}
+
+impl<V: Four> Magnitude<V> {
     /// Of all lanes.
     #[inline(always)]
     pub(crate) fn get(self) -> f64 {
@@ -40,9 +51,9 @@ pub(crate) struct Largest<V> {
 }
 
 #[cfg(feature = "alloc")]
-impl<V: Precise> Largest<V> {
+impl<V: Precise> Size<V> for Largest<V> {
     #[inline(always)]
-    pub(crate) fn none(like: V) -> Self {
+    fn none(like: V) -> Self {
         let zero = like.like(0.0);
         Self {
             size: zero,
@@ -51,17 +62,19 @@ impl<V: Precise> Largest<V> {
     }
 
     #[inline(always)]
-    pub(crate) fn raise(&mut self, value: V) {
+    fn raise(&mut self, value: V) {
         self.size = value.abs().larger(self.size);
         self.sum += value;
     }
 
-    /// The same for a value of which others tell whether it is finite.
     #[inline(always)]
-    pub(crate) fn raise_finite(&mut self, value: V) {
+    fn raise_finite(&mut self, value: V) {
         self.size = value.abs().larger(self.size);
     }
+}
 
+#[cfg(feature = "alloc")]
+impl<V: Precise> Largest<V> {
     /// One for each lane; NaN where one value of that lane was not finite.
     #[inline(always)]
     pub(crate) fn by_lane(self) -> V {
@@ -96,120 +109,184 @@ pub(crate) fn relative(h: f64, start: f64, x: f64, step: f64) -> f64 {
     }
 }
 
-impl<const N: usize, S: Storage> Work<N, S> {
-    /// What low words of the start and of the tables add at the points.
+/// Four points of a trajectory.
+impl<V: Four, const N: usize, S: Storage> Arrangement<V, 4, N> for Leg<'_, N, S> {
+    type Memory = S;
+    type Size = Magnitude<V>;
+    type Number = f64;
+    type Entry = [f64; 4];
+
     #[inline(always)]
-    pub(super) fn set_low<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
-        let (products, more_products) = (&mut self.products, &mut self.more_products);
-        match leg.tables.projected.first() {
-            None => (leg.tables.once_low).apply(like, &self.rates, products),
-            Some(projection) => (projection.position_low).apply(like, &self.rates, products),
+    fn tables(&self) -> &Fixed<S> {
+        self.tables
+    }
+
+    #[inline(always)]
+    fn inertia(&self) -> &Inertia<N, S> {
+        self.inertia
+    }
+
+    #[inline(always)]
+    fn h(&self) -> f64 {
+        self.h
+    }
+
+    #[inline(always)]
+    fn number(&self, like: V, number: f64) -> V {
+        like.like(number)
+    }
+
+    #[inline(always)]
+    fn entries(vector: &[[f64; 4]]) -> &[[f64; 4]] {
+        vector
+    }
+
+    #[inline(always)]
+    fn entry(like: V, entry: [f64; 4]) -> V {
+        like.with(entry)
+    }
+
+    #[inline(always)]
+    fn time(&self, like: V, node: [f64; 4]) -> V {
+        like.like(self.t) + like.like(self.h) * like.with(node)
+    }
+
+    #[inline(always)]
+    fn start(&self, like: V, a: usize) -> (V, V) {
+        (like.like(self.start.q[a]), like.like(self.start.p[a]))
+    }
+
+    #[inline(always)]
+    fn low(&self, like: V, a: usize) -> (V, V) {
+        (like.like(self.low.q[a]), like.like(self.low.p[a]))
+    }
+
+    #[inline(always)]
+    fn apply(&self, like: V, table: &Matrix<S>, rows: &[Row<N>], products: &mut [Row<N>]) {
+        table.apply(like, rows, products);
+    }
+
+    #[inline(always)]
+    fn set(&self, place: &mut [f64; 4], value: V) {
+        *place = value.lanes();
+    }
+
+    #[inline(always)]
+    fn first<M: Model<N>>(
+        model: &M,
+        t: V,
+        (q, z): (&[V; N], &[V; N]),
+        first: &mut First<V, N>,
+        mass: Option<&mut [[V; N]; N]>,
+    ) {
+        match mass {
+            Some(mass) => V::first_and_mass(model, t, q, z, first, mass),
+            None => V::first(model, t, q, z, first),
         }
-        (leg.tables.once_low).apply(like, &self.forces, more_products);
-        let h = like.like(leg.h);
-        for (low, product) in self.low_position.iter_mut().zip(products.iter()) {
-            for a in 0..N {
-                let product = like.with(product[a]);
-                low[a] = h.times_plus(product, like.like(leg.low.q[a])).lanes();
-            }
-        }
-        for (low, product) in self.low_momentum.iter_mut().zip(more_products.iter()) {
-            for a in 0..N {
-                let product = like.with(product[a]);
-                low[a] = h.times_plus(product, like.like(leg.low.p[a])).lanes();
-            }
+    }
+}
+
+impl<const N: usize, S: Storage> Work<N, S> {
+    /// The rows of equations of first order.
+    #[inline(always)]
+    pub(super) fn rows(&mut self) -> Rows<'_, 4, N> {
+        Rows {
+            rates: &mut self.rates,
+            forces: &mut self.forces,
+            momenta: &mut self.momenta,
+            velocities: &mut self.velocities,
+            products: &mut self.products,
+            more_products: &mut self.more_products,
+            low_position: &mut self.low_position,
+            low_momentum: &mut self.low_momentum,
+            masses: &mut self.masses,
         }
     }
 
-    /// A Lagrangian: momenta and forces at the velocities, then velocities that belong to the momenta asked for.
+    /// The rows of M q̈ = f.
+    #[inline(always)]
+    pub(super) fn accelerated(&mut self) -> Forces<'_, f64, 4, N> {
+        Forces {
+            forces: &mut self.forces,
+            products: &mut self.products,
+            more_products: &mut self.more_products,
+            drift: &mut self.drift,
+            velocity: &self.velocity,
+            velocity_low: &self.velocity_low,
+        }
+    }
+
+    /// Velocity at the start, and what it lost by rounding.
+    #[inline(always)]
+    pub(super) fn begin_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
+        let inertia = &leg.inertia;
+        if let Some(mass) = &inertia.diagonal {
+            for at in (0..N).step_by(4) {
+                let p = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
+                let inverse = block(like, &inertia.inverse_diagonal, at);
+                let (v, v_low) = velocity_of(p, block(like, mass, at), inverse);
+                put(v, &mut self.velocity, at);
+                put(v_low, &mut self.velocity_low, at);
+            }
+            return;
+        }
+        for (a, row) in inertia.inverse.iter().enumerate() {
+            let (mut v, mut low) = (0.0, 0.0);
+            for b in 0..N {
+                v += row[b] * leg.start.p[b];
+                low += row[b] * leg.low.p[b];
+            }
+            (self.velocity[a], self.velocity_low[a]) = (v, low);
+        }
+    }
+
+    /// A² f
+    #[inline(always)]
+    pub(super) fn integrate_twice<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
+        (leg.tables.twice).apply(like, &self.forces, &mut self.products);
+    }
+
+    /// An iteration of the forces of M q̈ = f.
+    #[inline(always)]
+    pub(super) fn sweep_second_order<V: Four, M>(
+        &mut self,
+        like: V,
+        model: &M,
+        leg: &Leg<'_, N, S>,
+        at: &mut Evaluation<V, N>,
+    ) -> Increment
+    where
+        M: Model<N>,
+    {
+        let (changed, size) = self.accelerated().sweep(like, model, leg, at);
+        let (changed, size) = (changed.get(), size.get());
+        if changed == 0.0 {
+            return Increment::NONE;
+        }
+        let h = leg.h.abs();
+        let speed = larger(self.speed, h * size);
+        let distance = larger(self.distance, h * (self.speed + h * size));
+        let velocity = h * changed / speed;
+        let position = h * (0.5 * h * changed) / distance;
+        // Both are NaN, or none is.
+        let relative = larger(velocity, position);
+        Increment { relative, position }
+    }
+
+    /// An iteration of a Lagrangian's velocities.
     #[inline(always)]
     pub(super) fn sweep_velocity<V: Four, M>(
         &mut self,
         like: V,
         model: &M,
         leg: &Leg<'_, N, S>,
-        at: &mut Evaluation<'_, V, N>,
+        at: &mut Evaluation<V, N>,
         refresh: bool,
     ) -> Increment
     where
         M: Model<N>,
     {
-        let (h, zero) = (like.like(leg.h), like.like(0.0));
-        let rates = &mut self.rates;
-        let count = rates.len();
-        let forces = &mut self.forces[..count];
-        let momenta = &mut self.momenta[..count];
-        let products = &mut self.products[..count];
-        let low_position = &self.low_position[..count];
-        let low_momentum = &self.low_momentum[..count];
-        let nodes = &leg.tables.nodes[..count];
-        let masses = &mut self.masses;
-        let more_products = &mut self.more_products[..count];
-        let projection = leg.tables.projected.first();
-        match projection {
-            None => leg.tables.once.apply(like, rates, products),
-            Some(projection) => projection.position.apply(like, rates, products),
-        }
-        for c in 0..count {
-            let Evaluation { q, z: v, first } = at;
-            for a in 0..N {
-                let low = like.with(low_position[c][a]);
-                let moved = h.times_plus(like.with(products[c][a]), low);
-                q[a] = like.like(leg.start.q[a]) + moved;
-                v[a] = like.with(rates[c][a]);
-            }
-            let t = like.like(leg.t) + h * like.with(nodes[c]);
-            if const { !M::FACTS.constant_mass } && refresh {
-                let mut mass = [[zero; N]; N];
-                V::first_and_mass(model, t, q, v, first, &mut mass);
-                factor(like, &mut mass);
-                store(&mut masses[c], &mass);
-            } else {
-                V::first(model, t, q, v, first);
-            }
-            for a in 0..N {
-                momenta[c][a] = (first.z[a] - like.like(leg.start.p[a])).lanes();
-                forces[c][a] = (first.q[a] + first.force[a]).lanes();
-            }
-        }
-        if let Some(projection) = projection {
-            more_products.copy_from_slice(momenta);
-            projection.onto_rates.apply(like, more_products, momenta);
-        }
-        leg.tables.once.apply(like, forces, products);
-        let (mut changed, mut size) = (Magnitude::none(like), Magnitude::none(like));
-        // The loops apart: the one without projection is what most elements go through.
-        if let Some(projection) = projection {
-            for c in 0..count {
-                let momenta = (&products[c], &low_momentum[c], &momenta[c]);
-                let step = leg.missing_velocity::<V, M>(like, momenta, masses.get(c));
-                for a in 0..N {
-                    more_products[c][a] = step[a].lanes();
-                }
-            }
-            // With one mass matrix for all points these would lie among the rates already.
-            projection.onto_rates.apply(like, more_products, products);
-            for c in 0..count {
-                for a in 0..N {
-                    let step = like.with(products[c][a]);
-                    let rate = like.with(rates[c][a]) + step;
-                    rates[c][a] = rate.lanes();
-                    changed.raise(step);
-                    size.raise(rate);
-                }
-            }
-        } else {
-            for c in 0..count {
-                let momenta = (&products[c], &low_momentum[c], &momenta[c]);
-                let step = leg.missing_velocity::<V, M>(like, momenta, masses.get(c));
-                for a in 0..N {
-                    let rate = like.with(rates[c][a]) + step[a];
-                    rates[c][a] = rate.lanes();
-                    changed.raise(step[a]);
-                    size.raise(rate);
-                }
-            }
-        }
+        let (changed, size) = (self.rows()).sweep_velocity(like, model, leg, at, refresh);
         let (changed, size) = (changed.get(), size.get());
         let position = relative(leg.h, self.distance, size, changed);
         // The momentum at the end is as good as the velocities, whatever the step; what is left of an increment reaches it through forces
@@ -223,124 +300,30 @@ impl<const N: usize, S: Storage> Work<N, S> {
         Increment { relative, position }
     }
 
-    /// A Hamiltonian: momenta, the velocities that belong to them, coordinates, and then both rates anew.
+    /// An iteration of a Hamiltonian's rates.
     #[inline(always)]
     pub(super) fn sweep_phase<V: Four, M>(
         &mut self,
         like: V,
         model: &M,
         leg: &Leg<'_, N, S>,
-        at: &mut Evaluation<'_, V, N>,
-        is_first: bool,
-        refresh: bool,
+        at: &mut Evaluation<V, N>,
+        which: (bool, bool),
     ) -> Increment
     where
         M: Model<N>,
     {
-        let (h, zero) = (like.like(leg.h), like.like(0.0));
-        let rates = &mut self.rates;
-        let count = rates.len();
-        let forces = &mut self.forces[..count];
-        let momenta = &mut self.momenta[..count];
-        let velocities = &mut self.velocities[..count];
-        let products = &mut self.products[..count];
-        let low_position = &self.low_position[..count];
-        let low_momentum = &self.low_momentum[..count];
-        let nodes = &leg.tables.nodes[..count];
-        let masses = &mut self.masses;
-        leg.tables.once.apply(like, forces, products);
-        for c in 0..count {
-            let mut change = [zero; N];
-            for a in 0..N {
-                let low = like.with(low_momentum[c][a]);
-                let moved = h.times_plus(like.with(products[c][a]), low);
-                let p = like.like(leg.start.p[a]) + moved;
-                change[a] = p - like.with(momenta[c][a]);
-                momenta[c][a] = p.lanes();
-            }
-            let mut by_change = [zero; N];
-            if const { M::FACTS.constant_mass } {
-                if !is_first {
-                    by_change = leg.inertia.times(like, &change);
-                }
-            } else if !is_first {
-                for a in 0..N {
-                    for b in 0..N {
-                        let mass = like.with(masses[c][a][b]);
-                        by_change[a] = mass.times_plus(change[b], by_change[a]);
-                    }
-                }
-            }
-            for a in 0..N {
-                velocities[c][a] = (like.with(rates[c][a]) + by_change[a]).lanes();
-            }
-        }
-        leg.tables.once.apply(like, velocities, products);
-        let none = Magnitude::none(like);
-        let (mut force_changed, mut force_size) = (none, none);
-        let (mut rate_changed, mut rate_size) = (none, none);
-        for c in 0..count {
-            let Evaluation { q, z: p, first } = at;
-            for a in 0..N {
-                let low = like.with(low_position[c][a]);
-                let moved = h.times_plus(like.with(products[c][a]), low);
-                q[a] = like.like(leg.start.q[a]) + moved;
-                p[a] = like.with(momenta[c][a]);
-            }
-            let t = like.like(leg.t) + h * like.with(nodes[c]);
-            if const { !M::FACTS.constant_mass } && refresh {
-                let mut mass = [[zero; N]; N];
-                V::first_and_mass(model, t, q, p, first, &mut mass);
-                store(&mut masses[c], &mass);
-            } else {
-                V::first(model, t, q, p, first);
-            }
-            for a in 0..N {
-                let force = first.force[a] - first.q[a];
-                force_changed.raise(force - like.with(forces[c][a]));
-                rate_changed.raise(first.z[a] - like.with(rates[c][a]));
-                force_size.raise(force);
-                rate_size.raise(first.z[a]);
-                forces[c][a] = force.lanes();
-                rates[c][a] = first.z[a].lanes();
-            }
-        }
-        let (force_changed, rate_changed) = (force_changed.get(), rate_changed.get());
-        let position = relative(leg.h, self.distance, rate_size.get(), rate_changed);
-        let momentum = relative(leg.h, self.speed, force_size.get(), force_changed);
+        let [of_rates, of_forces] = self.rows().sweep_phase(like, model, leg, at, which);
+        let (changed, size) = (of_rates.0.get(), of_rates.1.get());
+        let position = relative(leg.h, self.distance, size, changed);
+        let (changed, size) = (of_forces.0.get(), of_forces.1.get());
+        let momentum = relative(leg.h, self.speed, size, changed);
         let relative = if (position + momentum).is_nan() {
             f64::NAN
         } else {
             position.max(momentum)
         };
         Increment { relative, position }
-    }
-}
-
-impl<const N: usize, S: Storage> Leg<'_, N, S> {
-    /// M⁻¹ times what momenta lack: from products of the tables with forces, low words, and what the momenta are more than that at the start.
-    #[inline(always)]
-    fn missing_velocity<V: Four, M>(
-        &self,
-        like: V,
-        (products, low, momenta): (&Row<N>, &Row<N>, &Row<N>),
-        mass: Option<&[Row<N>; N]>,
-    ) -> [V; N]
-    where
-        M: Model<N>,
-    {
-        let (h, mut step) = (like.like(self.h), [like.like(0.0); N]);
-        for a in 0..N {
-            let wanted = h.times_plus(like.with(products[a]), like.with(low[a]));
-            step[a] = wanted - like.with(momenta[a]);
-        }
-        if const { M::FACTS.constant_mass } {
-            return self.inertia.times(like, &step);
-        }
-        if let Some(mass) = mass {
-            solve(like, mass, &mut step);
-        }
-        step
     }
 }
 
@@ -363,29 +346,33 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         product
     }
 
-    /// Coordinates at four points: start + drift + h² M⁻¹ · products.
+    /// Sets how far accelerations reach in a step of length h.
     #[inline(always)]
-    pub(super) fn positions<V: Four, const DIAGONAL: bool>(
-        &self,
-        square: V,
-        start: &[f64; N],
-        (products, drift): (&Row<N>, &Row<N>),
-        q: &mut [V; N],
-    ) {
-        for a in 0..N {
-            let rate = if const { DIAGONAL } {
-                square.like(self.inverse_diagonal[a]) * square.with(products[a])
-            } else {
-                self.row(square, products, a)
-            };
-            let moved = square.times_plus(rate, square.with(drift[a]));
-            q[a] = square.like(start[a]) + moved;
+    pub(crate) fn set_step<V: Four>(&mut self, like: V, h: f64) {
+        if self.diagonal.is_none() || self.step == h {
+            return;
+        }
+        self.step = h;
+        let (square, square_low) = like.like(h).product(like.like(h));
+        for at in (0..N).step_by(4) {
+            let inverse = block(like, &self.inverse_diagonal, at);
+            let inverse_low = block(like, &self.inverse_low, at);
+            let (product, rest) = square.product(inverse);
+            let rest = rest + (square * inverse_low + square_low * inverse);
+            let (high, low) = product.exact_sum(rest);
+            put(high, &mut self.reach, at);
+            put(low, &mut self.reach_low, at);
         }
     }
 
-    /// One line of it times the numbers at four points.
+    /// One line of it times the numbers of a row.
     #[inline(always)]
-    pub(super) fn row<V: Four>(&self, like: V, row: &Row<N>, a: usize) -> V {
+    pub(crate) fn row<V: Side<L>, const L: usize>(
+        &self,
+        like: V,
+        row: &[[f64; L]; N],
+        a: usize,
+    ) -> V {
         if self.diagonal.is_some() {
             return like.like(self.inverse_diagonal[a]) * like.with(row[a]);
         }
@@ -411,64 +398,5 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
             (of_high[a], of_low[a]) = (sum.high, sum.low);
         }
         (of_high, of_low)
-    }
-}
-
-#[inline(always)]
-fn store<V: Four, const N: usize>(to: &mut [Row<N>; N], matrix: &[[V; N]; N]) {
-    for a in 0..N {
-        for b in 0..N {
-            to[a][b] = matrix[a][b].lanes();
-        }
-    }
-}
-
-/// Where a kernel is evaluated, and what it writes there. Entries that are always zero are never written, so one serves for all points of a step: with many coordinates it takes as
-/// long to fill them with zeros as to evaluate a kernel.
-pub(super) struct Evaluation<'a, V, const N: usize> {
-    pub(super) q: &'a mut [V; N],
-    pub(super) z: &'a mut [V; N],
-    pub(super) first: &'a mut First<V, N>,
-}
-
-#[inline(always)]
-pub(crate) fn no_derivatives<V: Real, const N: usize>(like: V) -> First<V, N> {
-    let zero = [like.like(0.0); N];
-    First {
-        z: zero,
-        q: zero,
-        force: zero,
-    }
-}
-
-/// Factors without exchanging rows: a mass matrix is positive definite, and where it is not the iteration does not converge and the step is
-/// left to another method. The diagonal holds the inverse pivots.
-#[inline(always)]
-pub(crate) fn factor<V: Precise, const N: usize>(like: V, matrix: &mut [[V; N]; N]) {
-    for column in 0..N {
-        let inverse = like.like(1.0) / matrix[column][column];
-        matrix[column][column] = inverse;
-        for row in column + 1..N {
-            let factor = matrix[row][column] * inverse;
-            matrix[row][column] = factor;
-            for j in column + 1..N {
-                matrix[row][j] = (-factor).times_plus(matrix[column][j], matrix[row][j]);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn solve<V: Four, const N: usize>(like: V, factors: &[Row<N>; N], vector: &mut [V; N]) {
-    for row in 0..N {
-        for j in 0..row {
-            vector[row] = (-like.with(factors[row][j])).times_plus(vector[j], vector[row]);
-        }
-    }
-    for row in (0..N).rev() {
-        for j in row + 1..N {
-            vector[row] = (-like.with(factors[row][j])).times_plus(vector[j], vector[row]);
-        }
-        vector[row] = vector[row] * like.with(factors[row][row]);
     }
 }

@@ -1,47 +1,12 @@
 //! Four points side by side.
 
+use super::side::Side;
 use super::storage::{Matrix, Row, Storage};
 use crate::double_double::DoubleDouble;
 use crate::lanes::Lanes;
 use crate::model::{First, Model};
+use crate::precise::Precise;
 use crate::real::{Real, fused};
-
-/// Numbers whose products and sums can be had exactly.
-pub trait Precise: Real {
-    /// The product and what rounding takes from it, exactly.
-    fn product(self, other: Self) -> (Self, Self);
-
-    /// `self` · `factor` + `term` with one rounding ([`fused`]).
-    fn times_plus(self, factor: Self, term: Self) -> Self;
-
-    /// The sum and what rounding takes from it, exactly.
-    #[inline(always)]
-    fn exact_sum(self, other: Self) -> (Self, Self) {
-        let high = self + other;
-        let part = high - self;
-        (high, (self - (high - part)) + (other - part))
-    }
-
-    /// The larger one; of a NaN and another number, the second.
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        Self::select(other.less(self), self, other)
-    }
-}
-
-/// weight · value, and what rounding takes from it and took from the weight.
-#[inline(always)]
-pub(crate) fn exact_term<V: Precise>((weight, weight_low): (V, V), value: V) -> (V, V) {
-    let (product, rest) = weight.product(value);
-    (product, weight_low.times_plus(value, rest))
-}
-
-/// Adds a term, each a number and what rounding took from it.
-#[inline(always)]
-pub(crate) fn add_exactly<V: Precise>(sum: &mut (V, V), (term, term_low): (V, V)) {
-    let (high, lost) = sum.0.exact_sum(term);
-    *sum = (high, sum.1 + (term_low + lost));
-}
 
 /// Work that is compiled apart from the places where it is called, for the instruction set of the numbers with which it computes.
 pub(crate) trait Apart {
@@ -49,13 +14,7 @@ pub(crate) trait Apart {
 }
 
 /// Four numbers, one for each of four points.
-pub(crate) trait Four: Precise {
-    /// The same kind of numbers with these values.
-    fn with(self, lanes: [f64; 4]) -> Self;
-
-    /// The values.
-    fn lanes(self) -> [f64; 4];
-
+pub(crate) trait Four: Side<4> {
     /// Runs the work with numbers of this kind.
     #[cfg_attr(
         not(feature = "alloc"),
@@ -125,19 +84,6 @@ pub(crate) fn put<V: Four>(four: V, numbers: &mut [f64], at: usize) {
     numbers[at..end].copy_from_slice(&four.lanes()[..end - at]);
 }
 
-impl Precise for f64 {
-    #[inline(always)]
-    fn product(self, other: Self) -> (Self, Self) {
-        let product = DoubleDouble::product(self, other);
-        (product.high, product.low)
-    }
-
-    #[inline(always)]
-    fn times_plus(self, factor: Self, term: Self) -> Self {
-        fused(self, factor, term)
-    }
-}
-
 impl Precise for Lanes<4> {
     #[inline(always)]
     fn product(self, other: Self) -> (Self, Self) {
@@ -158,8 +104,7 @@ impl Precise for Lanes<4> {
     }
 }
 
-/// On every processor: the arithmetic in vectors as the compiler likes, the kernel for one point after the other.
-impl Four for Lanes<4> {
+impl Side<4> for Lanes<4> {
     #[inline(always)]
     fn with(self, lanes: [f64; 4]) -> Self {
         Self(lanes)
@@ -169,7 +114,10 @@ impl Four for Lanes<4> {
     fn lanes(self) -> [f64; 4] {
         self.0
     }
+}
 
+/// On every processor: the arithmetic in vectors as the compiler likes, the kernel for one point after the other.
+impl Four for Lanes<4> {
     /// Called and not inlined: what few processors run need not be compiled at every place of every model.
     #[inline(never)]
     fn apply<S: Storage, const N: usize>(

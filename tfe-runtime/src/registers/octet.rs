@@ -1,6 +1,7 @@
 //! Eight numbers in one register of a processor with AVX-512, for eight trajectories side by side. The rules are those of [`quad`](crate::registers::quad).
 
 use crate::registers::pair::{Apart, Eight, LANES};
+use crate::registers::side::Side;
 use crate::trigonometry::LIMIT;
 use pulp::x86::V4;
 use pulp::{Simd, b8, f64x8, u64x8};
@@ -53,7 +54,7 @@ impl<W: Apart> pulp::NullaryFnOnce for Call<W> {
     }
 }
 
-impl Eight for Octet {
+impl Side<LANES> for Octet {
     #[inline(always)]
     fn with(self, lanes: [f64; LANES]) -> Self {
         self.with(lanes)
@@ -63,7 +64,9 @@ impl Eight for Octet {
     fn lanes(self) -> [f64; LANES] {
         self.lanes()
     }
+}
 
+impl Eight for Octet {
     #[inline(always)]
     fn any_positive(self) -> bool {
         self.any_positive()

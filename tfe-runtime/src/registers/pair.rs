@@ -1,21 +1,17 @@
 //! Eight numbers: one register, or two of four. Written side by side the operations of two overlap, where one chain of them would wait for
 //! itself.
 
+use crate::precise::Precise;
 use crate::real::Real;
-use crate::registers::four::{self, Four, Precise};
+use crate::registers::four::{self, Four};
+use crate::registers::side::Side;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// So many trajectories share a kernel call.
 pub const LANES: usize = 8;
 
 /// Eight numbers, one for each of eight trajectories.
-pub trait Eight: Precise {
-    /// The same kind of numbers with these values.
-    fn with(self, lanes: [f64; LANES]) -> Self;
-
-    /// The values.
-    fn lanes(self) -> [f64; LANES];
-
+pub trait Eight: Side<LANES> {
     /// Whether a number is positive; of numbers that are no NaN.
     #[inline(always)]
     fn any_positive(self) -> bool {
@@ -49,7 +45,7 @@ impl<W: Apart> four::Apart for Paired<W> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pair<V>(pub(crate) V, pub(crate) V);
 
-impl<V: Four> Eight for Pair<V> {
+impl<V: Four> Side<LANES> for Pair<V> {
     #[inline(always)]
     fn with(self, [a, b, c, d, e, f, g, h]: [f64; LANES]) -> Self {
         Self(self.0.with([a, b, c, d]), self.1.with([e, f, g, h]))
@@ -60,7 +56,9 @@ impl<V: Four> Eight for Pair<V> {
         let ([a, b, c, d], [e, f, g, h]) = (self.0.lanes(), self.1.lanes());
         [a, b, c, d, e, f, g, h]
     }
+}
 
+impl<V: Four> Eight for Pair<V> {
     #[inline(always)]
     fn apart<W: Apart>(self, work: W) {
         self.0.apart(Paired(work));

@@ -1,7 +1,8 @@
 //! Products of the tables of an element with numbers at its points.
 
-use super::four::{Four, Precise, add_exactly, exact_term};
+use super::four::Four;
 use super::storage::{MAX_GROUPS, Matrix, Row, Storage, Weights};
+use crate::precise::{Precise, add_exactly, exact_term};
 
 impl<S: Storage> Matrix<S> {
     /// The product with a vector over the points for every coordinate.

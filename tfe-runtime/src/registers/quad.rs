@@ -104,7 +104,7 @@ macro_rules! register {
             }
         }
 
-        impl crate::registers::four::Precise for $name {
+        impl crate::precise::Precise for $name {
             /// By a fused instruction the second is exact.
             #[inline(always)]
             fn product(self, other: Self) -> (Self, Self) {
@@ -349,7 +349,7 @@ macro_rules! register {
         impl crate::trigonometry::Turn for $name {
             #[inline(always)]
             fn fused(self, factor: Self, term: Self) -> Self {
-                crate::registers::four::Precise::times_plus(self, factor, term)
+                crate::precise::Precise::times_plus(self, factor, term)
             }
 
             #[inline(always)]

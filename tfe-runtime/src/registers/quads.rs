@@ -1,13 +1,13 @@
 //! Four points in a register of the processor.
 
 use super::four::{Apart, Four, each_point};
+use super::side::Side;
 use super::storage::{Matrix, Row, Storage};
 use crate::lanes::Lanes;
 use crate::model::{First, Model};
 use crate::registers::quad::Quad;
 
-/// In registers of the processor, the kernel for all four points at once.
-impl Four for Quad {
+impl Side<4> for Quad {
     #[inline(always)]
     fn with(self, lanes: [f64; 4]) -> Self {
         self.with(lanes)
@@ -17,7 +17,10 @@ impl Four for Quad {
     fn lanes(self) -> [f64; 4] {
         self.lanes()
     }
+}
 
+/// In registers of the processor, the kernel for all four points at once.
+impl Four for Quad {
     #[inline(always)]
     fn apply<S: Storage, const N: usize>(
         self,

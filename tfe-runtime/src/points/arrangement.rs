@@ -1,0 +1,99 @@
+//! What lies side by side in registers while an iteration computes.
+
+use super::Inertia;
+use crate::model::{First, Model};
+use crate::real::Real;
+use crate::registers::side::Side;
+use crate::registers::storage::{Fixed, Matrix, Storage};
+
+/// A number for every coordinate of what lies side by side.
+pub(crate) type Row<const L: usize, const N: usize> = [[f64; L]; N];
+
+/// What lies side by side in registers: points of a trajectory, or trajectories.
+pub(crate) trait Arrangement<V: Side<L>, const L: usize, const N: usize> {
+    type Memory: Storage;
+    type Size: Size<V>;
+    /// A number at the start of a step: one for all points, or one for each trajectory.
+    type Number: Copy;
+    /// A number of the points of a row.
+    type Entry: Copy;
+
+    fn tables(&self) -> &Fixed<Self::Memory>;
+    fn inertia(&self) -> &Inertia<N, Self::Memory>;
+
+    /// The length of the step.
+    fn h(&self) -> f64;
+
+    /// Such a number in registers.
+    fn number(&self, like: V, number: Self::Number) -> V;
+
+    /// What a vector over the points has for each row.
+    fn entries(vector: &[[f64; 4]]) -> &[Self::Entry];
+
+    /// An entry in registers.
+    fn entry(like: V, entry: Self::Entry) -> V;
+
+    /// t + h c
+    fn time(&self, like: V, node: Self::Entry) -> V;
+
+    /// Coordinate and momentum `a` at the start.
+    fn start(&self, like: V, a: usize) -> (V, V);
+
+    /// What rounding took from them.
+    fn low(&self, like: V, a: usize) -> (V, V);
+
+    /// The product of a table with a vector over the points, for every coordinate.
+    fn apply(
+        &self,
+        like: V,
+        table: &Matrix<Self::Memory>,
+        rows: &[Row<L, N>],
+        products: &mut [Row<L, N>],
+    );
+
+    /// Writes an unknown, where it is wanted.
+    fn set(&self, place: &mut [f64; L], value: V);
+
+    /// The kernel of first derivatives at q and z, and the one of ∂²/∂z∂z if that is asked for.
+    fn first<M: Model<N>>(
+        model: &M,
+        t: V,
+        at: (&[V; N], &[V; N]),
+        first: &mut First<V, N>,
+        mass: Option<&mut [[V; N]; N]>,
+    );
+}
+
+/// The largest magnitude so far.
+pub(crate) trait Size<V>: Copy {
+    fn none(like: V) -> Self;
+
+    fn raise(&mut self, value: V);
+
+    /// The same for a value of which others tell whether it is finite.
+    fn raise_finite(&mut self, value: V);
+}
+
+/// Where a kernel is evaluated, and what it writes there. Entries that are always zero are never written, so one serves for all points of a step: with many coordinates it takes as
+/// long to fill them with zeros as to evaluate a kernel.
+pub(crate) struct Evaluation<V, const N: usize> {
+    pub(crate) q: [V; N],
+    pub(crate) z: [V; N],
+    pub(crate) first: First<V, N>,
+}
+
+impl<V: Real, const N: usize> Evaluation<V, N> {
+    #[inline(always)]
+    pub(crate) fn zero(like: V) -> Self {
+        let zero = [like.like(0.0); N];
+        Self {
+            q: zero,
+            z: zero,
+            first: First {
+                z: zero,
+                q: zero,
+                force: zero,
+            },
+        }
+    }
+}
