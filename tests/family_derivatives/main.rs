@@ -1,6 +1,8 @@
 //! Derivatives of steps of models of run-time length: transition operators, their spectra, periodic orbits.
 #![cfg(feature = "sparse")]
 
+#[path = "../common/differences.rs"]
+mod differences;
 #[path = "../common/largest.rs"]
 mod largest;
 

@@ -1,5 +1,6 @@
 //! Periodic orbits of families.
 
+use crate::differences::difference;
 use crate::largest::larger;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
@@ -407,12 +408,7 @@ fn a_period_changes_at_one_energy_as_its_closed_form() {
         let square = ((1.0 + 4.0 * b * energy).sqrt() - 1.0) / b;
         period(b, square.sqrt())
     };
-    let (h, weights) = (2e-3, [0.8, -0.2, 4.0 / 105.0, -1.0 / 280.0]);
-    let differences = (1..).zip(weights).map(|(k, weight)| {
-        let step = f64::from(k) * h;
-        weight * (at_energy(1.0 + step) - at_energy(1.0 - step)) / h
-    });
-    let expected: f64 = differences.sum();
+    let [expected] = difference(|b| [at_energy(b)], 1.0);
     let off = orbit.by("b").period() - expected;
     assert!(off.abs() < 1e-9, "{off:e}");
     // The start is a turning point of amplitude a(b).

@@ -6,6 +6,8 @@ mod common;
 mod constrained;
 mod continuation;
 mod convergence;
+#[path = "../common/differences.rs"]
+mod differences;
 mod errors;
 mod models;
 mod orbits;

@@ -1,34 +1,12 @@
 //! Derivatives of orbits and of solutions between given ends, beside differences of solutions.
 
+use crate::differences::{difference, difference_over};
 use crate::models::{Duffing, VanDerPol};
 use std::f64::consts::TAU;
 use tfe::boundary::Component::{Coordinate, Momentum};
 use tfe::boundary::SensitiveBoundaryMotion;
 use tfe::periodic::{HybridOrbit, HybridOrbits, OrbitSlopes};
 use tfe::prelude::*;
-
-/// The derivative of a function at `x`: of eighth order, so that the error is that of roundings.
-fn difference<const K: usize>(of: impl Fn(f64) -> [f64; K], x: f64) -> [f64; K] {
-    difference_over(4e-3 * x.abs().max(0.1), of, x)
-}
-
-/// The same over a distance.
-fn difference_over<const K: usize>(
-    distance: f64,
-    of: impl Fn(f64) -> [f64; K],
-    x: f64,
-) -> [f64; K] {
-    let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
-    let mut sum = [0.0; K];
-    for (k, weight) in (1..).zip(weights) {
-        let step = f64::from(k) * distance;
-        let (high, low) = (of(x + step), of(x - step));
-        for a in 0..K {
-            sum[a] += weight * (high[a] - low[a]) / distance;
-        }
-    }
-    sum
-}
 
 #[track_caller]
 fn close(found: f64, expected: f64, allowed: f64) {

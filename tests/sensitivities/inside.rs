@@ -35,16 +35,7 @@ fn differences<const N: usize>(
         let numbers = at.into_iter().flatten().flatten();
         numbers.chain([integral]).collect()
     };
-    let distance = 4e-3 * x.abs().max(0.1);
-    let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
-    let mut sums = vec![0.0; flat(x).len()];
-    for (k, weight) in (1..).zip(weights) {
-        let step = f64::from(k) * distance;
-        let (high, low) = (flat(x + step), flat(x - step));
-        for (sum, (high, low)) in sums.iter_mut().zip(high.iter().zip(&low)) {
-            *sum += weight * (high - low) / distance;
-        }
-    }
+    let mut sums = difference(flat, x);
     let integral = sums.pop().expect("the last");
     let mut rows = sums.chunks_exact(N);
     let mut row = || {

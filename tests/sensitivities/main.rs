@@ -1,5 +1,7 @@
 //! Derivatives of motions by parameters and starts, against differences of runs.
 
+#[path = "../common/differences.rs"]
+mod differences;
 #[path = "../common/duals.rs"]
 mod duals;
 
@@ -10,26 +12,12 @@ mod forwards;
 mod inside;
 mod second;
 
+use differences::difference;
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};
 use tfe::runtime::{Direction, Model, Parameter};
 use tfe::sensitivity::Loss;
 use tfe::{RunErrorKind, Sensitive};
-
-/// The derivative of a function at `x`: of eighth order, over a distance at which roundings of 1e-15 of the values leave some 1e-13 of them.
-fn difference<const N: usize>(of: impl Fn(f64) -> [f64; N], x: f64) -> [f64; N] {
-    let distance = 4e-3 * x.abs().max(0.1);
-    let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
-    let mut sum = [0.0; N];
-    for (k, weight) in (1..).zip(weights) {
-        let step = f64::from(k) * distance;
-        let (high, low) = (of(x + step), of(x - step));
-        for a in 0..N {
-            sum[a] += weight * (high[a] - low[a]) / distance;
-        }
-    }
-    sum
-}
 
 /// The state at the end of a run as one array, q and p.
 fn end<M: Model<N> + Sync, const N: usize, const D: usize>(

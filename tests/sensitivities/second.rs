@@ -1,6 +1,7 @@
 //! Second derivatives of losses, beside closed forms.
 
 use super::*;
+use crate::differences::difference_over;
 use std::sync::Mutex;
 
 #[dynamics(coordinates(x), lagrangian = m*dot(x)^2/2 - k*x^2/2, force(x) = -c*dot(x), output(place) = x)]
@@ -23,17 +24,7 @@ fn second(f: impl Fn([f64; 3]) -> f64, at: [f64; 3], (i, j): (usize, usize)) -> 
         at[place] += x;
         at
     };
-    let distance = 2e-2;
-    let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
-    let derivative = |g: &dyn Fn(f64) -> f64| -> f64 {
-        (1..)
-            .zip(weights)
-            .map(|(k, weight)| {
-                let step = f64::from(k) * distance;
-                weight * (g(step) - g(-step)) / distance
-            })
-            .sum()
-    };
+    let derivative = |g: &dyn Fn(f64) -> f64| difference_over(2e-2, |x| [g(x)], 0.0)[0];
     derivative(&|x| derivative(&|y| f(moved(y, j, moved(x, i, at)))))
 }
 

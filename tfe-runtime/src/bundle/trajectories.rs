@@ -97,6 +97,20 @@ impl<M, V: Eight, const N: usize> Arrangement<V, LANES, N> for Trajectories<'_, 
 }
 
 impl<M, const N: usize> Step<'_, M, N> {
+    #[inline(always)]
+    fn lying<'a, V: Eight>(
+        &'a self,
+        (start, low): (&'a Ends<N>, &'a Ends<N>),
+        mask: V::Mask,
+    ) -> Trajectories<'a, M, V, N> {
+        Trajectories {
+            step: self,
+            start,
+            low,
+            mask,
+        }
+    }
+
     /// The trajectories as they lie, and their rows of equations of first order.
     #[inline(always)]
     pub(super) fn rows<'a, V: Eight>(
@@ -105,12 +119,7 @@ impl<M, const N: usize> Step<'_, M, N> {
         work: &'a mut Work<N>,
         mask: V::Mask,
     ) -> (Trajectories<'a, M, V, N>, Rows<'a, LANES, N>) {
-        let at = Trajectories {
-            step: self,
-            start: &group.start,
-            low: &group.low,
-            mask,
-        };
+        let at = self.lying((&group.start, &group.low), mask);
         let rows = Rows {
             rates: &mut group.rates,
             forces: &mut group.forces,
@@ -136,12 +145,7 @@ impl<M, const N: usize> Step<'_, M, N> {
         Trajectories<'a, M, V, N>,
         Forces<'a, [f64; LANES], LANES, N>,
     ) {
-        let at = Trajectories {
-            step: self,
-            start: &group.start,
-            low: &group.low,
-            mask,
-        };
+        let at = self.lying((&group.start, &group.low), mask);
         let forces = Forces {
             forces: &mut group.forces,
             products: &mut work.products,
