@@ -1,23 +1,27 @@
 //! Models whose inputs are given: functions of the time, tables, or numbers held between steps.
 
+mod error;
+mod fixed;
+mod run_time;
+mod sources;
 mod table;
 
-use std::error::Error;
+use crate::length::{Declared, FixedLength, RunTimeLength};
+use sources::{Source, Sources};
 use std::fmt;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::marker::PhantomData;
+use std::sync::Arc;
 use table::Table;
-use tfe_runtime::{
-    By, Constraint, ConstraintSecond, Controlled, CoordinateName, Facts, First, Form, InputFailure,
-    InputPanicked, MAX_INPUTS, Model, Real, Second, Share,
-};
+use tfe_runtime::{Controlled, MAX_INPUTS, Share, family};
 
+pub use error::InputError;
+pub(crate) use sources::Cells;
 pub use table::Interpolation;
 
 /// A model with its inputs: a model itself, of the same coordinates and states.
 ///
-/// [`Simulation::input`](crate::Simulation::input) makes one for a run. By itself it is for what takes models: orbits, boundary values, ensembles, work-precision diagrams.
+/// [`Simulation::input`](crate::Simulation::input) makes one for a run. By itself it is for what takes models: orbits, boundary values, ensembles, work-precision diagrams. `L` is the kind of
+/// length of the model.
 ///
 /// ```
 /// use tfe::Driven;
@@ -34,62 +38,90 @@ pub use table::Interpolation;
 /// # Ok(())
 /// # }
 /// ```
-pub struct Driven<'m, M> {
+pub struct Driven<'m, M, L = FixedLength> {
     model: Share<'m, M>,
-    sources: Vec<Source<'m>>,
-    /// Numbers set between steps, which go before sources.
-    held: Option<Arc<Cells>>,
-    /// The last number of a function that was not finite.
-    failed: Arc<Mutex<Option<(usize, f64, f64)>>>,
+    sources: Sources<'m>,
+    length: PhantomData<L>,
 }
 
-/// Where an input comes from.
-#[derive(Clone)]
-enum Source<'m> {
-    Zero,
-    Function(Arc<dyn Fn(f64) -> f64 + Send + Sync + 'm>),
-    Table(Arc<Table>),
+/// A model that declares inputs: every [`Controlled`] and every [`family::Controlled`], and nothing else.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` declares no input",
+    label = "a model without inputs",
+    note = "inputs are declared by `input(u)` in `#[dynamics(...)]`"
+)]
+pub trait HasInputs<const N: usize, L>: Send + Sync {
+    /// Their names, in order.
+    const INPUTS: &'static [&'static str];
 }
 
-/// Inputs that are set between steps.
-#[derive(Debug)]
-pub(crate) struct Cells([AtomicU64; MAX_INPUTS]);
+impl<M: Controlled<N>, const N: usize> HasInputs<N, FixedLength> for M {
+    const INPUTS: &'static [&'static str] = M::INPUTS;
+}
 
-/// No number was set: the bits of a NaN, which is none either.
-const UNSET: u64 = u64::MAX;
+impl<M: family::Controlled> HasInputs<0, RunTimeLength> for M {
+    const INPUTS: &'static [&'static str] = M::INPUTS;
+}
 
-impl Cells {
-    pub(crate) fn new() -> Self {
-        Self(std::array::from_fn(|_| AtomicU64::new(UNSET)))
-    }
+/// What can be given inputs: a model that declares some, or one that has been given some already.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` declares no input",
+    label = "a model without inputs",
+    note = "inputs are declared by `input(u)` in `#[dynamics(...)]`"
+)]
+pub trait Drivable<'m, const N: usize, L>: Sized {
+    /// The model that declares them.
+    type Declaring: HasInputs<N, L>;
 
-    /// Sets an input from now on.
-    pub(crate) fn set(&self, input: usize, value: f64) {
-        if let Some(cell) = self.0.get(input) {
-            cell.store(value.to_bits(), Ordering::Relaxed);
-        }
-    }
+    /// The model with the inputs that it has, else zero.
+    fn driven(model: Share<'m, Self>) -> Driven<'m, Self::Declaring, L>;
+}
 
-    fn get(&self, input: usize) -> Option<f64> {
-        let bits = self.0[input].load(Ordering::Relaxed);
-        (bits != UNSET).then(|| f64::from_bits(bits))
+impl<'m, M: Controlled<N>, const N: usize> Drivable<'m, N, FixedLength> for M {
+    type Declaring = M;
+
+    fn driven(model: Share<'m, M>) -> Driven<'m, M> {
+        Driven::sharing(model)
     }
 }
 
-impl<M> Clone for Driven<'_, M> {
+impl<'m, M: family::Controlled> Drivable<'m, 0, RunTimeLength> for M {
+    type Declaring = M;
+
+    fn driven(model: Share<'m, M>) -> Driven<'m, M, RunTimeLength> {
+        Driven::sharing(model)
+    }
+}
+
+impl<'m, M: Controlled<N>, const N: usize> Drivable<'m, N, FixedLength> for Driven<'m, M> {
+    type Declaring = M;
+
+    fn driven(model: Share<'m, Self>) -> Self {
+        (*model).clone()
+    }
+}
+
+impl<'m, M: family::Controlled> Drivable<'m, 0, RunTimeLength> for Driven<'m, M, RunTimeLength> {
+    type Declaring = M;
+
+    fn driven(model: Share<'m, Self>) -> Self {
+        (*model).clone()
+    }
+}
+
+impl<M, L> Clone for Driven<'_, M, L> {
     fn clone(&self) -> Self {
         Self {
             model: self.model.clone(),
             sources: self.sources.clone(),
-            held: self.held.clone(),
-            failed: Arc::clone(&self.failed),
+            length: PhantomData,
         }
     }
 }
 
-impl<M: fmt::Debug> fmt::Debug for Driven<'_, M> {
+impl<M: fmt::Debug, L> fmt::Debug for Driven<'_, M, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kinds = self.sources.iter().map(|source| match source {
+        let kinds = self.sources.each.iter().map(|source| match source {
             Source::Zero => "zero",
             Source::Function(_) => "function",
             Source::Table(_) => "table",
@@ -101,24 +133,23 @@ impl<M: fmt::Debug> fmt::Debug for Driven<'_, M> {
     }
 }
 
-impl<'m, M> Driven<'m, M> {
+impl<'m, M, L> Driven<'m, M, L> {
     /// The model with all its inputs zero.
     pub fn new<const N: usize>(model: &'m M) -> Self
     where
-        M: Controlled<N>,
+        M: Declared<N, Length = L> + HasInputs<N, L>,
     {
         Self::sharing(Share::Borrowed(model))
     }
 
     pub(crate) fn sharing<const N: usize>(model: Share<'m, M>) -> Self
     where
-        M: Controlled<N>,
+        M: HasInputs<N, L>,
     {
         Self {
             model,
-            sources: vec![Source::Zero; M::INPUTS.len().min(MAX_INPUTS)],
-            held: None,
-            failed: Arc::default(),
+            sources: Sources::zero(M::INPUTS.len()),
+            length: PhantomData,
         }
     }
 
@@ -133,10 +164,10 @@ impl<'m, M> Driven<'m, M> {
         function: impl Fn(f64) -> f64 + Send + Sync + 'm,
     ) -> Result<Self, InputError>
     where
-        M: Controlled<N>,
+        M: HasInputs<N, L>,
     {
-        let place = place::<M, N>(name)?;
-        self.sources[place] = Source::Function(Arc::new(function));
+        let place = place(M::INPUTS, name)?;
+        self.sources.each[place] = Source::Function(Arc::new(function));
         Ok(self)
     }
 
@@ -153,304 +184,41 @@ impl<'m, M> Driven<'m, M> {
         interpolation: Interpolation,
     ) -> Result<Self, InputError>
     where
-        M: Controlled<N>,
+        M: HasInputs<N, L>,
     {
-        let place = place::<M, N>(name)?;
+        let place = place(M::INPUTS, name)?;
         let table = Table::new(times, values, interpolation).map_err(|why| InputError::Table {
             name: name.to_owned(),
             why,
         })?;
-        self.sources[place] = Source::Table(Arc::new(table));
+        self.sources.each[place] = Source::Table(Arc::new(table));
         Ok(self)
     }
 
     /// The same model, which looks at `cells` first.
     pub(crate) fn holding(mut self, cells: Arc<Cells>) -> Self {
-        self.held = Some(cells);
+        self.sources.held = Some(cells);
         self
     }
 
-    #[inline(always)]
-    fn values<R: Real>(&self, t: R) -> [R; MAX_INPUTS] {
-        let mut values = [t.like(0.0); MAX_INPUTS];
-        for ((input, source), value) in self.sources.iter().enumerate().zip(&mut values) {
-            let held = self.held.as_ref().and_then(|cells| cells.get(input));
-            *value = match (held, source) {
-                (Some(held), _) => t.like(held),
-                (None, Source::Zero) => continue,
-                (None, Source::Function(function)) => t.map(&mut |t| {
-                    let value = function(t);
-                    if !value.is_finite() {
-                        self.note(input, t, value);
-                    }
-                    value
-                }),
-                (None, Source::Table(table)) => t.map(&mut |t| table.at(t)),
-            };
+    /// The same inputs of another model.
+    fn of(&self, model: M) -> Self
+    where
+        M: Send + Sync,
+    {
+        Self {
+            model: Share::own(model),
+            ..self.clone()
         }
-        values
-    }
-
-    #[cold]
-    fn note(&self, input: usize, time: f64, value: f64) {
-        let mut failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
-        *failed = Some((input, time, value));
-    }
-
-    /// Whether no input changes with the time.
-    fn is_constant(&self) -> bool {
-        (self.sources.iter()).all(|source| matches!(source, Source::Zero))
     }
 }
 
-/// The place of an input.
-pub(crate) fn place<M: Controlled<N>, const N: usize>(name: &str) -> Result<usize, InputError> {
-    let mut inputs = M::INPUTS.iter().take(MAX_INPUTS);
+/// The place of an input among those of a model.
+pub(crate) fn place(known: &'static [&'static str], name: &str) -> Result<usize, InputError> {
+    let mut inputs = known.iter().take(MAX_INPUTS);
     let place = inputs.position(|own| *own == name);
     place.ok_or_else(|| InputError::Unknown {
         name: name.to_owned(),
-        known: M::INPUTS.to_vec(),
+        known: known.to_vec(),
     })
 }
-
-impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
-    /// Once for all that a step asks, so that functions are called as fast as they are. What is half done is left alone by those who are told.
-    fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked> {
-        if self.is_constant() {
-            return Ok(f());
-        }
-        catch_unwind(AssertUnwindSafe(f)).map_err(|_| InputPanicked)
-    }
-
-    fn failed_input(&self) -> Option<InputFailure> {
-        let mut failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
-        let (input, time, value) = failed.take()?;
-        Some(InputFailure {
-            input: M::INPUTS.get(input)?,
-            time,
-            value,
-        })
-    }
-
-    const FORM: Form = M::FORM;
-    const FACTS: Facts = Facts {
-        time_dependent: true,
-        ..M::FACTS
-    };
-
-    fn energy_function<R: Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
-        self.model.energy_function_with(&self.values(t), t, q, z)
-    }
-
-    const LANES: bool = M::LANES;
-
-    #[inline(always)]
-    fn first_inline<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
-        self.model.first_with(&self.values(t), t, q, z, first);
-    }
-
-    #[inline(always)]
-    fn first_and_mass_inline<R: Real>(
-        &self,
-        t: R,
-        q: &[R; N],
-        z: &[R; N],
-        first: &mut First<R, N>,
-        zz: &mut [[R; N]; N],
-    ) {
-        let inputs = self.values(t);
-        self.model.first_and_mass_with(&inputs, t, q, z, first, zz);
-    }
-
-    fn first<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
-        self.first_inline(t, q, z, first);
-    }
-
-    fn first_and_mass<R: Real>(
-        &self,
-        t: R,
-        q: &[R; N],
-        z: &[R; N],
-        first: &mut First<R, N>,
-        zz: &mut [[R; N]; N],
-    ) {
-        self.first_and_mass_inline(t, q, z, first, zz);
-    }
-
-    fn second<R: Real>(
-        &self,
-        t: R,
-        q: &[R; N],
-        z: &[R; N],
-        first: &mut First<R, N>,
-        second: &mut Second<R, N>,
-    ) {
-        let inputs = self.values(t);
-        self.model.second_with(&inputs, t, q, z, first, second);
-    }
-
-    const SENSITIVITIES: &'static [&'static str] = M::SENSITIVITIES;
-
-    fn sensitivity_parameter(&self, index: usize) -> f64 {
-        self.model.sensitivity_parameter(index)
-    }
-
-    /// Derivatives by the time are differences where an input is a function or a table: good to some 1e-10 of what these do in a unit of time.
-    fn first_by<R: Real>(&self, by: By, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
-        const DISTANCE: f64 = 6e-6;
-        let inputs = self.values(t);
-        if by != By::Time || self.is_constant() {
-            return self.model.first_by_with(by, &inputs, t, q, z, first);
-        }
-        let distance = t.map(&mut |t| DISTANCE * t.abs().max(1.0));
-        let (early, late) = (t - distance, t + distance);
-        let (mut before, mut after) = (First::zero(), First::zero());
-        self.first(early, q, z, &mut before);
-        self.first(late, q, z, &mut after);
-        let rate = |before: R, after: R| (after - before) / (late - early);
-        for a in 0..N {
-            first.z[a] = rate(before.z[a], after.z[a]);
-            first.q[a] = rate(before.q[a], after.q[a]);
-            first.force[a] = rate(before.force[a], after.force[a]);
-        }
-    }
-
-    fn parameters(&self) -> usize {
-        self.model.parameters()
-    }
-
-    fn parameter_name(&self, index: usize) -> CoordinateName {
-        self.model.parameter_name(index)
-    }
-
-    fn parameter(&self, index: usize) -> f64 {
-        self.model.parameter(index)
-    }
-
-    fn with_parameter(&self, index: usize, value: f64) -> Option<Self> {
-        let model = self.model.with_parameter(index, value)?;
-        Some(Self {
-            model: Share::own(model),
-            ..self.clone()
-        })
-    }
-
-    const CONSTRAINTS: &'static [Constraint] = M::CONSTRAINTS;
-
-    fn constraint_values<R: Real>(&self, t: R, q: &[R; N], values: &mut [R]) {
-        self.model.constraint_values(t, q, values);
-    }
-
-    fn constraint_rows<R: Real>(&self, t: R, q: &[R; N], rows: &mut [[R; N]], drift: &mut [R]) {
-        self.model.constraint_rows(t, q, rows, drift);
-    }
-
-    fn constraint_second<R: Real>(
-        &self,
-        t: R,
-        q: &[R; N],
-        v: &[R; N],
-        mu: &[R],
-        second: &mut ConstraintSecond<'_, R, N>,
-    ) {
-        self.model.constraint_second(t, q, v, mu, second);
-    }
-
-    fn coordinate_name(index: usize) -> CoordinateName {
-        M::coordinate_name(index)
-    }
-
-    const OBSERVABLES: &'static [&'static str] = M::OBSERVABLES;
-
-    fn columns(&self) -> usize {
-        self.model.columns()
-    }
-
-    fn column_name(&self, column: usize) -> CoordinateName {
-        self.model.column_name(column)
-    }
-
-    fn observables<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], values: &mut [R]) {
-        let inputs = self.values(t);
-        self.model.observables_with(&inputs, t, q, z, values);
-    }
-}
-
-/// What is wrong with an input.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum InputError {
-    /// The model declares no input of a name.
-    Unknown {
-        /// The name asked for.
-        name: String,
-        /// Those that there are.
-        known: Vec<&'static str>,
-    },
-    /// A function that gave a number that is not finite, so that an element could not be solved.
-    Value {
-        /// The input.
-        name: String,
-        /// The time that the function was asked for.
-        time: f64,
-        /// What it gave.
-        value: f64,
-    },
-    /// A function panicked. What it said is on standard error, or where the program's panic hook puts it.
-    Panicked {
-        /// Where the element begins that asked it, or the run.
-        time: f64,
-    },
-    /// Sampled feedback that cannot be.
-    Sampling {
-        /// The input.
-        name: String,
-        /// A time at which it was to be sampled.
-        time: f64,
-        /// What is wrong with it.
-        why: &'static str,
-    },
-    /// A number that is not finite.
-    NotFinite {
-        /// The input.
-        name: String,
-        /// What it was set to.
-        value: f64,
-    },
-    /// A table that is none.
-    Table {
-        /// The input.
-        name: String,
-        /// What is wrong with it.
-        why: &'static str,
-    },
-}
-
-impl fmt::Display for InputError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unknown { name, known } => write!(
-                f,
-                "the model has no input `{name}`, only `{}`",
-                known.join("`, `")
-            ),
-            Self::Value { name, time, value } => {
-                write!(
-                    f,
-                    "the function of input `{name}` gives {value} at t = {time}"
-                )
-            }
-            Self::Panicked { time } => write!(
-                f,
-                "a function of an input panicked in the element that begins at t = {time}"
-            ),
-            Self::Sampling { name, time, why } => {
-                write!(f, "the feedback of input `{name}` at t = {time}: {why}")
-            }
-            Self::NotFinite { name, value } => write!(f, "input `{name}` was set to {value}"),
-            Self::Table { name, why } => write!(f, "the table of input `{name}`: {why}"),
-        }
-    }
-}
-
-impl Error for InputError {}

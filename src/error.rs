@@ -9,7 +9,7 @@ use std::fmt;
 use tfe_runtime::constrained::Residual;
 use tfe_runtime::family;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{ElementError, InputFailure, Model, StepError};
+use tfe_runtime::{ElementError, InputFailure, StepError};
 
 pub use crate::motion::AtError;
 
@@ -206,9 +206,9 @@ impl RunErrorKind {
         Self::Unsupported { call, of }
     }
 
-    /// Of an element of a model that could not be solved: for a function of an input that is not finite within it, if there is one.
-    pub(crate) fn of_element<M: Model<N>, const N: usize>(
-        model: &M,
+    /// Of an element that could not be solved: for a function of an input that was not finite within it, if there is one.
+    pub(crate) fn of_element(
+        failed_input: Option<InputFailure>,
         element: usize,
         (time, step): (f64, f64),
         source: StepError,
@@ -218,7 +218,7 @@ impl RunErrorKind {
         let is_within = |failure: &InputFailure| {
             time.min(end) - slack <= failure.time && failure.time <= time.max(end) + slack
         };
-        match model.failed_input().filter(is_within) {
+        match failed_input.filter(is_within) {
             Some(InputFailure { input, time, value }) => Self::Input(InputError::Value {
                 name: input.to_owned(),
                 time,

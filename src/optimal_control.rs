@@ -305,7 +305,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
             return Err(OptimalControlErrorKind::NoCost);
         }
         for (name, _) in &self.inputs {
-            place::<M, N>(name)?;
+            place(M::INPUTS, name)?;
         }
         Ok(())
     }
@@ -405,7 +405,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
             iterate.interiors.push(DVector::from_vec(interior));
             let mut steering = DVector::zeros(sizes.steering());
             for (name, function) in &self.inputs {
-                let input = place::<M, N>(name)?;
+                let input = place(M::INPUTS, name)?;
                 // ∫ P_k u over ∫ P_k².
                 let mut basis = [0.0; MAX_NODES];
                 for (at, weight) in scheme.nodes.iter().zip(scheme.weights) {

@@ -18,7 +18,6 @@ pub(crate) mod mesh;
 mod pieces;
 mod progress;
 mod recorder;
-mod refused;
 mod run;
 mod section;
 mod sensitive;

@@ -1,41 +1,44 @@
 //! Runs step by step, with inputs that are set between steps.
 
+use super::kind::Simulated;
 use super::steps::Steps;
-use crate::driven::{Cells, Driven, InputError, place};
+use crate::driven::{Cells, Driven, HasInputs, InputError, place};
 use crate::error::RunErrorKind;
+use crate::evaluate::Evaluate;
+use crate::length::{FixedLength, Length};
 use crate::motion::Node;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
-use tfe_runtime::{Controlled, Form, Model, Statistics};
+use tfe_runtime::{CoordinateName, Statistics};
 
 /// A run that goes on step by step, made by [`Simulation::hold`](crate::Simulation::hold).
 ///
-/// An input keeps what it was [set](Self::set) to over the steps that follow: zero-order hold. No step allocates memory.
+/// An input keeps what it was [set](Self::set) to over the steps that follow: zero-order hold. No step of a model of fixed size allocates memory.
 #[derive(Debug)]
-pub struct Held<'m, M: Controlled<N>, const N: usize> {
-    steps: Steps<'m, Driven<'m, M>, N>,
+pub struct Held<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+    steps: Steps<'m, Driven<'m, M, L>, N, L>,
     cells: Arc<Cells>,
-    node: HeldNode<N>,
+    node: HeldNode<N, L>,
     /// An input that cannot be set, to be told by the next step.
     refusal: Option<InputError>,
-    samplers: Vec<Sampler<'m, N>>,
+    samplers: Vec<Sampler<'m, N, L>>,
 }
 
 /// Feedback with a rate of its own.
-struct Sampler<'m, const N: usize> {
+struct Sampler<'m, const N: usize, L: Length<N>> {
     /// The input.
     place: usize,
     start: f64,
     period: f64,
     /// How often it was called.
     count: u64,
-    law: Law<'m, N>,
+    law: Law<'m, N, L>,
 }
 
-type Law<'m, const N: usize> = Box<dyn FnMut(&HeldNode<N>) -> f64 + Send + 'm>;
+type Law<'m, const N: usize, L> = Box<dyn FnMut(&HeldNode<N, L>) -> f64 + Send + 'm>;
 
-impl<const N: usize> fmt::Debug for Sampler<'_, N> {
+impl<const N: usize, L: Length<N>> fmt::Debug for Sampler<'_, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Sampler")
             .field("input", &self.place)
@@ -46,36 +49,41 @@ impl<const N: usize> fmt::Debug for Sampler<'_, N> {
 
 /// A node with its outputs; a [`Node`] by dereference.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HeldNode<const N: usize> {
-    node: Node<N>,
+pub struct HeldNode<const N: usize, L: Length<N> = FixedLength> {
+    node: Node<N, L>,
     outputs: Vec<f64>,
-    names: &'static [&'static str],
+    names: Arc<[CoordinateName]>,
 }
 
-impl<const N: usize> HeldNode<N> {
-    /// All outputs, in the order of the declaration, with the inputs as they were over the last step.
+impl<const N: usize, L: Length<N>> HeldNode<N, L> {
+    /// All outputs, in the order of the declaration and of sites, with the inputs as they were over the last step.
     pub fn outputs(&self) -> &[f64] {
         &self.outputs
     }
 
-    /// The output of a name.
+    /// The output of a name, `stretch` or `stretch[3]`.
     pub fn output(&self, name: &str) -> Option<f64> {
-        let place = self.names.iter().position(|own| *own == name)?;
+        let place = self.names.iter().position(|own| own.is(name))?;
         self.outputs.get(place).copied()
     }
 }
 
-impl<const N: usize> Deref for HeldNode<N> {
-    type Target = Node<N>;
+impl<const N: usize, L: Length<N>> Deref for HeldNode<N, L> {
+    type Target = Node<N, L>;
 
-    fn deref(&self) -> &Node<N> {
+    fn deref(&self) -> &Node<N, L> {
         &self.node
     }
 }
 
-impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
+impl<'m, M, const N: usize, L> Held<'m, M, N, L>
+where
+    M: HasInputs<N, L>,
+    Driven<'m, M, L>: Simulated<N, L>,
+    L: Length<N>,
+{
     pub(super) fn new(
-        mut steps: Steps<'m, Driven<'m, M>, N>,
+        mut steps: Steps<'m, Driven<'m, M, L>, N, L>,
         cells: Arc<Cells>,
     ) -> Result<Self, RunErrorKind> {
         let Some(node) = steps.node() else {
@@ -85,10 +93,11 @@ impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
                 _ => Err(RunErrorKind::Step { step: f64::NAN }),
             };
         };
+        let names = steps.model().map_or_else(Vec::new, Evaluate::output_names);
         let node = HeldNode {
             node,
-            outputs: vec![0.0; M::OBSERVABLES.len()],
-            names: M::OBSERVABLES,
+            outputs: vec![0.0; names.len()],
+            names: names.into(),
         };
         let mut held = Self {
             steps,
@@ -103,7 +112,7 @@ impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
 
     /// Sets an input from the node reached on. A name that the model does not declare, or a number that is not finite, changes nothing and stops the next step.
     pub fn set(&mut self, input: &str, value: f64) {
-        match place::<M, N>(input) {
+        match place(M::INPUTS, input) {
             Ok(place) if value.is_finite() => self.cells.set(place, value),
             Ok(_) => {
                 let name = input.to_owned();
@@ -143,9 +152,9 @@ impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
         &mut self,
         input: &str,
         period: f64,
-        law: impl FnMut(&HeldNode<N>) -> f64 + Send + 'm,
+        law: impl FnMut(&HeldNode<N, L>) -> f64 + Send + 'm,
     ) -> Result<(), RunErrorKind> {
-        let place = place::<M, N>(input).map_err(RunErrorKind::Input)?;
+        let place = place(M::INPUTS, input).map_err(RunErrorKind::Input)?;
         if !(period > 0.0 && period.is_finite()) {
             return Err(RunErrorKind::Input(InputError::Sampling {
                 name: input.to_owned(),
@@ -195,7 +204,7 @@ impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
     }
 
     /// The node reached: t, q, v, p and outputs.
-    pub fn node(&self) -> &HeldNode<N> {
+    pub fn node(&self) -> &HeldNode<N, L> {
         &self.node
     }
 
@@ -225,12 +234,9 @@ impl<'m, M: Controlled<N>, const N: usize> Held<'m, M, N> {
     fn observe(&mut self) {
         let HeldNode { node, outputs, .. } = &mut self.node;
         if let Some(model) = self.steps.model().filter(|_| !outputs.is_empty()) {
-            let z = match M::FORM {
-                Form::Lagrangian => &node.v,
-                Form::Hamiltonian => &node.p,
-            };
-            let seen = model.guarded(|| model.observables(node.t, &node.q, z, outputs));
-            if seen.is_err() {
+            let at = (&node.q, &node.p);
+            let seen = model.guarded(|| model.outputs(node.t, at, &node.v, outputs));
+            if seen.is_none() {
                 outputs.fill(f64::NAN);
             }
         }

@@ -1,14 +1,21 @@
 //! Runs of models with inputs.
 
 use super::held::Held;
+use super::kind::Simulated;
 use super::setup::Simulation;
-use crate::driven::{Cells, Driven, InputError, Interpolation};
+use crate::driven::{Cells, Drivable, Driven, InputError, Interpolation};
 use crate::error::RunErrorKind;
+use crate::length::Length;
 use std::sync::Arc;
-use tfe_runtime::{Controlled, Model, Share, State};
+use tfe_runtime::Share;
 
-impl<'m, M: Controlled<N> + 'm, const N: usize> Simulation<'m, M, N> {
-    /// Gives an input of the model as a function of the time, as [`Driven::input`]. Inputs that are not given are zero.
+impl<'m, M, const N: usize, L> Simulation<'m, M, N, L>
+where
+    M: Drivable<'m, N, L, Declaring: 'm>,
+    Driven<'m, M::Declaring, L>: Simulated<N, L> + Send + Sync,
+    L: Length<N>,
+{
+    /// Gives an input of the model as a function of the time, as [`Driven::input`]; one that was given before is given anew. Inputs that are not given are zero.
     ///
     /// A name that the model does not declare stops the run before it begins. A function that gives a number that is not finite where it is needed, or panics, ends the run with an error,
     /// [`InputError::Value`] with the time, or [`InputError::Panicked`]. Panics are caught once for all that a step asks (a panic that aborts the program is not), by `run`, `steps`, `hold`,
@@ -28,13 +35,36 @@ impl<'m, M: Controlled<N> + 'm, const N: usize> Simulation<'m, M, N> {
     /// # Ok(())
     /// # }
     /// ```
+    ///
+    /// So have models of run-time length:
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// /// Floors on springs, the lowest on the ground.
+    /// #[dynamics(
+    ///     coordinates(x[floors]),
+    ///     lagrangian = sum(i in 0..floors, dot(x[i])^2/2) - k/2*(x[0] - ground)^2 - sum(i in 0..floors-1, k/2*(x[i+1] - x[i])^2),
+    ///     input(ground),
+    /// )]
+    /// struct Tower { floors: usize, k: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let tower = Tower { floors: 30, k: 100.0 };
+    /// // A ship's deck, and the tower at rest on it.
+    /// let simulation = Simulation::new(&tower).step(0.05).input("ground", |t| 0.5 * t);
+    /// let motion = simulation.run(tower.state([0.0; 30], [0.5; 30]), 0.0..10.0)?;
+    /// assert!((motion.last().q[29] - 5.0).abs() < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
     #[must_use]
     pub fn input(
         self,
         name: &str,
         function: impl Fn(f64) -> f64 + Send + Sync + 'm,
-    ) -> Simulation<'m, Driven<'m, M>, N> {
-        self.driven().input(name, function)
+    ) -> Simulation<'m, Driven<'m, M::Declaring, L>, N, L> {
+        self.driven(|driven| driven.input(name, function))
     }
 
     /// Gives an input of the model by its values at given times, as [`Driven::table`]; elements end there.
@@ -56,16 +86,18 @@ impl<'m, M: Controlled<N> + 'm, const N: usize> Simulation<'m, M, N> {
     /// ```
     #[must_use]
     pub fn table(
-        self,
+        mut self,
         name: &str,
         times: impl AsRef<[f64]>,
         values: impl AsRef<[f64]>,
         interpolation: Interpolation,
-    ) -> Simulation<'m, Driven<'m, M>, N> {
-        self.driven().table(name, times, values, interpolation)
+    ) -> Simulation<'m, Driven<'m, M::Declaring, L>, N, L> {
+        let (times, values) = (times.as_ref(), values.as_ref());
+        self.breaks.extend(times);
+        self.driven(|driven| driven.table(name, times, values, interpolation))
     }
 
-    /// A loop of control: steps one by one, between which inputs are [set](Held::set).
+    /// A loop of control: steps one by one, between which inputs are [set](Held::set); inputs that were given before keep their functions until then.
     ///
     /// # Errors
     /// As of [`steps`](Self::steps).
@@ -95,66 +127,39 @@ impl<'m, M: Controlled<N> + 'm, const N: usize> Simulation<'m, M, N> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn hold(self, start: State<N>, t0: f64) -> Result<Held<'m, M, N>, RunErrorKind> {
-        self.driven().hold(start, t0)
-    }
-
-    /// The same run with all inputs zero.
-    fn driven(self) -> Simulation<'m, Driven<'m, M>, N> {
-        let driven = Driven::sharing(self.model.clone());
-        self.of(Share::own(driven))
-    }
-}
-
-impl<'m, M: Controlled<N> + 'm, const N: usize> Simulation<'m, Driven<'m, M>, N> {
-    /// Gives another input, or the same anew.
-    #[must_use]
-    pub fn input(self, name: &str, function: impl Fn(f64) -> f64 + Send + Sync + 'm) -> Self {
-        self.changed(|driven| driven.input(name, function))
-    }
-
-    /// Gives another input by a table, or the same anew.
-    #[must_use]
-    pub fn table(
-        mut self,
-        name: &str,
-        times: impl AsRef<[f64]>,
-        values: impl AsRef<[f64]>,
-        interpolation: Interpolation,
-    ) -> Self {
-        self.breaks.extend(times.as_ref());
-        self.changed(|driven| driven.table(name, times.as_ref(), values.as_ref(), interpolation))
-    }
-
-    /// A loop of control; inputs keep their functions until they are [set](Held::set).
-    ///
-    /// # Errors
-    /// As of [`steps`](Self::steps).
-    pub fn hold(self, start: State<N>, t0: f64) -> Result<Held<'m, M, N>, RunErrorKind> {
+    pub fn hold(
+        self,
+        start: L::State,
+        t0: f64,
+    ) -> Result<Held<'m, M::Declaring, N, L>, RunErrorKind> {
         let cells = Arc::new(Cells::new());
-        let run = self.changed(|driven| Ok(driven.holding(Arc::clone(&cells))));
+        let run = self.driven(|driven| Ok(driven.holding(Arc::clone(&cells))));
         Held::new(run.steps(start, t0), cells)
     }
 
-    fn changed(
+    /// The same run with inputs, after a change of these.
+    fn driven(
         self,
-        change: impl FnOnce(Driven<'m, M>) -> Result<Driven<'m, M>, InputError>,
-    ) -> Self {
-        match change((*self.model).clone()) {
+        change: impl FnOnce(
+            Driven<'m, M::Declaring, L>,
+        ) -> Result<Driven<'m, M::Declaring, L>, InputError>,
+    ) -> Simulation<'m, Driven<'m, M::Declaring, L>, N, L> {
+        let unchanged = M::driven(self.model.clone());
+        match change(unchanged.clone()) {
             Ok(driven) => self.of(Share::own(driven)),
-            Err(error) => Self {
+            Err(error) => Simulation {
                 refusal: Some(RunErrorKind::Input(error)),
-                ..self
+                ..self.of(Share::own(unchanged))
             },
         }
     }
 }
 
-impl<'m, M, const N: usize> Simulation<'m, M, N> {
+impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
     /// The same run of another model.
-    fn of<T>(self, model: Share<'m, T>) -> Simulation<'m, T, N>
+    fn of<T>(self, model: Share<'m, T>) -> Simulation<'m, T, N, L>
     where
-        T: Model<N> + Send + Sync + 'm,
+        T: Simulated<N, L> + Send + Sync + 'm,
     {
         Simulation {
             model,

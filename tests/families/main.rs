@@ -18,6 +18,7 @@ mod events;
 #[cfg(feature = "sparse")]
 mod gradient;
 mod impulses;
+mod inputs;
 #[cfg(feature = "sparse")]
 mod inside;
 mod kernels;

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use tfe::prelude::*;
 use tfe::sensitivity::Loss;
 use tfe::work_precision::WorkPrecision;
-use tfe::{Act, Settings, stability};
+use tfe::{Act, Interpolation, Settings, stability};
 
 #[dynamics(
     coordinates(theta),
@@ -37,6 +37,8 @@ struct FixedOnRod {
 #[dynamics(
     coordinates(theta[n]),
     lagrangian = sum(i in 0..n, m*dot(theta[i])^2/2 + m*cos(theta[i])),
+    input(u),
+    force(theta[0]) = u,
     event(hit) = theta[0],
     output(height) = -cos(theta[0]),
 )]
@@ -49,6 +51,8 @@ struct Long {
     coordinates(x[n], y[n]),
     lagrangian = sum(i in 0..n, m*(dot(x[i])^2 + dot(y[i])^2)/2 - m*y[i]),
     constraint(rod[i in 0..n]) = x[i]^2 + y[i]^2 - 1,
+    input(u),
+    force(x[0]) = u,
     event(hit) = x[0],
     output(height) = y[0],
 )]
@@ -192,10 +196,17 @@ macro_rules! calls {
             is_finite(&[run().run_estimated(start(), span())?.error_estimate()])
         });
         call("`input`, `table`", &|| {
-            let run = run().input("u", |t| t.sin());
-            is_finite(&run.run(start(), span())?.last().q[..])
+            let driven = run().input("u", |t| t.sin());
+            is_finite(&driven.run(start(), span())?.last().q[..])?;
+            let driven = run().table("u", [0.0, 0.5], [1.0, -1.0], Interpolation::Hold);
+            is_finite(&driven.run(start(), span())?.last().q[..])
         });
-        call("`hold`", &|| Ok(run().hold(start(), 0.0).map(|_| ())?));
+        call("`hold`", &|| {
+            let mut held = run().hold(start(), 0.0)?;
+            held.set("u", 0.1);
+            held.advance()?;
+            is_finite(&held.node().q[..])
+        });
         call("`section`", &|| {
             let mut section = run().section("hit", Crossing::Either, start(), 0.0).take(1);
             Ok(section.next().ok_or("none")?.map(|_| ())?)

@@ -248,6 +248,11 @@ const _: () = {
             first.q[self.w + 1] += t2;
             entries.add(__tfe::Block::QQ, self.w + 1, self.w + 1, t4);
         }
+        fn observables<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R], values: &mut [R]) {
+            let __tfe_length = 1usize.saturating_add(self.n);
+            let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
+            values[0] = q[self.n] - q[1];
+        }
         fn coordinate_name(&self, index: usize) -> __tfe::CoordinateName {
             if index == 0 {
                 return __tfe::CoordinateName::single("s");
@@ -261,11 +266,6 @@ const _: () = {
             __tfe::CoordinateName::element("", index)
         }
         const OBSERVABLES: &'static [&'static str] = &["extension"];
-        fn observables<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R], values: &mut [R]) {
-            let __tfe_length = 1usize.saturating_add(self.n);
-            let (q, z) = (&q[..__tfe_length], &z[..__tfe_length]);
-            values[0] = q[self.n] - q[1];
-        }
         fn parameters(&self) -> usize {
             self.m.len() + 1 + 1
         }

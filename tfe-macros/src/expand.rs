@@ -1,5 +1,6 @@
 //! From tokens to tokens: the whole expansion, read from top to bottom.
 
+use crate::controls::{self, Controls};
 use crate::docs::Docs;
 use crate::emit::{self, Emitter, Signature};
 use crate::headings::Headings;
@@ -10,7 +11,7 @@ use crate::parameters::Parameters;
 use crate::source_map::SourceMap;
 use crate::{constraint, fallback, family, input, solver, state, variant};
 use proc_macro2::{Ident, Literal, TokenStream};
-use quote::{format_ident, quote};
+use quote::quote;
 use std::collections::BTreeMap;
 use syn::ItemStruct;
 use tfe_symbolic::compile;
@@ -111,27 +112,6 @@ pub(crate) fn runtime_path(declared: &Declared) -> TokenStream {
     }
 }
 
-/// The inputs among the parameters and the arguments of kernels; nothing where there are none.
-struct Given {
-    parameter: TokenStream,
-    argument: TokenStream,
-}
-
-impl Given {
-    fn of(declared: &Declared) -> Self {
-        if declared.inputs.is_empty() {
-            return Self {
-                parameter: TokenStream::new(),
-                argument: TokenStream::new(),
-            };
-        }
-        Self {
-            parameter: quote!(inputs: &[R; __tfe::MAX_INPUTS],),
-            argument: quote!(inputs,),
-        }
-    }
-}
-
 /// Everything that the emitted implementations have in common.
 struct Kernels<'a> {
     declared: &'a Declared,
@@ -206,10 +186,10 @@ impl<'a> Kernels<'a> {
             value: true,
             ..nothing
         };
-        let Given {
+        let Controls {
             parameter: given,
             argument: give,
-        } = Given::of(self.declared);
+        } = Controls::of(self.declared);
         let at = Signature {
             name: "value",
             parameters: quote!(#given t: R, q: &[R; #dof], z: &[R; #dof]),
@@ -416,19 +396,15 @@ impl<'a> Kernels<'a> {
         }
     }
 
-    /// The name of a kernel: that of `Model`, or of `Controlled` where there are inputs.
     fn kernel(&self, name: &str) -> Ident {
-        match self.declared.inputs.is_empty() {
-            true => format_ident!("{name}"),
-            false => format_ident!("{name}_with"),
-        }
+        controls::kernel(self.declared, name)
     }
 
     /// The kernels of `Model` where those of `Controlled` are given inputs: all of them zero. `lanes` says whether the first derivatives are there for several points at once.
     fn without_inputs(&self, lanes: Option<TokenStream>) -> TokenStream {
         let dof = &self.dof;
         let trait_name = quote!(<Self as __tfe::Controlled<#dof>>);
-        let zeros = quote!(&[t.like(0.0); __tfe::MAX_INPUTS]);
+        let zeros = controls::zeros();
         let observables = (!self.declared.observables.is_empty()).then(|| {
             quote! {
                 fn observables<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], values: &mut [R]) {
@@ -598,7 +574,7 @@ impl<'a> Kernels<'a> {
             return Default::default();
         }
         let (given, kernel) = (
-            Given::of(self.declared).parameter,
+            Controls::of(self.declared).parameter,
             self.kernel("observables"),
         );
         let dof = &self.dof;
@@ -681,7 +657,10 @@ impl<'a> Kernels<'a> {
         if arms.is_empty() && self.declared.inputs.is_empty() {
             return TokenStream::new();
         }
-        let (given, kernel) = (Given::of(self.declared).parameter, self.kernel("first_by"));
+        let (given, kernel) = (
+            Controls::of(self.declared).parameter,
+            self.kernel("first_by"),
+        );
         let formulas = Formulas::of(self.declared, self.derivation);
         let doc = format!(
             " Derivatives of {} by the time and by parameters",

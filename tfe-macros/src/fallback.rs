@@ -8,7 +8,7 @@ use crate::source_map::SourceMap;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{quote, quote_spanned};
 use std::collections::BTreeSet;
-use syn::{Data, DeriveInput, ItemStruct, Visibility, parse_quote};
+use syn::{Data, DeriveInput, ItemStruct, Visibility, WhereClause, parse_quote};
 use tfe_symbolic::diagnostic::{Bag, Diagnostic};
 use tfe_symbolic::syntax::ast::{Array, ExprKind, Item};
 use tfe_symbolic::syntax::parse;
@@ -80,11 +80,7 @@ fn implementations(item: &DeriveInput, guess: &Guess) -> TokenStream {
     let (name, vis) = (&item.ident, &item.vis);
     let states = guess.states(vis);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
-    // A type parameter, which is a mistake, need not be more than it is.
-    let mut shared = item.generics.clone();
-    (shared.make_where_clause().predicates)
-        .push(parse_quote!(Self: ::core::marker::Send + ::core::marker::Sync));
-    let shared = shared.where_clause;
+    let shared = shared(item);
     let form = if guess.hamiltonian {
         quote!(Hamiltonian)
     } else {
@@ -93,7 +89,8 @@ fn implementations(item: &DeriveInput, guess: &Guess) -> TokenStream {
     let outputs = &guess.outputs;
     let names = outputs.iter().map(crate::input::plain);
     if guess.run_time {
-        return family::stubs(item, path, &form, outputs, &guess.by_site);
+        let asked = (item, shared.as_ref());
+        return family::stubs(asked, path, &form, outputs, &guess.by_site);
     }
     quote! {
         const _: () = {
@@ -390,4 +387,12 @@ fn count(arrays: &[Array], item: &DeriveInput) -> TokenStream {
     }
     let fixed = Literal::usize_unsuffixed(fixed.max(1));
     quote!(#fixed)
+}
+
+/// What models with inputs are asked for: a type parameter, which is a mistake, need not be more than it is.
+fn shared(item: &DeriveInput) -> Option<WhereClause> {
+    let mut shared = item.generics.clone();
+    (shared.make_where_clause().predicates)
+        .push(parse_quote!(Self: ::core::marker::Send + ::core::marker::Sync));
+    shared.where_clause
 }

@@ -4,14 +4,16 @@ mod constraint;
 mod observable;
 mod sites;
 pub(crate) mod strides;
+mod zero;
 
+use crate::controls::{self, Controls};
 use crate::docs::Docs;
 use crate::emit::{Body, Emitter};
 use crate::headings::Headings;
 use crate::indices;
 use crate::page::{self, Formulas};
 use crate::parameters::RunTimeParameters;
-use proc_macro2::{Literal, TokenStream};
+use proc_macro2::{Ident, Literal, TokenStream};
 use quote::quote;
 use std::collections::BTreeMap;
 use strides::Strides;
@@ -94,6 +96,7 @@ impl Kernels<'_> {
     fn emitter(&self) -> Emitter<'_> {
         Emitter::new(&[], TokenStream::new())
             .by_entries()
+            .with_inputs(&self.declared.inputs)
             .with_headings(Headings::of(self.declared))
     }
 
@@ -140,16 +143,23 @@ impl Kernels<'_> {
             let (q, z, first) = __sweep.slices();
             #cut
         };
+        let [forces, name] = ["forces_inline", "forces_in_strides"].map(|name| self.kernel(name));
+        let Controls {
+            parameter,
+            argument,
+        } = Controls::of(self.declared);
+        let all_at_once = quote!(self.#forces(#argument t, q, z, first));
         let body = self
             .emitter()
             .onto_zeros()
             .assigning(strides.assigns)
-            .in_strides(program, strides, &lend)?;
+            .in_strides(program, strides, &lend, &all_at_once)?;
         Some(quote! {
             /// The same, several sites at a time.
             #[inline(always)]
-            fn forces_in_strides<R: __tfe::Real, __S: __tfe::Sweep<R>>(
+            fn #name<R: __tfe::Real, __S: __tfe::Sweep<R>>(
                 &self,
+                #parameter
                 t: R,
                 __sweep: &mut __S,
             ) {
@@ -162,8 +172,8 @@ impl Kernels<'_> {
         self.derivation.program(request)
     }
 
-    /// The members for observables; nothing where there are none.
-    fn observables(&self) -> Option<TokenStream> {
+    /// What the observables are called, and their kernel; nothing where there are none.
+    fn observables(&self) -> Option<(TokenStream, TokenStream)> {
         let observables = &self.declared.observables;
         let request = Request {
             observables: true,
@@ -172,8 +182,15 @@ impl Kernels<'_> {
         (!observables.is_empty()).then(|| {
             let program = self.program(request);
             let body = self.sensitive_body(&program, Given::Nothing).statements;
-            observable::members(observables, &body)
+            let name = self.kernel("observables");
+            let inputs = Controls::of(self.declared).parameter;
+            let kernel = observable::kernel(observables, (&name, &inputs), &body);
+            (observable::names(observables), kernel)
         })
+    }
+
+    fn kernel(&self, name: &str) -> Ident {
+        controls::kernel(self.declared, name)
     }
 
     fn implementation(&self, item: &ItemStruct, path: &TokenStream) -> TokenStream {
@@ -228,9 +245,95 @@ impl Kernels<'_> {
         let momenta_move = self.derivation.momenta_move();
         let (dof, check) = (&self.dof, self.check());
         let coordinate_name = self.coordinate_name();
-        let observables = self.observables();
+        let (observable_names, observables) = self.observables().unzip();
         let parameters = self.parameters.members();
         let constraints = constraint::members(self.declared, self.derivation, &self.dof);
+        let [value_name, first_name, forces_name, mass_name, second_name] = [
+            "energy_function",
+            "first",
+            "forces_inline",
+            "mass",
+            "second",
+        ]
+        .map(|name| self.kernel(name));
+        let inputs = Controls::of(self.declared).parameter;
+        let kernels = quote! {
+            #[doc = #value_doc]
+            fn #value_name<R: __tfe::Real>(&self, #inputs t: R, q: &[R], z: &[R]) -> R {
+                #value_statements
+                #value
+            }
+
+            #[doc = #first_doc]
+            fn #first_name<R: __tfe::Real>(
+                &self,
+                #inputs
+                t: R,
+                q: &[R],
+                z: &[R],
+                first: __tfe::Gradient<'_, R>,
+            ) {
+                #first
+            }
+
+            #[doc = #forces_doc]
+            #[inline(always)]
+            fn #forces_name<R: __tfe::Real>(
+                &self,
+                #inputs
+                t: R,
+                q: &[R],
+                z: &[R],
+                first: __tfe::Gradient<'_, R>,
+            ) {
+                #forces
+            }
+
+            #in_strides
+
+            #[doc = #mass_doc]
+            fn #mass_name<R: __tfe::Real, __E: __tfe::Entries<R>>(
+                &self,
+                #inputs
+                t: R,
+                q: &[R],
+                z: &[R],
+                entries: &mut __E,
+            ) {
+                #mass
+            }
+
+            #[doc = #second_doc]
+            fn #second_name<R: __tfe::Real, __E: __tfe::Entries<R>>(
+                &self,
+                #inputs
+                t: R,
+                q: &[R],
+                z: &[R],
+                first: __tfe::Gradient<'_, R>,
+                entries: &mut __E,
+            ) {
+                #second
+            }
+
+            #observables
+        };
+        let (kernels, controlled) = match &self.declared.inputs[..] {
+            [] => (kernels, None),
+            names => {
+                let controlled = quote! {
+                    #[automatically_derived]
+                    #[allow(unused, non_snake_case, clippy::too_many_arguments)]
+                    impl #impl_generics __tfe::FamilyControlled for #name #type_generics #where_clause {
+                        const INPUTS: &'static [&'static str] = &[#(#names),*];
+
+                        #kernels
+                    }
+                };
+                let zero = zero::kernels(in_strides.is_some(), observables.is_some());
+                (zero, Some(controlled))
+            }
+        };
         quote! {
             const _: () = {
                 use #path::__private as __tfe;
@@ -257,65 +360,15 @@ impl Kernels<'_> {
                         ::core::result::Result::Ok(())
                     }
 
-                    #[doc = #value_doc]
-                    fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R]) -> R {
-                        #value_statements
-                        #value
-                    }
-
-                    #[doc = #first_doc]
-                    fn first<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R],
-                        z: &[R],
-                        first: __tfe::Gradient<'_, R>,
-                    ) {
-                        #first
-                    }
-
-                    #[doc = #forces_doc]
-                    #[inline(always)]
-                    fn forces_inline<R: __tfe::Real>(
-                        &self,
-                        t: R,
-                        q: &[R],
-                        z: &[R],
-                        first: __tfe::Gradient<'_, R>,
-                    ) {
-                        #forces
-                    }
-
-                    #in_strides
-
-                    #[doc = #mass_doc]
-                    fn mass<R: __tfe::Real, __E: __tfe::Entries<R>>(
-                        &self,
-                        t: R,
-                        q: &[R],
-                        z: &[R],
-                        entries: &mut __E,
-                    ) {
-                        #mass
-                    }
-
-                    #[doc = #second_doc]
-                    fn second<R: __tfe::Real, __E: __tfe::Entries<R>>(
-                        &self,
-                        t: R,
-                        q: &[R],
-                        z: &[R],
-                        first: __tfe::Gradient<'_, R>,
-                        entries: &mut __E,
-                    ) {
-                        #second
-                    }
+                    #kernels
 
                     #coordinate_name
                     #constraints
-                    #observables
+                    #observable_names
                     #parameters
                 }
+
+                #controlled
             };
         }
     }

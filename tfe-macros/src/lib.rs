@@ -5,6 +5,7 @@
 
 mod balance;
 mod constraint;
+mod controls;
 mod docs;
 mod emit;
 mod expand;

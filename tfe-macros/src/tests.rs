@@ -213,6 +213,26 @@ fn a_family_of_run_time_length() {
 }
 
 #[test]
+fn a_family_with_inputs() {
+    check(
+        "driven_family",
+        quote!(
+            coordinates(q[n]),
+            lagrangian = sum(i in 0..n, dot(q[i])^2/2)
+                - sum(i in 0..n-1, (q[i+1] - q[i])^2/2) - (q[0] - w)^2/2,
+            input(w, u),
+            force(q[i]) = u,
+            output(power) = u*dot(q[0]),
+        ),
+        quote!(
+            struct Chain {
+                n: usize,
+            }
+        ),
+    );
+}
+
+#[test]
 fn loops_over_a_chain_of_any_length() {
     check(
         "chain",

@@ -9,6 +9,7 @@
 mod backwards;
 #[cfg(feature = "sparse")]
 mod blocked;
+mod controlled;
 mod dense;
 mod error;
 mod forces;
@@ -43,6 +44,7 @@ mod view;
 
 #[cfg(feature = "sparse")]
 pub use backwards::Backwards;
+pub use controlled::Controlled;
 pub use dense::DenseElement;
 pub use error::ModelError;
 pub use model::{Block, Entries, FamilyState, Gradient, Model, STRIDE, Sweep};

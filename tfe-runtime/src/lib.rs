@@ -117,9 +117,9 @@ pub mod __private {
     pub use crate::error::StepError;
     #[cfg(feature = "alloc")]
     pub use crate::family::{
-        Block, Entries, FamilyState, Gradient, Model as FamilyModel, ModelError as FamilyError,
-        STRIDE, Sweep, checks, observable as family_observable, observables as family_observables,
-        state as family_state,
+        Block, Controlled as FamilyControlled, Entries, FamilyState, Gradient,
+        Model as FamilyModel, ModelError as FamilyError, STRIDE, Sweep, checks,
+        observable as family_observable, observables as family_observables, state as family_state,
     };
     pub use crate::length::{Declared, RunTimeLength};
     pub use crate::model::{

@@ -487,16 +487,11 @@ impl Model {
 
     /// Arguments that need the number of coordinates.
     fn only_at_fixed_length(&self, bag: &mut Bag) {
-        if !self.is_of_run_time_length() {
-            return;
-        }
-        if let Some(parameter) = self.sensitivities.first() {
+        if self.is_of_run_time_length()
+            && let Some(parameter) = self.sensitivities.first()
+        {
             let argument = "sensitivity";
             bag.push(parameter.span, Kind::RunTimeLength { argument });
-        }
-        if let Some(input) = self.inputs.first() {
-            let argument = "input";
-            bag.push(input.span, Kind::RunTimeLength { argument });
         }
     }
 

@@ -10,7 +10,7 @@ use crate::length::{FixedLength, Length};
 use crate::simulation::kind::{Chosen, Simulated};
 use std::fmt;
 use std::sync::Arc;
-use tfe_runtime::{CoordinateName, Model, Share};
+use tfe_runtime::{CoordinateName, Share};
 
 /// What runs are asked to look for.
 pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
@@ -84,11 +84,11 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
     }
 }
 
-impl<'m, M, const N: usize> Watching<'m, M, N> {
+impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
     /// The same of another model.
-    pub(in crate::simulation) fn of<T>(self) -> Watching<'m, T, N>
+    pub(in crate::simulation) fn of<T>(self) -> Watching<'m, T, N, L>
     where
-        T: Model<N> + Send + Sync + 'm,
+        T: Simulated<N, L> + Send + Sync + 'm,
     {
         let mut watching = Watching::NOTHING;
         for on in self.on {

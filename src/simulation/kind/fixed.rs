@@ -353,6 +353,6 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     }
 
     fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
-        RunErrorKind::of_element(self, element, at, source)
+        RunErrorKind::of_element(self.failed_input(), element, at, source)
     }
 }

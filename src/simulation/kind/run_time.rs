@@ -337,16 +337,11 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     }
 
     fn guarded<T>(&self, f: impl FnOnce() -> T) -> Option<T> {
-        Some(f())
+        family::Model::guarded(self, f).ok()
     }
 
-    fn failed(&self, element: usize, (time, step): (f64, f64), source: StepError) -> RunErrorKind {
-        RunErrorKind::Solve {
-            element,
-            time,
-            step,
-            source,
-        }
+    fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
+        RunErrorKind::of_element(self.failed_input(), element, at, source)
     }
 }
 

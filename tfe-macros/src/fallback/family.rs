@@ -3,11 +3,11 @@
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 use std::collections::BTreeSet;
-use syn::DeriveInput;
+use syn::{DeriveInput, WhereClause};
 
-/// The implementations that uses of the type need to type-check.
+/// The implementations that uses of the type need to type-check; `shared` is what models with inputs are asked for.
 pub(super) fn stubs(
-    item: &DeriveInput,
+    (item, shared): (&DeriveInput, Option<&WhereClause>),
     path: &TokenStream,
     form: &TokenStream,
     outputs: &[Ident],
@@ -92,6 +92,63 @@ pub(super) fn stubs(
 
                 fn coordinate_name(&self, index: usize) -> __tfe::CoordinateName {
                     __tfe::CoordinateName::element("", index)
+                }
+            }
+
+            #[automatically_derived]
+            #[allow(clippy::all)]
+            impl #impl_generics __tfe::FamilyControlled for #name #type_generics #shared {
+                const INPUTS: &'static [&'static str] = &[];
+
+                fn energy_function_with<__R: __tfe::Real>(
+                    &self,
+                    _: &[__R; __tfe::MAX_INPUTS],
+                    t: __R,
+                    _: &[__R],
+                    _: &[__R],
+                ) -> __R {
+                    t
+                }
+
+                fn first_with<__R: __tfe::Real>(
+                    &self,
+                    _: &[__R; __tfe::MAX_INPUTS],
+                    _: __R,
+                    _: &[__R],
+                    _: &[__R],
+                    _: __tfe::Gradient<'_, __R>,
+                ) {
+                }
+
+                fn forces_inline_with<__R: __tfe::Real>(
+                    &self,
+                    _: &[__R; __tfe::MAX_INPUTS],
+                    _: __R,
+                    _: &[__R],
+                    _: &[__R],
+                    _: __tfe::Gradient<'_, __R>,
+                ) {
+                }
+
+                fn mass_with<__R: __tfe::Real, __E: __tfe::Entries<__R>>(
+                    &self,
+                    _: &[__R; __tfe::MAX_INPUTS],
+                    _: __R,
+                    _: &[__R],
+                    _: &[__R],
+                    _: &mut __E,
+                ) {
+                }
+
+                fn second_with<__R: __tfe::Real, __E: __tfe::Entries<__R>>(
+                    &self,
+                    _: &[__R; __tfe::MAX_INPUTS],
+                    _: __R,
+                    _: &[__R],
+                    _: &[__R],
+                    _: __tfe::Gradient<'_, __R>,
+                    _: &mut __E,
+                ) {
                 }
             }
         };

@@ -2,20 +2,38 @@
 
 use super::sites::{self, Sites};
 use crate::indices;
-use proc_macro2::TokenStream;
+use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 use syn::Visibility;
 use tfe_symbolic::model::declared::Observable;
 
-/// What an implementation of `FamilyModel` holds of observables, which `body` evaluates.
-pub(super) fn members(observables: &[Observable], body: &TokenStream) -> TokenStream {
-    let names = observables.iter().map(|one| &one.name);
-    let by_site = observables.iter().any(|one| !one.ranges.is_empty());
-    let cut = by_site.then(|| {
+fn by_site(observables: &[Observable]) -> bool {
+    observables.iter().any(|one| !one.ranges.is_empty())
+}
+
+/// The kernel of a name, of inputs and a body.
+pub(super) fn kernel(
+    observables: &[Observable],
+    (name, inputs): (&Ident, &TokenStream),
+    body: &TokenStream,
+) -> TokenStream {
+    let cut = by_site(observables).then(|| {
         quote! {
             let values = &mut values[..__tfe::FamilyModel::columns(self)];
         }
     });
+    quote! {
+        fn #name<R: __tfe::Real>(&self, #inputs t: R, q: &[R], z: &[R], values: &mut [R]) {
+            #cut
+            #body
+        }
+    }
+}
+
+/// How many observables there are, and what they are called.
+pub(super) fn names(observables: &[Observable]) -> TokenStream {
+    let names = observables.iter().map(|one| &one.name);
+    let by_site = by_site(observables);
     let columns = by_site.then(|| {
         let sites: Vec<Sites> = observables
             .iter()
@@ -36,11 +54,6 @@ pub(super) fn members(observables: &[Observable], body: &TokenStream) -> TokenSt
         const OBSERVABLES: &'static [&'static str] = &[#(#names),*];
 
         #columns
-
-        fn observables<R: __tfe::Real>(&self, t: R, q: &[R], z: &[R], values: &mut [R]) {
-            #cut
-            #body
-        }
     }
 }
 

@@ -108,12 +108,13 @@ fn read(operand: &Operand) -> Option<&Affine> {
 }
 
 impl Emitter<'_> {
-    /// The body of a kernel that borrows its slices by `lend`, anew after each stride of the loop, and says how far it has come.
+    /// The body of a kernel that borrows its slices by `lend`, anew after each stride of the loop, and says how far it has come; a short loop is left to `all_at_once`.
     pub(crate) fn in_strides(
         mut self,
         program: &Program,
         Strides { at, lowest, .. }: Strides,
         lend: &TokenStream,
+        all_at_once: &TokenStream,
     ) -> Option<TokenStream> {
         self.survey(&program.statements);
         let (before, rest) = program.statements.split_at(at);
@@ -143,7 +144,7 @@ impl Emitter<'_> {
             if __end <= __tfe::STRIDE {
                 // Slices that are arguments are known to lie apart.
                 let (q, z, first) = __sweep.slices();
-                return self.forces_inline(t, q, z, first);
+                return #all_at_once;
             }
             #parameters
             #lend

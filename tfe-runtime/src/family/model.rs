@@ -1,6 +1,7 @@
 //! What a generated family gives the runtime.
 
 use super::error::ModelError;
+use crate::input::{InputFailure, InputPanicked};
 use crate::length::{Declared, RunTimeLength};
 use crate::model::{CoordinateName, Facts, Form};
 use crate::real::Real;
@@ -192,6 +193,22 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
     where
         Self: Sized,
     {
+        None
+    }
+
+    /// What `f` gives, in which the model is evaluated. Models that ask functions given at run time for their inputs catch panics of these; all others do nothing else.
+    ///
+    /// # Errors
+    /// [`InputPanicked`]; what `f` was working on is to be left alone then.
+    fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked>
+    where
+        Self: Sized,
+    {
+        Ok(f())
+    }
+
+    /// The last number of a function given for an input that was not finite, which is forgotten then.
+    fn failed_input(&self) -> Option<InputFailure> {
         None
     }
 

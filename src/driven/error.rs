@@ -1,0 +1,83 @@
+//! What can be wrong with inputs.
+
+use std::error::Error;
+use std::fmt;
+
+/// What is wrong with an input.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum InputError {
+    /// The model declares no input of a name.
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// Those that there are.
+        known: Vec<&'static str>,
+    },
+    /// A function that gave a number that is not finite, so that an element could not be solved.
+    Value {
+        /// The input.
+        name: String,
+        /// The time that the function was asked for.
+        time: f64,
+        /// What it gave.
+        value: f64,
+    },
+    /// A function panicked. What it said is on standard error, or where the program's panic hook puts it.
+    Panicked {
+        /// Where the element begins that asked it, or the run.
+        time: f64,
+    },
+    /// Sampled feedback that cannot be.
+    Sampling {
+        /// The input.
+        name: String,
+        /// A time at which it was to be sampled.
+        time: f64,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// A number that is not finite.
+    NotFinite {
+        /// The input.
+        name: String,
+        /// What it was set to.
+        value: f64,
+    },
+    /// A table that is none.
+    Table {
+        /// The input.
+        name: String,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+}
+
+impl fmt::Display for InputError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown { name, known } => write!(
+                f,
+                "the model has no input `{name}`, only `{}`",
+                known.join("`, `")
+            ),
+            Self::Value { name, time, value } => {
+                write!(
+                    f,
+                    "the function of input `{name}` gives {value} at t = {time}"
+                )
+            }
+            Self::Panicked { time } => write!(
+                f,
+                "a function of an input panicked in the element that begins at t = {time}"
+            ),
+            Self::Sampling { name, time, why } => {
+                write!(f, "the feedback of input `{name}` at t = {time}: {why}")
+            }
+            Self::NotFinite { name, value } => write!(f, "input `{name}` was set to {value}"),
+            Self::Table { name, why } => write!(f, "the table of input `{name}`: {why}"),
+        }
+    }
+}
+
+impl Error for InputError {}

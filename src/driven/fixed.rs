@@ -1,0 +1,159 @@
+//! Models of fixed size whose inputs are given.
+
+use super::Driven;
+use tfe_runtime::{
+    By, Constraint, ConstraintSecond, Controlled, CoordinateName, Facts, First, Form, InputFailure,
+    InputPanicked, Model, Real, Second,
+};
+
+impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
+    /// Once for all that a step asks, so that functions are called as fast as they are. What is half done is left alone by those who are told.
+    fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked> {
+        self.sources.guarded(f)
+    }
+
+    fn failed_input(&self) -> Option<InputFailure> {
+        self.sources.failure(M::INPUTS)
+    }
+
+    const FORM: Form = M::FORM;
+    const FACTS: Facts = Facts {
+        time_dependent: true,
+        ..M::FACTS
+    };
+
+    fn energy_function<R: Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
+        self.model
+            .energy_function_with(&self.sources.values(t), t, q, z)
+    }
+
+    const LANES: bool = M::LANES;
+
+    #[inline(always)]
+    fn first_inline<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
+        self.model
+            .first_with(&self.sources.values(t), t, q, z, first);
+    }
+
+    #[inline(always)]
+    fn first_and_mass_inline<R: Real>(
+        &self,
+        t: R,
+        q: &[R; N],
+        z: &[R; N],
+        first: &mut First<R, N>,
+        zz: &mut [[R; N]; N],
+    ) {
+        let inputs = self.sources.values(t);
+        self.model.first_and_mass_with(&inputs, t, q, z, first, zz);
+    }
+
+    fn first<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
+        self.first_inline(t, q, z, first);
+    }
+
+    fn first_and_mass<R: Real>(
+        &self,
+        t: R,
+        q: &[R; N],
+        z: &[R; N],
+        first: &mut First<R, N>,
+        zz: &mut [[R; N]; N],
+    ) {
+        self.first_and_mass_inline(t, q, z, first, zz);
+    }
+
+    fn second<R: Real>(
+        &self,
+        t: R,
+        q: &[R; N],
+        z: &[R; N],
+        first: &mut First<R, N>,
+        second: &mut Second<R, N>,
+    ) {
+        let inputs = self.sources.values(t);
+        self.model.second_with(&inputs, t, q, z, first, second);
+    }
+
+    const SENSITIVITIES: &'static [&'static str] = M::SENSITIVITIES;
+
+    fn sensitivity_parameter(&self, index: usize) -> f64 {
+        self.model.sensitivity_parameter(index)
+    }
+
+    /// Derivatives by the time are differences where an input is a function or a table: good to some 1e-10 of what these do in a unit of time.
+    fn first_by<R: Real>(&self, by: By, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
+        const DISTANCE: f64 = 6e-6;
+        let inputs = self.sources.values(t);
+        if by != By::Time || self.sources.is_constant() {
+            return self.model.first_by_with(by, &inputs, t, q, z, first);
+        }
+        let distance = t.map(&mut |t| DISTANCE * t.abs().max(1.0));
+        let (early, late) = (t - distance, t + distance);
+        let (mut before, mut after) = (First::zero(), First::zero());
+        self.first(early, q, z, &mut before);
+        self.first(late, q, z, &mut after);
+        let rate = |before: R, after: R| (after - before) / (late - early);
+        for a in 0..N {
+            first.z[a] = rate(before.z[a], after.z[a]);
+            first.q[a] = rate(before.q[a], after.q[a]);
+            first.force[a] = rate(before.force[a], after.force[a]);
+        }
+    }
+
+    fn parameters(&self) -> usize {
+        self.model.parameters()
+    }
+
+    fn parameter_name(&self, index: usize) -> CoordinateName {
+        self.model.parameter_name(index)
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.model.parameter(index)
+    }
+
+    fn with_parameter(&self, index: usize, value: f64) -> Option<Self> {
+        Some(self.of(self.model.with_parameter(index, value)?))
+    }
+
+    const CONSTRAINTS: &'static [Constraint] = M::CONSTRAINTS;
+
+    fn constraint_values<R: Real>(&self, t: R, q: &[R; N], values: &mut [R]) {
+        self.model.constraint_values(t, q, values);
+    }
+
+    fn constraint_rows<R: Real>(&self, t: R, q: &[R; N], rows: &mut [[R; N]], drift: &mut [R]) {
+        self.model.constraint_rows(t, q, rows, drift);
+    }
+
+    fn constraint_second<R: Real>(
+        &self,
+        t: R,
+        q: &[R; N],
+        v: &[R; N],
+        mu: &[R],
+        second: &mut ConstraintSecond<'_, R, N>,
+    ) {
+        self.model.constraint_second(t, q, v, mu, second);
+    }
+
+    fn coordinate_name(index: usize) -> CoordinateName {
+        M::coordinate_name(index)
+    }
+
+    const OBSERVABLES: &'static [&'static str] = M::OBSERVABLES;
+
+    fn columns(&self) -> usize {
+        self.model.columns()
+    }
+
+    fn column_name(&self, column: usize) -> CoordinateName {
+        self.model.column_name(column)
+    }
+
+    fn observables<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], values: &mut [R]) {
+        let inputs = self.sources.values(t);
+        self.model.observables_with(&inputs, t, q, z, values);
+    }
+}
