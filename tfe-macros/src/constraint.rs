@@ -6,9 +6,9 @@ use crate::indices;
 use crate::page;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
-use std::collections::BTreeMap;
 use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::expr::input::Affine;
+use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::model::declared::{Constraint, ConstraintKind, Declared};
 use tfe_symbolic::program::{Array, Program, Request, Statement};
 
@@ -21,7 +21,7 @@ const SECOND: &str = "∂ψ/∂q, Ȧ, ∂(Aᵀμ)/∂q, ∂(Ȧᵀμ)/∂q and �
 pub(crate) fn members(
     declared: &Declared,
     derivation: &Derivation,
-    (coordinates, places): (&[String], &BTreeMap<String, Affine>),
+    (coordinates, places): (&[String], &SortedMap<String, Affine>),
 ) -> TokenStream {
     if declared.constraints.is_empty() {
         return TokenStream::new();
@@ -59,7 +59,7 @@ struct Kernels<'a> {
     derivation: &'a Derivation,
     coordinates: &'a [String],
     /// The numbers of the parameters.
-    places: &'a BTreeMap<String, Affine>,
+    places: &'a SortedMap<String, Affine>,
     dof: TokenStream,
     count: Literal,
 }

@@ -7,10 +7,10 @@ use crate::indices::{at, identifier, index, loop_name, number, real, signed};
 use crate::parts::{Part, Parts};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
-use std::collections::{BTreeMap, BTreeSet};
 use tfe_symbolic::expr::comparison::Comparison;
 use tfe_symbolic::expr::function::Function;
 use tfe_symbolic::expr::input::{Affine, Input};
+use tfe_symbolic::expr::ordered::{SortedMap, SortedSet};
 use tfe_symbolic::program::{Array, Operand, Operation, Place, Program, Statement, Temporary};
 
 /// Writes programs of one model.
@@ -20,9 +20,9 @@ pub(crate) struct Emitter<'a> {
     /// The names of the inputs, in order.
     inputs: &'a [String],
     /// The numbers of parameters, of arrays that of the first element, by their fields.
-    places: &'a BTreeMap<String, Affine>,
+    places: &'a SortedMap<String, Affine>,
     /// The same of a model of run-time length.
-    run_time_places: BTreeMap<String, TokenStream>,
+    run_time_places: SortedMap<String, TokenStream>,
     /// Where second derivatives go: `second.`, or nothing where the mass matrix alone is an argument.
     second: TokenStream,
     /// Second derivatives are told entry by entry, as those of models of run-time length are.
@@ -36,15 +36,15 @@ pub(crate) struct Emitter<'a> {
     /// What results are called, in headings.
     headings: Option<Headings>,
     /// How often each temporary is read.
-    reads: BTreeMap<Temporary, usize>,
+    reads: SortedMap<Temporary, usize>,
     /// The indices of all loops.
-    indices: BTreeSet<String>,
-    names: BTreeMap<Temporary, Ident>,
-    taken: BTreeSet<String>,
+    indices: SortedSet<String>,
+    names: SortedMap<Temporary, Ident>,
+    taken: SortedSet<String>,
     numbered: usize,
-    parameters: BTreeMap<String, Ident>,
+    parameters: SortedMap<String, Ident>,
     /// The places of what later parts read.
-    keeps: BTreeMap<Temporary, usize>,
+    keeps: SortedMap<Temporary, usize>,
     value: Option<TokenStream>,
 }
 
@@ -73,7 +73,7 @@ pub(crate) struct Body {
 impl<'a> Emitter<'a> {
     /// An emitter for a model with these coordinates.
     pub(crate) fn new(coordinates: &'a [String], second: TokenStream) -> Self {
-        static NONE: BTreeMap<String, Affine> = BTreeMap::new();
+        static NONE: SortedMap<String, Affine> = SortedMap::new();
         Self {
             coordinates,
             inputs: &[],
@@ -84,14 +84,14 @@ impl<'a> Emitter<'a> {
             assigns: false,
             z: format_ident!("z"),
             headings: None,
-            reads: BTreeMap::new(),
-            indices: BTreeSet::new(),
-            names: BTreeMap::new(),
-            taken: BTreeSet::new(),
+            reads: SortedMap::new(),
+            indices: SortedSet::new(),
+            names: SortedMap::new(),
+            taken: SortedSet::new(),
             numbered: 0,
-            parameters: BTreeMap::new(),
-            run_time_places: BTreeMap::new(),
-            keeps: BTreeMap::new(),
+            parameters: SortedMap::new(),
+            run_time_places: SortedMap::new(),
+            keeps: SortedMap::new(),
             value: None,
         }
     }
@@ -103,7 +103,7 @@ impl<'a> Emitter<'a> {
     }
 
     /// The same for a model whose parameters have numbers.
-    pub(crate) fn with_parameters(mut self, places: &'a BTreeMap<String, Affine>) -> Self {
+    pub(crate) fn with_parameters(mut self, places: &'a SortedMap<String, Affine>) -> Self {
         self.places = places;
         self
     }
@@ -111,7 +111,7 @@ impl<'a> Emitter<'a> {
     /// The same for a model of run-time length.
     pub(crate) fn with_run_time_parameters(
         mut self,
-        places: BTreeMap<String, TokenStream>,
+        places: SortedMap<String, TokenStream>,
     ) -> Self {
         self.run_time_places = places;
         self
@@ -264,7 +264,7 @@ impl<'a> Emitter<'a> {
             }
             for operand in statement.operands() {
                 if let Operand::Temporary(temporary) = operand {
-                    *self.reads.entry(*temporary).or_default() += 1;
+                    *self.reads.get_or_default(*temporary) += 1;
                 }
             }
         }

@@ -12,11 +12,11 @@ use crate::source_map::SourceMap;
 use crate::{constraint, fallback, family, input, solver, state, variant};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::quote;
-use std::collections::BTreeMap;
 use syn::ItemStruct;
 use tfe_symbolic::compile;
 use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::expr::input::Affine;
+use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::model::declared::{Declared, Form, Observable, Parameter, names};
 use tfe_symbolic::model::notation;
 use tfe_symbolic::program::{By, Program, Request};
@@ -124,7 +124,7 @@ struct Kernels<'a> {
     coordinates: Vec<String>,
     parameters: Parameters,
     /// The numbers of the parameters.
-    places: BTreeMap<String, Affine>,
+    places: SortedMap<String, Affine>,
 }
 
 impl<'a> Kernels<'a> {

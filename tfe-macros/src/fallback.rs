@@ -7,9 +7,9 @@ use crate::indices::identifier;
 use crate::source_map::SourceMap;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{quote, quote_spanned};
-use std::collections::BTreeSet;
 use syn::{Data, DeriveInput, ItemStruct, Visibility, WhereClause, parse_quote};
 use tfe_symbolic::diagnostic::{Bag, Diagnostic};
+use tfe_symbolic::expr::ordered::SortedSet;
 use tfe_symbolic::syntax::ast::{Array, ExprKind, Item};
 use tfe_symbolic::syntax::parse;
 use variant::Variant;
@@ -256,7 +256,7 @@ struct Guess {
     transformed: bool,
     outputs: Vec<Ident>,
     /// Which of them are declared by site.
-    by_site: BTreeSet<String>,
+    by_site: SortedSet<String>,
     solvers: Vec<Ident>,
     variants: Vec<Variant>,
 }
@@ -270,7 +270,7 @@ impl Guess {
             hamiltonian: false,
             transformed: false,
             outputs: Vec::new(),
-            by_site: BTreeSet::new(),
+            by_site: SortedSet::new(),
             solvers: Vec::new(),
             variants: Vec::new(),
         };
@@ -305,12 +305,12 @@ impl Guess {
             }
         }
         // A name that clashes has been reported; rustc would repeat it.
-        let mut seen = BTreeSet::from(["state".to_owned(), "structure".to_owned()]);
+        let mut seen = SortedSet::from(["state".to_owned(), "structure".to_owned()]);
         if guess.transformed {
             seen.insert("state_at".to_owned());
         }
         guess.outputs.retain(|name| seen.insert(name.to_string()));
-        let mut seen = BTreeSet::from([item.ident.to_string()]);
+        let mut seen = SortedSet::from([item.ident.to_string()]);
         guess.solvers.retain(|name| seen.insert(name.to_string()));
         guess
             .variants

@@ -15,11 +15,11 @@ use crate::page::{self, Formulas};
 use crate::parameters::RunTimeParameters;
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::quote;
-use std::collections::BTreeMap;
 use strides::Strides;
 use syn::ItemStruct;
 use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::expr::input::Affine;
+use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::model::declared::{Declared, Extent, Form, Requirement};
 use tfe_symbolic::program::{Program, Request};
 
@@ -384,7 +384,7 @@ impl Kernels<'_> {
             let length = indices::index(length);
             Some(quote!(__tfe::checks::elements(#name, #length)?;))
         });
-        let mut lengths: BTreeMap<&str, Vec<TokenStream>> = BTreeMap::new();
+        let mut lengths: SortedMap<&str, Vec<TokenStream>> = SortedMap::new();
         let mut rest = Vec::new();
         for requirement in &self.declared.requirements {
             match requirement {
@@ -396,7 +396,7 @@ impl Kernels<'_> {
                 } => {
                     let length = indices::signed(length);
                     let one = quote!((#length, #text, #ranges));
-                    lengths.entry(field).or_default().push(one);
+                    lengths.get_or_default(field).push(one);
                 }
                 Requirement::Turns { ranges, start, end } => {
                     let (start, end) = (indices::signed(start), indices::signed(end));

@@ -13,8 +13,9 @@
 
 use crate::in_place::is_written_in_place;
 use crate::parts::LONG_KERNEL;
-use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use tfe_symbolic::expr::ordered::{SortedMap, SortedSet};
+use tfe_symbolic::expr::sorting::sort;
 use tfe_symbolic::model::declared::{Declared, Form, names};
 use tfe_symbolic::model::notation;
 use tfe_symbolic::program::{Array, Operand, Place, Statement, Temporary};
@@ -59,9 +60,9 @@ impl Headings {
     pub(crate) fn place(
         &self,
         statements: &[Statement],
-        reads: &BTreeMap<Temporary, usize>,
-    ) -> BTreeMap<usize, String> {
-        let mut headings = BTreeMap::new();
+        reads: &SortedMap<Temporary, usize>,
+    ) -> SortedMap<usize, String> {
+        let mut headings = SortedMap::new();
         if statements.len() <= LONG_KERNEL {
             for group in groups(statements, reads) {
                 let begin = group.clone().find(|at| {
@@ -82,9 +83,9 @@ impl Headings {
     /// What the results of a group are, and whether other results need some of it. Where a result has no name of its own, as in a loop, the arrays are told.
     fn heading(&self, group: &[Statement]) -> Option<String> {
         let mut results: Vec<&Place> = group.iter().flat_map(results).collect();
-        results.sort_unstable();
+        sort(&mut results);
         let names: Option<Vec<String>> = results.iter().map(|place| self.name(place)).collect();
-        let mut seen = BTreeSet::new();
+        let mut seen = SortedSet::new();
         let names = names.map(|mut names| {
             names.retain(|name| seen.insert(name.clone()));
             names
@@ -92,7 +93,7 @@ impl Headings {
         let names = match names {
             Some(names) if names.len() <= MAX_RESULTS => names,
             _ => {
-                let arrays: BTreeSet<Array> = results.iter().map(|place| place.array).collect();
+                let arrays: SortedSet<Array> = results.iter().map(|place| place.array).collect();
                 let arrays: Option<Vec<String>> =
                     arrays.into_iter().map(|array| self.array(array)).collect();
                 arrays?
@@ -168,7 +169,7 @@ impl Headings {
 }
 
 /// Statements up to results, and the results, again and again; what is left behind the last result is no group. A loop with results belongs to what stands before it.
-fn groups(statements: &[Statement], reads: &BTreeMap<Temporary, usize>) -> Vec<Range<usize>> {
+fn groups(statements: &[Statement], reads: &SortedMap<Temporary, usize>) -> Vec<Range<usize>> {
     let (mut groups, mut begin, mut end) = (Vec::new(), 0, 0);
     for (at, statement) in statements.iter().enumerate() {
         if result(statement).is_some() {
@@ -226,7 +227,7 @@ fn takes_documentation(statement: &Statement) -> bool {
 
 /// Whether the results of a group need all that is computed in it.
 fn needs_all(group: &[Statement]) -> bool {
-    let mut needed: BTreeSet<Temporary> = BTreeSet::new();
+    let mut needed: SortedSet<Temporary> = SortedSet::new();
     group.iter().rev().all(|statement| {
         let is_needed = match statement {
             Statement::Let { target, .. } => needed.contains(target),
@@ -264,10 +265,10 @@ mod tests {
         };
         let declared = declare(text, &context).expect("no mistakes in it");
         let program = Derivation::of(&declared).program(request);
-        let mut reads: BTreeMap<Temporary, usize> = BTreeMap::new();
+        let mut reads: SortedMap<Temporary, usize> = SortedMap::new();
         for operand in program.statements.iter().flat_map(Statement::operands) {
             if let Operand::Temporary(temporary) = operand {
-                *reads.entry(*temporary).or_default() += 1;
+                *reads.get_or_default(*temporary) += 1;
             }
         }
         let placed = Headings::of(&declared).place(&program.statements, &reads);

@@ -1,12 +1,12 @@
 //! Results that are written where they belong, without a temporary.
 
-use std::collections::BTreeMap;
+use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::program::{Operand, Statement, Temporary};
 
 /// Whether the first statement computes what the next one writes, and nothing else needs that.
 pub(crate) fn is_written_in_place(
     statements: &[Statement],
-    reads: &BTreeMap<Temporary, usize>,
+    reads: &SortedMap<Temporary, usize>,
 ) -> bool {
     matches!(statements, [Statement::Let { target, .. }, next, ..]
         if reads.get(target) == Some(&1) && written(next) == Some(&Operand::Temporary(*target)))

@@ -5,9 +5,9 @@ use crate::indices::{identifier, index};
 use crate::input;
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::quote;
-use std::collections::BTreeMap;
 use syn::ItemStruct;
 use tfe_symbolic::expr::input::{Affine, IndexSymbol};
+use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::syntax::context::{Field, FieldKind, Length};
 
 /// The number of the parameter that a field is, or that its first element is.
@@ -70,7 +70,7 @@ impl Parameters {
     }
 
     /// The places of first numbers by the name of their field.
-    pub(crate) fn places(&self) -> BTreeMap<String, Affine> {
+    pub(crate) fn places(&self) -> SortedMap<String, Affine> {
         let place = |one: &Place| (one.name.clone(), one.first.clone());
         self.fields.iter().map(place).collect()
     }
@@ -207,9 +207,9 @@ impl RunTimeParameters {
     }
 
     /// The number of the first parameter of each field.
-    pub(crate) fn places(&self) -> BTreeMap<String, TokenStream> {
+    pub(crate) fn places(&self) -> SortedMap<String, TokenStream> {
         let (mut singles, mut sizes) = (0_usize, Vec::new());
-        let mut places = BTreeMap::new();
+        let mut places = SortedMap::new();
         for (name, size) in &self.fields {
             let count = Literal::usize_unsuffixed(singles);
             let place = match (&sizes[..], singles) {

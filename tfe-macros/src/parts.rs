@@ -2,7 +2,8 @@
 //!
 //! What a part computes and a later one reads is handed on in an array, `kept`, whose places are used again as soon as they are free.
 
-use std::collections::BTreeMap;
+use tfe_symbolic::expr::ordered::SortedMap;
+use tfe_symbolic::expr::sorting::{sort, sort_by_key};
 use tfe_symbolic::program::{Array, Operand, Statement, Temporary};
 
 /// Kernels of more statements are emitted in parts.
@@ -24,7 +25,7 @@ pub(crate) struct Part {
     /// Values of earlier parts that it reads, with their places in `kept`.
     pub(crate) reads: Vec<(Temporary, usize)>,
     /// Values of its own that later parts read, with their places.
-    pub(crate) keeps: BTreeMap<Temporary, usize>,
+    pub(crate) keeps: SortedMap<Temporary, usize>,
 }
 
 /// A kernel in parts.
@@ -61,7 +62,7 @@ impl Parts {
         let parts = pieces.into_iter().enumerate().map(|(number, statements)| {
             let mut read = Vec::new();
             for_each_read(&statements, &mut |temporary| read.push(temporary));
-            read.sort_unstable();
+            sort(&mut read);
             read.dedup();
             let of_earlier = |temporary: &Temporary| lives[temporary].0 < number;
             let reads = read.iter().filter(|temporary| of_earlier(temporary));
@@ -101,7 +102,7 @@ fn length(statements: &[Statement]) -> usize {
 
 /// Cuts the statements where a part is full. Running sums are not parted from the loops that add to them.
 fn cut(statements: Vec<Statement>) -> Vec<Vec<Statement>> {
-    let mut changed = BTreeMap::new();
+    let mut changed = SortedMap::new();
     for (at, statement) in statements.iter().enumerate() {
         for_each_change(statement, &mut |temporary| {
             changed.insert(temporary, at);
@@ -129,8 +130,8 @@ fn cut(statements: Vec<Statement>) -> Vec<Vec<Statement>> {
 fn lives(
     pieces: &[Vec<Statement>],
     value: Option<&Operand>,
-) -> BTreeMap<Temporary, (usize, usize)> {
-    let mut lives = BTreeMap::new();
+) -> SortedMap<Temporary, (usize, usize)> {
+    let mut lives = SortedMap::new();
     for (number, statements) in pieces.iter().enumerate() {
         for statement in statements {
             for target in defined(statement) {
@@ -138,7 +139,7 @@ fn lives(
             }
         }
         for_each_read(statements, &mut |temporary| {
-            lives.entry(temporary).or_insert((number, number)).1 = number;
+            lives.get_or_insert(temporary, (number, number)).1 = number;
         });
     }
     if let Some(Operand::Temporary(temporary)) = value
@@ -150,28 +151,28 @@ fn lives(
 }
 
 /// A place for each value that outlives its piece, and how many places there are.
-fn places(lives: &BTreeMap<Temporary, (usize, usize)>) -> (BTreeMap<Temporary, usize>, usize) {
+fn places(lives: &SortedMap<Temporary, (usize, usize)>) -> (SortedMap<Temporary, usize>, usize) {
     let mut kept: Vec<_> = lives
         .iter()
         .filter(|(_, (first, last))| first < last)
         .collect();
-    kept.sort_by_key(|(temporary, (first, _))| (*first, **temporary));
+    sort_by_key(&mut kept, |(temporary, (first, _))| (*first, *temporary));
     // The last reader of each place. A part reads before it keeps anything, so that its own reads end there.
-    let (mut places, mut ends): (BTreeMap<Temporary, usize>, BTreeMap<usize, Vec<usize>>) =
+    let (mut places, mut ends): (SortedMap<Temporary, usize>, SortedMap<usize, Vec<usize>>) =
         Default::default();
     let (mut free, mut used) = (Vec::new(), 0);
     for (temporary, (first, last)) in kept {
-        while let Some(entry) = ends.first_entry()
-            && *entry.key() <= *first
+        while let Some(&(end, _)) = ends.iter().next()
+            && end <= *first
         {
-            free.extend(entry.remove());
+            free.extend(ends.remove(&end).unwrap_or_default());
         }
         let at = free.pop().unwrap_or_else(|| {
             used += 1;
             used - 1
         });
         places.insert(*temporary, at);
-        ends.entry(*last).or_default().push(at);
+        ends.get_or_default(*last).push(at);
     }
     (places, used)
 }
@@ -261,7 +262,7 @@ mod tests {
         assert_eq!(lengths, [300, 300, 300, 100]);
         assert_eq!(parts.kept, 1);
         assert_eq!(parts.parts[1].reads, [(Temporary(300), 0)]);
-        assert_eq!(parts.parts[1].keeps, BTreeMap::from([(Temporary(600), 0)]));
+        assert_eq!(parts.parts[1].keeps, SortedMap::from([(Temporary(600), 0)]));
         let value = (Operand::Temporary(Temporary(1000)), Some(0));
         assert_eq!(parts.value, Some(value));
     }

@@ -7,10 +7,9 @@ mod solver;
 mod transformation;
 mod variants;
 
-use std::collections::BTreeMap;
-
 use crate::diagnostic::{Bag, Kind, Role, Span, nearest};
 use crate::expr::input::{Affine, IndexSymbol};
+use crate::expr::ordered::SortedMap;
 use crate::model::declared::{Form, Solver};
 use crate::syntax::ast::{Array, Expr, ExprKind, Item, Name, Pass, Range, Spanned};
 use crate::syntax::context::{Context, FieldKind, Length};
@@ -82,7 +81,7 @@ impl Slots {
 #[derive(Clone, Debug, Default)]
 pub struct Model {
     /// What the names stand for.
-    pub symbols: BTreeMap<String, Symbol>,
+    pub symbols: SortedMap<String, Symbol>,
     /// The coordinates.
     pub coordinates: Vec<Slots>,
     /// The momenta.

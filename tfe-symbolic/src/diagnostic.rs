@@ -9,6 +9,8 @@ mod wording;
 
 use std::fmt::Write as _;
 
+use crate::expr::sorting::sort_by_key;
+
 pub use kind::{Kind, Role};
 pub use span::Span;
 
@@ -119,7 +121,7 @@ impl Bag {
     pub fn finish<T>(mut self, value: T) -> Result<T, Vec<Diagnostic>> {
         self.finished = true;
         let mut diagnostics = std::mem::take(&mut self.diagnostics);
-        diagnostics.sort_by_key(|diagnostic| diagnostic.span);
+        sort_by_key(&mut diagnostics, |diagnostic| diagnostic.span);
         if diagnostics.is_empty() {
             Ok(value)
         } else {

@@ -2,8 +2,8 @@
 
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
-use std::collections::BTreeSet;
 use syn::{DeriveInput, WhereClause};
+use tfe_symbolic::expr::ordered::SortedSet;
 
 /// The implementations that uses of the type need to type-check; `shared` is what models with inputs are asked for.
 pub(super) fn stubs(
@@ -11,7 +11,7 @@ pub(super) fn stubs(
     path: &TokenStream,
     form: &TokenStream,
     outputs: &[Ident],
-    by_site: &BTreeSet<String>,
+    by_site: &SortedSet<String>,
 ) -> TokenStream {
     let (name, vis) = (&item.ident, &item.vis);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();

@@ -4,8 +4,8 @@ use crate::indices::identifier;
 use crate::input::plain;
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
-use std::collections::BTreeSet;
 use syn::{Data, DeriveInput, Field, Type};
+use tfe_symbolic::expr::ordered::SortedSet;
 use tfe_symbolic::syntax::ast::{Entry, Pass};
 
 /// What can be told of `model(Name, …)`.
@@ -17,7 +17,7 @@ pub(super) struct Variant {
     /// Whether only cyclic coordinates have gone.
     is_projected: bool,
     /// The fields that it has more.
-    added: BTreeSet<String>,
+    added: SortedSet<String>,
 }
 
 impl Variant {
@@ -51,7 +51,7 @@ impl Variant {
 }
 
 /// The fields of numbers that it may have: those of the original, and those added.
-fn fields(variant: &Variant, item: &DeriveInput) -> BTreeSet<Ident> {
+fn fields(variant: &Variant, item: &DeriveInput) -> SortedSet<Ident> {
     let own = match &item.data {
         Data::Struct(data) => data.fields.iter().collect(),
         _ => Vec::new(),
@@ -60,7 +60,7 @@ fn fields(variant: &Variant, item: &DeriveInput) -> BTreeSet<Ident> {
         |field: &&Field| matches!(&field.ty, Type::Path(path) if path.path.is_ident("f64"));
     let own = own.into_iter().filter(is_number);
     let own = own.filter_map(|field| field.ident.as_ref().map(plain));
-    let all: BTreeSet<String> = own.chain(variant.added.iter().cloned()).collect();
+    let all: SortedSet<String> = own.chain(variant.added.iter().cloned()).collect();
     all.iter().map(|name| identifier(name)).collect()
 }
 

@@ -16,6 +16,7 @@ use crate::expr::differentiate::{Forward, derivative, gradient};
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
+use crate::expr::sorting::sort;
 use crate::model::declared::{Constraint, ConstraintKind};
 use crate::program::{Array, Place};
 
@@ -214,7 +215,7 @@ fn leaves(graph: &Graph, roots: &[ExprId], pick: Pick) -> Vec<(Affine, ExprId)> 
         .into_iter()
         .filter_map(leaf)
         .collect();
-    found.sort();
+    sort(&mut found);
     found
 }
 
@@ -319,7 +320,7 @@ fn is_integrable(graph: &mut Graph, row: &Row) -> bool {
     };
     let mut columns: Vec<Affine> = row.entries.iter().map(|(at, _)| at.clone()).collect();
     columns.extend(leaves.into_iter().map(|(at, _)| at));
-    columns.sort();
+    sort(&mut columns);
     columns.dedup();
     let mut slope = |of: Option<ExprId>, by: &Input| match of {
         Some(of) => derivative(graph, of, by),

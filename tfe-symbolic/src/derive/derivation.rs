@@ -8,7 +8,6 @@
 //! the body, and the chain rule continues into it: ∂f/∂q = (∂f/∂S)(∂S/∂q), in one more loop.
 
 use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
 
 use crate::derive::constraint;
 use crate::derive::entry::Entry;
@@ -20,6 +19,8 @@ use crate::expr::differentiate::{Forward, gradient};
 use crate::expr::graph::{ExprId, Graph, Node, SumRange};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
+use crate::expr::ordered::{SortedMap, SortedSet};
+use crate::expr::sorting::sort;
 use crate::model::declared::{Constraint, Declared, Force, Form, Observable, Parameter};
 use crate::optimise::passes::{Pass, Passes};
 use crate::program::{Array, Place, Program, Request};
@@ -196,7 +197,7 @@ impl Derivation {
 }
 
 /// The places where some way of writing is zero: the others are zero there, too, but for rounding errors.
-fn vanishing(graph: &Graph, written: &[Vec<Entry>]) -> BTreeSet<Place> {
+fn vanishing(graph: &Graph, written: &[Vec<Entry>]) -> SortedSet<Place> {
     let is_zero = |value: ExprId| graph.as_constant(value).is_some_and(Constant::is_zero);
     let all = written.iter().flatten();
     all.filter(|entry| is_zero(entry.value))
@@ -366,7 +367,7 @@ impl Deriver<'_> {
             .into_iter()
             .filter_map(slot)
             .collect();
-        slots.sort();
+        sort(&mut slots);
         slots
     }
 
@@ -413,11 +414,11 @@ impl Deriver<'_> {
 
     /// Splits an expression into terms, each a body inside its own loops; a body that is linear in no sum keeps its sums.
     fn terms(&mut self, nest: &[SumRange], expression: ExprId) -> Vec<Term> {
-        let mut bodies: BTreeMap<Vec<SumRange>, Vec<(Constant, ExprId)>> = BTreeMap::new();
+        let mut bodies: SortedMap<Vec<SumRange>, Vec<(Constant, ExprId)>> = SortedMap::new();
         let mut waiting = vec![(nest.to_vec(), Constant::ONE, expression)];
         while let Some((nest, factor, id)) = waiting.pop() {
             if !self.graph.contains_sum(id) {
-                bodies.entry(nest).or_default().push((factor, id));
+                bodies.get_or_default(nest).push((factor, id));
                 continue;
             }
             match self.graph.node(id).clone() {
@@ -425,8 +426,7 @@ impl Deriver<'_> {
                     if !constant.is_zero() {
                         let one = self.graph.constant(Constant::ONE);
                         bodies
-                            .entry(nest.clone())
-                            .or_default()
+                            .get_or_default(nest.clone())
                             .push((factor * constant, one));
                     }
                     waiting.extend(
@@ -475,10 +475,10 @@ impl Deriver<'_> {
                                 waiting.push((nest, factor * constant, product));
                             }
                         }
-                        _ => bodies.entry(nest).or_default().push((factor, id)),
+                        _ => bodies.get_or_default(nest).push((factor, id)),
                     }
                 }
-                _ => bodies.entry(nest).or_default().push((factor, id)),
+                _ => bodies.get_or_default(nest).push((factor, id)),
             }
         }
         let mut terms = Vec::with_capacity(bodies.len());

@@ -12,8 +12,6 @@
 //! The *rates* u are z, or z and the sums of velocities that stand in the energy: in m (v₁ + v₂)²/2, m v₁ + m v₂ would lose the digits that
 //! v₁ + v₂ has where both are nearly opposite.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use crate::derive::entry::Entry;
 use crate::derive::sweep::Sweep;
 use crate::expr::constant::Constant;
@@ -21,7 +19,9 @@ use crate::expr::differentiate::gradient;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input};
+use crate::expr::ordered::{SortedMap, SortedSet};
 use crate::expr::rewrite::Mapping;
+use crate::expr::sorting::sort;
 use crate::optimise::estimate::{estimate, is_worth_following};
 use crate::program::{Array, Place};
 
@@ -32,14 +32,14 @@ struct Rate {
     /// What stands for it while derivatives are taken.
     leaf: ExprId,
     /// ∂value/∂z
-    shares: BTreeMap<Affine, Constant>,
+    shares: SortedMap<Affine, Constant>,
 }
 
 /// M, b, U and u.
 struct Parts {
     rates: Vec<Rate>,
     /// Of the upper triangle, where it is not zero.
-    mass: BTreeMap<(usize, usize), ExprId>,
+    mass: SortedMap<(usize, usize), ExprId>,
     linear: Vec<ExprId>,
     rest: ExprId,
 }
@@ -59,7 +59,7 @@ enum Writing {
 /// The derivatives of the energy by M, b and U in place of those among the entries, in the ways that may cost less; none if the energy is not
 /// quadratic or sums over ranges.
 pub(crate) fn entries(graph: &mut Graph, energy: ExprId, entries: &[Entry]) -> Vec<Vec<Entry>> {
-    let mut places: BTreeSet<&Place> = BTreeSet::new();
+    let mut places: SortedSet<&Place> = SortedSet::new();
     for entry in entries.iter().filter(|entry| is_derivative(&entry.place)) {
         if !places.insert(&entry.place) || !entry.nest.is_empty() {
             return Vec::new();
@@ -76,7 +76,7 @@ pub(crate) fn entries(graph: &mut Graph, energy: ExprId, entries: &[Entry]) -> V
         .map(|entry| entry.value)
         .collect();
     let declared = estimate(graph, &declared);
-    let (firsts, seconds): (BTreeSet<&Place>, BTreeSet<&Place>) =
+    let (firsts, seconds): (SortedSet<&Place>, SortedSet<&Place>) =
         places.into_iter().partition(is_first);
     let velocities = velocities(graph, energy);
     let sums = sums_of_velocities(graph, energy);
@@ -116,29 +116,29 @@ fn velocities(graph: &Graph, energy: ExprId) -> Vec<Rate> {
     let mut found: Vec<(Affine, ExprId)> = nodes
         .filter_map(|id| Some((velocity(graph, id)?.clone(), id)))
         .collect();
-    found.sort();
+    sort(&mut found);
     let rate = |(index, id)| Rate {
         value: id,
         leaf: id,
-        shares: BTreeMap::from([(index, Constant::ONE)]),
+        shares: SortedMap::from([(index, Constant::ONE)]),
     };
     found.into_iter().map(rate).collect()
 }
 
 /// The sums of velocities, or of momenta, in an energy, each with a leaf that stands for it.
 fn sums_of_velocities(graph: &mut Graph, energy: ExprId) -> Vec<Rate> {
-    let mut found: Vec<(ExprId, BTreeMap<Affine, Constant>)> = Vec::new();
+    let mut found: Vec<(ExprId, SortedMap<Affine, Constant>)> = Vec::new();
     for id in graph.reachable(&[energy]) {
         let Some((constant, terms)) = graph.as_sum(id).filter(|(_, terms)| terms.len() > 1) else {
             continue;
         };
         let share = |(c, x): &(Constant, ExprId)| Some((velocity(graph, *x)?.clone(), *c));
-        let shares: Option<BTreeMap<Affine, Constant>> = terms.iter().map(share).collect();
+        let shares: Option<SortedMap<Affine, Constant>> = terms.iter().map(share).collect();
         if let Some(shares) = shares.filter(|_| constant.is_zero()) {
             found.push((id, shares));
         }
     }
-    let rate = |(number, (value, shares)): (usize, (ExprId, BTreeMap<Affine, Constant>))| {
+    let rate = |(number, (value, shares)): (usize, (ExprId, SortedMap<Affine, Constant>))| {
         let place = Affine::constant(number as i64);
         Rate {
             value,
@@ -168,7 +168,7 @@ struct Slopes {
 }
 
 impl Slopes {
-    fn by(graph: &mut Graph, places: &BTreeSet<&Place>) -> Self {
+    fn by(graph: &mut Graph, places: &SortedSet<&Place>) -> Self {
         let by_q = places.iter().filter(|place| place.array == Array::ByQ);
         let indices: Vec<Affine> = by_q.map(|place| place.row.clone()).collect();
         let leaf = |index: &Affine| graph.input(Input::Coordinate(index.clone()));
@@ -205,7 +205,7 @@ fn at_rest(graph: &mut Graph, x: ExprId) -> ExprId {
 
 /// Whether z stands in sums and products only. Beside |z| or a choice, second derivatives free of z do not make the first ones linear.
 fn is_polynomial(graph: &Graph, energy: ExprId) -> bool {
-    let mut moving = BTreeSet::new();
+    let mut moving = SortedSet::new();
     for id in graph.reachable(&[energy]) {
         let moves = |x: &ExprId| moving.contains(x);
         let node = graph.node(id);
@@ -237,7 +237,7 @@ impl Parts {
         let energy = with_leaves_for(graph, energy, &rates);
         let leaves: Vec<ExprId> = rates.iter().map(|rate| rate.leaf).collect();
         let slopes = sweep.slopes(graph, energy, &leaves);
-        let mut mass = BTreeMap::new();
+        let mut mass = SortedMap::new();
         for (row, slope) in slopes.iter().enumerate() {
             for (at, value) in sweep
                 .slopes(graph, *slope, &leaves[row..])
@@ -288,11 +288,11 @@ impl Parts {
     fn derivatives(
         &self,
         graph: &mut Graph,
-        places: &BTreeSet<&Place>,
+        places: &SortedSet<&Place>,
         slopes: &mut Slopes,
-    ) -> BTreeMap<Place, ExprId> {
+    ) -> SortedMap<Place, ExprId> {
         let mut slope = |graph: &mut Graph, x, by: &Affine| slopes.slope(graph, x, by);
-        let mut values = BTreeMap::new();
+        let mut values = SortedMap::new();
         for place in places {
             let (row, column) = (&place.row, &place.column);
             let value = match place.array {

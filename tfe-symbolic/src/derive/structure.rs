@@ -1,12 +1,13 @@
 //! What is known about a model without running it.
 
-use std::collections::BTreeSet;
 use std::fmt;
 
 use crate::derive::entry::Entry;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
+use crate::expr::ordered::SortedSet;
+use crate::expr::sorting::sort;
 use crate::model::declared::Form;
 use crate::program::Array;
 
@@ -182,7 +183,7 @@ fn is_symmetric(entries: &[Entry]) -> bool {
             entry.value,
         )
     };
-    let found: BTreeSet<_> = entries
+    let found: SortedSet<_> = entries
         .iter()
         .filter(|entry| entry.place.array == Array::ForceQ)
         .map(own)
@@ -199,7 +200,7 @@ fn cyclic(dof: &Affine, entries: &[Entry]) -> Vec<usize> {
     else {
         return Vec::new();
     };
-    let mut rows = BTreeSet::new();
+    let mut rows = SortedSet::new();
     for entry in entries
         .iter()
         .filter(|entry| matches!(entry.place.array, Array::ByQ | Array::Row(_)))
@@ -219,7 +220,8 @@ fn conserved(cyclic: &[usize], entries: &[Entry]) -> Vec<usize> {
     let forces = entries
         .iter()
         .filter(|entry| entry.place.array == Array::Force);
-    let pushed: Option<BTreeSet<i64>> = forces.map(|entry| entry.place.row.as_constant()).collect();
+    let pushed: Option<SortedSet<i64>> =
+        forces.map(|entry| entry.place.row.as_constant()).collect();
     let Some(pushed) = pushed else {
         return Vec::new();
     };
@@ -230,7 +232,7 @@ fn conserved(cyclic: &[usize], entries: &[Entry]) -> Vec<usize> {
 
 impl Pattern {
     fn of<'a>(entries: impl Iterator<Item = &'a Entry>) -> Self {
-        let places: BTreeSet<(Affine, Affine)> = entries
+        let places: SortedSet<(Affine, Affine)> = entries
             .map(|entry| (entry.place.row.clone(), entry.place.column.clone()))
             .collect();
         let literal = |index: &Affine| {
@@ -244,7 +246,7 @@ impl Pattern {
             .collect();
         match numbers {
             Some(mut numbers) => {
-                numbers.sort_unstable();
+                sort(&mut numbers);
                 Self::Entries(numbers)
             }
             None => Self::Indexed(places.into_iter().collect()),

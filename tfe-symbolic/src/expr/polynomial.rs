@@ -2,16 +2,15 @@
 //!
 //! The constructors of expressions keep nested sums, because kernels share them. Comparing two expressions wants the opposite.
 
-use std::collections::BTreeMap;
-
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::ordered::SortedMap;
 
 /// Expressions with more terms than this are not compared.
 const MOST_TERMS: usize = 512;
 
 /// Σ c x: coefficients by products of atoms; the number one stands for the constant.
-type Polynomial = BTreeMap<ExprId, Constant>;
+type Polynomial = SortedMap<ExprId, Constant>;
 
 impl Graph {
     /// The expression multiplied out; `None` where that makes too many terms.
@@ -23,7 +22,7 @@ impl Graph {
 
     /// The same, with the largest number of terms on the way.
     pub(crate) fn expanded_within(&mut self, root: ExprId, most_terms: usize) -> Option<ExprId> {
-        let mut done: BTreeMap<ExprId, Polynomial> = BTreeMap::new();
+        let mut done: SortedMap<ExprId, Polynomial> = SortedMap::new();
         for id in self.reachable_outside_sums(&[root]) {
             let polynomial = match self.node(id).clone() {
                 Node::Constant(value) => {

@@ -21,12 +21,11 @@
 //! x/x → 1, x·0 → 0 and √x² → x also give a value where the left side has none. That is decided: kernels meet removable 0/0 in derivatives
 //! such as those of x²/x, and the continued value is the one wanted.
 
-use std::collections::BTreeMap;
-
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::{Function, Parity};
 use crate::expr::graph::{ExprId, Graph, Node, SumRange};
+use crate::expr::ordered::SortedMap;
 
 /// Products of more factors than this stay nested: opening them would make the derivative of a deep composition quadratic in its depth.
 const LONG_PRODUCT: usize = 16;
@@ -206,7 +205,7 @@ impl Graph {
     /// c Π xᵢ^nᵢ: all rules of products are here.
     pub(crate) fn product(&mut self, coefficient: Constant, factors: &[(ExprId, i32)]) -> ExprId {
         let mut coefficient = coefficient;
-        let mut collected: BTreeMap<ExprId, i64> = BTreeMap::new();
+        let mut collected: SortedMap<ExprId, i64> = SortedMap::new();
         let mut waiting: Vec<(ExprId, i64)> =
             factors.iter().map(|(x, n)| (*x, i64::from(*n))).collect();
         while let Some((x, n)) = waiting.pop() {
@@ -216,14 +215,14 @@ impl Graph {
                 _ if n == 0 => {}
                 Node::Constant(value) => match small.and_then(|n| value.powi(n)) {
                     Some(value) => coefficient = coefficient * value,
-                    None => *collected.entry(inner).or_default() += n,
+                    None => *collected.get_or_default(inner) += n,
                 },
                 _ if inner != x => match small.and_then(|n| multiple.powi(n)) {
                     Some(value) => {
                         coefficient = coefficient * value;
                         waiting.push((inner, n));
                     }
-                    None => *collected.entry(x).or_default() += n,
+                    None => *collected.get_or_default(x) += n,
                 },
                 Node::Product(inner) if inner.len() <= LONG_PRODUCT => waiting.extend(
                     inner
@@ -231,7 +230,7 @@ impl Graph {
                         .map(|(x, m)| (*x, i64::from(*m).saturating_mul(n))),
                 ),
                 _ => {
-                    let total = collected.entry(inner).or_default();
+                    let total = collected.get_or_default(inner);
                     *total = total.saturating_add(n);
                 }
             }
@@ -267,7 +266,7 @@ impl Graph {
     /// √x^(2n) → xⁿ and abs(x)^(2n) → x^(2n).
     fn fold_even_powers(
         &self,
-        collected: &mut BTreeMap<ExprId, i64>,
+        collected: &mut SortedMap<ExprId, i64>,
         waiting: &mut Vec<(ExprId, i64)>,
     ) {
         for (x, n) in collected.iter_mut() {

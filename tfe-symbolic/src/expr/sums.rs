@@ -1,17 +1,16 @@
 //! The rules of sums (the list of all rules is in `simplify.rs`).
 
-use std::collections::BTreeMap;
-
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::ordered::SortedMap;
 
 impl Graph {
     /// constant + Σ cᵢ xᵢ: all rules of sums are here.
     pub(crate) fn linear(&mut self, constant: Constant, terms: &[(Constant, ExprId)]) -> ExprId {
         let mut sum = Collected {
             constant,
-            terms: BTreeMap::new(),
+            terms: SortedMap::new(),
         };
         for (coefficient, x) in terms {
             sum.push(self, *coefficient, *x);
@@ -71,7 +70,7 @@ impl Graph {
 /// A sum being collected.
 struct Collected {
     constant: Constant,
-    terms: BTreeMap<ExprId, Constant>,
+    terms: SortedMap<ExprId, Constant>,
 }
 
 impl Collected {
@@ -92,7 +91,7 @@ impl Collected {
 
     fn open_where_terms_cancel(&mut self, graph: &Graph) {
         loop {
-            let cancels = |(x, coefficient): (&ExprId, &Constant)| {
+            let cancels = |(x, coefficient): &(ExprId, Constant)| {
                 let (constant, terms) = graph.as_sum(*x)?;
                 let cancels = |own: Option<Constant>, inner: Constant| {
                     own.is_some_and(|own| (own + *coefficient * inner).is_zero())

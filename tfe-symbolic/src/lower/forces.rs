@@ -5,6 +5,7 @@ use crate::check::Symbol;
 use crate::diagnostic::{Kind, nearest};
 use crate::expr::graph::{ExprId, SumRange};
 use crate::expr::input::{Affine, Input};
+use crate::expr::sorting::sort;
 use crate::model::declared::{Force, Form};
 use crate::syntax::ast::{Expr, ExprKind};
 
@@ -214,7 +215,7 @@ impl Lowerer<'_> {
                 _ => None,
             })
             .collect();
-        targets.sort_unstable();
+        sort(&mut targets);
         let forces = targets.into_iter().map(|at| Force {
             ranges: Vec::new(),
             target: Affine::constant(at),

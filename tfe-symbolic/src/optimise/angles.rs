@@ -24,12 +24,11 @@ mod choice;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
-
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::Input;
+use crate::expr::ordered::SortedMap;
 use crate::expr::rewrite::Mapping;
 use crate::optimise::binarize::arrange;
 use choice::{Angle, Choice, How, Need, canonical, choose};
@@ -43,10 +42,10 @@ const MOST_STEPS: usize = 24;
 /// The roots with sines and cosines of sums expanded where that pays.
 pub(crate) fn expand_angles(graph: &mut Graph, roots: Vec<ExprId>) -> Vec<ExprId> {
     let nodes = graph.reachable(&roots);
-    let mut wanted: BTreeMap<Angle, Need> = BTreeMap::new();
-    let mut calls: BTreeMap<ExprId, Occurrence> = BTreeMap::new();
+    let mut wanted: SortedMap<Angle, Need> = SortedMap::new();
+    let mut calls: SortedMap<ExprId, Occurrence> = SortedMap::new();
     // How an angle was written where it was written first: another order of its terms would round differently.
-    let mut written: BTreeMap<Angle, (ExprId, bool)> = BTreeMap::new();
+    let mut written: SortedMap<Angle, (ExprId, bool)> = SortedMap::new();
     for id in &nodes {
         let Node::Call {
             function: function @ (Function::Sin | Function::Cos),
@@ -60,12 +59,12 @@ pub(crate) fn expand_angles(graph: &mut Graph, roots: Vec<ExprId>) -> Vec<ExprId
         let Some((angle, negative)) = read(graph, argument) else {
             continue;
         };
-        let need = wanted.entry(angle.clone()).or_default();
+        let need = wanted.get_or_default(angle.clone());
         match function {
             Function::Sin => need.sine = true,
             _ => need.cosine = true,
         }
-        written.entry(angle.clone()).or_insert((argument, negative));
+        written.get_or_insert(angle.clone(), (argument, negative));
         calls.insert(
             *id,
             Occurrence {
@@ -115,7 +114,7 @@ impl Occurrence {
     fn value(
         &self,
         graph: &mut Graph,
-        known: &BTreeMap<Angle, (ExprId, ExprId)>,
+        known: &SortedMap<Angle, (ExprId, ExprId)>,
     ) -> Option<ExprId> {
         let (sine, cosine) = *known.get(&self.angle)?;
         Some(match (self.function, self.negative) {
@@ -131,7 +130,7 @@ fn read(graph: &mut Graph, argument: ExprId) -> Option<(Angle, bool)> {
     if graph.loops_of(argument) != 0 {
         return None;
     }
-    let mut parts: BTreeMap<ExprId, i64> = BTreeMap::new();
+    let mut parts: SortedMap<ExprId, i64> = SortedMap::new();
     let mut constant = Constant::ZERO;
     let mut waiting = vec![(Constant::ONE, argument)];
     let mut steps = 0;
@@ -148,7 +147,7 @@ fn read(graph: &mut Graph, argument: ExprId) -> Option<(Angle, bool)> {
                 | Input::Control(_)
                 | Input::Time,
             ) => {
-                let part = parts.entry(x).or_default();
+                let part = parts.get_or_default(x);
                 *part = part.checked_add(factor.as_integer()?)?;
             }
             Node::Sum {
@@ -182,9 +181,9 @@ fn read(graph: &mut Graph, argument: ExprId) -> Option<(Angle, bool)> {
 fn pairs(
     graph: &mut Graph,
     choice: &Choice,
-    written: &BTreeMap<Angle, (ExprId, bool)>,
-) -> BTreeMap<Angle, (ExprId, ExprId)> {
-    let mut known: BTreeMap<Angle, (ExprId, ExprId)> = BTreeMap::new();
+    written: &SortedMap<Angle, (ExprId, bool)>,
+) -> SortedMap<Angle, (ExprId, ExprId)> {
+    let mut known: SortedMap<Angle, (ExprId, ExprId)> = SortedMap::new();
     for (angle, how) in choice.steps() {
         let pair = match how {
             How::Direct => match written.get(angle) {

@@ -6,12 +6,12 @@
 mod demand;
 mod fractions;
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use crate::expr::constant::{Constant, is_decimal};
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
+use crate::expr::ordered::{SortedMap, SortedSet};
+use crate::expr::sorting::sort_by_key;
 use crate::optimise::cse::{self, Item, Kind, Operands, Pair};
 use crate::optimise::plan::{Op, Plan, Value};
 use demand::{Multiple, ONE, PositiveConstant, Terms, demanded, gather, multiple};
@@ -83,11 +83,10 @@ impl Family {
         let whole = operands
             .keys()
             .fold(0, |mask, item| mask | self.loops[*item as usize]);
-        let mut classes: BTreeMap<u64, Operands> = BTreeMap::new();
+        let mut classes: SortedMap<u64, Operands> = SortedMap::new();
         for (item, power) in &operands {
             classes
-                .entry(self.loops[*item as usize])
-                .or_default()
+                .get_or_default(self.loops[*item as usize])
                 .insert(*item, *power);
         }
         let mut grouped = Operands::new();
@@ -166,7 +165,7 @@ struct Arranger<'a> {
 type Places = Vec<(Multiple, i32)>;
 
 /// Divisors of which the reciprocal is computed, each with those that always stand beside it (and itself).
-type SharedDivisors = BTreeMap<ExprId, Vec<ExprId>>;
+type SharedDivisors = SortedMap<ExprId, Vec<ExprId>>;
 
 impl<'a> Arranger<'a> {
     fn new(graph: &'a Graph) -> Self {
@@ -227,15 +226,15 @@ impl<'a> Arranger<'a> {
     }
 
     /// Divisors that stand below several products, or in a loop that they do not vary in.
-    fn shared_divisors(&self, demanded: &BTreeSet<Multiple>) -> SharedDivisors {
-        let mut places: BTreeMap<ExprId, Places> = BTreeMap::new();
-        let mut outside: BTreeSet<ExprId> = BTreeSet::new();
+    fn shared_divisors(&self, demanded: &SortedSet<Multiple>) -> SharedDivisors {
+        let mut places: SortedMap<ExprId, Places> = SortedMap::new();
+        let mut outside: SortedSet<ExprId> = SortedSet::new();
         for multiple in demanded {
             let (_, factors) = self.fractions.rest(self.graph, multiple);
             for (x, n) in self.roots_below(&factors) {
                 // A number below is divided by: its reciprocal may not be exact.
                 if n < 0 && self.graph.as_constant(x).is_none() {
-                    places.entry(x).or_default().push((*multiple, n));
+                    places.get_or_default(x).push((*multiple, n));
                     if self.graph.loops_of(x) != self.graph.loops_of(multiple.0) {
                         outside.insert(x);
                     }
@@ -249,10 +248,10 @@ impl<'a> Arranger<'a> {
                     .all(|(_, n)| n.unsigned_abs() <= LARGEST_PRODUCT_POWER)
         });
         // Divisors that always stand together need one reciprocal together.
-        let mut together: BTreeMap<(Places, u64), Vec<ExprId>> = BTreeMap::new();
+        let mut together: SortedMap<(Places, u64), Vec<ExprId>> = SortedMap::new();
         for (x, places) in places {
             let key = (places, self.graph.loops_of(x));
-            together.entry(key).or_default().push(x);
+            together.get_or_default(key).push(x);
         }
         let mut shared = SharedDivisors::new();
         for group in together.into_values() {
@@ -484,7 +483,7 @@ impl<'a> Arranger<'a> {
 
     /// A sum that keeps its order, group by group.
     fn build_in_order(&mut self, Terms { number, terms }: &Terms) -> Value {
-        let mut groups: BTreeMap<usize, Vec<Value>> = BTreeMap::new();
+        let mut groups: SortedMap<usize, Vec<Value>> = SortedMap::new();
         for (multiple, negative) in terms {
             let value = self.built[multiple];
             let value = Value {
@@ -492,7 +491,7 @@ impl<'a> Arranger<'a> {
                 op: value.op,
             };
             let group = self.graph.group_of_term(multiple.0);
-            groups.entry(group).or_default().push(value);
+            groups.get_or_default(group).push(value);
         }
         let mut sums: Vec<Value> = groups
             .into_values()
@@ -532,7 +531,9 @@ impl<'a> Arranger<'a> {
                 Kind::Product => values.push(self.build_power(value, power)),
             }
         }
-        values.sort_by_key(|value| self.plan.loops_of(value.op).count_ones());
+        sort_by_key(&mut values, |value| {
+            self.plan.loops_of(value.op).count_ones()
+        });
         let value = self.fold(kind, &values);
         self.family(kind).built_sets[set] = Some(value);
         value

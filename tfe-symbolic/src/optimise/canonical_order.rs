@@ -8,10 +8,10 @@
 //! In the sums that belong to coordinates like each other, terms of one kind stand beside other ones; which are added first, and which operand
 //! of a sum or product stands first, are accidents of the derivation. Here like operations are made alike, at the same cost.
 
-use std::collections::BTreeSet;
-
 use crate::expr::function::Function;
 use crate::expr::input::Input;
+use crate::expr::ordered::SortedSet;
+use crate::expr::sorting::{sort, sort_by_key};
 use crate::optimise::plan::{Op, OpId, Plan, Value};
 use crate::optimise::rebuild::{Changes, Formula, rebuild};
 
@@ -112,7 +112,7 @@ fn sums(plan: &Plan, uses: &[usize]) -> Vec<(OpId, Vec<Value>)> {
         _ => Vec::new(),
     };
     let all: Vec<OpId> = plan.ids().filter(|id| is_sum(plan.op(*id))).collect();
-    let mut inner = BTreeSet::new();
+    let mut inner = SortedSet::new();
     for sum in &all {
         let parts = parts(*sum).into_iter().map(|(part, _)| part);
         inner.extend(parts.filter(|part| inside(*sum, *part)));
@@ -181,7 +181,7 @@ fn regrouped(shapes: &[usize], terms: &[Value]) -> Option<Formula> {
         return None;
     }
     // Groups first, then what stands alone.
-    groups.sort_by_key(|(_, group)| group.len() < 2);
+    sort_by_key(&mut groups, |(_, group)| group.len() < 2);
     let sums = groups
         .into_iter()
         .filter_map(|(_, group)| group.into_iter().map(Formula::Is).reduce(Formula::sum));
@@ -252,13 +252,13 @@ fn shapes(plan: &Plan, levels: usize, kind: impl Fn(&Op) -> Kind) -> Vec<usize> 
                 };
                 let mut operands: Vec<usize> = operands.iter().map(|x| shapes[x.index()]).collect();
                 if matches!(kind, Kind::Sum | Kind::Product) {
-                    operands.sort_unstable();
+                    sort(&mut operands);
                 }
                 in_one_number(*kind, &operands)
             })
             .collect();
         let mut all = made.clone();
-        all.sort_unstable();
+        sort(&mut all);
         all.dedup();
         shapes = made
             .iter()

@@ -4,7 +4,9 @@
 //! becomes an operand of its own, again and again, as long as one saves anything.
 
 use crate::expr::hash::Map;
-use std::collections::{BTreeMap, BinaryHeap};
+use crate::expr::ordered::SortedMap;
+use crate::expr::sorting::sort;
+use std::collections::BinaryHeap;
 
 /// An operand: an index chosen by the caller, or of a pair made here.
 pub(crate) type Item = u32;
@@ -19,7 +21,7 @@ pub(crate) enum Kind {
 }
 
 /// Operands with their signs or exponents.
-pub(crate) type Operands = BTreeMap<Item, i32>;
+pub(crate) type Operands = SortedMap<Item, i32>;
 
 /// `first + sign · second`, or `first · second` (then `sign` is 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -162,7 +164,7 @@ impl Search {
     }
 
     fn enqueue(&mut self, mut candidates: Vec<Pair>) {
-        candidates.sort_unstable();
+        sort(&mut candidates);
         candidates.dedup();
         for pair in candidates {
             let saving = self.saving(pair);

@@ -4,11 +4,11 @@
 //! estimate of the whole falls, and then one by one, each kept only if the arranged whole costs less; how many are tried depends on the size, to keep
 //! compile times linear.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::ordered::{SortedMap, SortedSet};
 use crate::expr::rewrite::{Mapping, Uses};
+use crate::expr::sorting::sort_by_key;
 use crate::optimise::binarize::arrange;
 use crate::optimise::estimate::estimate;
 use crate::optimise::plan::Plan;
@@ -45,7 +45,9 @@ pub(crate) fn take_out_factors(
     // All at once, as long as that seems to help: large models get no further.
     for _ in 0..MAX_ROUNDS {
         let mut all = candidates(graph, &roots);
-        all.sort_by_key(|candidate| (candidate.sum, std::cmp::Reverse(candidate.terms)));
+        sort_by_key(&mut all, |candidate| {
+            (candidate.sum, std::cmp::Reverse(candidate.terms))
+        });
         all.dedup_by_key(|candidate| candidate.sum);
         let trial = apply(graph, &roots, &all);
         let cost = estimate(graph, &trial);
@@ -68,11 +70,11 @@ pub(crate) fn take_out_factors(
     }
     let mut budget = budget;
     // One by one, the most promising first. What does not help is not tried again: it hardly would where the sum is the same.
-    let mut tried = BTreeSet::new();
+    let mut tried = SortedSet::new();
     'again: loop {
         let mut all = candidates(graph, &best.roots);
         all.retain(|candidate| !tried.contains(candidate));
-        all.sort_by_key(|candidate| std::cmp::Reverse(candidate.terms));
+        sort_by_key(&mut all, |candidate| std::cmp::Reverse(candidate.terms));
         for candidate in all {
             match budget.checked_sub(best.plan.len()) {
                 Some(rest) => budget = rest,
@@ -120,10 +122,10 @@ fn candidates(graph: &Graph, roots: &[ExprId]) -> Vec<Candidate> {
         let Some((_, terms)) = graph.as_sum(sum) else {
             continue;
         };
-        let mut counts: BTreeMap<(ExprId, bool), usize> = BTreeMap::new();
+        let mut counts: SortedMap<(ExprId, bool), usize> = SortedMap::new();
         for (_, x) in terms {
             for (factor, exponent) in own_factors(graph, &uses, *x) {
-                *counts.entry((*factor, *exponent < 0)).or_default() += 1;
+                *counts.get_or_default((*factor, *exponent < 0)) += 1;
             }
         }
         let several = counts.into_iter().filter(|(_, terms)| *terms > 1);
@@ -148,7 +150,7 @@ fn own_factors<'a>(graph: &'a Graph, uses: &Uses, x: ExprId) -> &'a [(ExprId, i3
 fn apply(graph: &mut Graph, roots: &[ExprId], changes: &[Candidate]) -> Vec<ExprId> {
     let nodes = graph.reachable(roots);
     let uses = graph.uses(&nodes, roots);
-    let changes: BTreeMap<ExprId, Candidate> =
+    let changes: SortedMap<ExprId, Candidate> =
         changes.iter().map(|change| (change.sum, *change)).collect();
     let mut mapping = Mapping::default();
     for old in nodes {

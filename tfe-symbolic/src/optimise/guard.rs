@@ -25,6 +25,7 @@ use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
 use crate::expr::input::Input;
+use crate::expr::sorting::sort_by_key;
 use crate::optimise::plan::{Op, OpId, Plan};
 use bounded::Bounded;
 use states::{moves_together, number_of_states, state};
@@ -321,7 +322,7 @@ impl<'a> Baseline<'a> {
                         scales_exactly: c.is_power_of_two(),
                     };
                     let mut terms: Vec<Term> = terms.iter().map(term).collect();
-                    terms.sort_by_key(|term| term.group);
+                    sort_by_key(&mut terms, |term| term.group);
                     let number = (!constant.is_zero()).then(|| Bounded::exact(constant.to_f64()));
                     Step::Sum { terms, number }
                 }

@@ -1,13 +1,12 @@
 //! Operations of two operands, hash-consed: what is left to do is to put them in order.
 
-use std::collections::BTreeMap;
-
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, SumRange, loop_bit, loops_in};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input};
+use crate::expr::ordered::SortedMap;
 use crate::program::cost;
 
 /// An operation of a [`Plan`].
@@ -61,7 +60,7 @@ pub(crate) struct Plan {
     /// Whether there is a sum over a range in it.
     reduces: Vec<bool>,
     known: Map<Op, OpId>,
-    values: BTreeMap<ExprId, Value>,
+    values: SortedMap<ExprId, Value>,
 }
 
 impl Plan {

@@ -1,9 +1,9 @@
 //! Plans written anew: from the operations that their roots need, with some replaced and some differences turned round.
 
-use std::collections::BTreeSet;
-
 use crate::expr::constant::Constant;
 use crate::expr::hash::Map;
+use crate::expr::ordered::SortedSet;
+use crate::expr::sorting::sort_by_key;
 use crate::optimise::plan::{Op, OpId, Plan, Value};
 
 /// An expression in place of an operation, of operations of the same plan.
@@ -45,7 +45,7 @@ pub(crate) struct Changes {
     /// What is computed instead of these operations. No formula may need what it replaces.
     pub(crate) formulas: Map<OpId, Formula>,
     /// Differences a − b that are computed as −(b − a).
-    pub(crate) turned: BTreeSet<OpId>,
+    pub(crate) turned: SortedSet<OpId>,
 }
 
 /// A plan with the changes made, of what its roots need and nothing else; and what each operation has become.
@@ -58,7 +58,7 @@ pub(crate) fn rebuild(old: &Plan, changes: &Changes) -> (Plan, Map<OpId, Value>)
     };
     let mut roots: Vec<_> = old.values().collect();
     // In the order in which they were made: the same plan on every run.
-    roots.sort_unstable_by_key(|(_, value)| value.op);
+    sort_by_key(&mut roots, |(_, value)| value.op);
     for (root, value) in roots {
         let built = rebuilder.value(value);
         rebuilder.new.set_value(root, built);

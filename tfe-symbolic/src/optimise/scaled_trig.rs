@@ -5,13 +5,12 @@
 //! several ways. So S/l and C/l are put in for sine and cosine, with new inputs for S and C; where all divisors cancel, the operations are
 //! arranged with the new inputs, and these are made products afterwards.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::{Map, Set};
 use crate::expr::input::{Affine, Input};
+use crate::expr::ordered::{SortedMap, SortedSet};
 use crate::expr::rewrite::Mapping;
 use crate::optimise::plan::{Op, Plan};
 use crate::optimise::rebuild::{Changes, Formula, rebuild};
@@ -30,7 +29,7 @@ const SCALED: u32 = 1;
 pub(crate) struct ScaledTrig(Vec<Arm>);
 
 /// Exponents of parameters, and of whatever is made of parameters alone; of sines and cosines, by their argument.
-type Powers = BTreeMap<ExprId, i32>;
+type Powers = SortedMap<ExprId, i32>;
 
 impl ScaledTrig {
     /// The values by arms; nothing where there are none.
@@ -41,7 +40,7 @@ impl ScaledTrig {
         let mut search = Search {
             moving: moving(graph, values),
             counts: true,
-            arguments: BTreeSet::new(),
+            arguments: SortedSet::new(),
             written: Map::default(),
             lost: Vec::new(),
         };
@@ -99,7 +98,7 @@ impl ScaledTrig {
                 changes.formulas.insert(input, product);
             }
         }
-        let values: BTreeSet<ExprId> = values.iter().copied().collect();
+        let values: SortedSet<ExprId> = values.iter().copied().collect();
         plan.retain_values(|root| values.contains(&root));
         rebuild(&plan, &changes).0
     }
@@ -134,7 +133,7 @@ struct Search {
     /// Whether sines and cosines count as powers of their arguments, to find amplitudes.
     counts: bool,
     /// The arguments of these.
-    arguments: BTreeSet<ExprId>,
+    arguments: SortedSet<ExprId>,
     written: Map<ExprId, (Powers, ExprId)>,
     /// Powers that stay in one term of a sum.
     lost: Vec<Powers>,
@@ -161,7 +160,7 @@ impl Search {
                 for (x, n) in factors {
                     let (own, core) = &self.written[x];
                     for (y, m) in own {
-                        let total = powers.entry(*y).or_insert(0_i32);
+                        let total = powers.get_or_insert(*y, 0_i32);
                         *total = total.saturating_add(m.saturating_mul(*n));
                     }
                     rest.push((*core, *n));
@@ -193,7 +192,7 @@ impl Search {
                 for (c, x) in terms {
                     let (mut own, core) = self.written[x].clone();
                     for (y, n) in &common {
-                        *own.entry(*y).or_default() -= n;
+                        *own.get_or_default(*y) -= n;
                     }
                     own.retain(|_, n| *n != 0);
                     inside.push((*c, product(graph, &own, core)));
@@ -217,7 +216,7 @@ impl Search {
                 function: Function::Sin | Function::Cos,
                 arguments,
             } if self.counts => {
-                self.arguments.extend(arguments);
+                self.arguments.extend(arguments.iter().copied());
                 let inside = arguments.iter().map(|x| self.written[x].0.clone());
                 self.lost.extend(inside);
                 (arguments.iter().map(|x| (*x, 1)).collect(), one)
@@ -240,15 +239,15 @@ impl Search {
     }
 
     /// By argument: the parameters that stand beside each sine and cosine, as often as these.
-    fn amplitudes(&self, values: &[ExprId]) -> BTreeMap<ExprId, Powers> {
-        let mut found: BTreeMap<ExprId, Powers> = BTreeMap::new();
+    fn amplitudes(&self, values: &[ExprId]) -> SortedMap<ExprId, Powers> {
+        let mut found: SortedMap<ExprId, Powers> = SortedMap::new();
         let values = values.iter().map(|value| &self.written[value].0);
         for powers in self.lost.iter().chain(values) {
             let calls = powers.iter().filter(|(x, _)| self.arguments.contains(x));
             for (argument, degree) in calls {
                 let still = powers
                     .iter()
-                    .filter(|(x, n)| *degree > 0 && *n >= degree && !self.moving.contains(x));
+                    .filter(|(x, n)| *degree > 0 && n >= degree && !self.moving.contains(x));
                 let own: Powers = still.map(|(x, n)| (*x, n / degree)).collect();
                 let known = found.remove(argument);
                 found.insert(
@@ -272,7 +271,7 @@ fn product(graph: &mut Graph, powers: &Powers, rest: ExprId) -> ExprId {
 /// The powers that both have.
 fn least(a: &Powers, b: &Powers) -> Powers {
     let of = |all: &Powers, x: &ExprId| all.get(x).copied().unwrap_or(0);
-    let both: BTreeSet<&ExprId> = a.keys().chain(b.keys()).collect();
+    let both: SortedSet<&ExprId> = a.keys().chain(b.keys()).collect();
     let least = both.into_iter().map(|x| (*x, of(a, x).min(of(b, x))));
     least.filter(|(_, n)| *n != 0).collect()
 }

@@ -4,9 +4,8 @@
 //! the products and sums that it goes into; so each is turned round where that leaves fewer negations, alone or with differences that use it.
 //! Of equal ways the one is taken in which more differences begin with what nothing else needs afterwards: that can be overwritten.
 
-use std::collections::BTreeSet;
-
 use crate::expr::graph::ExprId;
+use crate::expr::ordered::SortedSet;
 use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::{Changes, rebuild};
 
@@ -17,7 +16,7 @@ const LONGEST: usize = 4;
 const WORK: usize = 300_000;
 
 /// The plan with differences turned round; `plain`: the roots that are wanted without a sign beside them.
-pub(crate) fn with_fewer_negations(plan: Plan, plain: &BTreeSet<ExprId>) -> Plan {
+pub(crate) fn with_fewer_negations(plan: Plan, plain: &SortedSet<ExprId>) -> Plan {
     let mut signs = Signs::of(&plan, plain);
     signs.search();
     let changes = Changes {
@@ -41,9 +40,9 @@ struct Signs<'a> {
 }
 
 impl<'a> Signs<'a> {
-    fn of(plan: &'a Plan, plain: &BTreeSet<ExprId>) -> Self {
+    fn of(plan: &'a Plan, plain: &SortedSet<ExprId>) -> Self {
         let stored = plan.values().filter(|(root, _)| plain.contains(root));
-        let roots: BTreeSet<(OpId, bool)> = stored
+        let roots: SortedSet<(OpId, bool)> = stored
             .map(|(_, value)| (value.op, value.negative))
             .collect();
         let mut users = vec![Vec::new(); plan.len()];
@@ -76,7 +75,7 @@ impl<'a> Signs<'a> {
         }
     }
 
-    fn turned(&self) -> BTreeSet<OpId> {
+    fn turned(&self) -> SortedSet<OpId> {
         let own = self
             .users
             .iter()
@@ -127,7 +126,7 @@ impl<'a> Signs<'a> {
             return usize::MAX;
         };
         self.work = left;
-        let mut plain: BTreeSet<usize> = BTreeSet::new();
+        let mut plain: SortedSet<usize> = SortedSet::new();
         let mut copies = 0;
         for at in 0..self.ops.len() {
             let of = |id: &OpId| self.negative[id.index()];
@@ -180,7 +179,7 @@ mod tests {
 
     /// Negations of the roots, before and after.
     fn negations(graph: &Graph, roots: &[ExprId]) -> (usize, usize) {
-        let plain: BTreeSet<ExprId> = roots.iter().copied().collect();
+        let plain: SortedSet<ExprId> = roots.iter().copied().collect();
         let count = |plan: &Plan| Signs::of(plan, &plain).count() / plan.len();
         let plan = arrange(graph, roots);
         let before = count(&plan);

@@ -1,10 +1,10 @@
 //! From entries to a program: the same results written in several ways, of which the cheapest that loses no digits is scheduled.
 
-use std::collections::BTreeSet;
-
 use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph};
+use crate::expr::ordered::SortedSet;
+use crate::expr::sorting::sort_by_key;
 use crate::optimise::angles::expand_angles;
 use crate::optimise::binarize::arrange;
 use crate::optimise::canonical_order::with_like_operations_alike;
@@ -60,7 +60,7 @@ impl Way {
 pub(crate) struct Draft {
     passes: Passes,
     graph: Graph,
-    cleared: BTreeSet<Array>,
+    cleared: SortedSet<Array>,
     block: Block,
     balances: Vec<Balance>,
     /// The results as declared.
@@ -132,7 +132,7 @@ impl Draft {
         let declared = Self::of(graph.clone(), way.entries.clone(), passes);
         let guard = Guard::of(&declared.graph, &declared.plain);
         let mut drafts = Self::followed(declared, &ways, &guard);
-        drafts.sort_by_key(|draft| draft.plan.cost());
+        sort_by_key(&mut drafts, |draft| draft.plan.cost());
         let least = drafts.first().map_or(0, |draft| draft.plan.cost());
         drafts.retain(|draft| 5 * draft.plan.cost() <= MAX_FIFTHS_OF_CHEAPEST * least);
         drafts.dedup_by_key(|draft| draft.plan.cost());
@@ -141,7 +141,7 @@ impl Draft {
             .iter_mut()
             .flat_map(|draft| draft.candidates(share, &guard))
             .collect();
-        candidates.sort_by_key(|candidate| candidate.plan.cost());
+        sort_by_key(&mut candidates, |candidate| candidate.plan.cost());
         let mut left = MAX_OPERATIONS_FOR_IDENTITIES;
         for candidate in &mut candidates {
             if left >= candidate.plan.len() {
@@ -159,7 +159,7 @@ impl Draft {
     /// is left.
     fn followed(mut declared: Self, ways: &[Way], guard: &Guard) -> Vec<Self> {
         let mut cheapest_first: Vec<(usize, &Way)> = ways.iter().enumerate().collect();
-        cheapest_first.sort_by_key(|(_, way)| way.estimate);
+        sort_by_key(&mut cheapest_first, |(_, way)| way.estimate);
         let mut drafts = Vec::with_capacity(ways.len());
         let (mut least, mut follow_declared) = (None, false);
         for (number, way) in cheapest_first {

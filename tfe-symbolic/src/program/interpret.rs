@@ -1,9 +1,9 @@
 //! Runs a program on `f64`, with exactly the operations that the emitted code does: the oracle of the emitted code.
 
-use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
+use crate::expr::ordered::SortedMap;
 use crate::program::place::{Array, Place};
 use crate::program::{Operand, Operation, Program, Statement, Temporary};
 
@@ -17,15 +17,15 @@ pub struct Environment {
     /// Velocities of a Lagrangian, momenta of a Hamiltonian; for constraints, velocities
     pub z: Vec<f64>,
     /// Scalar fields by name
-    pub parameters: BTreeMap<String, f64>,
+    pub parameters: SortedMap<String, f64>,
     /// Array fields by name
-    pub arrays: BTreeMap<String, Vec<f64>>,
+    pub arrays: SortedMap<String, Vec<f64>>,
     /// The multipliers of the constraints
     pub mu: Vec<f64>,
     /// Const parameters and lengths by name
-    pub sizes: BTreeMap<String, i64>,
+    pub sizes: SortedMap<String, i64>,
     /// Lists of indices by name
-    pub lists: BTreeMap<String, Vec<usize>>,
+    pub lists: SortedMap<String, Vec<usize>>,
 }
 
 /// What a kernel computes. Entries that a program does not write are zero. There are as many constraints as multipliers.
@@ -145,7 +145,7 @@ pub fn interpret(program: &Program, environment: &Environment) -> Result<Results
     let mut machine = Machine {
         environment,
         temporaries,
-        loops: BTreeMap::new(),
+        loops: SortedMap::new(),
         results,
     };
     machine.run(&program.statements)?;
@@ -155,7 +155,7 @@ pub fn interpret(program: &Program, environment: &Environment) -> Result<Results
 struct Machine<'a> {
     environment: &'a Environment,
     temporaries: Vec<Option<f64>>,
-    loops: BTreeMap<LoopVariable, i64>,
+    loops: SortedMap<LoopVariable, i64>,
     results: Results,
 }
 

@@ -7,11 +7,10 @@
 //! The entries off the diagonals of the blocks are written once for each pair. Those on the diagonals would be added up in memory, for both
 //! bodies of each pair; they follow from the others after the loops.
 
-use std::collections::BTreeMap;
-
 use crate::derive::entry::Entry;
 use crate::expr::graph::{ExprId, Graph, SumRange};
 use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
+use crate::expr::ordered::SortedMap;
 use crate::program::{Array, Place};
 
 /// Entries (row + k, column + k) for k below the length, and (column + k, row + k), that make the sums over l of (row + l, column + k) vanish.
@@ -112,7 +111,7 @@ impl Pairs {
 
     /// The diagonals of all blocks of the pairs; nothing if one of them does not follow, or is written to by others.
     fn balances(&self, graph: &mut Graph, all: &[&Entry]) -> Option<Vec<Balance>> {
-        let mut values: BTreeMap<(Offset, Offset), ExprId> = BTreeMap::new();
+        let mut values: SortedMap<(Offset, Offset), ExprId> = SortedMap::new();
         let mut others = Vec::new();
         for entry in all {
             if entry.nest == self.nest {

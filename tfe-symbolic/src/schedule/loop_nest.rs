@@ -4,12 +4,11 @@
 //! turn is a running sum: what an inner loop adds to a place that it does not move, and, where a loop adds to the places i and i + 1, the part
 //! of i + 1 that the next turn completes.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, SumRange};
 use crate::expr::input::{Affine, IndexSymbol};
+use crate::expr::ordered::{SortedMap, SortedSet};
 use crate::program::Place;
 
 /// `Σ c x`
@@ -86,11 +85,10 @@ impl Block {
     /// Orders entries into nested loops.
     pub(crate) fn of(graph: &mut Graph, entries: Vec<Entry>) -> Self {
         // Outer loops come before those inside of them.
-        let mut merged: BTreeMap<(Vec<SumRange>, Place), Terms> = BTreeMap::new();
+        let mut merged: SortedMap<(Vec<SumRange>, Place), Terms> = SortedMap::new();
         for Entry { nest, place, value } in entries {
             merged
-                .entry((nest, place))
-                .or_default()
+                .get_or_default((nest, place))
                 .push((Constant::ONE, value));
         }
         let mut root = Self::default();
@@ -147,7 +145,7 @@ impl Block {
     }
 
     /// The values that are wanted as they are: what is added to a variable may as well be subtracted.
-    pub(crate) fn stored(&self) -> BTreeSet<ExprId> {
+    pub(crate) fn stored(&self) -> SortedSet<ExprId> {
         let starts = self.locals.iter().filter_map(|(_, start)| *start);
         let adds = |sink: &&Sink| matches!(sink.target, Target::Add(_)) || sink.local.is_some();
         let sinks = self.sinks.iter().chain(&self.after);

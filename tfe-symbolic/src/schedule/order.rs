@@ -5,11 +5,12 @@
 //! equal ones the one that was first before; a result is stored at once. Sines and cosines stay where they are, with all that comes before them.
 
 use std::cmp::Reverse;
-use std::collections::BTreeSet;
 
 use crate::expr::function::Function;
 use crate::expr::hash::{Map, Set};
 use crate::expr::input::Input;
+use crate::expr::ordered::SortedSet;
+use crate::expr::sorting::sort;
 use crate::program::{Operand, Operation, Statement, Temporary};
 
 /// The same statements, where nothing else depends on their order, in one that keeps few values; temporaries are numbered as they come.
@@ -135,11 +136,11 @@ impl Scope {
             .map(|(statement, reads)| self.ends(statement, reads))
             .collect();
         let known = (0..run.len()).filter(|at| missing[*at] == 0);
-        let mut ready: BTreeSet<(Reverse<usize>, usize)> =
-            known.map(|at| (Reverse(ends[at]), at)).collect();
+        let mut ready: SortedSet<(usize, Reverse<usize>)> =
+            known.map(|at| (ends[at], Reverse(at))).collect();
         let mut waiting = vec![true; run.len()];
         let mut order = Vec::with_capacity(run.len());
-        while let Some((_, at)) = ready.pop_first() {
+        while let Some((_, Reverse(at))) = ready.pop_last() {
             order.push(at);
             waiting[at] = false;
             self.read(&run[at]);
@@ -152,15 +153,15 @@ impl Scope {
                 for other in others.filter(|other| waiting[**other]) {
                     let now = self.ends(&run[*other], &all_reads[*other]);
                     let before = std::mem::replace(&mut ends[*other], now);
-                    if ready.remove(&(Reverse(before), *other)) {
-                        ready.insert((Reverse(now), *other));
+                    if ready.remove(&(before, Reverse(*other))) {
+                        ready.insert((now, Reverse(*other)));
                     }
                 }
             }
             for user in defines(&run[at]).into_iter().flat_map(users) {
                 missing[*user] -= 1;
                 if missing[*user] == 0 {
-                    ready.insert((Reverse(ends[*user]), *user));
+                    ready.insert((ends[*user], Reverse(*user)));
                 }
             }
         }
@@ -203,7 +204,7 @@ fn reads(statement: &Statement) -> Vec<Value> {
                 .collect()
         }
     };
-    values.sort_unstable();
+    sort(&mut values);
     values.dedup();
     values
 }

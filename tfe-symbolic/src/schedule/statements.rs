@@ -1,11 +1,11 @@
 //! From arranged operations to a program: temporaries as they are needed, each as far outside of the loops as it can be.
 
-use std::collections::BTreeSet;
-
 use crate::expr::function::Function;
 use crate::expr::graph::{SumRange, loop_bit};
 use crate::expr::hash::Map;
 use crate::expr::input::LoopVariable;
+use crate::expr::ordered::SortedSet;
+use crate::expr::sorting::sort_by_key;
 use crate::optimise::canonical_order::ranks;
 use crate::optimise::plan::{Op, OpId, Plan, Value};
 use crate::program::{Array, Operand, Operation, Program, Statement, Temporary};
@@ -15,7 +15,7 @@ use crate::schedule::loop_nest::{Block, Local, Sink, Target};
 /// Schedules a plan that holds the values of all results; these arrays are cleared first.
 pub(crate) fn schedule(
     plan: Plan,
-    cleared: &BTreeSet<Array>,
+    cleared: &SortedSet<Array>,
     root: &Block,
     balances: &[Balance],
 ) -> Program {
@@ -92,7 +92,7 @@ impl Scheduler {
         };
         let mut angles: Vec<OpId> = self.plan.ids().filter(angle).collect();
         // In the order of the coordinates; what has to be computed comes after them.
-        angles.sort_by_key(|id| match self.plan.op(*id).operands()[..] {
+        sort_by_key(&mut angles, |id| match self.plan.op(*id).operands()[..] {
             [argument] => match self.plan.op(argument) {
                 Op::Input(input) => (false, Some(input.clone())),
                 _ => (true, None),

@@ -5,11 +5,10 @@
 
 mod apart;
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use crate::expr::graph::{ExprId, SumRange};
 use crate::expr::hash::Set;
 use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
+use crate::expr::ordered::{SortedMap, SortedSet};
 use crate::program::{Array, Place};
 use crate::schedule::loop_nest::{Block, Sink, Target};
 use apart::all_apart;
@@ -21,7 +20,7 @@ const MOST_WRITES: usize = 100_000;
 const MOST_ZEROS: usize = 32;
 
 /// Decides for each result, and puts zeros in front where they are needed; the arrays that have to be cleared.
-pub(crate) fn settle(root: &mut Block, zero: ExprId) -> BTreeSet<Array> {
+pub(crate) fn settle(root: &mut Block, zero: ExprId) -> SortedSet<Array> {
     let mut writers = Vec::new();
     let steps = steps(root, &mut Vec::new(), &mut writers);
     let mut turns = Turns {
@@ -30,7 +29,7 @@ pub(crate) fn settle(root: &mut Block, zero: ExprId) -> BTreeSet<Array> {
     };
     turns.run(&steps, &mut Vec::new());
     let mut cleared = turns.unknown;
-    let mut zeros: BTreeMap<Array, Vec<Place>> = BTreeMap::new();
+    let mut zeros: SortedMap<Array, Vec<Place>> = SortedMap::new();
     for writer in &mut turns.writers {
         let array = writer.place.array;
         if cleared.contains(&array) {
@@ -42,7 +41,7 @@ pub(crate) fn settle(root: &mut Block, zero: ExprId) -> BTreeSet<Array> {
                 column: Affine::constant(*column),
             };
             let first = writer.first.iter().map(place);
-            zeros.entry(array).or_default().extend(first);
+            zeros.get_or_default(array).extend(first);
         }
     }
     cleared.retain(|array| {
@@ -137,7 +136,7 @@ struct Turns {
     written: Set<(Array, i64, i64)>,
     writes: usize,
     /// Arrays of which not all is known.
-    unknown: BTreeSet<Array>,
+    unknown: SortedSet<Array>,
 }
 
 /// The values of loop variables.

@@ -5,6 +5,7 @@ use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, IndexSymbol, Input};
+use crate::expr::sorting::sort_by_key;
 use crate::syntax::ast::{BinaryOperator, Expr, ExprKind, Range, Spanned};
 
 /// The syntax of an expression with names of coordinates, velocities and momenta from `state`.
@@ -73,7 +74,7 @@ fn written(
                 )
             };
             let mut factors = factors.clone();
-            factors.sort_by_key(|(x, _)| moves(*x));
+            sort_by_key(&mut factors, |(x, _)| moves(*x));
             let powers = factors.iter().map(|(x, exponent)| match exponent {
                 1 => child(*x),
                 _ => {

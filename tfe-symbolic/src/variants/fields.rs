@@ -1,9 +1,8 @@
 //! The fields that a model made from another one still uses.
 
-use std::collections::BTreeSet;
-
 use crate::expr::graph::{Graph, Node, SumRange};
 use crate::expr::input::{Affine, IndexSymbol, Input};
+use crate::expr::ordered::SortedSet;
 use crate::model::declared::{Declared, Extent, Parameter, Requirement};
 
 /// Keeps what is used: fields (in the order of `fields`, then those added), requirements on their lengths, derivatives by them.
@@ -43,7 +42,7 @@ fn is_in_constraint(model: &Declared, parameter: &Parameter) -> bool {
 
 /// Names of fields.
 #[derive(Default)]
-struct Used(BTreeSet<String>);
+struct Used(SortedSet<String>);
 
 impl Used {
     fn formulas(&mut self, model: &Declared) {

@@ -6,8 +6,6 @@
 //!
 //! Whatever holds the coordinate there takes the forces on it.
 
-use std::collections::BTreeMap;
-
 use super::target::Places;
 use super::{Assignment, Mistake, Reduction};
 use crate::derive::constraint::{holds_state, holds_velocity, kind};
@@ -15,6 +13,7 @@ use crate::diagnostic::Kind;
 use crate::expr::differentiate::derivative;
 use crate::expr::graph::ExprId;
 use crate::expr::input::Input;
+use crate::expr::ordered::SortedMap;
 use crate::model::declared::Form;
 
 const PASS: &str = "frozen";
@@ -43,8 +42,8 @@ impl Reduction {
     }
 
     /// The functions by number of coordinate.
-    fn positions(&self, held: &[Assignment]) -> Result<BTreeMap<i64, ExprId>, Mistake> {
-        let mut positions = BTreeMap::new();
+    fn positions(&self, held: &[Assignment]) -> Result<SortedMap<i64, ExprId>, Mistake> {
+        let mut positions = SortedMap::new();
         for Assignment {
             target,
             span,
@@ -66,8 +65,8 @@ impl Reduction {
         Ok(positions)
     }
 
-    fn substitute(&mut self, positions: &BTreeMap<i64, ExprId>) -> Result<(), Kind> {
-        let rates: BTreeMap<i64, ExprId> = positions
+    fn substitute(&mut self, positions: &SortedMap<i64, ExprId>) -> Result<(), Kind> {
+        let rates: SortedMap<i64, ExprId> = positions
             .iter()
             .map(|(at, value)| {
                 let rate = derivative(&mut self.model.graph, *value, &Input::Time);

@@ -14,6 +14,7 @@ use crate::expr::constant::Constant;
 use crate::expr::differentiate::derivative;
 use crate::expr::graph::{ExprId, Graph};
 use crate::expr::input::{Affine, Input};
+use crate::expr::sorting::sort;
 use crate::model::declared::{Form, Observable, names};
 
 const PASS: &str = "routh";
@@ -55,7 +56,7 @@ impl Reduction {
             self.from_state.extend(original.copied());
         }
         let mut removed = numbers;
-        removed.sort_unstable();
+        sort(&mut removed);
         for at in removed.iter().rev() {
             if let Ok(at) = usize::try_from(*at)
                 && at < self.kept.len()

@@ -7,8 +7,6 @@
 //! The derivatives are directional ones, the direction is a leaf of its own that later derivatives hold fixed: that goes through sums over
 //! ranges as it does through anything else, whatever their length.
 
-use std::collections::BTreeMap;
-
 use super::removal::written_out_forces;
 use super::target::Places;
 use super::{Assignment, Mistake, Reduction};
@@ -17,6 +15,7 @@ use crate::expr::constant::Constant;
 use crate::expr::differentiate::directional;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
+use crate::expr::ordered::SortedMap;
 use crate::model::declared::Form;
 
 /// The parts of a state. While derivatives are taken, placeholders of these numbers stand for q − q₀, v − v₀ and p − p₀.
@@ -28,7 +27,7 @@ const PASS: &str = "truncated";
 struct Values {
     /// Of all places that have none of their own; zero where nothing is said.
     all: Option<ExprId>,
-    own: BTreeMap<i64, ExprId>,
+    own: SortedMap<i64, ExprId>,
 }
 
 impl Values {

@@ -1,9 +1,8 @@
 //! The whole way of a declaration: to messages where it is rejected, else to all programs of the model and of those made from it.
 
-use std::collections::BTreeMap;
-
 use tfe_symbolic::compile::declare;
 use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::model::declared::{Declared, names};
 use tfe_symbolic::program::count::Counts;
 use tfe_symbolic::program::interpret::{Environment, InterpretError, interpret};
@@ -154,7 +153,7 @@ fn check(program: &Program, declared: &Declared, context: &Context) {
     for name in &declared.inputs {
         environment.parameters.insert(name.clone(), 0.9);
     }
-    let mut arrays = BTreeMap::new();
+    let mut arrays = SortedMap::new();
     for field in &context.fields {
         let name = field.name.clone();
         match &field.kind {

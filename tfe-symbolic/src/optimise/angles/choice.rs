@@ -4,9 +4,9 @@
 //! need n pairs. Atoms that are no angle of the program themselves are tried as helpers: three angles a − b, b − c, a + b + c do not
 //! follow from each other, but from a, b, c.
 
-use std::collections::BTreeMap;
-
 use crate::expr::graph::ExprId;
+use crate::expr::ordered::SortedMap;
+use crate::expr::sorting::{sort, sort_by_key};
 use crate::program::cost;
 
 /// An angle, `Σ n x`: atoms in order, n ≠ 0, the first n positive. A number is an atom like the others.
@@ -38,9 +38,9 @@ pub(super) enum How {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Choice {
     steps: Vec<Step>,
-    known: BTreeMap<Angle, usize>,
+    known: SortedMap<Angle, usize>,
     /// The angles with an atom, by that atom.
-    with_atom: BTreeMap<ExprId, Vec<usize>>,
+    with_atom: SortedMap<ExprId, Vec<usize>>,
 }
 
 #[derive(Clone, Debug)]
@@ -70,8 +70,11 @@ impl Need {
 }
 
 /// A choice of low cost.
-pub(super) fn choose(wanted: &BTreeMap<Angle, Need>, is_number: &dyn Fn(ExprId) -> bool) -> Choice {
-    let mut helpers: BTreeMap<Angle, bool> = BTreeMap::new();
+pub(super) fn choose(
+    wanted: &SortedMap<Angle, Need>,
+    is_number: &dyn Fn(ExprId) -> bool,
+) -> Choice {
+    let mut helpers: SortedMap<Angle, bool> = SortedMap::new();
     let mut numbers: Vec<Angle> = Vec::new();
     for (x, _) in wanted.keys().filter(|angle| angle.len() > 1).flatten() {
         let atom = vec![(*x, 1)];
@@ -81,12 +84,12 @@ pub(super) fn choose(wanted: &BTreeMap<Angle, Need>, is_number: &dyn Fn(ExprId) 
             helpers.insert(atom, false);
         }
     }
-    numbers.sort_unstable();
+    sort(&mut numbers);
     numbers.dedup();
     let mut order: Vec<(&Angle, Need)> =
         wanted.iter().map(|(angle, need)| (angle, *need)).collect();
-    order.sort_by_key(|(angle, _)| (size(angle), *angle));
-    let attempt = |helpers: &BTreeMap<Angle, bool>| Choice::with(&numbers, helpers, &order);
+    sort_by_key(&mut order, |(angle, _)| (size(angle), *angle));
+    let attempt = |helpers: &SortedMap<Angle, bool>| Choice::with(&numbers, helpers, &order);
     let mut best = attempt(&helpers);
     if helpers.is_empty() {
         return best;
@@ -103,7 +106,9 @@ pub(super) fn choose(wanted: &BTreeMap<Angle, Need>, is_number: &dyn Fn(ExprId) 
         .collect::<Vec<_>>()
     {
         let mut other = helpers.clone();
-        other.entry(atom).and_modify(|used| *used = !*used);
+        if let Some(used) = other.get_mut(&atom) {
+            *used = !*used;
+        }
         let trial = attempt(&other);
         if trial.cost() < best.cost() {
             (best, helpers) = (trial, other);
@@ -127,9 +132,9 @@ fn size(angle: &Angle) -> u64 {
 
 /// a + sign · b
 fn plus(a: &Angle, sign: i64, b: &Angle) -> Angle {
-    let mut parts: BTreeMap<ExprId, i64> = a.iter().copied().collect();
+    let mut parts: SortedMap<ExprId, i64> = a.iter().copied().collect();
     for (x, n) in b {
-        *parts.entry(*x).or_default() += sign * n;
+        *parts.get_or_default(*x) += sign * n;
     }
     parts.retain(|_, n| *n != 0);
     parts.into_iter().collect()
@@ -146,12 +151,12 @@ impl Choice {
         self.steps.iter().map(|step| (&step.angle, &step.how))
     }
 
-    fn with(numbers: &[Angle], helpers: &BTreeMap<Angle, bool>, order: &[(&Angle, Need)]) -> Self {
+    fn with(numbers: &[Angle], helpers: &SortedMap<Angle, bool>, order: &[(&Angle, Need)]) -> Self {
         let mut choice = Self::default();
         for number in numbers {
             choice.push(number.clone(), How::Direct, BOTH, true);
         }
-        for (atom, _) in helpers.iter().filter(|(_, used)| **used) {
+        for (atom, _) in helpers.iter().filter(|(_, used)| *used) {
             choice.push(atom.clone(), How::Direct, BOTH, false);
         }
         for (angle, need) in order {
@@ -163,7 +168,7 @@ impl Choice {
     fn push(&mut self, angle: Angle, how: How, need: Need, free: bool) {
         let at = self.steps.len();
         for (x, _) in &angle {
-            self.with_atom.entry(*x).or_default().push(at);
+            self.with_atom.get_or_default(*x).push(at);
         }
         self.known.insert(angle.clone(), at);
         self.steps.push(Step {

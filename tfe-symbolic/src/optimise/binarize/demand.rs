@@ -1,9 +1,9 @@
 //! Which multiples of expressions have to be computed, and what the terms of sums are.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::hash::Set;
+use crate::expr::ordered::{SortedMap, SortedSet};
 
 /// A positive multiple of an expression that is no multiple itself.
 pub(crate) type Multiple = (ExprId, PositiveConstant);
@@ -34,7 +34,7 @@ pub(super) const ONE: PositiveConstant = PositiveConstant(Constant::ONE);
 /// `number ± x ± …`; true for minus.
 pub(super) struct Terms {
     pub(super) number: Constant,
-    pub(super) terms: BTreeMap<Multiple, bool>,
+    pub(super) terms: SortedMap<Multiple, bool>,
 }
 
 impl Terms {
@@ -52,14 +52,15 @@ pub(super) fn multiple(graph: &Graph, c: Constant, x: ExprId) -> (Multiple, bool
 }
 
 /// The multiples that have to be computed.
-pub(super) fn demanded(graph: &Graph, roots: &[ExprId]) -> BTreeSet<Multiple> {
-    let mut demanded = BTreeSet::new();
+pub(super) fn demanded(graph: &Graph, roots: &[ExprId]) -> SortedSet<Multiple> {
+    let (mut demanded, mut known) = (Vec::new(), Set::default());
     let plain = |x: &ExprId| multiple(graph, Constant::ONE, *x).0;
     let mut stack: Vec<Multiple> = roots.iter().map(plain).collect();
     while let Some((x, factor)) = stack.pop() {
-        if !demanded.insert((x, factor)) {
+        if !known.insert((x, factor)) {
             continue;
         }
+        demanded.push((x, factor));
         match graph.node(x) {
             Node::Sum { terms, .. } if factor == ONE => {
                 stack.extend(terms.iter().map(|(c, y)| multiple(graph, *c, *y).0));
@@ -69,12 +70,12 @@ pub(super) fn demanded(graph: &Graph, roots: &[ExprId]) -> BTreeSet<Multiple> {
             node => stack.extend(node.children().iter().map(plain)),
         }
     }
-    demanded
+    demanded.into_iter().collect()
 }
 
 /// The terms of each sum.
-pub(super) fn gather(graph: &Graph, demanded: &BTreeSet<Multiple>) -> BTreeMap<Multiple, Terms> {
-    let mut sums: BTreeMap<Multiple, Terms> = BTreeMap::new();
+pub(super) fn gather(graph: &Graph, demanded: &SortedSet<Multiple>) -> SortedMap<Multiple, Terms> {
+    let mut sums: SortedMap<Multiple, Terms> = SortedMap::new();
     for (x, factor) in demanded.iter().filter(|(_, factor)| *factor == ONE) {
         if let Node::Sum { constant, terms } = graph.node(*x) {
             let sum = Terms {

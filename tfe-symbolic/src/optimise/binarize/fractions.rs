@@ -3,11 +3,10 @@
 //! Where d stands below several products, each with the factor k, the fraction k/d is computed once: the reciprocal 1/d would cost a
 //! product more. That holds for the force k x/(r √r) between two bodies, and its other components.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use super::demand::Multiple;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::ordered::{SortedMap, SortedSet};
 
 /// Larger powers are left to the method that computes integer powers.
 pub(super) const LARGEST_PRODUCT_POWER: u32 = 64;
@@ -26,12 +25,12 @@ pub(super) struct Fraction {
 #[derive(Default)]
 pub(super) struct Fractions {
     pub(super) all: Vec<Fraction>,
-    products: BTreeMap<Multiple, (Vec<usize>, Factors)>,
+    products: SortedMap<Multiple, (Vec<usize>, Factors)>,
 }
 
 impl Fractions {
     /// Those of the products that have to be computed.
-    pub(super) fn of(graph: &Graph, demanded: &BTreeSet<Multiple>) -> Self {
+    pub(super) fn of(graph: &Graph, demanded: &SortedSet<Multiple>) -> Self {
         let mut fractions = Self::default();
         for (places, below) in divisors(graph, demanded) {
             let mut rest: Vec<Factors> = places
@@ -58,7 +57,7 @@ impl Fractions {
             let number = fractions.all.len();
             fractions.all.push(Fraction { above, below });
             for (place, rest) in places.into_iter().zip(rest) {
-                let known = fractions.products.entry(place).or_default();
+                let known = fractions.products.get_or_default(place);
                 known.0.push(number);
                 known.1 = rest;
             }
@@ -77,18 +76,18 @@ impl Fractions {
 }
 
 /// Divisors that have one exponent wherever they stand, together with those that stand in the same products.
-fn divisors(graph: &Graph, demanded: &BTreeSet<Multiple>) -> BTreeMap<Vec<Multiple>, Factors> {
-    let mut places: BTreeMap<ExprId, Vec<(Multiple, i32)>> = BTreeMap::new();
+fn divisors(graph: &Graph, demanded: &SortedSet<Multiple>) -> SortedMap<Vec<Multiple>, Factors> {
+    let mut places: SortedMap<ExprId, Vec<(Multiple, i32)>> = SortedMap::new();
     for multiple in demanded {
         if let Node::Product(factors) = graph.node(multiple.0) {
             let below = factors.iter().filter(|(_, n)| *n < 0);
             for (x, n) in below.filter(|(x, _)| graph.as_constant(*x).is_none()) {
-                places.entry(*x).or_default().push((*multiple, *n));
+                places.get_or_default(*x).push((*multiple, *n));
             }
         }
     }
-    let all: BTreeSet<ExprId> = places.keys().copied().collect();
-    let mut together: BTreeMap<Vec<Multiple>, Factors> = BTreeMap::new();
+    let all: SortedSet<ExprId> = places.keys().copied().collect();
+    let mut together: SortedMap<Vec<Multiple>, Factors> = SortedMap::new();
     for (x, places) in places {
         let n = places[0].1;
         let here = |(place, m): &(Multiple, i32)| {
@@ -98,7 +97,7 @@ fn divisors(graph: &Graph, demanded: &BTreeSet<Multiple>) -> BTreeMap<Vec<Multip
         if places.len() > 1 && places.iter().all(here) && n.unsigned_abs() <= LARGEST_PRODUCT_POWER
         {
             let places = places.into_iter().map(|(place, _)| place).collect();
-            together.entry(places).or_default().push((x, -n));
+            together.get_or_default(places).push((x, -n));
         }
     }
     // The reciprocal of √x also serves for x, wherever one of both stands alone.

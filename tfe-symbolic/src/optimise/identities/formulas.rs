@@ -1,9 +1,9 @@
 //! The formulas that give one operation, from short ones to long ones.
 
-use std::collections::BTreeMap;
-
 use super::residue::Residue;
 use super::search::{Candidate, Search};
+use crate::expr::ordered::SortedMap;
+use crate::expr::sorting::sort_by_key;
 use crate::optimise::plan::{OpId, Value};
 use crate::optimise::rebuild::Formula;
 use crate::program::cost;
@@ -21,11 +21,11 @@ impl Search<'_> {
                 continue;
             }
             let mut own = self.formulas(target, &uses);
-            own.sort_by_key(|candidate| std::cmp::Reverse(candidate.saving));
+            sort_by_key(&mut own, |candidate| std::cmp::Reverse(candidate.saving));
             own.truncate(KEPT);
             all.append(&mut own);
         }
-        all.sort_by_key(|candidate| std::cmp::Reverse(candidate.saving));
+        sort_by_key(&mut all, |candidate| std::cmp::Reverse(candidate.saving));
         all
     }
 
@@ -61,7 +61,7 @@ impl Search<'_> {
 pub(super) struct Found<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) target: OpId,
-    pub(super) alone: &'a BTreeMap<OpId, usize>,
+    pub(super) alone: &'a SortedMap<OpId, usize>,
     pub(super) total: usize,
     pub(super) unit: usize,
     pub(super) usable: Vec<bool>,

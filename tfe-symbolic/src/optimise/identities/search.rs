@@ -1,10 +1,9 @@
 //! Tables of values, and for each operation what it could be replaced by.
 
-use std::collections::BTreeMap;
-
 use super::residue::{Residue, residues};
 use crate::expr::hash::Map;
 use crate::expr::input::Input;
+use crate::expr::ordered::SortedMap;
 use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::Formula;
 
@@ -157,13 +156,13 @@ impl<'a> Search<'a> {
     }
 
     /// The operations that only the target needs, itself with them, and what each costs together with those that only it needs.
-    pub(super) fn alone(&self, target: OpId, uses: &[u32]) -> BTreeMap<OpId, usize> {
-        let mut left: BTreeMap<OpId, u32> = BTreeMap::new();
-        let mut alone = BTreeMap::from([(target, weight(self.plan, target))]);
+    pub(super) fn alone(&self, target: OpId, uses: &[u32]) -> SortedMap<OpId, usize> {
+        let mut left: SortedMap<OpId, u32> = SortedMap::new();
+        let mut alone = SortedMap::from([(target, weight(self.plan, target))]);
         let mut stack = vec![target];
         while let Some(id) = stack.pop() {
             for operand in self.plan.op(id).operands() {
-                let left = left.entry(operand).or_insert(uses[operand.index()]);
+                let left = left.get_or_insert(operand, uses[operand.index()]);
                 *left -= 1;
                 if *left == 0 {
                     alone.insert(operand, weight(self.plan, operand));

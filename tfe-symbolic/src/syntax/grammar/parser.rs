@@ -158,7 +158,7 @@ impl ::pest::Parser<Rule> for TfeParser {
         mod rules {
             #![allow(clippy::upper_case_acronyms)]
             pub mod hidden {
-                use super::super::Rule;
+                use super::super::{Combine, Rule};
                 #[inline]
                 #[allow(dead_code, non_snake_case, unused_variables)]
                 pub fn skip(
@@ -167,14 +167,14 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     if state.atomicity() == ::pest::Atomicity::NonAtomic {
-                        state.repeat(|state| super::visible::WHITESPACE(state))
+                        state.repeat_of(|state| super::visible::WHITESPACE(state))
                     } else {
                         Ok(state)
                     }
                 }
             }
             pub mod visible {
-                use super::super::Rule;
+                use super::super::{Combine, Rule};
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
                 pub fn r#WHITESPACE(
@@ -183,7 +183,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .atomic(
+                        .atomic_of(
                             ::pest::Atomicity::Atomic,
                             |state| { self::r#WHITE_SPACE(state) },
                         )
@@ -196,11 +196,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#coordinates,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("coordinates") })
@@ -220,11 +220,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#momenta,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("momenta") })
@@ -244,11 +244,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#input,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("input") })
@@ -257,31 +257,31 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .optional(|state| {
+                                                    .optional_of(|state| {
                                                         state
-                                                            .sequence(|state| {
+                                                            .sequence_of(|state| {
                                                                 self::r#name(state)
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
                                                                         state
-                                                                            .sequence(|state| {
+                                                                            .sequence_of(|state| {
                                                                                 state
-                                                                                    .optional(|state| {
+                                                                                    .optional_of(|state| {
                                                                                         state
-                                                                                            .sequence(|state| {
+                                                                                            .sequence_of(|state| {
                                                                                                 self::r#comma(state)
                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                     .and_then(|state| { self::r#name(state) })
                                                                                             })
                                                                                             .and_then(|state| {
                                                                                                 state
-                                                                                                    .repeat(|state| {
+                                                                                                    .repeat_of(|state| {
                                                                                                         state
-                                                                                                            .sequence(|state| {
+                                                                                                            .sequence_of(|state| {
                                                                                                                 super::hidden::skip(state)
                                                                                                                     .and_then(|state| {
                                                                                                                         state
-                                                                                                                            .sequence(|state| {
+                                                                                                                            .sequence_of(|state| {
                                                                                                                                 self::r#comma(state)
                                                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                                                     .and_then(|state| { self::r#name(state) })
@@ -295,7 +295,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                                     })
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
-                                                                        state.optional(|state| { self::r#comma(state) })
+                                                                        state.optional_of(|state| { self::r#comma(state) })
                                                                     })
                                                             })
                                                     })
@@ -316,11 +316,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#binding,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("let") })
@@ -344,11 +344,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#lagrangian,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("lagrangian") })
@@ -370,11 +370,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#hamiltonian,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("hamiltonian") })
@@ -396,11 +396,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#time_transformation,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
@@ -424,11 +424,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#dissipation,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("dissipation") })
@@ -450,11 +450,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#force,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("force") })
@@ -482,11 +482,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#constraint,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("constraint") })
@@ -510,11 +510,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#output,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("output") })
@@ -538,11 +538,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#event,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("event") })
@@ -566,11 +566,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#sensitivity,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("sensitivity") })
@@ -579,31 +579,31 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .optional(|state| {
+                                                    .optional_of(|state| {
                                                         state
-                                                            .sequence(|state| {
+                                                            .sequence_of(|state| {
                                                                 self::r#expression(state)
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
                                                                         state
-                                                                            .sequence(|state| {
+                                                                            .sequence_of(|state| {
                                                                                 state
-                                                                                    .optional(|state| {
+                                                                                    .optional_of(|state| {
                                                                                         state
-                                                                                            .sequence(|state| {
+                                                                                            .sequence_of(|state| {
                                                                                                 self::r#comma(state)
                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                     .and_then(|state| { self::r#expression(state) })
                                                                                             })
                                                                                             .and_then(|state| {
                                                                                                 state
-                                                                                                    .repeat(|state| {
+                                                                                                    .repeat_of(|state| {
                                                                                                         state
-                                                                                                            .sequence(|state| {
+                                                                                                            .sequence_of(|state| {
                                                                                                                 super::hidden::skip(state)
                                                                                                                     .and_then(|state| {
                                                                                                                         state
-                                                                                                                            .sequence(|state| {
+                                                                                                                            .sequence_of(|state| {
                                                                                                                                 self::r#comma(state)
                                                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                                                     .and_then(|state| { self::r#expression(state) })
@@ -617,7 +617,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                                     })
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
-                                                                        state.optional(|state| { self::r#comma(state) })
+                                                                        state.optional_of(|state| { self::r#comma(state) })
                                                                     })
                                                             })
                                                     })
@@ -638,11 +638,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#solver,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("solver") })
@@ -656,7 +656,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { self::r#element(state) })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
-                                                state.optional(|state| { self::r#comma(state) })
+                                                state.optional_of(|state| { self::r#comma(state) })
                                             })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#close(state) })
@@ -674,11 +674,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#model,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("model") })
@@ -689,24 +689,24 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .sequence(|state| {
+                                                    .sequence_of(|state| {
                                                         state
-                                                            .optional(|state| {
+                                                            .optional_of(|state| {
                                                                 state
-                                                                    .sequence(|state| {
+                                                                    .sequence_of(|state| {
                                                                         self::r#comma(state)
                                                                             .and_then(|state| { super::hidden::skip(state) })
                                                                             .and_then(|state| { self::r#pass(state) })
                                                                     })
                                                                     .and_then(|state| {
                                                                         state
-                                                                            .repeat(|state| {
+                                                                            .repeat_of(|state| {
                                                                                 state
-                                                                                    .sequence(|state| {
+                                                                                    .sequence_of(|state| {
                                                                                         super::hidden::skip(state)
                                                                                             .and_then(|state| {
                                                                                                 state
-                                                                                                    .sequence(|state| {
+                                                                                                    .sequence_of(|state| {
                                                                                                         self::r#comma(state)
                                                                                                             .and_then(|state| { super::hidden::skip(state) })
                                                                                                             .and_then(|state| { self::r#pass(state) })
@@ -720,7 +720,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
-                                                state.optional(|state| { self::r#comma(state) })
+                                                state.optional_of(|state| { self::r#comma(state) })
                                             })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#close(state) })
@@ -738,11 +738,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#location,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#SOI(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("crate") })
@@ -764,36 +764,36 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .sequence(|state| {
+                        .sequence_of(|state| {
                             self::r#open(state)
                                 .and_then(|state| { super::hidden::skip(state) })
                                 .and_then(|state| {
                                     state
-                                        .optional(|state| {
+                                        .optional_of(|state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     self::r#array(state)
                                                         .and_then(|state| { super::hidden::skip(state) })
                                                         .and_then(|state| {
                                                             state
-                                                                .sequence(|state| {
+                                                                .sequence_of(|state| {
                                                                     state
-                                                                        .optional(|state| {
+                                                                        .optional_of(|state| {
                                                                             state
-                                                                                .sequence(|state| {
+                                                                                .sequence_of(|state| {
                                                                                     self::r#comma(state)
                                                                                         .and_then(|state| { super::hidden::skip(state) })
                                                                                         .and_then(|state| { self::r#array(state) })
                                                                                 })
                                                                                 .and_then(|state| {
                                                                                     state
-                                                                                        .repeat(|state| {
+                                                                                        .repeat_of(|state| {
                                                                                             state
-                                                                                                .sequence(|state| {
+                                                                                                .sequence_of(|state| {
                                                                                                     super::hidden::skip(state)
                                                                                                         .and_then(|state| {
                                                                                                             state
-                                                                                                                .sequence(|state| {
+                                                                                                                .sequence_of(|state| {
                                                                                                                     self::r#comma(state)
                                                                                                                         .and_then(|state| { super::hidden::skip(state) })
                                                                                                                         .and_then(|state| { self::r#array(state) })
@@ -807,7 +807,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                         })
                                                         .and_then(|state| { super::hidden::skip(state) })
                                                         .and_then(|state| {
-                                                            state.optional(|state| { self::r#comma(state) })
+                                                            state.optional_of(|state| { self::r#comma(state) })
                                                         })
                                                 })
                                         })
@@ -824,18 +824,18 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#array,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#name(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .optional(|state| {
+                                                    .optional_of(|state| {
                                                         state
-                                                            .sequence(|state| {
+                                                            .sequence_of(|state| {
                                                                 self::r#open_index(state)
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| { self::r#expression(state) })
@@ -856,16 +856,16 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .sequence(|state| {
+                        .sequence_of(|state| {
                             self::r#open(state)
                                 .and_then(|state| { super::hidden::skip(state) })
                                 .and_then(|state| { self::r#name(state) })
                                 .and_then(|state| { super::hidden::skip(state) })
                                 .and_then(|state| {
                                     state
-                                        .optional(|state| {
+                                        .optional_of(|state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     self::r#open_index(state)
                                                         .and_then(|state| { super::hidden::skip(state) })
                                                         .and_then(|state| { self::r#range(state) })
@@ -886,11 +886,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#element,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#name(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#turbofish(state) })
@@ -900,7 +900,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { self::r#close_angle(state) })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
-                                                state.optional(|state| { self::r#method(state) })
+                                                state.optional_of(|state| { self::r#method(state) })
                                             })
                                     })
                             },
@@ -914,42 +914,42 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#pass,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#name(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#open(state) })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .optional(|state| {
+                                                    .optional_of(|state| {
                                                         state
-                                                            .sequence(|state| {
+                                                            .sequence_of(|state| {
                                                                 self::r#entry(state)
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
                                                                         state
-                                                                            .sequence(|state| {
+                                                                            .sequence_of(|state| {
                                                                                 state
-                                                                                    .optional(|state| {
+                                                                                    .optional_of(|state| {
                                                                                         state
-                                                                                            .sequence(|state| {
+                                                                                            .sequence_of(|state| {
                                                                                                 self::r#comma(state)
                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                     .and_then(|state| { self::r#entry(state) })
                                                                                             })
                                                                                             .and_then(|state| {
                                                                                                 state
-                                                                                                    .repeat(|state| {
+                                                                                                    .repeat_of(|state| {
                                                                                                         state
-                                                                                                            .sequence(|state| {
+                                                                                                            .sequence_of(|state| {
                                                                                                                 super::hidden::skip(state)
                                                                                                                     .and_then(|state| {
                                                                                                                         state
-                                                                                                                            .sequence(|state| {
+                                                                                                                            .sequence_of(|state| {
                                                                                                                                 self::r#comma(state)
                                                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                                                     .and_then(|state| { self::r#entry(state) })
@@ -963,7 +963,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                                     })
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
-                                                                        state.optional(|state| { self::r#comma(state) })
+                                                                        state.optional_of(|state| { self::r#comma(state) })
                                                                     })
                                                             })
                                                     })
@@ -982,18 +982,18 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#entry,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#expression(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .optional(|state| {
+                                                    .optional_of(|state| {
                                                         state
-                                                            .sequence(|state| {
+                                                            .sequence_of(|state| {
                                                                 self::r#equals(state)
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| { self::r#expression(state) })
@@ -1012,11 +1012,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#method,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#dot(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#name(state) })
@@ -1024,7 +1024,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { self::r#open(state) })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
-                                                state.optional(|state| { self::r#integer(state) })
+                                                state.optional_of(|state| { self::r#integer(state) })
                                             })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#close(state) })
@@ -1040,15 +1040,15 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#path,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         state
-                                            .optional(|state| {
+                                            .optional_of(|state| {
                                                 state
-                                                    .sequence(|state| {
+                                                    .sequence_of(|state| {
                                                         state
                                                             .match_string(":")
                                                             .and_then(|state| { super::hidden::skip(state) })
@@ -1060,11 +1060,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .sequence(|state| {
+                                                    .sequence_of(|state| {
                                                         state
-                                                            .optional(|state| {
+                                                            .optional_of(|state| {
                                                                 state
-                                                                    .sequence(|state| {
+                                                                    .sequence_of(|state| {
                                                                         state
                                                                             .match_string(":")
                                                                             .and_then(|state| { super::hidden::skip(state) })
@@ -1074,13 +1074,13 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                                     })
                                                                     .and_then(|state| {
                                                                         state
-                                                                            .repeat(|state| {
+                                                                            .repeat_of(|state| {
                                                                                 state
-                                                                                    .sequence(|state| {
+                                                                                    .sequence_of(|state| {
                                                                                         super::hidden::skip(state)
                                                                                             .and_then(|state| {
                                                                                                 state
-                                                                                                    .sequence(|state| {
+                                                                                                    .sequence_of(|state| {
                                                                                                         state
                                                                                                             .match_string(":")
                                                                                                             .and_then(|state| { super::hidden::skip(state) })
@@ -1107,21 +1107,21 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#expression,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         state
-                                            .sequence(|state| {
+                                            .sequence_of(|state| {
                                                 state
-                                                    .optional(|state| {
+                                                    .optional_of(|state| {
                                                         self::r#sign(state)
                                                             .and_then(|state| {
                                                                 state
-                                                                    .repeat(|state| {
+                                                                    .repeat_of(|state| {
                                                                         state
-                                                                            .sequence(|state| {
+                                                                            .sequence_of(|state| {
                                                                                 super::hidden::skip(state)
                                                                                     .and_then(|state| { self::r#sign(state) })
                                                                             })
@@ -1134,15 +1134,15 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .sequence(|state| {
+                                                    .sequence_of(|state| {
                                                         state
-                                                            .optional(|state| {
+                                                            .optional_of(|state| {
                                                                 self::r#index(state)
                                                                     .and_then(|state| {
                                                                         state
-                                                                            .repeat(|state| {
+                                                                            .repeat_of(|state| {
                                                                                 state
-                                                                                    .sequence(|state| {
+                                                                                    .sequence_of(|state| {
                                                                                         super::hidden::skip(state)
                                                                                             .and_then(|state| { self::r#index(state) })
                                                                                     })
@@ -1154,24 +1154,24 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .sequence(|state| {
+                                                    .sequence_of(|state| {
                                                         state
-                                                            .optional(|state| {
+                                                            .optional_of(|state| {
                                                                 state
-                                                                    .sequence(|state| {
+                                                                    .sequence_of(|state| {
                                                                         self::r#operator(state)
                                                                             .and_then(|state| { super::hidden::skip(state) })
                                                                             .and_then(|state| {
                                                                                 state
-                                                                                    .sequence(|state| {
+                                                                                    .sequence_of(|state| {
                                                                                         state
-                                                                                            .optional(|state| {
+                                                                                            .optional_of(|state| {
                                                                                                 self::r#sign(state)
                                                                                                     .and_then(|state| {
                                                                                                         state
-                                                                                                            .repeat(|state| {
+                                                                                                            .repeat_of(|state| {
                                                                                                                 state
-                                                                                                                    .sequence(|state| {
+                                                                                                                    .sequence_of(|state| {
                                                                                                                         super::hidden::skip(state)
                                                                                                                             .and_then(|state| { self::r#sign(state) })
                                                                                                                     })
@@ -1185,15 +1185,15 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                                             .and_then(|state| { super::hidden::skip(state) })
                                                                             .and_then(|state| {
                                                                                 state
-                                                                                    .sequence(|state| {
+                                                                                    .sequence_of(|state| {
                                                                                         state
-                                                                                            .optional(|state| {
+                                                                                            .optional_of(|state| {
                                                                                                 self::r#index(state)
                                                                                                     .and_then(|state| {
                                                                                                         state
-                                                                                                            .repeat(|state| {
+                                                                                                            .repeat_of(|state| {
                                                                                                                 state
-                                                                                                                    .sequence(|state| {
+                                                                                                                    .sequence_of(|state| {
                                                                                                                         super::hidden::skip(state)
                                                                                                                             .and_then(|state| { self::r#index(state) })
                                                                                                                     })
@@ -1205,26 +1205,26 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                                     })
                                                                     .and_then(|state| {
                                                                         state
-                                                                            .repeat(|state| {
+                                                                            .repeat_of(|state| {
                                                                                 state
-                                                                                    .sequence(|state| {
+                                                                                    .sequence_of(|state| {
                                                                                         super::hidden::skip(state)
                                                                                             .and_then(|state| {
                                                                                                 state
-                                                                                                    .sequence(|state| {
+                                                                                                    .sequence_of(|state| {
                                                                                                         self::r#operator(state)
                                                                                                             .and_then(|state| { super::hidden::skip(state) })
                                                                                                             .and_then(|state| {
                                                                                                                 state
-                                                                                                                    .sequence(|state| {
+                                                                                                                    .sequence_of(|state| {
                                                                                                                         state
-                                                                                                                            .optional(|state| {
+                                                                                                                            .optional_of(|state| {
                                                                                                                                 self::r#sign(state)
                                                                                                                                     .and_then(|state| {
                                                                                                                                         state
-                                                                                                                                            .repeat(|state| {
+                                                                                                                                            .repeat_of(|state| {
                                                                                                                                                 state
-                                                                                                                                                    .sequence(|state| {
+                                                                                                                                                    .sequence_of(|state| {
                                                                                                                                                         super::hidden::skip(state)
                                                                                                                                                             .and_then(|state| { self::r#sign(state) })
                                                                                                                                                     })
@@ -1238,15 +1238,15 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                                                                             .and_then(|state| { super::hidden::skip(state) })
                                                                                                             .and_then(|state| {
                                                                                                                 state
-                                                                                                                    .sequence(|state| {
+                                                                                                                    .sequence_of(|state| {
                                                                                                                         state
-                                                                                                                            .optional(|state| {
+                                                                                                                            .optional_of(|state| {
                                                                                                                                 self::r#index(state)
                                                                                                                                     .and_then(|state| {
                                                                                                                                         state
-                                                                                                                                            .repeat(|state| {
+                                                                                                                                            .repeat_of(|state| {
                                                                                                                                                 state
-                                                                                                                                                    .sequence(|state| {
+                                                                                                                                                    .sequence_of(|state| {
                                                                                                                                                         super::hidden::skip(state)
                                                                                                                                                             .and_then(|state| { self::r#index(state) })
                                                                                                                                                     })
@@ -1290,7 +1290,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#add, |state| { state.match_string("+") })
+                    state.rule_of(Rule::r#add, |state| { state.match_string("+") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -1299,7 +1299,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#subtract, |state| { state.match_string("-") })
+                    state.rule_of(Rule::r#subtract, |state| { state.match_string("-") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -1309,11 +1309,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#double_star,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         state
                                             .match_string("*")
                                             .and_then(|state| { super::hidden::skip(state) })
@@ -1329,7 +1329,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#multiply, |state| { state.match_string("*") })
+                    state.rule_of(Rule::r#multiply, |state| { state.match_string("*") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -1338,7 +1338,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#divide, |state| { state.match_string("/") })
+                    state.rule_of(Rule::r#divide, |state| { state.match_string("/") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -1347,7 +1347,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#power, |state| { state.match_string("^") })
+                    state.rule_of(Rule::r#power, |state| { state.match_string("^") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -1357,11 +1357,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#missing,
                             |state| {
                                 state
-                                    .lookahead(
+                                    .lookahead_of(
                                         true,
                                         |state| {
                                             self::r#number(state)
@@ -1379,7 +1379,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#sign, |state| { state.match_string("-") })
+                    state.rule_of(Rule::r#sign, |state| { state.match_string("-") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -1389,11 +1389,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#index,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#open_index(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#expression(state) })
@@ -1427,11 +1427,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#group,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#open(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#expression(state) })
@@ -1449,41 +1449,41 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#vector,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         state
                                             .match_string("[")
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .optional(|state| {
+                                                    .optional_of(|state| {
                                                         state
-                                                            .sequence(|state| {
+                                                            .sequence_of(|state| {
                                                                 self::r#expression(state)
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
                                                                         state
-                                                                            .sequence(|state| {
+                                                                            .sequence_of(|state| {
                                                                                 state
-                                                                                    .optional(|state| {
+                                                                                    .optional_of(|state| {
                                                                                         state
-                                                                                            .sequence(|state| {
+                                                                                            .sequence_of(|state| {
                                                                                                 self::r#comma(state)
                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                     .and_then(|state| { self::r#expression(state) })
                                                                                             })
                                                                                             .and_then(|state| {
                                                                                                 state
-                                                                                                    .repeat(|state| {
+                                                                                                    .repeat_of(|state| {
                                                                                                         state
-                                                                                                            .sequence(|state| {
+                                                                                                            .sequence_of(|state| {
                                                                                                                 super::hidden::skip(state)
                                                                                                                     .and_then(|state| {
                                                                                                                         state
-                                                                                                                            .sequence(|state| {
+                                                                                                                            .sequence_of(|state| {
                                                                                                                                 self::r#comma(state)
                                                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                                                     .and_then(|state| { self::r#expression(state) })
@@ -1497,7 +1497,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                                     })
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
-                                                                        state.optional(|state| { self::r#comma(state) })
+                                                                        state.optional_of(|state| { self::r#comma(state) })
                                                                     })
                                                             })
                                                     })
@@ -1516,13 +1516,13 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#call,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         state
-                                            .lookahead(
+                                            .lookahead_of(
                                                 false,
                                                 |state| {
                                                     self::r#word_sum(state)
@@ -1536,31 +1536,31 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
                                                 state
-                                                    .optional(|state| {
+                                                    .optional_of(|state| {
                                                         state
-                                                            .sequence(|state| {
+                                                            .sequence_of(|state| {
                                                                 self::r#expression(state)
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
                                                                         state
-                                                                            .sequence(|state| {
+                                                                            .sequence_of(|state| {
                                                                                 state
-                                                                                    .optional(|state| {
+                                                                                    .optional_of(|state| {
                                                                                         state
-                                                                                            .sequence(|state| {
+                                                                                            .sequence_of(|state| {
                                                                                                 self::r#comma(state)
                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                     .and_then(|state| { self::r#expression(state) })
                                                                                             })
                                                                                             .and_then(|state| {
                                                                                                 state
-                                                                                                    .repeat(|state| {
+                                                                                                    .repeat_of(|state| {
                                                                                                         state
-                                                                                                            .sequence(|state| {
+                                                                                                            .sequence_of(|state| {
                                                                                                                 super::hidden::skip(state)
                                                                                                                     .and_then(|state| {
                                                                                                                         state
-                                                                                                                            .sequence(|state| {
+                                                                                                                            .sequence_of(|state| {
                                                                                                                                 self::r#comma(state)
                                                                                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                                                                                     .and_then(|state| { self::r#expression(state) })
@@ -1574,7 +1574,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                                                     })
                                                                     .and_then(|state| { super::hidden::skip(state) })
                                                                     .and_then(|state| {
-                                                                        state.optional(|state| { self::r#comma(state) })
+                                                                        state.optional_of(|state| { self::r#comma(state) })
                                                                     })
                                                             })
                                                     })
@@ -1593,11 +1593,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#sum,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#word_sum(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("(") })
@@ -1609,7 +1609,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { self::r#expression(state) })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
-                                                state.optional(|state| { self::r#comma(state) })
+                                                state.optional_of(|state| { self::r#comma(state) })
                                             })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#close(state) })
@@ -1625,11 +1625,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#select,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#word_select(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string("(") })
@@ -1649,7 +1649,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                                             .and_then(|state| { self::r#expression(state) })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
-                                                state.optional(|state| { self::r#comma(state) })
+                                                state.optional_of(|state| { self::r#comma(state) })
                                             })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#close(state) })
@@ -1665,11 +1665,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#range,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#name(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { self::r#word_in(state) })
@@ -1691,15 +1691,15 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#variable,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         self::r#identifier(state)
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
-                                                state.lookahead(false, |state| { state.match_string("(") })
+                                                state.lookahead_of(false, |state| { state.match_string("(") })
                                             })
                                     })
                             },
@@ -1713,17 +1713,17 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#comparison,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         state
                                             .match_string("<")
                                             .or_else(|state| { state.match_string(">") })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
-                                                state.optional(|state| { state.match_string("=") })
+                                                state.optional_of(|state| { state.match_string("=") })
                                             })
                                     })
                             },
@@ -1737,18 +1737,18 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#dots,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         state
                                             .match_string(".")
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| { state.match_string(".") })
                                             .and_then(|state| { super::hidden::skip(state) })
                                             .and_then(|state| {
-                                                state.optional(|state| { state.match_string("=") })
+                                                state.optional_of(|state| { state.match_string("=") })
                                             })
                                     })
                             },
@@ -1761,7 +1761,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#name, |state| { self::r#identifier(state) })
+                    state.rule_of(Rule::r#name, |state| { self::r#identifier(state) })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -1771,17 +1771,17 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#identifier,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     state
-                                                        .lookahead(
+                                                        .lookahead_of(
                                                             false,
                                                             |state| {
                                                                 self::r#word_in(state)
@@ -1805,15 +1805,15 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#raw,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     state
                                                         .match_string("r#")
                                                         .and_then(|state| { self::r#plain(state) })
@@ -1831,19 +1831,19 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#plain,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     self::r#XID_START(state)
                                                         .or_else(|state| { state.match_string("_") })
                                                         .and_then(|state| {
-                                                            state.repeat(|state| { self::r#XID_CONTINUE(state) })
+                                                            state.repeat_of(|state| { self::r#XID_CONTINUE(state) })
                                                         })
                                                 })
                                         },
@@ -1859,20 +1859,20 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#word_in,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     state
                                                         .match_string("in")
                                                         .and_then(|state| {
                                                             state
-                                                                .lookahead(false, |state| { self::r#XID_CONTINUE(state) })
+                                                                .lookahead_of(false, |state| { self::r#XID_CONTINUE(state) })
                                                         })
                                                 })
                                         },
@@ -1888,20 +1888,20 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#word_let,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     state
                                                         .match_string("let")
                                                         .and_then(|state| {
                                                             state
-                                                                .lookahead(false, |state| { self::r#XID_CONTINUE(state) })
+                                                                .lookahead_of(false, |state| { self::r#XID_CONTINUE(state) })
                                                         })
                                                 })
                                         },
@@ -1917,30 +1917,30 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#word_sum,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     state
                                                         .match_string("sum")
                                                         .and_then(|state| {
                                                             state
-                                                                .lookahead(false, |state| { self::r#XID_CONTINUE(state) })
+                                                                .lookahead_of(false, |state| { self::r#XID_CONTINUE(state) })
                                                         })
                                                         .and_then(|state| {
                                                             state
-                                                                .lookahead(
+                                                                .lookahead_of(
                                                                     true,
                                                                     |state| {
                                                                         state
-                                                                            .sequence(|state| {
+                                                                            .sequence_of(|state| {
                                                                                 state
-                                                                                    .repeat(|state| { self::r#WHITE_SPACE(state) })
+                                                                                    .repeat_of(|state| { self::r#WHITE_SPACE(state) })
                                                                                     .and_then(|state| { state.match_string("(") })
                                                                             })
                                                                     },
@@ -1960,30 +1960,30 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#word_select,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     state
                                                         .match_string("select")
                                                         .and_then(|state| {
                                                             state
-                                                                .lookahead(false, |state| { self::r#XID_CONTINUE(state) })
+                                                                .lookahead_of(false, |state| { self::r#XID_CONTINUE(state) })
                                                         })
                                                         .and_then(|state| {
                                                             state
-                                                                .lookahead(
+                                                                .lookahead_of(
                                                                     true,
                                                                     |state| {
                                                                         state
-                                                                            .sequence(|state| {
+                                                                            .sequence_of(|state| {
                                                                                 state
-                                                                                    .repeat(|state| { self::r#WHITE_SPACE(state) })
+                                                                                    .repeat_of(|state| { self::r#WHITE_SPACE(state) })
                                                                                     .and_then(|state| { state.match_string("(") })
                                                                             })
                                                                     },
@@ -2003,34 +2003,34 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#number,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     self::r#digits(state)
                                                         .and_then(|state| {
                                                             state
-                                                                .optional(|state| {
+                                                                .optional_of(|state| {
                                                                     state
-                                                                        .sequence(|state| {
+                                                                        .sequence_of(|state| {
                                                                             state
                                                                                 .match_string(".")
                                                                                 .and_then(|state| {
-                                                                                    state.lookahead(false, |state| { state.match_string(".") })
+                                                                                    state.lookahead_of(false, |state| { state.match_string(".") })
                                                                                 })
                                                                                 .and_then(|state| {
-                                                                                    state.optional(|state| { self::r#digits(state) })
+                                                                                    state.optional_of(|state| { self::r#digits(state) })
                                                                                 })
                                                                         })
                                                                 })
                                                         })
                                                         .and_then(|state| {
-                                                            state.optional(|state| { self::r#exponent(state) })
+                                                            state.optional_of(|state| { self::r#exponent(state) })
                                                         })
                                                 })
                                         },
@@ -2046,28 +2046,28 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#exponent,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     state
                                                         .match_string("e")
                                                         .or_else(|state| { state.match_string("E") })
                                                         .and_then(|state| {
                                                             state
-                                                                .optional(|state| {
+                                                                .optional_of(|state| {
                                                                     state
                                                                         .match_string("+")
                                                                         .or_else(|state| { state.match_string("-") })
                                                                 })
                                                         })
                                                         .and_then(|state| {
-                                                            state.repeat(|state| { state.match_string("_") })
+                                                            state.repeat_of(|state| { state.match_string("_") })
                                                         })
                                                         .and_then(|state| { self::r#digits(state) })
                                                 })
@@ -2084,23 +2084,23 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#integer,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     self::r#digits(state)
                                                         .and_then(|state| {
                                                             state
-                                                                .lookahead(
+                                                                .lookahead_of(
                                                                     false,
                                                                     |state| {
                                                                         state
-                                                                            .sequence(|state| {
+                                                                            .sequence_of(|state| {
                                                                                 state
                                                                                     .match_string(".")
                                                                                     .and_then(|state| { self::r#ASCII_DIGIT(state) })
@@ -2122,19 +2122,19 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#digits,
                             |state| {
                                 state
-                                    .atomic(
+                                    .atomic_of(
                                         ::pest::Atomicity::Atomic,
                                         |state| {
                                             state
-                                                .sequence(|state| {
+                                                .sequence_of(|state| {
                                                     self::r#ASCII_DIGIT(state)
                                                         .and_then(|state| {
                                                             state
-                                                                .repeat(|state| {
+                                                                .repeat_of(|state| {
                                                                     self::r#ASCII_DIGIT(state)
                                                                         .or_else(|state| { state.match_string("_") })
                                                                 })
@@ -2152,7 +2152,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#equals, |state| { state.match_string("=") })
+                    state.rule_of(Rule::r#equals, |state| { state.match_string("=") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -2161,7 +2161,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#comma, |state| { state.match_string(",") })
+                    state.rule_of(Rule::r#comma, |state| { state.match_string(",") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -2170,7 +2170,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#dot, |state| { state.match_string(".") })
+                    state.rule_of(Rule::r#dot, |state| { state.match_string(".") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -2179,7 +2179,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#open, |state| { state.match_string("(") })
+                    state.rule_of(Rule::r#open, |state| { state.match_string("(") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -2188,7 +2188,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#close, |state| { state.match_string(")") })
+                    state.rule_of(Rule::r#close, |state| { state.match_string(")") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -2197,7 +2197,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#open_index, |state| { state.match_string("[") })
+                    state.rule_of(Rule::r#open_index, |state| { state.match_string("[") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -2206,7 +2206,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#close_index, |state| { state.match_string("]") })
+                    state.rule_of(Rule::r#close_index, |state| { state.match_string("]") })
                 }
                 #[inline]
                 #[allow(non_snake_case, unused_variables)]
@@ -2216,11 +2216,11 @@ impl ::pest::Parser<Rule> for TfeParser {
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
                     state
-                        .rule(
+                        .rule_of(
                             Rule::r#turbofish,
                             |state| {
                                 state
-                                    .sequence(|state| {
+                                    .sequence_of(|state| {
                                         state
                                             .match_string(":")
                                             .and_then(|state| { super::hidden::skip(state) })
@@ -2238,7 +2238,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::r#close_angle, |state| { state.match_string(">") })
+                    state.rule_of(Rule::r#close_angle, |state| { state.match_string(">") })
                 }
                 #[inline]
                 #[allow(dead_code, non_snake_case, unused_variables)]
@@ -2247,7 +2247,7 @@ impl ::pest::Parser<Rule> for TfeParser {
                 ) -> ::pest::ParseResult<
                     ::std::boxed::Box<::pest::ParserState<'_, Rule>>,
                 > {
-                    state.rule(Rule::EOI, |state| state.end_of_input())
+                    state.rule_of(Rule::EOI, |state| state.end_of_input())
                 }
                 #[inline]
                 #[allow(dead_code, non_snake_case, unused_variables)]

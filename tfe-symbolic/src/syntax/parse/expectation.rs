@@ -1,5 +1,6 @@
 //! pest's errors in words of the language: what could have stood there, and what stands there.
 
+use crate::expr::sorting::sort_by_key;
 use crate::syntax::grammar::Rule;
 
 /// What pest would have accepted, in words of the language.
@@ -49,7 +50,7 @@ pub(super) fn wanted(rules: &[Rule]) -> String {
         // A parenthesis is one way to begin it.
         words.retain(|word| *word != "`(`");
     }
-    words.sort_by_key(|word| word.starts_with('`'));
+    sort_by_key(&mut words, |word| word.starts_with('`'));
     match words.pop() {
         None => "something else".into(),
         Some(last) if words.is_empty() => last.into(),
