@@ -371,7 +371,7 @@ impl fmt::Display for RunErrorKind {
             ),
             Self::KinksUnsupported { call } => write!(
                 f,
-                "`{call}` does not cut steps at kinks; runs of models of fixed size from start to end do"
+                "`{call}` does not cut steps at kinks; runs from start to end do"
             ),
             Self::NodeOrder { node, time } => {
                 write!(

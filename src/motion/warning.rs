@@ -57,7 +57,7 @@ pub enum Warning {
         /// How many such jumps there are.
         count: usize,
     },
-    /// Forces of a model of run-time length have kinks or jumps, at which steps are not cut there: elements that cross one lose their order, and the estimate of the error
+    /// Forces of the model have kinks or jumps, at which steps are not [cut](crate::Simulation::at_kinks): elements that cross one lose their order, and the estimate of the error
     /// compares runs that cross it both.
     ///
     /// Told by runs with an estimate of their error.
@@ -126,7 +126,7 @@ impl fmt::Display for Warning {
                 f.write_str(": take a shorter step, or look for a singular point of the model")
             }
             Self::KinksCrossed => f.write_str(
-                "forces of the model have kinks or jumps, which steps go across: elements lose their order there, and errors fall more slowly than with smooth forces",
+                "forces of the model have kinks or jumps, which steps go across: elements lose their order there, and errors fall more slowly than with smooth forces: `at_kinks(true)` cuts them",
             ),
             Self::Unresolved {
                 time,

@@ -33,8 +33,6 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     const FACTS: Facts;
     /// Whether a search for an accuracy may iterate fixed points.
     const MAY_ITERATE: bool;
-    /// Whether steps can be cut at kinks.
-    const CUTS_AT_KINKS: bool;
     /// Whether the energy is kept, and jumps of it tell of steps that are too long.
     const CONSERVES: bool;
 
@@ -69,12 +67,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     ///
     /// # Errors
     /// What is wrong with them.
-    fn check_start(
-        &self,
-        start: &L::State,
-        impulses: &[L::Impulse],
-        at_kinks: bool,
-    ) -> Result<(), RunErrorKind>;
+    fn check_start(&self, start: &L::State, impulses: &[L::Impulse]) -> Result<(), RunErrorKind>;
 
     /// Refuses a start that is not on the constraints, for a first element of a length.
     ///

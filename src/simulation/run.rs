@@ -202,10 +202,7 @@ where
     pub(super) fn check_start(&self, start: &L::State) -> Result<(), RunErrorKind> {
         match &self.refusal {
             Some(refusal) => Err(refusal.clone()),
-            None => {
-                let at_kinks = self.at_kinks == Some(true);
-                self.model.check_start(start, &self.impulses, at_kinks)
-            }
+            None => self.model.check_start(start, &self.impulses),
         }
     }
 

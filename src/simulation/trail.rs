@@ -79,6 +79,8 @@ impl Trail {
             "models of run-time length whose events change the state or end the run"
         } else if motion.statistics().cuts > 0 {
             LONG_STEPS
+        } else if motion.statistics().kinks > 0 {
+            "models of run-time length whose steps are cut at kinks"
         } else {
             return None;
         };

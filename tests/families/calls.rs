@@ -1,8 +1,8 @@
 //! The calls of the surface on models of run-time length: what works gives what a model of fixed size gives, what does not is one typed error.
 
 use crate::common::distance;
+use tfe::family;
 use tfe::prelude::*;
-use tfe::{RunErrorKind, family};
 
 #[dynamics(
     coordinates(q[n]),
@@ -113,28 +113,6 @@ fn ensembles() {
         error.to_string(),
         "`Ensemble::begin` is not to be had of models of run-time length"
     );
-}
-
-/// A chain with an end stop.
-#[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2 - abs(q[i])))]
-struct Bent {
-    n: usize,
-}
-
-#[test]
-fn kinks_are_not_cut() {
-    let bent = Bent { n: 2 };
-    let run = Simulation::new(&bent).step(0.1).at_kinks(true);
-    let error = run
-        .run(bent.state([1.0; 2], [0.0; 2]), 0.0..1.0)
-        .expect_err("refused");
-    assert!(matches!(
-        error.kind(),
-        RunErrorKind::KinksUnsupported { .. }
-    ));
-    // Where there are none nothing is asked for.
-    let run = Simulation::new(&CHAIN).step(0.1).at_kinks(true);
-    assert!(run.run(start(), 0.0..1.0).is_ok());
 }
 
 #[cfg(feature = "sparse")]

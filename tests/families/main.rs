@@ -22,6 +22,7 @@ mod inputs;
 #[cfg(feature = "sparse")]
 mod inside;
 mod kernels;
+mod kinks;
 mod lists;
 mod motions;
 mod outputs;

@@ -11,7 +11,7 @@ use crate::error::StepError;
 use crate::model::{Form, Model};
 use alloc::vec::Vec;
 use search::{Crossing, begins_on_root, first_crossing};
-use watched::{Log, Watched};
+pub(crate) use watched::{Log, Watched};
 
 /// All arcs of a step may cost so many trials: a motion that needs more goes to and fro without end.
 const MAX_WORK: u32 = 1000;
@@ -48,7 +48,7 @@ pub(crate) trait Kinked:
     fn forget(&mut self);
 
     /// Adds the values of all switching functions.
-    fn switches(&self, t: f64, state: &Self::State, values: &mut Vec<f64>);
+    fn switches(&mut self, t: f64, state: &Self::State, values: &mut Vec<f64>);
 
     /// Points of an element; whether there are some at its ends.
     fn points(&self) -> (usize, bool);
@@ -306,7 +306,7 @@ fn arc<S: Kinked>(
                 (tau - 1.0) * length
             }
             (None, Some(switch)) => {
-                let value = |tau: f64| {
+                let mut value = |tau: f64| {
                     let mut row = Vec::new();
                     values(tau, &mut row);
                     row.get(switch).copied().unwrap_or(f64::NAN)
@@ -395,7 +395,7 @@ fn slides<S: Kinked>(
         return false;
     }
     let inside = stepper.inside();
-    let value = |stepper: &S, t: f64, state: &S::State| {
+    let value = |stepper: &mut S, t: f64, state: &S::State| {
         let mut row = Vec::new();
         stepper.switches(t, state, &mut row);
         row.get(switch).copied().unwrap_or(f64::NAN)

@@ -70,6 +70,13 @@ pub struct SchemeRef<'a> {
 }
 
 impl SchemeRef<'_> {
+    /// Whether there are points at the ends of the element.
+    #[cfg(feature = "alloc")]
+    #[must_use]
+    pub(crate) fn has_ends(&self) -> bool {
+        self.nodes.first() == Some(&0.0) || self.nodes.last() == Some(&1.0)
+    }
+
     /// The number K of points at which the model is evaluated.
     #[inline]
     #[must_use]

@@ -119,9 +119,7 @@ where
         span: Range<f64>,
     ) -> Result<Estimated<Motion<N, L>>, RunError<N, L>> {
         let mut run = self.simulation.clone();
-        if const { M::CUTS_AT_KINKS } {
-            run.at_kinks.get_or_insert(true);
-        }
+        run.at_kinks.get_or_insert(true);
         let run = &run;
         if span.start == span.end {
             let motion = run.run(start, span)?;
@@ -163,10 +161,6 @@ where
         span: &Range<f64>,
     ) -> Result<(), RunErrorKind> {
         check_accuracy(self.accuracy)?;
-        if const { !M::CUTS_AT_KINKS } && run.crosses_kinks() {
-            let call = "accuracy";
-            return Err(RunErrorKind::KinksUnsupported { call });
-        }
         run.check_start(start)?;
         if run.nodes.is_some() {
             run.mesh(span)?;
@@ -311,7 +305,7 @@ where
         let mut motion = self
             .drive_over((t, start), mesh, stepper, Some(&mut compared))
             .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))?;
-        if const { !M::CUTS_AT_KINKS } && self.crosses_kinks() {
+        if self.crosses_kinks() {
             motion.add_warning(Warning::KinksCrossed);
         }
         // A run that an event has stopped stays where it is.

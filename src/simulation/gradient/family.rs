@@ -142,7 +142,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let times: Vec<f64> = mesh.elements().map(|(_, next, _)| next).collect();
         let segments = times.len().div_ceil(self.record_every);
         let is_plain = segments > 0 && motion.states().len() == segments + 1;
-        if motion.statistics().cuts > 0 || !is_plain {
+        let statistics = motion.statistics();
+        if statistics.cuts > 0 || statistics.kinks > 0 || !is_plain {
             return Ok(None);
         }
         let mut backwards = self.backwards()?;

@@ -35,7 +35,6 @@ fn cutting<'m, M: Model<N>, const N: usize>(
 impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     const FACTS: Facts = M::FACTS;
     const MAY_ITERATE: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
-    const CUTS_AT_KINKS: bool = true;
     const CONSERVES: bool = conserves_energy::<M, N>();
 
     fn coordinates(&self) -> usize {
@@ -79,7 +78,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         stepper.take_statistics()
     }
 
-    fn check_start(&self, start: &State<N>, _: &[Impulse<N>], _: bool) -> Result<(), RunErrorKind> {
+    fn check_start(&self, start: &State<N>, _: &[Impulse<N>]) -> Result<(), RunErrorKind> {
         check_start(start)
     }
 

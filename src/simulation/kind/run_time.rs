@@ -22,7 +22,6 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     const FACTS: Facts = M::FACTS;
     // Without sparse factorisations there is nothing else.
     const MAY_ITERATE: bool = M::FACTS.separable && !M::CONSTRAINED;
-    const CUTS_AT_KINKS: bool = false;
     const CONSERVES: bool = conserves_energies::<M>();
 
     fn coordinates(&self) -> usize {
@@ -61,11 +60,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         &self,
         start: &FamilyState,
         impulses: &[(f64, Vec<f64>)],
-        at_kinks: bool,
     ) -> Result<(), RunErrorKind> {
-        if at_kinks && const { !M::FACTS.smooth } {
-            return Err(RunErrorKind::KinksUnsupported { call: "at_kinks" });
-        }
         self.check().map_err(RunErrorKind::Family)?;
         check_lengths(self.len(), start)?;
         for (_, impulse) in impulses {
@@ -115,7 +110,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         M: 'm,
     {
         let stepper = family::Stepper::sharing(model, chosen.element, chosen.control);
-        stepper.map_err(RunErrorKind::Family)
+        cutting(stepper, chosen.at_kinks)
     }
 
     fn resumed<'m>(
@@ -130,7 +125,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
             element, control, ..
         } = chosen;
         let stepper = family::Stepper::resume(model, element, control, suspended);
-        stepper.map_err(RunErrorKind::Family)
+        cutting(stepper, chosen.at_kinks)
     }
 
     fn suspended(stepper: family::Stepper<'_, M>) -> family::Suspended {
@@ -343,6 +338,18 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
         RunErrorKind::of_element(self.failed_input(), element, at, source)
     }
+}
+
+/// A stepper that cuts its steps at kinks, if it is to.
+fn cutting<'m, M: family::Model>(
+    stepper: Result<family::Stepper<'m, M>, family::ModelError>,
+    at_kinks: bool,
+) -> Result<family::Stepper<'m, M>, RunErrorKind> {
+    let stepper = stepper.map_err(RunErrorKind::Family)?;
+    Ok(match at_kinks {
+        true => stepper.at_kinks(),
+        false => stepper,
+    })
 }
 
 /// The reactions at a node of a model of run-time length.

@@ -102,6 +102,15 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
         })
     }
 
+    /// The next step continues none.
+    pub(super) fn forget(&mut self) {
+        self.last = None;
+    }
+
+    pub(super) fn table(&self) -> &SchemeTable {
+        &self.table
+    }
+
     /// Whether the last step ended there.
     pub(super) fn ends_in(&self, state: &FamilyState) -> bool {
         self.last.is_some() && self.end == *state

@@ -1,5 +1,7 @@
 //! Steps of families: which unknowns a model gets.
 
+mod kinks;
+
 use super::dense::DenseElement;
 use super::error::ModelError;
 use super::forces::Forces;
@@ -42,6 +44,8 @@ pub struct Stepper<'m, M> {
     #[cfg(feature = "sparse")]
     instant: Option<Instant>,
     control: Control,
+    /// Steps are cut at kinks, if there are any.
+    at_kinks: bool,
     /// Of a last step that was cut.
     pieces: Vec<DenseElement>,
 }
@@ -127,6 +131,7 @@ impl<'m, M: Model> Stepper<'m, M> {
             #[cfg(feature = "sparse")]
             instant: None,
             control,
+            at_kinks: false,
             pieces: Vec::new(),
         }
     }
@@ -205,6 +210,9 @@ impl<'m, M: Model> Stepper<'m, M> {
     /// [`StepError`]; `state` is unchanged then. A state of another length than the model's counts as one that is not finite.
     pub fn advance(&mut self, t: f64, h: f64, state: &mut FamilyState) -> Result<(), StepError> {
         self.pieces.clear();
+        if const { !M::FACTS.smooth } && self.at_kinks && self.has_kinks(t, state) {
+            return self.advance_in_arcs(t, h, state);
+        }
         let error = match self.whole(t, h, state, &[]) {
             Err(error) if may_be_cut(&error, M::FACTS.linear, self.control.solve) => error,
             outcome => return outcome,
@@ -319,6 +327,7 @@ impl<'m, M: Model> Stepper<'m, M> {
         let mut other = Self::sharing(model, self.element, self.control)?;
         other.set_tolerance(self.way.control_mut().tolerance);
         *other.statistics_mut() = *self.statistics();
+        other.at_kinks = self.at_kinks;
         *self = other;
         Ok(())
     }
@@ -342,7 +351,7 @@ impl<'m, M: Model> Stepper<'m, M> {
 impl<M: Model> Halving for Stepper<'_, M> {
     type State = FamilyState;
     type Kick = Infallible;
-    type Kicks = [Infallible; 0];
+    type Kicks = Vec<Infallible>;
 
     fn whole(
         &mut self,
@@ -354,7 +363,7 @@ impl<M: Model> Halving for Stepper<'_, M> {
         self.advance_whole(t, h, state)
     }
 
-    fn passed(&mut self, t: f64, h: f64, _: [Infallible; 0]) {
+    fn passed(&mut self, t: f64, h: f64, _: Vec<Infallible>) {
         let dense = self.dense_of_last(t, t + h);
         self.pieces.push(dense);
     }

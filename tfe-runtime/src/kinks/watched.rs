@@ -6,21 +6,26 @@ use core::cell::RefCell;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Where switching functions are written, in the order in which a kernel comes to them.
-pub(super) type Log = RefCell<Vec<f64>>;
+pub(crate) type Log = RefCell<Vec<f64>>;
 
 /// A number; those that depend on the time or the state know where to write.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Watched<'a> {
+pub(crate) struct Watched<'a> {
     value: f64,
     log: Option<&'a Log>,
 }
 
 impl<'a> Watched<'a> {
-    pub(super) fn new(value: f64, log: &'a Log) -> Self {
+    pub(crate) fn new(value: f64, log: &'a Log) -> Self {
         Self {
             value,
             log: Some(log),
         }
+    }
+
+    /// A constant.
+    pub(crate) fn unwatched(value: f64) -> Self {
+        Self { value, log: None }
     }
 
     fn of(self, value: f64) -> Self {
@@ -91,7 +96,7 @@ impl Real for Watched<'_> {
     type Mask = bool;
 
     fn from_f64(value: f64) -> Self {
-        Self { value, log: None }
+        Self::unwatched(value)
     }
 
     smooth!(sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp ln sqrt);

@@ -332,14 +332,13 @@ where
         self.carried.memory.last = None;
     }
 
-    fn switches(&self, t: f64, state: &State<N>, values: &mut Vec<f64>) {
+    fn switches(&mut self, t: f64, state: &State<N>, values: &mut Vec<f64>) {
         switches(&*self.model, t, state, values);
     }
 
     fn points(&self) -> (usize, bool) {
         let scheme = self.table.view();
-        let has_ends = scheme.nodes.first() == Some(&0.0) || scheme.nodes.last() == Some(&1.0);
-        (scheme.points(), has_ends)
+        (scheme.points(), scheme.has_ends())
     }
 
     fn crossed(&mut self) {

@@ -1,0 +1,128 @@
+//! Steps of families that are cut at kinks and jumps of forces (T-119).
+
+use super::{Stepper, Way};
+use crate::error::StepError;
+use crate::family::dense::DenseElement;
+use crate::family::model::{FamilyState, Gradient, Model};
+use crate::kinks::{Kinked, Log, Watched, in_arcs};
+use crate::model::Form;
+use crate::newton::Solve;
+use crate::scheme::Tables as _;
+use alloc::vec;
+use alloc::vec::Vec;
+
+impl<M: Model> Stepper<'_, M> {
+    /// The same with steps that end where a force has a kink or a jump, and go on behind it: `abs`, `sign`, `min`, `max` and `select` choose by the sign of functions of the
+    /// state, of each site its own, and elements in which none changes its sign keep their order. [`Statistics::kinks`](crate::Statistics::kinks) counts the crossings. Models without such
+    /// functions step as before.
+    #[must_use]
+    pub fn at_kinks(self) -> Self {
+        Self {
+            at_kinks: true,
+            ..self
+        }
+    }
+
+    /// Whether kernels choose by the sign of anything; where they do not nobody asks again.
+    pub(super) fn has_kinks(&mut self, t: f64, state: &FamilyState) -> bool {
+        let is_right = state.q.len() == self.length && state.p.len() == self.length;
+        if is_right {
+            let mut switches = Vec::new();
+            self.switches(t, state, &mut switches);
+            self.at_kinks = !switches.is_empty();
+        }
+        is_right && self.at_kinks
+    }
+
+    #[cold]
+    pub(super) fn advance_in_arcs(
+        &mut self,
+        t: f64,
+        h: f64,
+        state: &mut FamilyState,
+    ) -> Result<(), StepError> {
+        let (start, steps) = (state.clone(), self.statistics().steps);
+        let outcome = in_arcs(self, (t, h), state, &[]);
+        self.trust(false);
+        self.statistics_mut().steps = steps + u64::from(outcome.is_ok());
+        if outcome.is_err() {
+            *state = start;
+            self.forget();
+            self.pieces.clear();
+        }
+        outcome
+    }
+}
+
+impl<M: Model> Kinked for Stepper<'_, M> {
+    type Inside = DenseElement;
+
+    fn inside(&self) -> DenseElement {
+        self.dense_of_last(0.0, 1.0)
+    }
+
+    fn at(inside: &DenseElement, tau: f64) -> FamilyState {
+        inside.at(tau)
+    }
+
+    fn forget(&mut self) {
+        match &mut self.way {
+            Way::Forces(forces) => forces.forget(),
+            #[cfg(feature = "sparse")]
+            Way::Rates(rates) => rates.forget(),
+        }
+    }
+
+    fn switches(&mut self, t: f64, state: &FamilyState, values: &mut Vec<f64>) {
+        let velocity = match M::FORM {
+            Form::Lagrangian => match self.legendre.velocity(&*self.model, t, state) {
+                Ok(velocity) => Some(velocity),
+                Err(_) => return,
+            },
+            Form::Hamiltonian => None,
+        };
+        let log = Log::new(core::mem::take(values));
+        let watched = |numbers: &[f64]| -> Vec<Watched<'_>> {
+            let all = numbers.iter().map(|number| Watched::new(*number, &log));
+            all.collect()
+        };
+        let (q, z) = (
+            watched(&state.q),
+            watched(velocity.as_ref().unwrap_or(&state.p)),
+        );
+        let zeros = || vec![Watched::unwatched(0.0); self.length];
+        let (mut by_z, mut by_q, mut force) = (zeros(), zeros(), zeros());
+        let first = Gradient {
+            z: &mut by_z,
+            q: &mut by_q,
+            force: &mut force,
+        };
+        self.model.first(Watched::new(t, &log), &q, &z, first);
+        drop((q, z, by_z, by_q, force));
+        *values = log.into_inner();
+    }
+
+    fn points(&self) -> (usize, bool) {
+        let scheme = match &self.way {
+            Way::Forces(forces) => forces.table().view(),
+            #[cfg(feature = "sparse")]
+            Way::Rates(rates) => rates.table().view(),
+        };
+        (scheme.points(), scheme.has_ends())
+    }
+
+    fn crossed(&mut self) {
+        self.statistics_mut().kinks += 1;
+    }
+
+    fn cuts(&self) -> bool {
+        matches!(self.control.solve, Solve::Auto | Solve::Newton)
+    }
+
+    fn trust(&mut self, all: bool) {
+        self.way.control_mut().solve = match (self.control.solve, all) {
+            (Solve::Auto, true) => Solve::Trusting,
+            (solve, _) => solve,
+        };
+    }
+}
