@@ -499,6 +499,51 @@ fn what_cannot_be_cut_at_kinks_is_refused() {
     smooth.begin(&[start], 0.0).expect("no kinks");
 }
 
+/// A structure at rest, whose sites begin to move one after the other: signs of what moves by powers of a small time are no kinks where gaps are open.
+#[test]
+fn what_decides_nothing_cuts_nothing() {
+    #[dynamics(
+        coordinates(x[12]),
+        lagrangian = sum(i in 0..12, dot(x[i])^2/2 - s/2*max(abs(x[i]) - gap, 0)^2)
+            - k/2*(x[0] - 0.05*sin(7*t))^2 - sum(i in 0..11, k/2*(x[i+1] - x[i])^2),
+    )]
+    struct Gaps {
+        k: f64,
+        s: f64,
+        gap: f64,
+    }
+    let gaps = |gap| Gaps {
+        k: 900.0,
+        s: 2e4,
+        gap,
+    };
+    let rest = State {
+        q: [0.0; 12],
+        p: [0.0; 12],
+    };
+    let open = gaps(1.0);
+    for element in [Element::mixed(3), Element::mixed(6), Element::radau(4)] {
+        let run = Simulation::new(&open).element(element).step(0.01);
+        let cut = run.clone().at_kinks(true).run(rest, 0.0..2.0);
+        let cut = cut.unwrap_or_else(|error| panic!("{element}: {error}"));
+        assert_eq!(cut.statistics().kinks, 0, "{element}");
+        let across = run.run(rest, 0.0..2.0).expect("a run");
+        let off = cut.last().q.iter().zip(across.last().q);
+        let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, larger);
+        assert!(off < 1e-13, "{element}: {off:e}");
+    }
+    let narrow = gaps(0.03);
+    let run = |step| {
+        let run = Simulation::new(&narrow).element(Mixed::<8>).step(step);
+        run.at_kinks(true).run(rest, 0.0..2.0).expect("a run")
+    };
+    let (coarse, fine) = (run(0.01), run(0.005));
+    assert_eq!(coarse.statistics().kinks, fine.statistics().kinks);
+    let off = coarse.last().q.iter().zip(fine.last().q);
+    let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, larger);
+    assert!(off < 1e-12, "{off:e}");
+}
+
 /// An estimate of runs that both go across a kink is doubtful, and says so; of cut ones, and of smooth models, it is not.
 #[test]
 fn estimates_across_kinks_say_so() {

@@ -144,7 +144,7 @@ fn transition_matrices_need_a_feature() {
     let error = run.run_linearised(start(), 0.0..5.0).expect_err("refused");
     let of = "models of run-time length without the feature `sparse`";
     let call = "run_linearised";
-    assert_eq!(error.kind(), &RunErrorKind::Unsupported { call, of });
+    assert_eq!(error.kind(), &tfe::RunErrorKind::Unsupported { call, of });
 }
 
 /// Two pendulums on rods, one hanging from the other, whose top one is pushed by a moving hand.

@@ -168,6 +168,23 @@ fn elements_keep_their_order_at_every_site() {
     }
 }
 
+/// A plate that lands all but flat: many sites cross at all but one time, or one shortly after the other.
+#[test]
+fn many_sites_cross_in_one_step() {
+    for (n, apart) in [(60, 0.0), (60, 1e-14), (60, 1e-9), (100, 1e-3)] {
+        let (k, g) = (1e-3, 10.0);
+        let plate = Beads { n, k, g };
+        let heights = (0..n).map(|i| 0.45 + apart * i as f64);
+        let start = plate.state(heights.collect::<Vec<_>>(), vec![0.0; n]);
+        let run = Simulation::new(&plate).element(Mixed::<4>).step(0.5);
+        let motion = run.at_kinks(true).run(start, 0.0..0.5);
+        let motion = motion.unwrap_or_else(|error| panic!("{n} {apart:e}: {error}"));
+        assert_eq!(motion.statistics().steps, 1);
+        let error = motion.energy_error();
+        assert!(error < 1e-11, "{n} {apart:e}: {error:e}");
+    }
+}
+
 /// An accuracy is met across kinks, and an estimate of steps that go across says so.
 #[test]
 fn accuracies_are_met_across_kinks() {

@@ -195,6 +195,8 @@ pub enum StepError {
     },
     /// The motion comes back at once to a jump of a force that it has crossed: it would slide along it (Filippov), which the equations as declared do not describe.
     Slides,
+    /// The step crosses kinks or jumps of forces more often than it can be cut.
+    TooManyKinks,
     /// The change between velocities and momenta failed at a point of the element.
     Legendre(LegendreError),
     /// Something about the constraints.
@@ -263,6 +265,9 @@ impl fmt::Display for StepError {
             Self::Slides => f.write_str(
                 "the motion slides along a jump of a force: on either side of where a `sign`, `select` or the like changes, it is driven back to the other side; \
                  take a law without the jump, such as tanh(v/w) for sign(v)",
+            ),
+            Self::TooManyKinks => f.write_str(
+                "the step crosses kinks or jumps of forces more often than it can be cut: take a shorter step",
             ),
             Self::Legendre(source) => source.fmt(f),
             Self::Constraint(source) => source.fmt(f),

@@ -13,10 +13,13 @@ use alloc::vec::Vec;
 use search::{Crossing, begins_on_root, first_crossing};
 pub(crate) use watched::{Log, Watched};
 
-/// All arcs of a step may cost so many trials: a motion that needs more goes to and fro without end.
-const MAX_WORK: u32 = 1000;
+/// All arcs of a step may cost so many trials,
+const MAX_WORK: usize = 1000;
 
-/// Of these so many are short ones: one that goes to and fro does so faster and faster.
+/// and so many more for every switching function that changes its sign in it.
+const WORK_OF_ONE: usize = 16;
+
+/// So many arcs may be short that end where others have: a motion that goes to and fro without end does so faster and faster, while many sites may come to their roots at all but one time.
 const MAX_SHORT: u32 = 20;
 
 /// Lengths that are tried for one arc.
@@ -89,13 +92,15 @@ pub(crate) fn switches<M, const N: usize>(
         &z.map(watched),
         &mut first,
     );
-    *values = log.into_inner();
+    let results = first.z.iter().chain(&first.q).chain(&first.force);
+    let origins = results.map(|one| one.origin()).collect();
+    *values = log.decisive(origins);
 }
 
 /// What all arcs of a step have cost.
 #[derive(Default)]
 struct Effort {
-    trials: u32,
+    trials: usize,
     /// Why the first one failed that did.
     failed: Option<StepError>,
 }
@@ -126,13 +131,18 @@ pub(crate) fn in_arcs<S: Kinked>(
     let (mut now, mut kicks) = (t, kicks.to_vec());
     let (mut begins_at_root, mut short) = (false, 0);
     let (mut effort, mut crossings) = (Effort::default(), 0);
-    while effort.trials < MAX_WORK {
+    // The functions that have changed their signs.
+    let mut seen: Vec<usize> = Vec::new();
+    while effort.trials < MAX_WORK + WORK_OF_ONE * seen.len() {
         // Friction ends with a velocity of zero, relative to which all increments are large.
         stepper.trust(begins_at_root);
         let (from, kicked) = ((now, begins_at_root), &kicks);
         let arc = arc(stepper, from, (end, h), state, kicked, &mut effort)?;
         let (Arc::Smooth { length } | Arc::Crossing { length, .. }) = arc;
-        short += u32::from(length.abs() < SHORTEST * h.abs());
+        match arc {
+            Arc::Crossing { switch, .. } if !seen.contains(&switch) => seen.push(switch),
+            _ => short += u32::from(length.abs() < SHORTEST * h.abs()),
+        }
         if short > MAX_SHORT {
             return Err(StepError::Slides);
         }
@@ -172,7 +182,7 @@ pub(crate) fn in_arcs<S: Kinked>(
             };
         }
     }
-    Err(StepError::Slides)
+    Err(StepError::TooManyKinks)
 }
 
 /// Whether something acts after a time.

@@ -42,6 +42,8 @@ pub(super) fn first_crossing(
     let passed = (16.0 * resolution / part).max(ROUNDING);
     let count = rows.iter().map(Vec::len).min()?;
     let mut first: Option<Crossing> = None;
+    // All functions at the first root.
+    let mut there = Vec::new();
     for switch in 0..count {
         let column: Vec<f64> = rows.iter().map(|row| row[switch]).collect();
         let mut value = |tau: f64| {
@@ -52,12 +54,18 @@ pub(super) fn first_crossing(
         let Some((side, bracket)) = bracket(&times, &column, passed, &mut value) else {
             continue;
         };
-        if first.is_some_and(|first| first.tau <= bracket.start) {
+        let is_later = |first: Crossing| {
+            let on_side = there.get(switch).is_some_and(|value| side * value > 0.0);
+            first.tau <= bracket.start || first.tau < bracket.end && on_side
+        };
+        if first.is_some_and(is_later) {
             continue;
         }
         let tau = root(bracket, side, resolution, &mut value);
         if first.is_none_or(|first| tau < first.tau) {
             first = Some(Crossing { switch, tau });
+            there.clear();
+            values(tau, &mut there);
         }
     }
     first

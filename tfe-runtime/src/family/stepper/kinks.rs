@@ -98,8 +98,10 @@ impl<M: Model> Kinked for Stepper<'_, M> {
             force: &mut force,
         };
         self.model.first(Watched::new(t, &log), &q, &z, first);
+        let results = by_z.iter().chain(&by_q).chain(&force);
+        let origins = results.map(|one| one.origin()).collect();
         drop((q, z, by_z, by_q, force));
-        *values = log.into_inner();
+        *values = log.decisive(origins);
     }
 
     fn points(&self) -> (usize, bool) {
