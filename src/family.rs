@@ -37,8 +37,8 @@
 pub use crate::evaluate::Evaluate;
 pub use crate::length::{Declared, FixedLength, RunTimeLength};
 pub use tfe_runtime::family::{
-    Block, Entries, FamilyState, Gradient, Model, ModelError, Pattern, STRIDE, Stepper, Suspended,
-    Sweep, constraint_residual, energy, momenta, state, velocity,
+    Block, Controlled, Entries, FamilyState, Gradient, Model, ModelError, Pattern, STRIDE, Stepper,
+    Suspended, Sweep, constraint_residual, energy, momenta, state, velocity,
 };
 
 /// [`Simulation`](crate::Simulation) of a model of run-time length.
@@ -57,5 +57,9 @@ pub type Loss<'l> = crate::sensitivity::Loss<'l, 0, RunTimeLength>;
 pub type LossGradient = crate::sensitivity::LossGradient<0, RunTimeLength>;
 /// [`Steps`](crate::Steps) of a model of run-time length.
 pub type Steps<'m, M> = crate::Steps<'m, M, 0, RunTimeLength>;
+/// [`Driven`](crate::Driven), a model of run-time length with its inputs.
+pub type Driven<'m, M> = crate::Driven<'m, M, RunTimeLength>;
+/// [`Held`](crate::Held), a loop of control of a model of run-time length.
+pub type Held<'m, M> = crate::Held<'m, M, 0, RunTimeLength>;
 /// [`Checkpoint`](crate::Checkpoint) of a model of run-time length.
 pub type Checkpoint = crate::Checkpoint<0, RunTimeLength>;

@@ -265,7 +265,7 @@ fn what_is_wrong_with_inputs_is_told() {
     let model = chain(3);
     let start = || chain(3).state([0.0; 3], [0.0; 3]);
     let run = || Simulation::new(&model).step(0.1);
-    let kind = |run: family::Simulation<'_, Driven<'_, Chain, family::RunTimeLength>>| {
+    let kind = |run: family::Simulation<'_, family::Driven<'_, Chain>>| {
         run.run(start(), 0.0..2.0).err().map(|error| {
             let last = error.partial().last().t;
             (error.kind().clone(), last)
