@@ -93,8 +93,8 @@ pub(crate) fn switches<M, const N: usize>(
         &mut first,
     );
     let results = first.z.iter().chain(&first.q).chain(&first.force);
-    let origins = results.map(|one| one.origin()).collect();
-    *values = log.decisive(origins);
+    let origin = log.deciding(results);
+    *values = log.decisive(origin);
 }
 
 /// What all arcs of a step have cost.

@@ -42,33 +42,44 @@ pub(super) fn first_crossing(
     let passed = (16.0 * resolution / part).max(ROUNDING);
     let count = rows.iter().map(Vec::len).min()?;
     let mut first: Option<Crossing> = None;
-    // All functions at the first root.
+    // All functions at the first root, once they are asked for.
     let mut there = Vec::new();
     for switch in 0..count {
         let column: Vec<f64> = rows.iter().map(|row| row[switch]).collect();
-        let mut value = |tau: f64| {
-            let mut row = Vec::new();
-            values(tau, &mut row);
-            row.get(switch).copied().unwrap_or(f64::NAN)
-        };
-        let Some((side, bracket)) = bracket(&times, &column, passed, &mut value) else {
+        let found = bracket(&times, &column, passed, &mut |tau| {
+            value(values, switch, tau)
+        });
+        let Some((side, bracket)) = found else {
             continue;
         };
-        let is_later = |first: Crossing| {
+        if let Some(first) = first {
+            if first.tau <= bracket.start {
+                continue;
+            }
+            if there.is_empty() {
+                values(first.tau, &mut there);
+            }
             let on_side = there.get(switch).is_some_and(|value| side * value > 0.0);
-            first.tau <= bracket.start || first.tau < bracket.end && on_side
-        };
-        if first.is_some_and(is_later) {
-            continue;
+            if first.tau < bracket.end && on_side {
+                continue;
+            }
         }
-        let tau = root(bracket, side, resolution, &mut value);
+        let tau = root(bracket, side, resolution, &mut |tau| {
+            value(values, switch, tau)
+        });
         if first.is_none_or(|first| tau < first.tau) {
             first = Some(Crossing { switch, tau });
             there.clear();
-            values(tau, &mut there);
         }
     }
     first
+}
+
+/// One of the functions.
+fn value(values: &mut dyn FnMut(f64, &mut Vec<f64>), switch: usize, tau: f64) -> f64 {
+    let mut row = Vec::new();
+    values(tau, &mut row);
+    row.get(switch).copied().unwrap_or(f64::NAN)
 }
 
 /// Whether any of the functions is zero at the start, to what it does within the resolution, and not soon after.

@@ -14,7 +14,7 @@ pub(crate) struct Log(RefCell<Notes>);
 struct Notes {
     /// Of the switching functions.
     values: Vec<f64>,
-    /// What has decided numbers; an [`Origin`] is a place in it.
+    /// What has decided numbers, beyond the first switching functions.
     deciders: Vec<Decider>,
 }
 
@@ -22,11 +22,20 @@ struct Notes {
 enum Decider {
     /// The sign of a switching function.
     Switch(usize),
-    Both(Origin, Origin),
+    Both(usize, usize),
 }
 
-/// What has decided a number, if anything has.
-pub(crate) type Origin = Option<usize>;
+/// So many switching functions are a bit each.
+const EARLY: usize = 64;
+
+/// Which switching functions have decided a number.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Origin {
+    /// Of the first ones, a bit each.
+    early: u64,
+    /// A place among the deciders, for the others.
+    late: Option<usize>,
+}
 
 impl Log {
     /// An empty one, in memory that may be used.
@@ -38,41 +47,73 @@ impl Log {
         }))
     }
 
-    /// The values of all switching functions. Those that decide nothing of results of these origins are zero, which has no sign: the |x| in max(|x| − a, 0) near x = 0.
-    pub(crate) fn decisive(self, mut origins: Vec<Origin>) -> Vec<f64> {
-        let Notes { values, deciders } = self.0.into_inner();
-        let (mut known, mut decisive) = (vec![false; deciders.len()], vec![0.0; values.len()]);
-        while let Some(origin) = origins.pop() {
-            let Some(place) = origin else { continue };
+    /// What has decided any of some numbers.
+    pub(crate) fn deciding<'a>(&self, numbers: impl Iterator<Item = &'a Watched<'a>>) -> Origin {
+        numbers.fold(Origin::default(), |all, one| self.both(all, one.origin))
+    }
+
+    /// The values of all switching functions. Those that are not of an origin, and decide nothing of the results, are zero, which has no sign: the |x| in max(|x| − a, 0) near x = 0.
+    pub(crate) fn decisive(self, Origin { early, late }: Origin) -> Vec<f64> {
+        let Notes {
+            mut values,
+            deciders,
+        } = self.0.into_inner();
+        let mut known = vec![false; deciders.len()];
+        let mut places: Vec<usize> = late.into_iter().collect();
+        let mut decides = vec![false; values.len().saturating_sub(EARLY)];
+        while let Some(place) = places.pop() {
             if core::mem::replace(&mut known[place], true) {
                 continue;
             }
             match deciders[place] {
-                Decider::Switch(switch) => decisive[switch] = values[switch],
-                Decider::Both(one, other) => origins.extend([one, other]),
+                Decider::Switch(switch) => decides[switch - EARLY] = true,
+                Decider::Both(one, other) => places.extend([one, other]),
             }
         }
-        decisive
+        for (switch, value) in values.iter_mut().enumerate() {
+            let decides = match switch.checked_sub(EARLY) {
+                None => early >> switch & 1 == 1,
+                Some(late) => decides[late],
+            };
+            if !decides {
+                *value = 0.0;
+            }
+        }
+        values
     }
 
+    #[inline]
     fn note(&self, value: f64) -> Origin {
         let mut notes = self.0.borrow_mut();
         let switch = notes.values.len();
         notes.values.push(value);
+        if switch < EARLY {
+            return Origin {
+                early: 1 << switch,
+                late: None,
+            };
+        }
         notes.deciders.push(Decider::Switch(switch));
-        Some(notes.deciders.len() - 1)
+        Origin {
+            early: 0,
+            late: Some(notes.deciders.len() - 1),
+        }
     }
 
+    #[inline]
     fn both(&self, one: Origin, other: Origin) -> Origin {
-        if one.is_none() || one == other {
-            return other;
+        let late = match (one.late, other.late) {
+            (Some(a), Some(b)) if a != b => {
+                let mut notes = self.0.borrow_mut();
+                notes.deciders.push(Decider::Both(a, b));
+                Some(notes.deciders.len() - 1)
+            }
+            (a, b) => a.or(b),
+        };
+        Origin {
+            early: one.early | other.early,
+            late,
         }
-        if other.is_none() {
-            return one;
-        }
-        let mut notes = self.0.borrow_mut();
-        notes.deciders.push(Decider::Both(one, other));
-        Some(notes.deciders.len() - 1)
     }
 }
 
@@ -81,52 +122,52 @@ impl Log {
 pub(crate) struct Watched<'a> {
     value: f64,
     log: Option<&'a Log>,
-    /// Of the branch in which this is.
+    /// What has decided the branch in which this is.
     origin: Origin,
     /// Whether it is constant in that branch.
     is_fixed: bool,
 }
 
 impl<'a> Watched<'a> {
+    #[inline]
     pub(crate) fn new(value: f64, log: &'a Log) -> Self {
         Self {
             value,
             log: Some(log),
-            origin: None,
+            origin: Origin::default(),
             is_fixed: false,
         }
     }
 
     /// A constant.
+    #[inline]
     pub(crate) fn unwatched(value: f64) -> Self {
         Self {
             value,
             log: None,
-            origin: None,
+            origin: Origin::default(),
             is_fixed: true,
         }
     }
 
-    /// What has decided it.
-    pub(crate) fn origin(self) -> Origin {
-        self.origin
-    }
-
+    #[inline]
     fn of(self, value: f64) -> Self {
         Self { value, ..self }
     }
 
+    #[inline]
     fn with(self, other: Self, value: f64) -> Self {
         let log = self.log.or(other.log);
         Self {
             value,
             log,
-            origin: log.and_then(|log| log.both(self.origin, other.origin)),
+            origin: log.map_or_else(Origin::default, |log| log.both(self.origin, other.origin)),
             is_fixed: self.is_fixed && other.is_fixed,
         }
     }
 
     /// The same, which the sign of `value` has decided, too.
+    #[inline]
     fn decided_by(self, value: f64) -> Self {
         let Some(log) = self.log else { return self };
         Self {
@@ -136,6 +177,7 @@ impl<'a> Watched<'a> {
     }
 
     /// One of two, which the sign of their difference has decided.
+    #[inline]
     fn chosen(is_first: bool, first: Self, second: Self) -> Self {
         let chosen = if is_first { first } else { second };
         Self {
@@ -146,6 +188,7 @@ impl<'a> Watched<'a> {
     }
 
     /// Whether what it is a factor of vanishes.
+    #[inline]
     fn vanishes(self) -> bool {
         self.is_fixed && self.value == 0.0
     }
@@ -160,9 +203,10 @@ pub(crate) struct Choice<'a> {
 }
 
 impl<'a> Choice<'a> {
+    #[inline]
     fn by(holds: bool, a: Watched<'a>, b: Watched<'a>) -> Self {
         let plain = Watched {
-            origin: None,
+            origin: Origin::default(),
             ..a.with(b, 0.0)
         };
         Self {
@@ -176,6 +220,7 @@ macro_rules! operators {
     ($($trait:ident $method:ident $operator:tt;)*) => {
         $(impl $trait for Watched<'_> {
             type Output = Self;
+            #[inline]
             fn $method(self, other: Self) -> Self {
                 self.with(other, self.value $operator other.value)
             }
@@ -191,6 +236,7 @@ operators! {
 
 impl Mul for Watched<'_> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         let product = self.with(other, self.value * other.value);
         match [self, other].into_iter().find(|factor| factor.vanishes()) {
@@ -234,57 +280,71 @@ macro_rules! smooth {
 impl<'a> Real for Watched<'a> {
     type Mask = Choice<'a>;
 
+    #[inline]
     fn from_f64(value: f64) -> Self {
         Self::unwatched(value)
     }
 
     smooth!(sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp ln sqrt);
 
+    #[inline]
     fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
         self.of(function(self.value))
     }
+    #[inline]
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = Real::sin_cos(self.value);
         (self.of(sin), self.of(cos))
     }
+    #[inline]
     fn atan2(self, x: Self) -> Self {
         self.with(x, Real::atan2(self.value, x.value))
     }
+    #[inline]
     fn hypot(self, other: Self) -> Self {
         self.with(other, Real::hypot(self.value, other.value))
     }
+    #[inline]
     fn powi(self, exponent: i32) -> Self {
         self.of(Real::powi(self.value, exponent))
     }
+    #[inline]
     fn powf(self, exponent: Self) -> Self {
         self.with(exponent, Real::powf(self.value, exponent.value))
     }
+    #[inline]
     fn abs(self) -> Self {
         self.decided_by(self.value).of(Real::abs(self.value))
     }
+    #[inline]
     fn sign(self) -> Self {
         let decided = Self {
-            origin: None,
+            origin: Origin::default(),
             is_fixed: true,
             ..self
         };
         let sign = decided.of(Real::sign(self.value));
         sign.decided_by(self.value)
     }
+    #[inline]
     fn min(self, other: Self) -> Self {
         let chosen = Self::chosen(self.value < other.value, self, other);
         chosen.of(Real::min(self.value, other.value))
     }
+    #[inline]
     fn max(self, other: Self) -> Self {
         let chosen = Self::chosen(self.value > other.value, self, other);
         chosen.of(Real::max(self.value, other.value))
     }
+    #[inline]
     fn less(self, other: Self) -> Choice<'a> {
         Choice::by(self.value < other.value, self, other)
     }
+    #[inline]
     fn less_or_equal(self, other: Self) -> Choice<'a> {
         Choice::by(self.value <= other.value, self, other)
     }
+    #[inline]
     fn select(mask: Choice<'a>, then: Self, otherwise: Self) -> Self {
         let chosen = if mask.holds { then } else { otherwise };
         let decided = chosen.with(mask.decided, chosen.value);
@@ -304,8 +364,8 @@ mod tests {
     /// The switching functions of f at x.
     fn switches(x: f64, f: impl for<'a> Fn(Watched<'a>) -> Watched<'a>) -> Vec<f64> {
         let log = Log::new(Vec::new());
-        let origin = f(Watched::new(x, &log)).origin();
-        log.decisive(vec![origin])
+        let origin = f(Watched::new(x, &log)).origin;
+        log.decisive(origin)
     }
 
     fn number<'a>(value: f64) -> Watched<'a> {
@@ -325,6 +385,28 @@ mod tests {
         // A zero by chance is none that stays.
         assert_eq!(switches(0.0, |x| x.sign() * (x * x)), [0.0]);
         assert_eq!(switches(2.0, |x| (x - number(2.0)) * x.sign()), [2.0]);
+    }
+
+    #[test]
+    fn hundreds_of_functions_are_told_apart() {
+        let log = Log::new(Vec::new());
+        let numbers: Vec<Watched<'_>> = (0..200)
+            .map(|k| {
+                let gap = Watched::new(f64::from(k) / 100.0 - 0.995, &log).abs();
+                (gap - number(0.5)).max(number(0.0))
+            })
+            .collect();
+        let sum = numbers
+            .into_iter()
+            .reduce(|sum, one| sum + one)
+            .expect("some");
+        let origin = sum.origin;
+        let values = log.decisive(origin);
+        assert_eq!(values.len(), 400);
+        for (k, pair) in values.chunks(2).enumerate() {
+            let is_open = (50..150).contains(&k);
+            assert_eq!((pair[0] == 0.0, pair[1] == 0.0), (is_open, false), "{k}");
+        }
     }
 
     #[test]

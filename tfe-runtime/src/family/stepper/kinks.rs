@@ -99,9 +99,9 @@ impl<M: Model> Kinked for Stepper<'_, M> {
         };
         self.model.first(Watched::new(t, &log), &q, &z, first);
         let results = by_z.iter().chain(&by_q).chain(&force);
-        let origins = results.map(|one| one.origin()).collect();
+        let origin = log.deciding(results);
         drop((q, z, by_z, by_q, force));
-        *values = log.decisive(origins);
+        *values = log.decisive(origin);
     }
 
     fn points(&self) -> (usize, bool) {
