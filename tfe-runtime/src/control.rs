@@ -15,6 +15,22 @@ pub enum Solve {
     Trusting,
 }
 
+impl Solve {
+    /// Whether steps that fail are cut.
+    pub(crate) fn cuts(self) -> bool {
+        matches!(self, Self::Auto | Self::Newton)
+    }
+
+    /// The same, which takes whatever an iteration converges to, if it is to choose.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn trusting(self, all: bool) -> Self {
+        match (self, all) {
+            (Self::Auto, true) => Self::Trusting,
+            (solve, _) => solve,
+        }
+    }
+}
+
 /// What the iterations are allowed, and what is asked of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Control {

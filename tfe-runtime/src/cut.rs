@@ -69,7 +69,7 @@ pub(crate) fn may_be_cut(error: &StepError, linear: bool, solve: Solve) -> bool 
             | StepError::NewtonStalled { .. }
             | StepError::Legendre(_)
     );
-    is_of_the_iteration && !linear && matches!(solve, Solve::Auto | Solve::Newton)
+    is_of_the_iteration && !linear && solve.cuts()
 }
 
 /// Moves `state` from t to t + h in two halves, and these in halves where they need it; false where the shortest pieces fail, too.

@@ -139,17 +139,6 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// A constant.
-    #[inline]
-    pub(crate) fn unwatched(value: f64) -> Self {
-        Self {
-            value,
-            log: None,
-            origin: Origin::default(),
-            is_fixed: true,
-        }
-    }
-
     #[inline]
     fn of(self, value: f64) -> Self {
         Self { value, ..self }
@@ -282,7 +271,12 @@ impl<'a> Real for Watched<'a> {
 
     #[inline]
     fn from_f64(value: f64) -> Self {
-        Self::unwatched(value)
+        Self {
+            value,
+            log: None,
+            origin: Origin::default(),
+            is_fixed: true,
+        }
     }
 
     smooth!(sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp ln sqrt);
@@ -369,7 +363,7 @@ mod tests {
     }
 
     fn number<'a>(value: f64) -> Watched<'a> {
-        Watched::unwatched(value)
+        Watched::from_f64(value)
     }
 
     #[test]

@@ -346,14 +346,11 @@ where
     }
 
     fn cuts(&self) -> bool {
-        matches!(self.solve, Solve::Auto | Solve::Newton)
+        self.solve.cuts()
     }
 
     fn trust(&mut self, all: bool) {
-        self.control.solve = match (self.solve, all) {
-            (Solve::Auto, true) => Solve::Trusting,
-            (solve, _) => solve,
-        };
+        self.control.solve = self.solve.trusting(all);
     }
 }
 

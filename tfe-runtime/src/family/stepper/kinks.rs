@@ -6,7 +6,7 @@ use crate::family::dense::DenseElement;
 use crate::family::model::{FamilyState, Gradient, Model};
 use crate::kinks::{Kinked, Log, Watched, in_arcs};
 use crate::model::Form;
-use crate::newton::Solve;
+use crate::real::Real as _;
 use crate::scheme::Tables as _;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -90,7 +90,7 @@ impl<M: Model> Kinked for Stepper<'_, M> {
             watched(&state.q),
             watched(velocity.as_ref().unwrap_or(&state.p)),
         );
-        let zeros = || vec![Watched::unwatched(0.0); self.length];
+        let zeros = || vec![Watched::from_f64(0.0); self.length];
         let (mut by_z, mut by_q, mut force) = (zeros(), zeros(), zeros());
         let first = Gradient {
             z: &mut by_z,
@@ -118,13 +118,10 @@ impl<M: Model> Kinked for Stepper<'_, M> {
     }
 
     fn cuts(&self) -> bool {
-        matches!(self.control.solve, Solve::Auto | Solve::Newton)
+        self.control.solve.cuts()
     }
 
     fn trust(&mut self, all: bool) {
-        self.way.control_mut().solve = match (self.control.solve, all) {
-            (Solve::Auto, true) => Solve::Trusting,
-            (solve, _) => solve,
-        };
+        self.way.control_mut().solve = self.control.solve.trusting(all);
     }
 }
