@@ -1,5 +1,6 @@
 //! Ensembles: the same run from many starts, or with many parameter sets.
 
+mod batch;
 mod doubts;
 mod ends;
 mod error;

@@ -165,11 +165,6 @@ pub enum RunErrorKind {
         /// The last node.
         time: f64,
     },
-    /// Events were to be looked for by something that cannot.
-    EventsUnsupported {
-        /// What was called.
-        call: &'static str,
-    },
     /// Steps were to be cut at kinks by something that cannot.
     KinksUnsupported {
         /// What was called.
@@ -200,12 +195,6 @@ pub enum RunErrorKind {
 }
 
 impl RunErrorKind {
-    /// Of a call that models of run-time length do not have.
-    pub(crate) fn run_time_length(call: &'static str) -> Self {
-        let of = "models of run-time length";
-        Self::Unsupported { call, of }
-    }
-
     /// Of an element that could not be solved: for a function of an input that was not finite within it, if there is one.
     pub(crate) fn of_element(
         failed_input: Option<InputFailure>,
@@ -365,10 +354,6 @@ impl fmt::Display for RunErrorKind {
             Self::Ended { time } => {
                 write!(f, "a step after t = {time} failed: the run has ended")
             }
-            Self::EventsUnsupported { call } => write!(
-                f,
-                "`{call}` does not look for events; runs from start to end do"
-            ),
             Self::KinksUnsupported { call } => write!(
                 f,
                 "`{call}` does not cut steps at kinks; runs from start to end do"

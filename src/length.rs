@@ -11,17 +11,17 @@ use tfe_runtime::{CoordinateName, State};
 ///
 /// A [`Motion<N>`](crate::Motion) is one of `FixedLength`; of a model of run-time length it is a `Motion<0, RunTimeLength>`, or
 /// [`family::Motion`](crate::family::Motion).
-pub trait Length<const N: usize>: Copy + Debug + PartialEq + 'static {
+pub trait Length<const N: usize>: Copy + Debug + PartialEq + Send + Sync + 'static {
     /// Coordinates, momenta or velocities.
-    type Vector: Clone + Debug + PartialEq + AsRef<[f64]>;
+    type Vector: Clone + Debug + PartialEq + AsRef<[f64]> + Send + Sync;
     /// A point of phase space.
-    type State: Clone + Debug + PartialEq;
+    type State: Clone + Debug + PartialEq + Send + Sync;
     /// The solution inside an element.
     type Polynomial: Polynomial<State = Self::State, Vector = Self::Vector>;
     /// What makes the steps.
     type Stepper<'m, M: 'm>;
     /// A stepper without its model.
-    type Suspended: Clone + Debug;
+    type Suspended: Clone + Debug + Send + Sync;
     /// A force that acts at one instant.
     type Impulse: Clone + Debug;
     /// The name of a constraint.

@@ -12,7 +12,7 @@ pub use checkpoint::Checkpoint;
 pub use event::Event;
 pub use warning::Warning;
 
-pub(crate) use checkpoint::Reached;
+pub(crate) use checkpoint::{LastCut, Reached, Seen};
 
 pub use arcs::{MotionArc, Setting};
 

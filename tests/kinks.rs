@@ -458,6 +458,12 @@ fn ensembles_are_cut_at_kinks() {
     }
     assert_eq!(ends.statistics().kinks, kinks);
     assert!(kinks > 40, "{kinks}");
+    // In parts, too.
+    let mut parts = cut.begin(&starts, 0.0).expect("starts");
+    let middle = parts.run_to(0.4).expect("runs");
+    let end = parts.run_to(1.0).expect("runs");
+    let both = middle.statistics().kinks + end.statistics().kinks;
+    assert_eq!((both, end.into_results()), (kinks, ends.into_results()));
     let across = ensemble.run(&starts, 0.0..1.0).expect("runs");
     assert_eq!(across.statistics().kinks, 0);
     // A motion that slides is the failure of its run.
@@ -475,15 +481,7 @@ fn ensembles_are_cut_at_kinks() {
 /// What cannot be cut there says so.
 #[test]
 fn what_cannot_be_cut_at_kinks_is_refused() {
-    let ensemble = Ensemble::new(&BOUNCE).step(0.02).at_kinks(true);
     let start = BOUNCE.state([0.1], [0.0]);
-    let Err(refused) = ensemble.begin(&[start], 0.0) else {
-        panic!("begun");
-    };
-    assert!(
-        refused.to_string().contains("`Ensemble::begin`"),
-        "{refused}"
-    );
     let run = Simulation::new(&BOUNCE).step(0.02).at_kinks(true);
     let refused = run.run_linearised(start, 0.0..1.0).expect_err("kinks");
     let kind = refused.kind();
@@ -495,8 +493,6 @@ fn what_cannot_be_cut_at_kinks_is_refused() {
     let smooth = Simulation::new(&SMOOTHED).step(0.02).at_kinks(true);
     let start = SMOOTHED.state([1.0], [0.0]);
     smooth.run_linearised(start, 0.0..1.0).expect("a run");
-    let smooth = Ensemble::new(&SMOOTHED).step(0.02).at_kinks(true);
-    smooth.begin(&[start], 0.0).expect("no kinks");
 }
 
 /// A structure at rest, whose sites begin to move one after the other: signs of what moves by powers of a small time are no kinks where gaps are open.

@@ -63,6 +63,12 @@ pub(super) struct Energy {
 }
 
 impl Energy {
+    /// Of what is no state.
+    pub(super) const UNKNOWN: Self = Self {
+        energy: f64::NAN,
+        kinetic: 0.0,
+    };
+
     /// Not a number where no velocity belongs to the momentum.
     pub(super) fn of<M, L, const N: usize>(model: &M, t: f64, state: &L::State) -> Self
     where

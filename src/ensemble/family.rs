@@ -11,7 +11,6 @@ use crate::length::RunTimeLength;
 use crate::motion::Node;
 use crate::progress::Progress;
 use crate::simulation::mesh::Mesh;
-use std::convert::Infallible;
 use std::ops::Range;
 use std::sync::Mutex;
 use tfe_runtime::Statistics;
@@ -95,13 +94,5 @@ where
                 statistics
             },
         ))
-    }
-
-    /// Refused: ensembles that go on where they have got to are those of models of fixed size.
-    ///
-    /// # Errors
-    /// [`RunErrorKind::Unsupported`], in any case. [`Simulation::resume`](crate::Simulation::resume) goes on with single runs.
-    pub fn begin(&self, _: &[FamilyState], _: f64) -> Result<Infallible, EnsembleError> {
-        Err(RunErrorKind::run_time_length("Ensemble::begin").into())
     }
 }

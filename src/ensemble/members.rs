@@ -7,7 +7,7 @@ use tfe_runtime::step::Control;
 use tfe_runtime::{Element, ElementError, Model, State};
 
 /// The models of an ensemble, of either kind of length.
-pub trait Models<'m, M>: Copy + Sync {
+pub trait Models<'m, M>: Copy + Sync + 'm {
     /// The model of one run.
     fn model(&self, index: usize) -> &'m M;
 
@@ -21,7 +21,7 @@ pub trait Models<'m, M>: Copy + Sync {
 /// Models of fixed size, whose runs may go side by side.
 pub trait Members<'m, M: Model<N>, const N: usize>: Models<'m, M> {
     /// What eight trajectories side by side compute with.
-    type Lanes: Trajectories<'m, M, N> + Send + Sync;
+    type Lanes: Trajectories<'m, M, N> + Send + Sync + 'm;
 
     /// Whether runs may go side by side, as far as the models are concerned.
     fn share_kernels(&self) -> bool;

@@ -21,6 +21,7 @@ pub(super) struct Plan<const N: usize> {
     pub(super) element: Element,
     pub(super) control: Control,
     pub(super) end: f64,
+    pub(super) step: f64,
     pub(super) mesh: Mesh<N>,
     /// Elements of the mesh that are behind.
     pub(super) done: usize,

@@ -279,6 +279,7 @@ where
             element: self.element,
             control: self.control,
             end: span.end,
+            step,
             mesh,
             done: 0,
         };

@@ -64,34 +64,47 @@ where
         M: Declared<N, Length = L>,
     {
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
-        let mut run = Simulation::new(model)
-            .element(self.element)
-            .step(step)
-            .record_every(usize::MAX)
-            .at_kinks(self.at_kinks)
-            .with_control(self.control);
-        for time in &self.breaks {
-            run = run.break_at(*time);
-        }
-        match run.watching(&self.events).run(start.clone(), span.clone()) {
+        let run = self.simulation(model, step);
+        match run.run(start.clone(), span.clone()) {
             Ok(motion) => (Ok(motion.last().clone()), *motion.statistics()),
             Err(error) => (Err(error.kind().clone()), *error.partial().statistics()),
         }
     }
 
-    /// How many runs that came to their ends are doubtful: of one, none where events may have changed the energy.
+    /// A run with the settings of the ensemble.
+    pub(super) fn simulation(&self, model: &'m M, step: f64) -> Simulation<'m, M, N, L>
+    where
+        M: Declared<N, Length = L>,
+    {
+        let run = Simulation::new(model)
+            .element(self.element)
+            .step(step)
+            .record_every(usize::MAX)
+            .at_kinks(self.at_kinks)
+            .with_control(self.control)
+            .watching(&self.events);
+        let breaks = self.breaks.iter();
+        breaks.fold(run, |run, time| run.break_at(*time))
+    }
+
+    /// How many runs that came to their ends are doubtful: of one.
     pub(super) fn doubts(
         &self,
         model: &M,
         (from, start): (f64, &L::State),
         result: &Result<Node<N, L>, RunErrorKind>,
     ) -> WarningCounts {
-        match result {
-            Ok(node) if self.events.is_empty() => {
-                let (before, after) = (Energy::of(model, from, start), Energy::at(model, node));
-                WarningCounts::of(M::CONSERVES, before, after)
-            }
-            _ => WarningCounts::default(),
-        }
+        result.as_ref().map_or_else(
+            |_| WarningCounts::default(),
+            |node| {
+                let before = Energy::of(model, from, start);
+                WarningCounts::of(self.conserves(), before, Energy::at(model, node))
+            },
+        )
+    }
+
+    /// Whether energies should stay what they are, which events may change.
+    pub(super) fn conserves(&self) -> bool {
+        M::CONSERVES && self.events.is_empty()
     }
 }

@@ -12,6 +12,7 @@ pub struct Checkpoint<const N: usize, L: Length<N> = FixedLength> {
     pub(crate) state: L::State,
     pub(crate) velocity: L::Vector,
     pub(crate) stepper: L::Suspended,
+    pub(crate) seen: Seen,
 }
 
 impl<const N: usize, L: Length<N>> Checkpoint<N, L> {
@@ -35,4 +36,25 @@ pub(crate) struct Reached {
     /// How many elements were done.
     pub(crate) elements: usize,
     pub(crate) time: f64,
+}
+
+/// What is known of events where a run has got to.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Seen {
+    /// What is looked for.
+    pub(crate) names: Vec<String>,
+    /// Sides on which the values were seen last; 0 where this is not known.
+    pub(crate) sides: Vec<f64>,
+    pub(crate) last: Option<LastCut>,
+}
+
+/// An event that cut an element.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LastCut {
+    pub(crate) time: f64,
+    /// Among those that are looked for.
+    pub(crate) function: usize,
+    pub(crate) rises: bool,
+    /// Whether the motion went on as if nothing had happened.
+    pub(crate) is_idle: bool,
 }

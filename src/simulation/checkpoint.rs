@@ -114,7 +114,8 @@ where
             Ok(((mesh, done, origin), stepper)) => {
                 let node = Node::of(time, state, checkpoint.velocity.clone());
                 let motion = Motion::starting(&*self.model, node);
-                self.drive_on(motion, state, (&mesh, done, origin), stepper, None)
+                let place = (&mesh, done, origin, Some(&checkpoint.seen));
+                self.drive_on(motion, state, place, stepper, None)
             }
             Err(kind) => {
                 let motion = self.model.first_node((time, state), None);

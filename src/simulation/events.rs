@@ -13,6 +13,7 @@ use super::acting;
 use super::kind::{Chosen, Simulated};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length, Polynomial};
+use crate::motion::{LastCut, Seen};
 use act::{Act, After, Event, On};
 use clear::Clear;
 use remodel::Remodel;
@@ -64,17 +65,6 @@ pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> 
     /// Length of this step.
     step: f64,
     last: Option<LastCut>,
-}
-
-/// An event that cut an element.
-#[derive(Clone, Copy, Debug)]
-struct LastCut {
-    time: f64,
-    /// Among those that are looked for.
-    function: usize,
-    rises: bool,
-    /// Whether the motion went on as if nothing had happened.
-    is_idle: bool,
 }
 
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Events<'_, M, N, L> {
@@ -194,6 +184,27 @@ where
 
     pub(super) fn is_empty(&self) -> bool {
         self.watched.is_empty()
+    }
+
+    /// What the rest of a run depends on.
+    pub(super) fn seen(&self) -> Seen {
+        Seen {
+            names: self.names().map(str::to_owned).collect(),
+            sides: self.sides.clone(),
+            last: self.last,
+        }
+    }
+
+    /// Goes on with a run that has looked for the same.
+    pub(super) fn go_on(&mut self, seen: &Seen) {
+        if self.names().eq(seen.names.iter().map(String::as_str)) {
+            self.sides.clone_from(&seen.sides);
+            self.last = seen.last;
+        }
+    }
+
+    fn names(&self) -> impl Iterator<Item = &str> {
+        self.watched.iter().map(|watched| &*watched.on.name)
     }
 
     /// A new step of the run.

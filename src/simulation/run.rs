@@ -12,7 +12,7 @@ use super::steps::{Beginning, Steps};
 use super::times::Endless;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::Length;
-use crate::motion::{Checkpoint, Motion, Reached};
+use crate::motion::{Checkpoint, Motion, Reached, Seen};
 use std::ops::Range;
 
 impl<'m, M, const N: usize, L> Simulation<'m, M, N, L>
@@ -76,7 +76,7 @@ where
             Ok(prepared) => prepared,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
-        let place = (&mesh, 0, span.start);
+        let place = (&mesh, 0, span.start, None);
         self.drive_on(motion, &start, place, ready(stepper), follower)
     }
 
@@ -85,11 +85,12 @@ where
         &self,
         motion: Motion<N, L>,
         start: &L::State,
-        (mesh, done, origin): (&Mesh<N>, usize, f64),
+        (mesh, done, origin, seen): (&Mesh<N>, usize, f64, Option<&Seen>),
         mut stepper: L::Stepper<'m, M>,
         follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
-        let mut motion = self.drive_from(motion, start, (mesh, done), &mut stepper, follower)?;
+        let place = (mesh, done, seen);
+        let (mut motion, seen) = self.drive_from(motion, start, place, &mut stepper, follower)?;
         let last = motion.last();
         // A run that was stopped has no grid to go on with, and one whose parameters were set no model.
         if mesh.end().is_some_and(|end| end != last.t) || !motion.settings().is_empty() {
@@ -100,6 +101,7 @@ where
             state: last.state(),
             velocity: last.v.clone(),
             stepper: M::suspended(stepper),
+            seen,
         };
         motion.set_checkpoint(checkpoint);
         Ok(motion)
@@ -114,22 +116,26 @@ where
         follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
         let motion = self.model.first_node((t0, start), Some(stepper));
-        self.drive_from(motion, start, (mesh, 0), stepper, follower)
+        let (motion, _) = self.drive_from(motion, start, (mesh, 0, None), stepper, follower)?;
+        Ok(motion)
     }
 
-    /// The same from the only node of `motion`, after the elements that are done.
+    /// The same from the only node of `motion`, after the elements that are done and with what was seen there.
     fn drive_from(
         &self,
         motion: Motion<N, L>,
         start: &L::State,
-        (mesh, done): (&Mesh<N>, usize),
+        (mesh, done, seen): (&Mesh<N>, usize, Option<&Seen>),
         stepper: &mut L::Stepper<'m, M>,
         follower: Follower<'_, 'm, M, N, L>,
-    ) -> Result<Motion<N, L>, RunError<N, L>> {
+    ) -> Result<(Motion<N, L>, Seen), RunError<N, L>> {
         let mut pieces = match self.pieces(stepper) {
             Ok(pieces) => pieces,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
+        if let Some(seen) = seen {
+            pieces.events.go_on(seen);
+        }
         let mut recorder = Recorder::new(self, motion, follower);
         let mut state = start.clone();
         let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
@@ -176,9 +182,10 @@ where
         {
             failure.get_or_insert(kind);
         }
+        let seen = pieces.events.seen();
         motion.set_events(pieces.events.met);
         match failure {
-            None => Ok(motion),
+            None => Ok((motion, seen)),
             Some(kind) => Err(RunError::new(kind, motion)),
         }
     }

@@ -428,7 +428,32 @@ fn ensembles_meet_the_events_of_single_runs() {
             (motion.last().t, motion.last().state())
         );
     }
-    assert!(ensemble.begin(&starts, 0.0).is_err());
+    // In parts, too, to the bit.
+    let states = |ends: tfe::ensemble::Ends<1>| {
+        let states = ends.nodes().map(|node| (node.t, node.state()));
+        states.collect::<Vec<_>>()
+    };
+    let mut parts = ensemble.begin(&starts, 0.0).expect("starts");
+    let cut = 9.0 * 0.07; // on the grid
+    let middle = parts.run_to(cut).expect("runs");
+    let expected = ensemble.run(&starts, 0.0..cut).expect("runs");
+    assert_eq!(states(middle), states(expected));
+    let mut checkpoint = parts.clone();
+    for parts in [&mut parts, &mut checkpoint] {
+        let end = parts.run_to(1.5).expect("runs");
+        assert_eq!(states(end), states(ends.clone()));
+    }
+    // What has stopped stays where it did.
+    let stopped = ensemble.on("height", Crossing::Falling, |_| Act::Stop);
+    let mut parts = stopped.begin(&starts, 0.0).expect("starts");
+    let ends = stopped.run(&starts, 0.0..1.5).expect("runs");
+    for end in [5.0 * 0.07, 10.0 * 0.07, 1.5] {
+        let ends = ends.iter().flatten();
+        let reached = parts.run_to(end).expect("runs").into_results();
+        for (node, last) in reached.into_iter().flatten().zip(ends) {
+            assert_eq!((node.t, &node == last), (end.min(last.t), last.t <= end));
+        }
+    }
     // Some come to rest: failures of their own.
     let dull = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.5));
     let ends = Ensemble::new(&BALL)
@@ -437,4 +462,49 @@ fn ensembles_meet_the_events_of_single_runs() {
         .run(&starts, 0.0..1.5)
         .expect("runs");
     assert!(ends.failures().count() > 0 && ends.nodes().count() > 0);
+}
+
+/// One run is two halves of it, to the bit: nodes, and all events with their times; with impacts, with events that only are recorded, and with those that change nothing.
+#[test]
+fn halves_of_runs_with_events() {
+    fn halves<M: tfe::Model<N> + Sync, const N: usize>(
+        run: &Simulation<'_, M, N>,
+        start: State<N>,
+        h: f64,
+    ) {
+        let steps = 100;
+        let whole = run.run(start, 0.0..f64::from(steps) * h).expect("a run");
+        assert!(whole.events().len() > 4, "{}", whole.events().len());
+        for cut in 1..steps {
+            let time = f64::from(cut) * h;
+            let first = run.run(start, 0.0..time).expect("a run");
+            let checkpoint = first.checkpoint().expect("complete");
+            let second = run.resume(checkpoint, f64::from(steps) * h).expect("a run");
+            let number = whole.states().len() - second.states().len();
+            assert_eq!(
+                &whole.states()[number + 1..],
+                &second.states()[1..],
+                "{time}"
+            );
+            let both: Vec<_> = first.events().iter().chain(second.events()).collect();
+            assert!(both.into_iter().eq(whole.events()), "{time}");
+        }
+    }
+    let bounce = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.9));
+    let ball = Simulation::new(&BALL).on("height", Crossing::Falling, bounce);
+    halves(&ball.clone().step(0.07), BALL.state([2.0], [0.0]), 0.07);
+    let turns = ball.on("rate", Crossing::Either, |_| Act::Record);
+    halves(&turns.step(0.03), BALL.state([0.3], [0.0]), 0.03);
+    let links = TwoLinks { g: 9.81, w: 0.1 };
+    let hit = |event: &tfe::Occurrence<'_, 2>| Act::Restart(event.after_impact(0.98));
+    let wall = Simulation::new(&links).on("wall", Crossing::Falling, hit);
+    let start = links.state([-1.0, -0.5], [0.0, 0.0]);
+    halves(&wall.clone().step(0.1), start, 0.1);
+    halves(&wall.solver(Solve::Newton).step(0.1), start, 0.1);
+    let start = HenonHeiles.state([0.0, 0.1], [0.45, 0.0]);
+    for act in [Act::Record, Act::Impulse([0.0, 0.0])] {
+        let run =
+            Simulation::new(&HenonHeiles).on("section", Crossing::Either, move |_| act.clone());
+        halves(&run.step(0.4), start, 0.4);
+    }
 }

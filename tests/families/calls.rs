@@ -108,11 +108,19 @@ fn ensembles() {
     let ends = ends.expect("an ensemble");
     let failures: Vec<_> = ends.failures().map(|failure| failure.index).collect();
     assert_eq!(failures, [2]);
-    let error = ensemble.begin(&starts, 0.0).expect_err("refused");
-    assert_eq!(
-        error.to_string(),
-        "`Ensemble::begin` is not to be had of models of run-time length"
-    );
+    // In parts, to the bit; the same starts, and one that is none.
+    let many = Ensemble::of_models(&chains).step(0.1);
+    let mut parts = many.begin(&bad, 0.0).expect("starts");
+    for steps in [0.0, 7.0, 20.0, 23.5] {
+        let end = steps * 0.1; // on the grid, but for the last one
+        let mut checkpoint = parts.clone();
+        let reached = parts.run_to(end).expect("runs");
+        let again = checkpoint.run_to(end).expect("runs");
+        assert_eq!((parts.time(), &reached), (end, &again));
+        assert_eq!(reached.failures().count(), 1, "{end}");
+        let expected = many.run(&bad, 0.0..end).expect("runs");
+        assert_eq!(reached.into_results(), expected.into_results(), "{end}");
+    }
 }
 
 #[cfg(feature = "sparse")]

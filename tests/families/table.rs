@@ -252,9 +252,14 @@ macro_rules! calls {
             assert_eq!(ends.nodes().count(), 2);
             Ok(())
         });
-        call("`Ensemble::begin`", &|| {
+        call("`Ensemble::begin`, `EnsembleRun::run_to`", &|| {
             let ensemble = Ensemble::new(&model).step(0.1);
-            Ok(ensemble.begin(&[start()], 0.0).map(|_| ())?)
+            let ensemble = ensemble.on("hit", Crossing::Either, |_| Act::Record);
+            let mut parts = ensemble.begin(&[start()], 0.0)?;
+            let ends = ensemble.run(&[start()], span())?.into_results();
+            parts.run_to(span().end / 2.0)?;
+            assert_eq!(parts.run_to(span().end)?.into_results(), ends);
+            Ok(())
         });
         call("`PeriodicOrbit`", &|| {
             let orbit = PeriodicOrbit::of(&model)

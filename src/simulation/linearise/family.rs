@@ -88,6 +88,9 @@ pub(in crate::simulation) fn operator_failed(
             call,
             of: LONG_STEPS,
         },
-        _ => RunErrorKind::run_time_length(call),
+        _ => RunErrorKind::Unsupported {
+            call,
+            of: "models of run-time length",
+        },
     }
 }

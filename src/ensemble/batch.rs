@@ -1,0 +1,212 @@
+//! Trajectories of an ensemble that goes on: those that are moved by one processor at a time.
+
+use super::members::Members;
+use super::plan::{Failures, Plan, WIDTH, bad_starts};
+use super::setup::Ensemble;
+use crate::error::RunErrorKind;
+use crate::length::{Declared, FixedLength, Length};
+use crate::motion::{Checkpoint, Node};
+use crate::simulation::Simulated;
+use tfe_runtime::bundle::Bundle;
+use tfe_runtime::step::Stepper;
+use tfe_runtime::{Model, State, Statistics};
+
+/// How a run came to its end, or why it did not.
+pub(super) type Outcome<const N: usize, L> = Result<Node<N, L>, RunErrorKind>;
+
+/// Trajectories that are moved one after the other, or side by side.
+pub(super) trait Batch<'m, M, const N: usize, K, L: Length<N>>: Send + Sync {
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// Over the rest of the mesh: the runs from `first` on. What is `finished` has its number within the batch.
+    fn drive(
+        &mut self,
+        ensemble: &Ensemble<'m, M, N, K, L>,
+        plan: &Plan<N>,
+        first: usize,
+        finished: &dyn Fn(usize, Outcome<N, L>),
+    ) -> Statistics;
+
+    /// A clone.
+    fn copied(&self) -> AnyBatch<'m, M, N, K, L>;
+}
+
+pub(super) type AnyBatch<'m, M, const N: usize, K, L> = Box<dyn Batch<'m, M, N, K, L> + 'm>;
+
+/// A run as a [`Simulation`](crate::Simulation) makes it, in parts.
+pub(super) enum Resumed<const N: usize, L: Length<N>> {
+    /// Not begun.
+    At(f64, L::State),
+    Going(Box<Checkpoint<N, L>>),
+    /// By an event, or an error.
+    Ended(Box<Outcome<N, L>>),
+}
+
+impl<const N: usize, L: Length<N>> Clone for Resumed<N, L> {
+    fn clone(&self) -> Self {
+        match self {
+            Self::At(time, start) => Self::At(*time, start.clone()),
+            Self::Going(checkpoint) => Self::Going(checkpoint.clone()),
+            Self::Ended(outcome) => Self::Ended(outcome.clone()),
+        }
+    }
+}
+
+impl<'m, M, const N: usize, K, L> Batch<'m, M, N, K, L> for Resumed<N, L>
+where
+    M: Simulated<N, L> + Declared<N, Length = L>,
+    K: super::members::Models<'m, M>,
+    L: Length<N>,
+{
+    fn count(&self) -> usize {
+        1
+    }
+
+    fn drive(
+        &mut self,
+        ensemble: &Ensemble<'m, M, N, K, L>,
+        plan: &Plan<N>,
+        first: usize,
+        finished: &dyn Fn(usize, Outcome<N, L>),
+    ) -> Statistics {
+        let run = ensemble.simulation(ensemble.models.model(first), plan.step);
+        let motion = match self {
+            Self::At(time, start) => run.run(start.clone(), *time..plan.end),
+            Self::Going(checkpoint) => run.resume(checkpoint, plan.end),
+            Self::Ended(outcome) => {
+                finished(0, (**outcome).clone());
+                return Statistics::default();
+            }
+        };
+        let (outcome, statistics) = match &motion {
+            Ok(motion) => (Ok(motion.last().clone()), *motion.statistics()),
+            Err(error) => (Err(error.kind().clone()), *error.partial().statistics()),
+        };
+        let checkpoint = motion.as_ref().ok().and_then(|motion| motion.checkpoint());
+        *self = match checkpoint {
+            Some(checkpoint) if checkpoint.time() == plan.end => {
+                Self::Going(Box::new(checkpoint.clone()))
+            }
+            _ => Self::Ended(Box::new(outcome.clone())),
+        };
+        finished(0, outcome);
+        statistics
+    }
+
+    fn copied(&self) -> AnyBatch<'m, M, N, K, L> {
+        Box::new(self.clone())
+    }
+}
+
+/// Runs of a model of fixed size without events, each by steps of the mesh.
+pub(super) enum Stepped<'m, M, const N: usize, T> {
+    /// Not begun: the starts.
+    At(Vec<State<N>>),
+    Lanes(Box<Lanes<'m, M, N, T>>),
+    Alone(Box<(Stepper<'m, M, N>, State<N>)>),
+    Failed(RunErrorKind),
+}
+
+pub(super) struct Lanes<'m, M, const N: usize, T> {
+    bundle: Bundle<'m, M, N, WIDTH, T>,
+    failures: Failures,
+    count: usize,
+}
+
+impl<'m, M, const N: usize, K> Batch<'m, M, N, K, FixedLength> for Stepped<'m, M, N, K::Lanes>
+where
+    M: Model<N> + Sync,
+    K: Members<'m, M, N>,
+{
+    fn count(&self) -> usize {
+        match self {
+            Self::At(starts) => starts.len(),
+            Self::Lanes(lanes) => lanes.count,
+            Self::Alone(_) | Self::Failed(_) => 1,
+        }
+    }
+
+    fn drive(
+        &mut self,
+        ensemble: &Ensemble<'m, M, N, K>,
+        plan: &Plan<N>,
+        first: usize,
+        finished: &dyn Fn(usize, Outcome<N, FixedLength>),
+    ) -> Statistics {
+        if let Self::At(starts) = self {
+            *self = Self::begin(ensemble, plan, first, starts);
+        }
+        match self {
+            // Made above.
+            Self::At(_) => Statistics::default(),
+            Self::Lanes(lanes) => {
+                let Lanes {
+                    bundle,
+                    failures,
+                    count,
+                } = &mut **lanes;
+                plan.drive_together(bundle, *count, failures, finished)
+            }
+            Self::Alone(one) => {
+                let (stepper, state) = &mut **one;
+                let outcome = plan.drive_alone(stepper, state);
+                let statistics = stepper.take_statistics();
+                finished(0, outcome.clone());
+                if let Err(kind) = outcome {
+                    *self = Self::Failed(kind);
+                }
+                statistics
+            }
+            Self::Failed(kind) => {
+                finished(0, Err(kind.clone()));
+                Statistics::default()
+            }
+        }
+    }
+
+    fn copied(&self) -> AnyBatch<'m, M, N, K, FixedLength> {
+        Box::new(match self {
+            Self::At(starts) => Self::At(starts.clone()),
+            Self::Lanes(lanes) => Self::Lanes(Box::new(Lanes {
+                bundle: lanes.bundle.clone(),
+                failures: lanes.failures.clone(),
+                count: lanes.count,
+            })),
+            Self::Alone(one) => Self::Alone(Box::new((one.0.clone(), one.1))),
+            Self::Failed(kind) => Self::Failed(kind.clone()),
+        })
+    }
+}
+
+impl<'m, M: Model<N> + Sync, const N: usize, T> Stepped<'m, M, N, T> {
+    /// The runs from `first` on, as many as there are starts.
+    fn begin<K: Members<'m, M, N, Lanes = T>>(
+        ensemble: &Ensemble<'m, M, N, K>,
+        plan: &Plan<N>,
+        first: usize,
+        starts: &[State<N>],
+    ) -> Self {
+        let models = &ensemble.models;
+        if ensemble.width() == WIDTH {
+            return match models.bundle(plan.element, plan.control) {
+                Ok(mut bundle) => {
+                    models.place(&mut bundle, first, starts);
+                    Self::Lanes(Box::new(Lanes {
+                        bundle,
+                        failures: bad_starts(starts),
+                        count: starts.len(),
+                    }))
+                }
+                Err(error) => Self::Failed(RunErrorKind::Element(error)),
+            };
+        }
+        let Some(&start) = starts.first() else {
+            return Self::At(Vec::new());
+        };
+        match plan.stepper(models.model(first), &start) {
+            Ok(stepper) => Self::Alone(Box::new((stepper, start))),
+            Err(kind) => Self::Failed(kind),
+        }
+    }
+}
