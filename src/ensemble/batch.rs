@@ -3,6 +3,7 @@
 use super::members::Members;
 use super::plan::{Failures, Plan, WIDTH, bad_starts};
 use super::setup::Ensemble;
+use super::watched::outcome;
 use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::{Checkpoint, Node};
@@ -70,7 +71,8 @@ where
         first: usize,
         finished: &dyn Fn(usize, Outcome<N, L>),
     ) -> Statistics {
-        let run = ensemble.simulation(ensemble.models.model(first), plan.step);
+        let model = ensemble.models.model(first);
+        let run = ensemble.simulation(model, plan.step);
         let motion = match self {
             Self::At(time, start) => run.run(start.clone(), *time..plan.end),
             Self::Going(checkpoint) => run.resume(checkpoint, plan.end),
@@ -79,16 +81,18 @@ where
                 return Statistics::default();
             }
         };
-        let (outcome, statistics) = match &motion {
-            Ok(motion) => (Ok(motion.last().clone()), *motion.statistics()),
-            Err(error) => (Err(error.kind().clone()), *error.partial().statistics()),
-        };
-        let checkpoint = motion.as_ref().ok().and_then(|motion| motion.checkpoint());
-        *self = match checkpoint {
-            Some(checkpoint) if checkpoint.time() == plan.end => {
-                Self::Going(Box::new(checkpoint.clone()))
-            }
-            _ => Self::Ended(Box::new(outcome.clone())),
+        let (outcome, statistics) = outcome(model, &motion);
+        *self = match &motion {
+            Ok(motion) => match motion.checkpoint() {
+                Some(checkpoint) => Self::Going(Box::new(checkpoint.clone())),
+                // At an event.
+                None if motion.last().t != plan.end => Self::Ended(Box::new(outcome.clone())),
+                None => Self::Ended(Box::new(Err(RunErrorKind::Unsupported {
+                    call: "EnsembleRun::run_to",
+                    of: "runs whose events have set parameters",
+                }))),
+            },
+            Err(_) => Self::Ended(Box::new(outcome.clone())),
         };
         finished(0, outcome);
         statistics

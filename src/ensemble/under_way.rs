@@ -207,7 +207,8 @@ where
         self.reached.time
     }
 
-    /// Runs all trajectories on to the time `end`. What has failed stays so, and what an event has stopped stays at that event.
+    /// Runs all trajectories on to the time `end`. What has failed stays so, and what an event has stopped stays at that event. A run whose events have [set](crate::Act::Set) parameters
+    /// does not go on from there: its next result is [`RunErrorKind::Unsupported`].
     ///
     /// Where that time lies on the grid of steps from the first start, and the last one did, the results are to the last bit those of one run; else the grid begins anew where the
     /// ensemble is. Without a step of one's own it is a thousandth of the first span.

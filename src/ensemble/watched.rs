@@ -1,10 +1,12 @@
 //! Ensembles whose runs look for events, or are cut at kinks.
 
+use super::batch::Outcome;
 use super::doubts::{Energy, WarningCounts};
 use super::setup::Ensemble;
-use crate::error::RunErrorKind;
+use crate::error::{RunError, RunErrorKind};
+use crate::evaluate::Evaluate;
 use crate::length::{Declared, Length};
-use crate::motion::Node;
+use crate::motion::{Motion, Node};
 use crate::simulation::{Act, Crossing, Occurrence, Settable, Simulated, Simulation};
 use std::ops::Range;
 use tfe_runtime::Statistics;
@@ -59,16 +61,13 @@ where
         model: &'m M,
         start: &L::State,
         span: &Range<f64>,
-    ) -> (Result<Node<N, L>, RunErrorKind>, Statistics)
+    ) -> (Outcome<N, L>, Statistics)
     where
         M: Declared<N, Length = L>,
     {
         let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
         let run = self.simulation(model, step);
-        match run.run(start.clone(), span.clone()) {
-            Ok(motion) => (Ok(motion.last().clone()), *motion.statistics()),
-            Err(error) => (Err(error.kind().clone()), *error.partial().statistics()),
-        }
+        outcome(model, &run.run(start.clone(), span.clone()))
     }
 
     /// A run with the settings of the ensemble.
@@ -107,4 +106,32 @@ where
     pub(super) fn conserves(&self) -> bool {
         M::CONSERVES && self.events.is_empty()
     }
+}
+
+/// How a run came to its end, and what it has cost. The velocity there is looked for from rest, as trajectories side by side look for theirs, and not from another node: the same bits in
+/// whatever parts a run is made.
+pub(super) fn outcome<M, const N: usize, L>(
+    model: &M,
+    run: &Result<Motion<N, L>, RunError<N, L>>,
+) -> (Outcome<N, L>, Statistics)
+where
+    M: Evaluate<N, L>,
+    L: Length<N>,
+{
+    let motion = match run {
+        Ok(motion) => motion,
+        Err(error) => return (Err(error.kind().clone()), *error.partial().statistics()),
+    };
+    let last = motion.last();
+    let from_rest = || Node::new(model, last.t, &last.state(), &L::zero(&last.q));
+    // Parameters that events have set are not those of the model.
+    let is_unchanged = motion.settings().is_empty();
+    let node = is_unchanged.then(from_rest).filter(|node| {
+        let mut velocity = node.v.as_ref().iter();
+        velocity.all(|v| v.is_finite())
+    });
+    (
+        Ok(node.unwrap_or_else(|| last.clone())),
+        *motion.statistics(),
+    )
 }

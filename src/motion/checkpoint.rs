@@ -48,6 +48,24 @@ pub(crate) struct Seen {
     pub(crate) last: Option<LastCut>,
 }
 
+impl Seen {
+    /// Nothing yet.
+    pub(crate) fn nothing(names: Vec<String>) -> Self {
+        Self {
+            sides: vec![0.0; names.len()],
+            names,
+            last: None,
+        }
+    }
+
+    /// Goes on with a run that has looked for the same.
+    pub(crate) fn go_on(&mut self, seen: &Self) {
+        if self.names == seen.names {
+            self.clone_from(seen);
+        }
+    }
+}
+
 /// An event that cut an element.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LastCut {

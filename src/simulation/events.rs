@@ -49,8 +49,7 @@ pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> 
     look: Look<'m, M, N, L>,
     keep_off: KeepOff<'m, M, N, L>,
     watched: Vec<Watched<'m, N, L>>,
-    /// Sides on which the values were seen last; 0 where this is not known.
-    sides: Vec<f64>,
+    pub(super) seen: Seen,
     /// Of the steps that look for the times of events, as of those of the run.
     chosen: Chosen,
     rooms: Rooms,
@@ -64,7 +63,6 @@ pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> 
     cuts: u32,
     /// Length of this step.
     step: f64,
-    last: Option<LastCut>,
 }
 
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Events<'_, M, N, L> {
@@ -186,27 +184,6 @@ where
         self.watched.is_empty()
     }
 
-    /// What the rest of a run depends on.
-    pub(super) fn seen(&self) -> Seen {
-        Seen {
-            names: self.names().map(str::to_owned).collect(),
-            sides: self.sides.clone(),
-            last: self.last,
-        }
-    }
-
-    /// Goes on with a run that has looked for the same.
-    pub(super) fn go_on(&mut self, seen: &Seen) {
-        if self.names().eq(seen.names.iter().map(String::as_str)) {
-            self.sides.clone_from(&seen.sides);
-            self.last = seen.last;
-        }
-    }
-
-    fn names(&self) -> impl Iterator<Item = &str> {
-        self.watched.iter().map(|watched| &*watched.on.name)
-    }
-
     /// A new step of the run.
     pub(super) fn begin(&mut self, step: f64) {
         (self.cuts, self.step) = (0, step);
@@ -224,7 +201,7 @@ where
     fn keep_off(&mut self, stepper: &mut L::Stepper<'m, M>, element: (f64, f64)) -> bool {
         let within = |bounds: &[(f64, f64)]| M::reaches_within(stepper, bounds);
         (self.clear.holds(element, within) || self.look_about(stepper, element))
-            && self.clear.agree(&mut self.sides)
+            && self.clear.agree(&mut self.seen.sides)
     }
 
     #[cold]
@@ -288,8 +265,13 @@ where
         };
         let mut course = |function, part| self.course(dense, function, part);
         let resolution_of_tau = resolution / h.abs();
-        let (found, sides) =
-            search::crossings(&self.sides, samples, resolution_of_tau, &value, &mut course);
+        let (found, sides) = search::crossings(
+            &self.seen.sides,
+            samples,
+            resolution_of_tau,
+            &value,
+            &mut course,
+        );
         for (number, root) in found.iter().enumerate() {
             let on = &self.watched[root.function].on;
             if !on.crossing.counts(root.rises) {
@@ -335,7 +317,7 @@ where
             let returns = after.is_some() && self.comes_soon(root, time).is_some();
             let is_idle =
                 |after: &After<'m, M, N, L>| after.model.is_none() && after.state == met.state;
-            self.last = Some(LastCut {
+            self.seen.last = Some(LastCut {
                 time,
                 function: root.function,
                 rises: root.rises,
@@ -353,7 +335,7 @@ where
                 place,
             }));
         }
-        self.sides = sides;
+        self.seen.sides = sides;
         Ok(None)
     }
 
@@ -368,7 +350,7 @@ where
         let soon = Self::SOON * self.step.abs();
         let is_soon =
             |last: &LastCut| last.function == root.function && (time - last.time).abs() < soon;
-        self.last.filter(is_soon)
+        self.seen.last.filter(is_soon)
     }
 
     /// A cut, with all that derivatives need.
@@ -412,13 +394,13 @@ where
 
     /// After a jump of the state outputs are on new sides, but for those that are to cross at the same time.
     fn forget_sides(&mut self, found: &[search::Root], tau: f64, resolution: f64) {
-        let mut sides = vec![0.0; self.sides.len()];
+        let mut sides = vec![0.0; self.seen.sides.len()];
         for root in &found[1..] {
             if root.tau - tau <= 16.0 * resolution && root.function != found[0].function {
                 sides[root.function] = if root.rises { -1.0 } else { 1.0 };
             }
         }
-        self.sides = sides;
+        self.seen.sides = sides;
     }
 
     /// Whether anything that is watched is a function of velocities; those of a Hamiltonian are of momenta.
@@ -460,7 +442,7 @@ where
         for piece in dense.pieces() {
             let mut values = self.rooms.bounds.borrow_mut();
             self.model.outputs_along(piece, &mut values);
-            for (watched, known) in self.watched.iter().zip(&mut self.sides) {
+            for (watched, known) in self.watched.iter().zip(&mut self.seen.sides) {
                 let Value::Column(column) = watched.value else {
                     return false;
                 };

@@ -134,7 +134,7 @@ where
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
         if let Some(seen) = seen {
-            pieces.events.go_on(seen);
+            pieces.events.seen.go_on(seen);
         }
         let mut recorder = Recorder::new(self, motion, follower);
         let mut state = start.clone();
@@ -182,10 +182,9 @@ where
         {
             failure.get_or_insert(kind);
         }
-        let seen = pieces.events.seen();
         motion.set_events(pieces.events.met);
         match failure {
-            None => Ok((motion, seen)),
+            None => Ok((motion, pieces.events.seen)),
             Some(kind) => Err(RunError::new(kind, motion)),
         }
     }

@@ -508,3 +508,77 @@ fn halves_of_runs_with_events() {
         halves(&run.step(0.4), start, 0.4);
     }
 }
+
+/// A particle in a magnetic field, whose momenta are no multiples of velocities: its impacts are found to roundings of these momenta, in the run and at states nearby, from which matrices take their derivatives.
+#[test]
+fn impacts_with_momenta_of_a_field() {
+    #[dynamics(
+        coordinates(x, y),
+        lagrangian = m/2*(dot(x)^2 + dot(y)^2) + b*(x*dot(y) - y*dot(x)) - k*hypot(x - 1, y)^3,
+        event(line) = y - 0.1,
+    )]
+    struct Particle {
+        m: f64,
+        b: f64,
+        k: f64,
+    }
+    let mut impacts = 0;
+    for size in 0..40_i32 {
+        let field = 0.1 * 1.3_f64.powi(size % 20);
+        let particle = Particle {
+            m: 1.0,
+            b: if size < 20 { field } else { -field },
+            k: 0.4,
+        };
+        let start = particle.state([0.1, 0.4], [0.5, -0.2]);
+        let run = Simulation::new(&particle)
+            .element(Mixed::<6>)
+            .step(0.05)
+            .on("line", Crossing::Either, |event| {
+                Act::Restart(event.after_impact(0.8))
+            });
+        let matrices = run.run_linearised(start, 0.0..2.0);
+        let matrices = matrices.unwrap_or_else(|error| panic!("{field}: {error}"));
+        for pair in matrices.motion().states().windows(2) {
+            if pair[0].t == pair[1].t {
+                impacts += 1;
+                let [before, after] = [pair[0].v, pair[1].v];
+                let size = field.max(1.0);
+                assert!(
+                    (after[1] + 0.8 * before[1]).abs() < 1e-14 * size,
+                    "{field}: {pair:?}"
+                );
+                assert!(
+                    (after[0] - before[0]).abs() < 1e-14 * size,
+                    "{field}: {pair:?}"
+                );
+            }
+        }
+    }
+    assert!(impacts > 20, "{impacts}");
+}
+
+/// Runs whose events have set parameters have no model to go on with, and say so.
+#[test]
+fn parts_of_ensembles_whose_events_set_parameters() {
+    let springs = Springs { m: 1.0, k: 4.0 };
+    let starts = [[1.0], [0.0]].map(|v| springs.state([0.5], v));
+    let ensemble = Ensemble::new(&springs)
+        .step(0.1)
+        .on("middle", Crossing::Falling, |_| {
+            Act::Set(Settings::new("k", 1.0))
+        });
+    let mut parts = ensemble.begin(&starts, 0.0).expect("starts");
+    let whole = ensemble.run(&starts, 0.0..1.0).expect("runs");
+    // One passes the middle in the first part, the other in the second.
+    let first = parts.run_to(1.0).expect("runs");
+    assert_eq!(first.into_results(), whole.into_results());
+    let second = parts.run_to(2.0).expect("runs");
+    let failures: Vec<_> = second.failures().collect();
+    assert!(
+        failures.len() == 1 && matches!(failures[0].kind, RunErrorKind::Unsupported { .. }),
+        "{failures:?}"
+    );
+    let third = parts.run_to(3.0).expect("runs");
+    assert_eq!((third.nodes().count(), third.failures().count()), (0, 2));
+}

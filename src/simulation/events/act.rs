@@ -188,33 +188,42 @@ where
             self.model.allowed_velocity(*t, &state, v)
         };
         let aim = -restitution * rate(v);
-        // Linear in λ where the kinetic energy is quadratic: the second secant is then the last one that changes anything.
+        // Linear in λ where the kinetic energy is quadratic: the second secant is then the last one that changes anything but roundings.
         const MAX_SECANTS: u32 = 20;
-        let (mut before, mut lambda) = ((0.0, rate(v) - aim), f64::NAN);
         // Of the size that an energy ½ v·p has.
         let size = |values: &L::Vector| {
             let values = values.as_ref().iter();
             values.fold(0.0_f64, |m, x| m.max(x.abs()))
         };
-        let mut next = size(p).max(f64::MIN_POSITIVE.sqrt()) / size(&normal);
+        let first = size(p).max(f64::MIN_POSITIVE.sqrt()) / size(&normal);
+        let (mut before, mut next) = ((0.0, rate(v) - aim), first);
+        let (mut least, mut steepest) = (f64::INFINITY, 0.0_f64);
+        let mut after = None;
         for _ in 0..MAX_SECANTS {
             let Some(found) = velocity(next) else {
-                return unknown();
+                break;
             };
             let here = (next, rate(&found) - aim);
-            lambda = next;
-            let change = -here.1 * (here.0 - before.0) / (here.1 - before.1);
-            if here.1 == 0.0 || change.abs() <= 2.0 * f64::EPSILON * next.abs() {
+            if here.1.abs() < least {
+                (least, after) = (here.1.abs(), Some(found));
+            }
+            let slope = (here.1 - before.1) / (here.0 - before.0);
+            let change = -here.1 / slope;
+            // Roundings have no slope.
+            if here.1 == 0.0
+                || !change.is_finite()
+                || change.abs() <= 2.0 * f64::EPSILON * next.abs()
+            {
                 break;
             }
+            steepest = steepest.max(slope.abs());
             (before, next) = (here, next + change);
         }
-        let Some(after) = velocity(lambda) else {
+        // What roundings of the momenta leave.
+        let roundings = 16.0 * f64::EPSILON * steepest * first;
+        let Some(after) = after.filter(|_| least <= 1e-9 * rate(v).abs() + roundings) else {
             return unknown();
         };
-        if !((rate(&after) - aim).abs() <= 1e-9 * rate(v).abs()) {
-            return unknown();
-        }
         L::state(q.clone(), self.model.momenta(*t, q, &after))
     }
 

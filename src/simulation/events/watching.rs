@@ -7,6 +7,7 @@ use super::value::{Function, Value};
 use super::{Events, KeepOff, Look, Rooms, Watched};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
+use crate::motion::Seen;
 use crate::simulation::kind::{Chosen, Simulated};
 use std::fmt;
 use std::sync::Arc;
@@ -154,7 +155,7 @@ where
             remodel: watching.remodel,
             look: watching.look,
             keep_off: watching.keep_off,
-            sides: vec![0.0; watched.len()],
+            seen: Seen::nothing(watched.iter().map(|one| one.on.name.clone()).collect()),
             watched,
             chosen,
             clear: Clear::default(),
@@ -164,7 +165,6 @@ where
             recorded: Vec::new(),
             cuts: 0,
             step: 0.0,
-            last: None,
         })
     }
 }
