@@ -464,6 +464,16 @@ fn ensembles_are_cut_at_kinks() {
     let end = parts.run_to(1.0).expect("runs");
     let both = middle.statistics().kinks + end.statistics().kinks;
     assert_eq!((both, end.into_results()), (kinks, ends.into_results()));
+    // And back, off the grid; a time that is none changes nothing.
+    assert!(parts.run_to(f64::NAN).is_err());
+    let back = parts.run_to(-0.013).expect("runs back");
+    let ahead = parts.run_to(0.0).expect("runs");
+    assert_eq!((back.nodes().count(), ahead.nodes().count()), (20, 20));
+    for (start, node) in starts.iter().zip(ahead.nodes()) {
+        assert!((start.q[0] - node.q[0]).abs() < 1e-9, "{start:?} {node:?}");
+    }
+    let mut none = cut.begin(&[], 0.0).expect("no starts");
+    assert!(none.run_to(1.0).expect("nothing").is_empty());
     let across = ensemble.run(&starts, 0.0..1.0).expect("runs");
     assert_eq!(across.statistics().kinks, 0);
     // A motion that slides is the failure of its run.

@@ -192,7 +192,7 @@ impl fmt::Display for ModelError {
             Self::Element(error) => error.fmt(f),
             Self::ElementNotSupported { element } => write!(
                 f,
-                "`{element}` is not available for this model of run-time length; `Mixed` is, and so is any element where there are no constraints and the feature `sparse` is on"
+                "`{element}` is not available for this model of run-time length; take `Mixed`, or any element for a Lagrangian without constraints, given the feature `sparse`"
             ),
             Self::NoNewton => f.write_str(
                 "Newton's method for models of run-time length needs the feature `sparse`",
