@@ -60,7 +60,7 @@ impl Seen {
 
     /// Goes on with a run that has looked for the same.
     pub(crate) fn go_on(&mut self, seen: &Self) {
-        if self.names == seen.names {
+        if !self.names.is_empty() && self.names == seen.names {
             self.clone_from(seen);
         }
     }

@@ -89,8 +89,9 @@ where
         mut stepper: L::Stepper<'m, M>,
         follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
-        let place = (mesh, done, seen);
-        let (mut motion, seen) = self.drive_from(motion, start, place, &mut stepper, follower)?;
+        let mut seen = seen.cloned().unwrap_or_default();
+        let place = (mesh, done, &mut seen);
+        let mut motion = self.drive_from(motion, start, place, &mut stepper, follower)?;
         let last = motion.last();
         // A run that was stopped has no grid to go on with, and one whose parameters were set no model.
         if mesh.end().is_some_and(|end| end != last.t) || !motion.settings().is_empty() {
@@ -116,26 +117,24 @@ where
         follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
         let motion = self.model.first_node((t0, start), Some(stepper));
-        let (motion, _) = self.drive_from(motion, start, (mesh, 0, None), stepper, follower)?;
-        Ok(motion)
+        let place = (mesh, 0, &mut Seen::default());
+        self.drive_from(motion, start, place, stepper, follower)
     }
 
-    /// The same from the only node of `motion`, after the elements that are done and with what was seen there.
+    /// The same from the only node of `motion`, after the elements that are done. What was seen of events there becomes what is seen at the end.
     fn drive_from(
         &self,
         motion: Motion<N, L>,
         start: &L::State,
-        (mesh, done, seen): (&Mesh<N>, usize, Option<&Seen>),
+        (mesh, done, seen): (&Mesh<N>, usize, &mut Seen),
         stepper: &mut L::Stepper<'m, M>,
         follower: Follower<'_, 'm, M, N, L>,
-    ) -> Result<(Motion<N, L>, Seen), RunError<N, L>> {
+    ) -> Result<Motion<N, L>, RunError<N, L>> {
         let mut pieces = match self.pieces(stepper) {
             Ok(pieces) => pieces,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
-        if let Some(seen) = seen {
-            pieces.events.seen.go_on(seen);
-        }
+        pieces.events.seen.go_on(seen);
         let mut recorder = Recorder::new(self, motion, follower);
         let mut state = start.clone();
         let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
@@ -182,9 +181,10 @@ where
         {
             failure.get_or_insert(kind);
         }
+        *seen = pieces.events.seen;
         motion.set_events(pieces.events.met);
         match failure {
-            None => Ok((motion, pieces.events.seen)),
+            None => Ok(motion),
             Some(kind) => Err(RunError::new(kind, motion)),
         }
     }
