@@ -1,19 +1,17 @@
 //! Trajectories of an ensemble that goes on: those that are moved by one processor at a time.
 
-use super::members::Members;
+use super::ends::Outcome;
+use super::members::{Members, Models};
 use super::plan::{Failures, Plan, WIDTH, bad_starts};
 use super::setup::Ensemble;
 use super::watched::outcome;
 use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
-use crate::motion::{Checkpoint, Node};
+use crate::motion::Checkpoint;
 use crate::simulation::Simulated;
 use tfe_runtime::bundle::Bundle;
 use tfe_runtime::step::Stepper;
 use tfe_runtime::{Model, State, Statistics};
-
-/// How a run came to its end, or why it did not.
-pub(super) type Outcome<const N: usize, L> = Result<Node<N, L>, RunErrorKind>;
 
 /// Trajectories that are moved one after the other, or side by side.
 pub(super) trait Batch<'m, M, const N: usize, K, L: Length<N>>: Send + Sync {
@@ -57,7 +55,7 @@ impl<const N: usize, L: Length<N>> Clone for Resumed<N, L> {
 impl<'m, M, const N: usize, K, L> Batch<'m, M, N, K, L> for Resumed<N, L>
 where
     M: Simulated<N, L> + Declared<N, Length = L>,
-    K: super::members::Models<'m, M>,
+    K: Models<'m, M>,
     L: Length<N>,
 {
     fn count(&self) -> usize {

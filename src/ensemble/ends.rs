@@ -7,12 +7,15 @@ use crate::motion::Node;
 use std::ops::Index;
 use tfe_runtime::Statistics;
 
+/// How a run came to its end, or why it did not.
+pub(super) type Outcome<const N: usize, L> = Result<Node<N, L>, RunErrorKind>;
+
 /// The results of an [`Ensemble`](crate::Ensemble), in the order of its starts.
 ///
 /// `ends[k]` is the result of run k: the node at the end of the span, or why the run stopped before.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ends<const N: usize, L: Length<N> = FixedLength> {
-    results: Vec<Result<Node<N, L>, RunErrorKind>>,
+    results: Vec<Outcome<N, L>>,
     statistics: Statistics,
     warnings: WarningCounts,
 }

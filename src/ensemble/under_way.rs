@@ -1,8 +1,8 @@
 //! Ensembles that go on where they have got to.
 
-use super::batch::{AnyBatch, Outcome, Resumed, Stepped};
+use super::batch::{AnyBatch, Resumed, Stepped};
 use super::doubts::{Energy, WarningCounts};
-use super::ends::Ends;
+use super::ends::{Ends, Outcome};
 use super::error::EnsembleError;
 use super::members::{Members, Models, OneModel, some_starts};
 use super::plan::{Plan, WIDTH, start_of};

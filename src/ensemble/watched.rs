@@ -1,7 +1,7 @@
 //! Ensembles whose runs look for events, or are cut at kinks.
 
-use super::batch::Outcome;
 use super::doubts::{Energy, WarningCounts};
+use super::ends::Outcome;
 use super::setup::Ensemble;
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
