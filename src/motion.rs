@@ -278,8 +278,8 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.checkpoint = Some(Box::new(checkpoint));
     }
 
-    /// Where the run ended, with all that [`Simulation::resume`](crate::Simulation::resume) needs to go on as if it had never stopped; `None` where the run failed, or
-    /// was made of several ([`accuracy`](crate::Simulation::accuracy)).
+    /// Where the run ended, with all that [`Simulation::resume`](crate::Simulation::resume) needs to go on as if it had never stopped; `None` where the run failed, an event has ended it or set
+    /// parameters, or it was made of several ([`accuracy`](crate::Simulation::accuracy)).
     pub fn checkpoint(&self) -> Option<&Checkpoint<N, L>> {
         self.checkpoint.as_deref()
     }

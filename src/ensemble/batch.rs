@@ -83,8 +83,10 @@ where
         *self = match &motion {
             Ok(motion) => match motion.checkpoint() {
                 Some(checkpoint) => Self::Going(Box::new(checkpoint.clone())),
-                // At an event.
-                None if motion.last().t != plan.end => Self::Ended(Box::new(outcome.clone())),
+                // At an event, unless parameters were set.
+                None if motion.settings().is_empty() || motion.last().t != plan.end => {
+                    Self::Ended(Box::new(outcome.clone()))
+                }
                 None => Self::Ended(Box::new(Err(RunErrorKind::Unsupported {
                     call: "EnsembleRun::run_to",
                     of: "runs whose events have set parameters",

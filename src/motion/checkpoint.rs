@@ -46,6 +46,8 @@ pub(crate) struct Seen {
     /// Sides on which the values were seen last; 0 where this is not known.
     pub(crate) sides: Vec<f64>,
     pub(crate) last: Option<LastCut>,
+    /// Whether one has ended the run.
+    pub(crate) has_stopped: bool,
 }
 
 impl Seen {
@@ -55,6 +57,7 @@ impl Seen {
             sides: vec![0.0; names.len()],
             names,
             last: None,
+            has_stopped: false,
         }
     }
 

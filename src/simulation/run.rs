@@ -94,7 +94,7 @@ where
         let mut motion = self.drive_from(motion, start, place, &mut stepper, follower)?;
         let last = motion.last();
         // A run that was stopped has no grid to go on with, and one whose parameters were set no model.
-        if mesh.end().is_some_and(|end| end != last.t) || !motion.settings().is_empty() {
+        if seen.has_stopped || !motion.settings().is_empty() {
             return Ok(motion);
         }
         let checkpoint = Checkpoint {
@@ -166,7 +166,10 @@ where
             });
             match passed {
                 Ok(Left::Done) => {}
-                Ok(Left::Stopped) => break,
+                Ok(Left::Stopped) => {
+                    pieces.events.seen.has_stopped = true;
+                    break;
+                }
                 Err(broken) => {
                     recorder.fail(stepper, &*pieces.model, number, &broken);
                     failure = Some(broken.kind);

@@ -582,3 +582,33 @@ fn parts_of_ensembles_whose_events_set_parameters() {
     let third = parts.run_to(3.0).expect("runs");
     assert_eq!((third.nodes().count(), third.failures().count()), (0, 2));
 }
+
+/// What stops at the very end of a part does not go on in the next.
+#[test]
+fn parts_that_end_where_an_event_stops() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^4/4, event(alarm) = t - 0.3)]
+    struct Timed;
+    let start = Timed.state([1.0], [0.0]);
+    let stop = |_: &tfe::Occurrence<'_, 1>| Act::Stop;
+    let ensemble = Ensemble::new(&Timed)
+        .step(0.1)
+        .on("alarm", Crossing::Rising, stop);
+    let single = Simulation::new(&Timed)
+        .step(0.1)
+        .on("alarm", Crossing::Rising, stop);
+    let end = 3.0 * 0.1;
+    assert!(
+        single
+            .run(start, 0.0..end)
+            .expect("a run")
+            .checkpoint()
+            .is_none()
+    );
+    let whole = ensemble.run(&[start], 0.0..1.0).expect("runs");
+    let mut parts = ensemble.begin(&[start], 0.0).expect("starts");
+    assert_eq!(parts.run_to(0.1).expect("runs").nodes().count(), 1);
+    for end in [end, 0.7, 1.0] {
+        let ends = parts.run_to(end).expect("runs");
+        assert_eq!(ends.into_results(), whole.clone().into_results());
+    }
+}
