@@ -7,12 +7,35 @@ use tfe_runtime::Form;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::family::{Block, Entries, Gradient, Model};
 
-/// The second derivative by velocities.
-struct Mass(DMatrix<f64>);
+/// The second derivative by velocities, bordered by the rows of constraints.
+struct Mass {
+    matrix: DMatrix<f64>,
+    n: usize,
+}
 
 impl Entries<f64> for Mass {
-    fn add(&mut self, _: Block, row: usize, column: usize, value: f64) {
-        self.0[(row, column)] += value;
+    fn add(&mut self, block: Block, row: usize, column: usize, value: f64) {
+        if block == Block::Row {
+            self.matrix[(self.n + row, column)] += value;
+            self.matrix[(column, self.n + row)] += value;
+        } else {
+            self.matrix[(row, column)] += value;
+        }
+    }
+}
+
+/// A v and Aᵀη, with derivatives.
+struct Held<'a> {
+    v: &'a [f64],
+    eta: &'a [f64],
+    rates: Vec<Dual>,
+    reactions: Vec<Dual>,
+}
+
+impl Entries<Dual> for Held<'_> {
+    fn add(&mut self, _: Block, row: usize, column: usize, value: Dual) {
+        self.rates[row] += value * Dual::new(self.v[column], 0.0);
+        self.reactions[column] += value * Dual::new(self.eta[row], 0.0);
     }
 }
 
@@ -20,23 +43,53 @@ impl Entries<f64> for Mass {
 pub(crate) struct Along<'a, M> {
     model: &'a M,
     node: &'a Node<0, RunTimeLength>,
-    /// Factors of L_vv of a Lagrangian.
+    /// Factors of L_vv of a Lagrangian; where that is singular and there are constraints, of the matrix of (T-74).
     factors: Option<LU<f64, Dyn, Dyn>>,
+    /// The multipliers η that this matrix has for p = L_v + Aᵀη; nothing of L_vv alone.
+    eta: Option<Vec<f64>>,
 }
 
 impl<'a, M: Model> Along<'a, M> {
     pub(crate) fn new(model: &'a M, node: &'a Node<0, RunTimeLength>) -> Self {
-        let n = model.len();
-        let factors = (M::FORM == Form::Lagrangian).then(|| {
-            let mut mass = Mass(DMatrix::zeros(n, n));
-            model.mass(node.t, &node.q, &node.v, &mut mass);
-            mass.0.lu()
-        });
-        Self {
+        let mut along = Self {
             model,
             node,
-            factors,
+            factors: None,
+            eta: None,
+        };
+        if M::FORM == Form::Hamiltonian {
+            return along;
         }
+        let factors = along.factored(0);
+        let is_regular = factors.is_invertible() || model.constraints() == 0;
+        along.factors = Some(factors);
+        if !is_regular {
+            let n = model.len();
+            let factors = along.factored(model.constraints());
+            let still = |values: &[f64]| duals(values, &vec![0.0; n]);
+            let slope = along.first(Dual::new(node.t, 0.0), &still(&node.q), &still(&node.v));
+            let right = DVector::from_fn(n + model.constraints(), |a, _| {
+                let own = slope.get(a).zip(node.p.get(a));
+                own.map_or(0.0, |(slope, p)| p - slope.value)
+            });
+            let found = factors.solve(&right);
+            along.eta = found.map(|found| found.as_slice()[n..].to_vec());
+            along.factors = Some(factors);
+        }
+        along
+    }
+
+    /// Of L_vv with so many rows of constraints.
+    fn factored(&self, rows: usize) -> LU<f64, Dyn, Dyn> {
+        let (model, node) = (self.model, self.node);
+        let n = model.len();
+        let matrix = DMatrix::zeros(n + rows, n + rows);
+        let mut mass = Mass { matrix, n };
+        model.mass(node.t, &node.q, &node.v, &mut mass);
+        if rows > 0 {
+            model.constraint_rows(node.t, &node.q, &mut vec![0.0; rows], &mut mass);
+        }
+        mass.matrix.lu()
     }
 
     /// The changes of velocities, NaN where the mass matrix is singular, and of outputs; for one of (p, q) and of a parameter.
@@ -52,9 +105,13 @@ impl<'a, M: Model> Along<'a, M> {
                 // p = L_v(q, v): L_vv δv = δp − ∂L_v/∂(q, a).
                 let still = duals(&self.node.v, &vec![0.0; n]);
                 let by_others = self.by_z(time, &q, &still);
-                let right = DVector::from_fn(n, |a, _| by_p[a] - by_others[a]);
+                let mut right: Vec<f64> = by_p.iter().zip(&by_others).map(|(p, l)| p - l).collect();
+                if let Some(eta) = &self.eta {
+                    self.add_held(time, &q, eta, &mut right);
+                }
+                let right = DVector::from_vec(right);
                 let found = factors.solve(&right);
-                found.map_or_else(|| vec![f64::NAN; n], |found| found.as_slice().to_vec())
+                found.map_or_else(|| vec![f64::NAN; n], |found| found.as_slice()[..n].to_vec())
             }
         };
         let mut values = vec![Dual::ZERO; self.model.columns()];
@@ -69,8 +126,31 @@ impl<'a, M: Model> Along<'a, M> {
         (velocity, outputs)
     }
 
+    /// Takes the slopes of Aᵀη from what there is, and those of A v + a from nothing, at constant velocities and multipliers.
+    fn add_held(&self, time: Dual, q: &[Dual], eta: &[f64], right: &mut Vec<f64>) {
+        let mut drift = vec![Dual::ZERO; eta.len()];
+        let mut held = Held {
+            v: &self.node.v,
+            eta,
+            rates: drift.clone(),
+            reactions: vec![Dual::ZERO; q.len()],
+        };
+        (self.model).constraint_rows(time, q, &mut drift, &mut held);
+        for (right, reaction) in right.iter_mut().zip(&held.reactions) {
+            *right -= reaction.slope;
+        }
+        let rates = held.rates.iter().zip(&drift);
+        right.extend(rates.map(|(rate, drift)| -(*rate + *drift).slope));
+    }
+
     /// The slopes of L_v, or H_p.
     fn by_z(&self, time: Dual, q: &[Dual], z: &[Dual]) -> Vec<f64> {
+        let first = self.first(time, q, z);
+        first.iter().map(|one| one.slope).collect()
+    }
+
+    /// L_v, or H_p.
+    fn first(&self, time: Dual, q: &[Dual], z: &[Dual]) -> Vec<Dual> {
         let zeros = || vec![Dual::ZERO; q.len()];
         let (mut by_z, mut by_q, mut force) = (zeros(), zeros(), zeros());
         let first = Gradient {
@@ -79,7 +159,7 @@ impl<'a, M: Model> Along<'a, M> {
             force: &mut force,
         };
         self.model.first(time, q, z, first);
-        by_z.iter().map(|one| one.slope).collect()
+        by_z
     }
 }
 

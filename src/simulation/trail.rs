@@ -108,8 +108,10 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
             let of = "models of run-time length without the feature `sparse`";
             return Err(refused(of));
         }
-        if const { M::CONSTRAINED } {
-            return Err(refused("models of run-time length with constraints"));
+        if const { M::CONSTRAINED } && !self.impulses.is_empty() {
+            return Err(refused(
+                "models of run-time length with constraints and impulses",
+            ));
         }
         let motion = self.drive(start, span, identity, Some(&mut trail))?;
         match trail.refusal(&motion, call) {

@@ -79,12 +79,12 @@ impl<M: family::Model> Transitions<M, 0> for RunTimeLength {
 /// (δp₁, δq₁) = A (δp₀, δq₀)                                                                             (theory.md (T-30))
 /// ```
 ///
-/// The kinetic energy may be any of a Lagrangian; that of a Hamiltonian has to be ½ Σ p²/m.
+/// The kinetic energy may be any of a Lagrangian, with constraints, too (theory.md (T-160)); that of a Hamiltonian has to be ½ Σ p²/m.
 ///
 /// # Shapes
 /// 2n numbers, ordered (p, q).
 /// # Errors
-/// [`family::OperatorError`] where a step is impossible or fails, and for models with constraints.
+/// [`family::OperatorError`] where a step is impossible or fails.
 ///
 /// ```
 /// use tfe::prelude::*;

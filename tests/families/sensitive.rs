@@ -263,11 +263,12 @@ fn what_has_no_derivatives_is_told() {
     };
     let error = Simulation::new(&rods)
         .step(0.1)
+        .impulse(0.5, vec![0.1; 4])
         .run_sensitive(start, 0.0..1.0);
-    let text = told(error.expect_err("constraints"));
+    let text = told(error.expect_err("an impulse that constraints take a part of"));
     assert_eq!(
         text,
-        "run_sensitive models of run-time length with constraints"
+        "run_sensitive models of run-time length with constraints and impulses"
     );
 
     #[dynamics(

@@ -6,5 +6,6 @@ mod differences;
 #[path = "../common/largest.rs"]
 mod largest;
 
+mod constrained;
 mod orbits;
 mod transitions;

@@ -1,10 +1,9 @@
 //! The derivative of a step of a family.
 
 use crate::largest::larger;
-use tfe::family::{self, Block, Declared, Entries, FamilyState, Gradient, RunTimeLength};
+use tfe::family::{self, FamilyState};
 use tfe::prelude::*;
 use tfe::runtime::step::Control;
-use tfe::runtime::{CoordinateName, Facts, Form, Real};
 use tfe::stability::{
     DominantError, Iteration, OperatorError, dominant, spectral_radius, symplecticity_defect,
     transition, transition_matrix,
@@ -291,60 +290,6 @@ fn stable_symplectic_steps_have_no_largest_eigenvalue() {
     assert!((found.radius() - 1.0).abs() < 1e-12, "{found:?}");
 }
 
-/// A particle that says it is constrained.
-struct Bound;
-
-impl Declared<0> for Bound {
-    type Length = RunTimeLength;
-}
-
-impl family::Model for Bound {
-    const FORM: Form = Form::Lagrangian;
-    const FACTS: Facts = Facts::UNKNOWN;
-    const MOMENTA_MOVE: bool = false;
-    const CONSTRAINED: bool = true;
-
-    fn len(&self) -> usize {
-        1
-    }
-
-    fn check(&self) -> Result<(), family::ModelError> {
-        Ok(())
-    }
-
-    fn energy_function<R: Real>(&self, _: R, _: &[R], z: &[R]) -> R {
-        z[0] * z[0] * R::from_f64(0.5)
-    }
-
-    fn first<R: Real>(&self, _: R, _: &[R], z: &[R], first: Gradient<'_, R>) {
-        (first.z[0], first.q[0]) = (z[0], R::from_f64(0.0));
-    }
-
-    fn forces_inline<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>) {
-        self.first(t, q, z, first);
-    }
-
-    fn mass<R: Real, E: Entries<R>>(&self, _: R, _: &[R], _: &[R], entries: &mut E) {
-        entries.add(Block::ZZ, 0, 0, R::from_f64(1.0));
-    }
-
-    fn second<R: Real, E: Entries<R>>(
-        &self,
-        t: R,
-        q: &[R],
-        z: &[R],
-        first: Gradient<'_, R>,
-        entries: &mut E,
-    ) {
-        self.first(t, q, z, first);
-        self.mass(t, q, z, entries);
-    }
-
-    fn coordinate_name(&self, index: usize) -> CoordinateName {
-        CoordinateName::element("x", index)
-    }
-}
-
 #[test]
 fn what_is_impossible_is_told() {
     let (web, _) = webs();
@@ -370,10 +315,4 @@ fn what_is_impossible_is_told() {
     };
     let error = transition(&chain, Primal::<3>, &chain.state(Q, V), 0.0, 0.1).expect_err("phase");
     assert!(matches!(error, OperatorError::Family(_)), "{error}");
-    let state = FamilyState {
-        q: vec![0.0],
-        p: vec![1.0],
-    };
-    let error = transition(&Bound, Mixed::<4>, &state, 0.0, 0.1).expect_err("constraints");
-    assert_eq!(error, OperatorError::Constrained);
 }

@@ -247,7 +247,8 @@ impl Kernels<'_> {
         let coordinate_name = self.coordinate_name();
         let (observable_names, observables) = self.observables().unzip();
         let parameters = self.parameters.members();
-        let constraints = constraint::members(self.declared, self.derivation, &self.dof);
+        let constraints =
+            constraint::members(self.declared, self.derivation, &self.parameters, &self.dof);
         let [value_name, first_name, forces_name, mass_name, second_name] = [
             "energy_function",
             "first",

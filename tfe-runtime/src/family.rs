@@ -13,6 +13,8 @@ mod controlled;
 mod dense;
 mod error;
 mod forces;
+#[cfg(feature = "sparse")]
+mod held;
 mod inertia;
 #[cfg(feature = "sparse")]
 mod instant;

@@ -48,7 +48,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::NoOutput`](crate::RunErrorKind::NoOutput) and [`RunErrorKind::Loss`](crate::RunErrorKind::Loss) for a loss that does not belong to the model
-    /// and the span. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where
+    /// and the span. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for impulses on models with constraints, for events that change the state or end the run, and where
     /// steps were so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn gradient(
@@ -68,7 +68,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let mut run = self.clone();
         run.breaks.extend(loss.nodes());
         #[cfg(feature = "sparse")]
-        if self.record_every > 1 && self.events.is_empty() && !M::CONSTRAINED {
+        if self.record_every > 1 && self.events.is_empty() {
             let found = run.by_checkpoints(&start, &span, loss)?;
             if let Some(found) = found {
                 return Ok(found);

@@ -18,7 +18,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Elements are solved once more for their matrices, which are dense: 4n² numbers an element, and 2n solutions with sparse factors.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where steps were
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for impulses on models with constraints, for events that change the state or end the run, and where steps were
     /// so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_linearised(

@@ -25,7 +25,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// ([`record_every`](Self::record_every) keeps fewer nodes).
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for models with constraints, for events that change the state or end the run, and where steps were
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for impulses on models with constraints, for events that change the state or end the run, and where steps were
     /// so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_sensitive(

@@ -5,6 +5,7 @@ use crate::constraint::{ROWS, VALUES};
 use crate::emit::Emitter;
 use crate::headings::Headings;
 use crate::page;
+use crate::parameters::RunTimeParameters;
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::derive::derivation::Derivation;
@@ -15,6 +16,7 @@ use tfe_symbolic::program::{Program, Request};
 pub(super) fn members(
     declared: &Declared,
     derivation: &Derivation,
+    parameters: &RunTimeParameters,
     dof: &TokenStream,
 ) -> TokenStream {
     let constraints = &declared.constraints;
@@ -29,6 +31,7 @@ pub(super) fn members(
     let kernels = Kernels {
         declared,
         derivation,
+        parameters,
         dof,
     };
     let (values, rows_and_drift, second) = (kernels.values(), kernels.rows(), kernels.second());
@@ -52,6 +55,7 @@ pub(super) fn members(
 struct Kernels<'a> {
     declared: &'a Declared,
     derivation: &'a Derivation,
+    parameters: &'a RunTimeParameters,
     /// The number of coordinates.
     dof: &'a TokenStream,
 }
@@ -63,12 +67,24 @@ impl Kernels<'_> {
 
     /// The body of a kernel, with its slices cut to their lengths so that the compiler knows them.
     fn body(&self, program: &Program) -> TokenStream {
-        let dof = self.dof;
-        let statements = Emitter::new(&[], TokenStream::new())
+        self.body_by(self.emitter(), program)
+    }
+
+    /// The same of a kernel that is differentiated by parameters.
+    fn sensitive_body(&self, program: &Program) -> TokenStream {
+        let places = self.parameters.places();
+        self.body_by(self.emitter().with_run_time_parameters(places), program)
+    }
+
+    fn emitter(&self) -> Emitter<'_> {
+        Emitter::new(&[], TokenStream::new())
             .by_entries()
             .with_headings(Headings::of(self.declared))
-            .body(program)
-            .statements;
+    }
+
+    fn body_by(&self, emitter: Emitter<'_>, program: &Program) -> TokenStream {
+        let dof = self.dof;
+        let statements = emitter.body(program).statements;
         quote! {
             let q = &q[..#dof];
             #statements
@@ -80,7 +96,10 @@ impl Kernels<'_> {
             constraint_values: true,
             ..Request::default()
         });
-        let (body, doc) = (self.body(&program), page::kernel(VALUES, &program));
+        let (body, doc) = (
+            self.sensitive_body(&program),
+            page::kernel(VALUES, &program),
+        );
         quote! {
             #[doc = #doc]
             fn constraint_values<R: __tfe::Real>(&self, t: R, q: &[R], values: &mut [R]) {
@@ -95,7 +114,7 @@ impl Kernels<'_> {
             constraint_rows: true,
             ..Request::default()
         });
-        let (body, doc) = (self.body(&program), page::kernel(ROWS, &program));
+        let (body, doc) = (self.sensitive_body(&program), page::kernel(ROWS, &program));
         quote! {
             #[doc = #doc]
             fn constraint_rows<R: __tfe::Real, __E: __tfe::Entries<R>>(

@@ -1,16 +1,18 @@
 //! Gradients of losses backwards along elements of run-time length: one row times their derivatives, and derivatives by all parameters at once (T-127, T-149).
 
+mod held;
 mod iteration;
 mod written;
 
-use super::blocked::Blocked;
 use super::error::ModelError;
 use super::inertia::Inertia;
 use super::model::{FamilyState, Model};
-use super::pattern::Pattern;
+use super::node::Node;
 use super::rates::Rates;
+use super::rows::Rows;
 use super::stepper::Stepper;
-use super::transition::{OperatorError, Seeds, TransitionOperator};
+use super::transition::pull::Seeds;
+use super::transition::{Ground, OperatorError, TransitionOperator};
 use super::view::View;
 use crate::condense::add_multiple;
 use crate::element::Element;
@@ -20,14 +22,13 @@ use crate::lanes::Lanes;
 use crate::model::Form;
 use crate::newton::Control;
 use crate::pull::{Partials, Results};
-use crate::scheme::{SchemeTable, Tables as _};
+use crate::scheme::Tables as _;
 use crate::tape::Tape;
-use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 use iteration::Iteration;
-use written::{Points, add_of_place, add_of_points};
+use written::{Points, add_of_place, add_of_points, add_of_rows_at};
 
 /// Goes backwards along a run, from its last node: carries the row λ = ∂ℓ/∂(p, q) of a loss ℓ, and adds up its derivatives by all parameters.
 ///
@@ -38,14 +39,14 @@ use written::{Points, add_of_place, add_of_points};
 /// Elements are solved once more. Where the equations are M q̈ = f with a constant diagonal M and the iteration contracts, memory and time are linear in the number of coordinates; else a sparse matrix of all points is factored.
 pub struct Backwards<'m, M> {
     view: View<'m, M>,
-    table: SchemeTable,
-    pattern: Arc<Pattern>,
+    ground: Ground,
     stepper: Stepper<'m, M>,
     iteration: Option<Iteration>,
     /// Made when it is needed.
     rates: Option<Rates<()>>,
-    /// L_vv of a Lagrangian, at nodes.
-    mass: Option<(Pattern, Blocked)>,
+    /// L_vv of a Lagrangian, at nodes, and the same bordered by the rows of constraints; made when they are needed.
+    node: Option<Node>,
+    bordered: Option<(Rows, Node)>,
     tape: Tape,
     lambda: Vec<f64>,
     places: Places,
@@ -75,14 +76,15 @@ impl<'m, M: Model> Backwards<'m, M> {
     /// At the end of a run with an element, with λ = 0.
     ///
     /// # Errors
-    /// [`OperatorError`] where steps of this model are impossible, and for constraints.
+    /// [`OperatorError`] where steps of this model are impossible.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, OperatorError> {
         let table = TransitionOperator::admitted::<M>(model, element)?;
         let view = View::new(model, 0.0)?;
-        let pattern = Arc::new(Pattern::of(&view));
-        let scheme = table.view();
-        let inertia = Inertia::of(model).ok().filter(|_| scheme.collocated);
-        let iteration = inertia.map(|inertia| Iteration::new(&scheme, &pattern, inertia));
+        let ground = Ground::of(&view, table);
+        let scheme = ground.table.view();
+        let inertia = Inertia::of(model).ok();
+        let inertia = inertia.filter(|_| scheme.collocated && !M::CONSTRAINED);
+        let iteration = inertia.map(|inertia| Iteration::new(&scheme, &ground.pattern, inertia));
         let (n, groups) = (model.len(), scheme.points().div_ceil(4));
         let rows = || vec![Lanes([0.0; 4]); groups * n];
         let mut tape = Tape::default();
@@ -98,11 +100,11 @@ impl<'m, M: Model> Backwards<'m, M> {
             },
             stepper: Stepper::new(model, element, control)?,
             view,
-            table,
-            pattern,
+            ground,
             iteration,
             rates: None,
-            mass: None,
+            node: None,
+            bordered: None,
             tape,
             lambda: vec![0.0; 2 * n],
         })
@@ -193,7 +195,9 @@ impl<'m, M: Model> Backwards<'m, M> {
         }
         if M::FORM == Form::Lagrangian {
             // p = L_v(q, v): δv = L_vv⁻¹ (δp − ∂L_v/∂(q, a)).
-            Self::divide_by_mass(&mut self.mass, model, place, &mut by_v)?;
+            if Self::divide_by_mass(&mut self.node, model, place, &mut by_v).is_err() {
+                self.divide_by_bordered(place, &state.p, &mut by_v, of_q)?;
+            }
             for a in 0..n {
                 of_p[a] += by_v[a];
                 by_v[a] = -by_v[a];
@@ -210,33 +214,67 @@ impl<'m, M: Model> Backwards<'m, M> {
         Ok(by_state)
     }
 
+    /// Solves with L_vv.
     fn divide_by_mass(
-        memory: &mut Option<(Pattern, Blocked)>,
+        memory: &mut Option<Node>,
         model: &M,
-        (t, q, v): (f64, &[f64], &[f64]),
+        at: (f64, &[f64], &[f64]),
         values: &mut [f64],
     ) -> Result<(), OperatorError> {
-        let (pattern, mass) = match memory {
+        let rows = Rows::none();
+        let node = match memory {
+            Some(made) => made,
+            empty => empty.insert(Node::new(model, &rows).ok_or(ModelError::TooLarge)?),
+        };
+        let sides = values.iter().copied();
+        let solution = node.solve_linear(model, at, &rows, sides);
+        values.copy_from_slice(solution?);
+        Ok(())
+    }
+
+    /// The same where L_vv is singular: constraints leave one velocity, p = L_v(q, v) + Aᵀη, A v + a = 0 (T-74). What the rows have of coordinates and parameters is added.
+    ///
+    /// # Errors
+    /// [`StepError::SingularTangent`] where there are none, or not enough.
+    fn divide_by_bordered(
+        &mut self,
+        (t, q, v): (f64, &[f64], &[f64]),
+        p: &[f64],
+        by_v: &mut [f64],
+        of_q: &mut [f64],
+    ) -> Result<(), OperatorError> {
+        let singular = StepError::SingularTangent { unknown: 0 };
+        if !M::CONSTRAINED {
+            return Err(singular.into());
+        }
+        let model = self.view.model();
+        let (rows, node) = match &mut self.bordered {
             Some(made) => made,
             empty => {
-                let pattern = Pattern::of_mass(model);
-                let places = pattern.places().iter();
-                let places: Vec<_> = places.map(|(_, row, column)| (*row, *column)).collect();
-                let mass = Blocked::new(model.len(), 1, &places);
-                let mass = mass.ok_or(ModelError::TooLarge)?;
-                empty.insert((pattern, mass))
+                let rows = Rows::new(model);
+                let node = Node::new(model, &rows).ok_or(ModelError::TooLarge)?;
+                empty.insert((rows, node))
             }
         };
-        // Blocks of one number are sorted by column and row, as the places of the pattern are.
-        let mut entries = pattern.scatter(&mut mass.values);
-        model.mass(t, q, v, &mut entries);
-        mass.factor()?;
-        mass.solve(values);
-        if values.iter().all(|value| value.is_finite()) {
-            Ok(())
-        } else {
-            Err(StepError::SingularTangent { unknown: 0 }.into())
+        rows.evaluate(model, t, q);
+        node.solve(model, (t, q), p, rows, &mut v.to_vec())?;
+        let eta = node.multipliers().to_vec();
+        let sides = by_v.iter().copied().chain(eta.iter().map(|_| 0.0));
+        let solution = node.solve_linear(model, (t, q, v), rows, sides);
+        let (own, taken) = solution.map_err(|_| singular)?.split_at(v.len());
+        // Of −(A v + a) and −Aᵀη.
+        let places = &self.ground.places.rows;
+        let drift: Vec<f64> = taken.iter().map(|taken| -taken).collect();
+        let entries = places.places().iter();
+        let entries = entries.map(|(_, c, a)| -(taken[*c] * v[*a] + own[*a] * eta[*c]));
+        let entries: Vec<f64> = entries.collect();
+        by_v.copy_from_slice(own);
+        add_of_rows_at(&mut self.tape, model, (t, q), places, (&drift, &entries));
+        let parameters = model.parameters();
+        for (a, of_q) in of_q.iter_mut().enumerate() {
+            *of_q += self.tape.take(parameters + a);
         }
+        Ok(())
     }
 
     /// Goes back over the element from t to t + h, from where it ends to `before`, with what the loss has of its inside; where it has ended, solved once more.
@@ -263,14 +301,13 @@ impl<'m, M: Model> Backwards<'m, M> {
         inside: Option<&InsideLoss>,
     ) -> Result<FamilyState, OperatorError> {
         if let Some(inside) = inside {
-            let degree = self.table.element().degree();
+            let degree = self.ground.table.element().degree();
             let needed = 2 * degree * self.view.model().len();
             let given = inside.coefficients.len();
             if given != needed {
                 return Err(OperatorError::Shape { needed, given });
             }
         }
-        let within = Within::of(inside, &self.table.view(), h);
         let mut end = before.clone();
         if self.iteration.is_some() {
             let cuts = self.stepper.statistics().cuts;
@@ -278,6 +315,7 @@ impl<'m, M: Model> Backwards<'m, M> {
             if self.stepper.statistics().cuts > cuts {
                 return Err(OperatorError::Cut);
             }
+            let within = Within::of(inside, &self.ground.table.view(), h);
             if self.iterate(t, h, &within) {
                 self.take_derivatives();
                 return Ok(end);
@@ -285,12 +323,15 @@ impl<'m, M: Model> Backwards<'m, M> {
         }
         let transition = self.transition((t, h), before)?;
         end.clone_from(transition.end());
-        let seeds = transition.pull(&within, &mut self.lambda);
+        let seeds = transition.pull(inside, &mut self.lambda);
         if !self.lambda.iter().all(|one| one.is_finite()) {
             return Err(StepError::SingularTangent { unknown: 0 }.into());
         }
         self.places.weigh(&seeds);
         self.take_derivatives();
+        if let Some(weights) = &seeds.held {
+            self.take_derivatives_of_constraints((t, t + h), weights);
+        }
         Ok(end)
     }
 
@@ -300,12 +341,12 @@ impl<'m, M: Model> Backwards<'m, M> {
         (t, h): (f64, f64),
         before: &FamilyState,
     ) -> Result<TransitionOperator, OperatorError> {
-        let (view, table) = (&self.view, &self.table);
+        let (view, ground) = (&self.view, &self.ground);
+        let table = &ground.table;
         let mut rates = match self.rates.take() {
             Some(rates) => rates.hand_over(view),
             None => Rates::new(view, table.clone(), Control::default())?,
         };
-        let ground = (table, &self.pattern);
         let transition = TransitionOperator::next(view, &mut rates, ground, before, (t, h));
         for (l, point) in rates.points.iter().enumerate() {
             let time = t + h * table.view().nodes[l];
@@ -320,7 +361,7 @@ impl<'m, M: Model> Backwards<'m, M> {
         let Some(iteration) = &mut self.iteration else {
             return false;
         };
-        let scheme = self.table.view();
+        let scheme = self.ground.table.view();
         let dense = self.stepper.dense(t, t + h);
         for (l, node) in scheme.nodes.iter().enumerate() {
             let (q, v) = dense.motion_at(*node, h);
@@ -329,7 +370,7 @@ impl<'m, M: Model> Backwards<'m, M> {
         let places = &mut self.places;
         iteration.linearise(
             &self.view,
-            &self.pattern,
+            &self.ground.pattern,
             (&places.times, &places.q, &places.v),
         );
         if !iteration.pull(h, within, &mut self.lambda) {

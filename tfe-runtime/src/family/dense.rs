@@ -279,6 +279,35 @@ fn coefficients(
     rows
 }
 
+/// What takes momenta at the points, at the start and at the end to the Legendre coefficients of h dp/dτ of the polynomial through them, where momenta jump at the ends (T-79): a row of points + 2 for
+/// each coefficient.
+#[cfg(feature = "sparse")]
+pub(super) fn jumps(scheme: &SchemeRef<'_>) -> Vec<f64> {
+    let (points, s) = (scheme.points(), scheme.rates());
+    let mut weights = vec![0.0; s * (points + 2)];
+    for column in 0..points + 2 {
+        let unit = |place: usize| if place == column { 1.0 } else { 0.0 };
+        let state = |p: f64| FamilyState {
+            q: vec![0.0],
+            p: vec![p],
+        };
+        let ends = (state(unit(points)), state(unit(points + 1)));
+        let momentum = |point: usize, _: usize| unit(point);
+        let polynomial =
+            DenseElement::with_jumps(scheme, (0.0, 1.0), 1.0, ends, &|_, _| 0.0, &momentum);
+        let Momenta::Values(values) = polynomial.momenta else {
+            return weights;
+        };
+        // P_j′ = Σ 2 (2k + 1) P_k over k = j − 1, j − 3, …
+        for (j, value) in values.iter().enumerate() {
+            for k in (0..j).rev().step_by(2) {
+                weights[k * (points + 2) + column] += 2.0 * (2 * k + 1) as f64 * value;
+            }
+        }
+    }
+    weights
+}
+
 /// Adds Σ_m weights_m rows_m.
 fn add(rows: &[f64], weights: &[f64], sum: &mut [f64]) {
     for (row, weight) in rows.chunks_exact(sum.len().max(1)).zip(weights) {

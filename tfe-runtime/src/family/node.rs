@@ -137,6 +137,20 @@ impl Node {
         })
     }
 
+    /// The matrix at one instant, factored.
+    ///
+    /// # Errors
+    /// [`StepError`] where it is singular.
+    pub(super) fn linearised<M: Model>(
+        mut self,
+        model: &M,
+        at: (f64, &[f64], &[f64]),
+        rows: &Rows,
+    ) -> Result<Blocked, StepError> {
+        self.factor(model, at, rows)?;
+        Ok(self.matrix)
+    }
+
     /// The solution of the linear equations at one instant, with Aᵀ at the multipliers.
     ///
     /// # Errors

@@ -11,8 +11,10 @@
 use super::blocked::Blocked;
 use super::dense::DenseElement;
 use super::error::ModelError;
+use super::held::Solved;
 use super::model::{FamilyState, Gradient, Model};
 use super::node::Node;
+use super::pattern::Pattern;
 use super::point::Point;
 use super::rows::Rows;
 use super::tangent::Parts;
@@ -25,7 +27,7 @@ use crate::evidence::Evidence;
 use crate::legendre::largest;
 use crate::method::{continued_ratio, set_extrapolation};
 use crate::newton::{Control, Monitor, SERVES, Solve, Verdict};
-use crate::scheme::{SchemeTable, Tables as _};
+use crate::scheme::{SchemeRef, SchemeTable, Tables as _};
 use crate::statistics::Statistics;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -486,6 +488,33 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         self.matrix.factor()?;
         self.factored = h;
         Ok(self.matrix.clone())
+    }
+
+    /// The last step, from t to t + h, as it was solved.
+    pub(super) fn solved<'a>(
+        &'a self,
+        scheme: &'a SchemeRef<'a>,
+        (t, h): (f64, f64),
+        second: &'a Pattern,
+    ) -> Solved<'a> {
+        Solved {
+            scheme,
+            second,
+            t,
+            h,
+            points: &self.points,
+            multipliers: &self.unknowns[self.start.q.len() * scheme.unknowns()..],
+            start: &self.start.q,
+            end: (&self.end.q, &self.v_end),
+            start_rows: &self.start_rows,
+            end_rows: &self.rows,
+            node: &self.node,
+        }
+    }
+
+    /// h A₀ᵀ m₀ of the last step.
+    pub(super) fn impulse_of_start(&self) -> &[f64] {
+        &self.impulse
     }
 
     /// The polynomial of the last step.

@@ -1,8 +1,14 @@
 //! The derivative of one step of a family by its start, as an operator: implicit differentiation (T-30).
 
+mod error;
+pub(super) mod pull;
+
+pub use error::OperatorError;
+
 use super::blocked::Blocked;
-use super::dense::DenseElement;
+use super::dense::{DenseElement, jumps};
 use super::error::ModelError;
+use super::held::{Held, Moved, Places};
 use super::model::{Block, FamilyState, Gradient, Model};
 use super::pattern::Pattern;
 use super::rates::Rates;
@@ -10,7 +16,6 @@ use super::view::View;
 use crate::condense::add_multiple;
 use crate::element::Element;
 use crate::error::StepError;
-use crate::inside::Seeds as Within;
 use crate::model::Form;
 use crate::newton::Control;
 use crate::registers::storage::MAX_GROUPS;
@@ -18,67 +23,7 @@ use crate::scheme::{SchemeTable, Tables as _};
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::fmt;
 use nalgebra::DMatrix;
-
-/// Why there is no derivative of a step of a family.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum OperatorError {
-    /// The model does not fit together, or families cannot do what was asked for.
-    Family(ModelError),
-    /// The step itself failed, or its tangent is singular.
-    Step(StepError),
-    /// The model has constraints: not supported yet.
-    Constrained,
-    /// The step is so long that it was made in pieces.
-    Cut,
-    /// A vector is not as long as the phase space.
-    Shape {
-        /// Numbers that are needed.
-        needed: usize,
-        /// Numbers that were given.
-        given: usize,
-    },
-}
-
-impl From<ModelError> for OperatorError {
-    fn from(error: ModelError) -> Self {
-        Self::Family(error)
-    }
-}
-
-impl From<StepError> for OperatorError {
-    fn from(error: StepError) -> Self {
-        Self::Step(error)
-    }
-}
-
-impl fmt::Display for OperatorError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Family(error) => error.fmt(f),
-            Self::Step(error) => error.fmt(f),
-            Self::Constrained => f.write_str(
-                "transition matrices of models of run-time length with constraints are not supported",
-            ),
-            Self::Cut => f.write_str("the step is so long that it was made in pieces"),
-            Self::Shape { needed, given } => {
-                write!(f, "the vector needs {needed} numbers, not {given}")
-            }
-        }
-    }
-}
-
-impl core::error::Error for OperatorError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            Self::Family(error) => error.source(),
-            Self::Step(error) => error.source(),
-            _ => None,
-        }
-    }
-}
 
 /// The derivative of one step of a family, (δp₀, δq₀) ↦ (δp₁, δq₁): an operator on 2n numbers, ordered (p, q).
 ///
@@ -90,7 +35,7 @@ impl core::error::Error for OperatorError {
 /// δp₁ = δp₀ + h Σ_l b_l (F_v δv_l + F_q δq_l) ,     δq₁ = δq₀ + h Σ_j β_j δν_j .
 /// ```
 ///
-/// It is the derivative of the numbers that the step computes, whichever iteration computes them. It holds the sparse factors of J and the second
+/// with constraints (T-160). It is the derivative of the numbers that the step computes, whichever iteration computes them. It holds the sparse factors of J and the second
 /// derivatives at the points: memory, and the time of [`apply`](Self::apply), are linear in their entries.
 ///
 /// # Example
@@ -105,35 +50,48 @@ pub struct TransitionOperator {
     values: Vec<f64>,
     end: FamilyState,
     dense: DenseElement,
+    /// What constraints add.
+    held: Option<Held>,
     by_length: Vec<f64>,
     by_damping: Vec<f64>,
     by_parameters: Vec<Vec<f64>>,
     inside_by_parameters: Vec<Vec<f64>>,
 }
 
-/// What a row of phase space weighs at the points of an element, a row of n for each point.
-pub(super) struct Seeds {
-    /// Of L_v and of F.
-    pub(super) momenta: Vec<f64>,
-    pub(super) forces: Vec<f64>,
-    /// What these make of velocities.
-    pub(super) by_velocities: Vec<f64>,
+/// What is the same for all steps of a model with an element.
+#[derive(Clone, Debug)]
+pub(super) struct Ground {
+    pub(super) table: SchemeTable,
+    pub(super) pattern: Arc<Pattern>,
+    pub(super) places: Arc<Places>,
 }
 
-/// What changes in an element, by point and coordinate: q_l, L_v,l and F_l before rates answer; by coordinate: p₀, and q₁ − h Σ β ν.
-struct Change<S, L, F, P, A> {
+impl Ground {
+    /// Of a model that has been checked.
+    pub(super) fn of<V: Model>(view: &V, table: SchemeTable) -> Self {
+        Self {
+            table,
+            pattern: Arc::new(Pattern::of(view)),
+            places: Arc::new(Places::of(view)),
+        }
+    }
+}
+
+/// What changes in an element, by point and coordinate: q_l, L_v,l and F_l before rates answer; by coordinate: p₀, and q₁ − h Σ β ν; of constraints.
+struct Change<'a, S, L, F, P, A> {
     shift: S,
     lift: L,
     push: F,
     impulse: P,
     advance: A,
+    moved: Option<&'a Moved>,
 }
 
 impl TransitionOperator {
     /// That of the step from `state` at time t to t + h.
     ///
     /// # Errors
-    /// [`OperatorError`] where a step of this model is impossible or fails, for a state of another length, and for constraints.
+    /// [`OperatorError`] where a step of this model is impossible or fails, and for a state of another length.
     pub fn of_step<M: Model>(
         model: &M,
         element: Element,
@@ -183,9 +141,9 @@ impl TransitionOperator {
         let view = View::new(model, damping).map_err(|error| refused(error.into()))?;
         let rates = Rates::new(&view, table.clone(), Control::default());
         let mut rates = rates.map_err(|error| refused(error.into()))?;
-        let pattern = Arc::new(Pattern::of(&view));
+        let ground = Ground::of(&view, table);
         for (number, (t, h, state)) in steps.into_iter().enumerate() {
-            let transition = Self::next(&view, &mut rates, (&table, &pattern), state, (t, h));
+            let transition = Self::next(&view, &mut rates, &ground, state, (t, h));
             let done = transition.and_then(|mut transition| {
                 transition.answer(&view, &rates, (t, h), parameters);
                 each(transition)
@@ -201,10 +159,13 @@ impl TransitionOperator {
         element: Element,
     ) -> Result<SchemeTable, OperatorError> {
         model.check()?;
-        if M::CONSTRAINED {
-            return Err(OperatorError::Constrained);
-        }
         let table = SchemeTable::new(element).map_err(ModelError::Element)?;
+        if M::CONSTRAINED && M::FORM == Form::Hamiltonian {
+            return Err(ModelError::ConstraintsNotSupported.into());
+        }
+        if M::CONSTRAINED && !(element.is_collocated() && element.holds(true)) {
+            return Err(ModelError::ElementNotSupported { element }.into());
+        }
         let stepped = element.has_phase_form() && table.view().points() <= 4 * MAX_GROUPS;
         if M::FORM == Form::Hamiltonian && !stepped {
             return Err(ModelError::ElementNotSupported { element }.into());
@@ -215,7 +176,7 @@ impl TransitionOperator {
     pub(super) fn next<V: Model>(
         view: &V,
         rates: &mut Rates<&V>,
-        (table, pattern): (&SchemeTable, &Arc<Pattern>),
+        ground: &Ground,
         state: &FamilyState,
         (t, h): (f64, f64),
     ) -> Result<Self, OperatorError> {
@@ -239,7 +200,7 @@ impl TransitionOperator {
         let mut end = state.clone();
         rates.advance(t, h, &mut end, false)?;
         let matrix = rates.linearised(t, h)?;
-        let scheme = table.view();
+        let (scheme, pattern) = (ground.table.view(), &ground.pattern);
         let count = pattern.places().len();
         let mut values = vec![0.0; count * scheme.points()];
         let mut unused = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
@@ -250,14 +211,22 @@ impl TransitionOperator {
             let time = t + h * scheme.nodes[l];
             view.second(time, &point.q, &point.v, first, &mut entries);
         }
+        let held = match V::CONSTRAINED {
+            true => {
+                let solved = rates.solved(&scheme, (t, h), pattern);
+                Some(Held::of(view, &ground.places, &solved)?)
+            }
+            false => None,
+        };
         let mut transition = Self {
             h,
-            table: table.clone(),
+            table: ground.table.clone(),
             matrix,
             pattern: Arc::clone(pattern),
             values,
             end,
             dense: rates.dense(t, t + h),
+            held,
             by_length: Vec::new(),
             by_damping: Vec::new(),
             by_parameters: Vec::new(),
@@ -276,12 +245,15 @@ impl TransitionOperator {
             weights.iter().zip(rates).map(|(w, rate)| w * rate).sum()
         };
         let h = self.h;
+        let impulse = rates.impulse_of_start().iter().map(|impulse| impulse / h);
+        let stretched = Moved::impulse(impulse.collect());
         let by_length = self.respond(&Change {
             shift: |l: usize, a: usize| sum(&scheme.position[l * count..(l + 1) * count], a),
             lift: |_, _| 0.0,
             push: |l: usize, a: usize| rates.points[l].force[a] / h,
             impulse: |_| 0.0,
             advance: |a| sum(scheme.advance, a),
+            moved: self.held.as_ref().map(|_| &stretched),
         });
         let by_damping = self.respond(&Change {
             shift: |_, _| 0.0,
@@ -289,6 +261,7 @@ impl TransitionOperator {
             push: |l: usize, a: usize| rates.points[l].v[a],
             impulse: |_| 0.0,
             advance: |_| 0.0,
+            moved: None,
         });
         (self.by_length, self.by_damping) = (by_length, by_damping);
     }
@@ -304,20 +277,29 @@ impl TransitionOperator {
         let n = self.end.q.len();
         let (still, mut unused) = (vec![0.0; n], vec![0.0; n]);
         for parameter in parameters {
-            let mut points = Vec::with_capacity(rates.points.len());
+            let (mut momenta, mut forces) = (Vec::new(), Vec::new());
             for (l, point) in rates.points.iter().enumerate() {
                 let time = t + h * self.table.view().nodes[l];
                 let mut by = view.by_parameter(time, &point.q, &point.v, *parameter);
                 self.bend(l, &still, &by.velocity, &mut unused, &mut by.force);
-                points.push(by);
+                momenta.push(by.momentum);
+                forces.push(by.force);
             }
+            let moved = self.held.as_ref().map(|held| {
+                let scheme = self.table.view();
+                let solved = rates.solved(&scheme, (t, h), &self.pattern);
+                let (q, v) = solved.end;
+                let end = view.by_parameter(t + h, q, v, *parameter).momentum;
+                held.moved(view, *parameter, &solved, end, &mut forces)
+            });
             let mut inside = Vec::new();
             let change = Change {
                 shift: |_, _| 0.0,
-                lift: |l: usize, a: usize| points[l].momentum[a],
-                push: |l: usize, a: usize| points[l].force[a],
+                lift: |l: usize, a: usize| momenta[l][a],
+                push: |l: usize, a: usize| forces[l][a],
                 impulse: |_| 0.0,
                 advance: |_| 0.0,
+                moved: moved.as_ref(),
             };
             let end = self.respond_inside(&change, Some(&mut inside));
             self.by_parameters.push(end);
@@ -392,122 +374,40 @@ impl TransitionOperator {
             }
         }
         let (p, q) = input.split_at(needed / 2);
+        output.copy_from_slice(&self.respond_to((p, q), inside));
+        Ok(())
+    }
+
+    /// The end of the step after a change of its start.
+    fn respond_to(&self, (p, q): (&[f64], &[f64]), inside: Option<&mut Vec<f64>>) -> Vec<f64> {
+        let moved = self.held.as_ref().map(|held| held.struck(q));
         let change = Change {
             shift: |_, a: usize| q[a],
             lift: |_, _| 0.0,
             push: |_, _| 0.0,
             impulse: |a: usize| p[a],
             advance: |a: usize| q[a],
+            moved: moved.as_ref(),
         };
-        output.copy_from_slice(&self.respond_inside(&change, inside));
-        Ok(())
-    }
-
-    /// Writes the row λ of phase space times the derivative for λ, and gives what λ weighs at the points (T-127).
-    pub(super) fn pull(&self, within: &Within, lambda: &mut [f64]) -> Seeds {
-        let scheme = self.table.view();
-        let (n, h) = (self.end.q.len(), self.h);
-        let (count, points) = (scheme.unknowns(), scheme.points());
-        let (of_p, of_q) = lambda.split_at_mut(n);
-        let mut mu = vec![0.0; n * count];
-        let (mut by_q, mut by_v, still) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        for (rates, of_q) in mu.chunks_exact_mut(count).zip(&*of_q) {
-            for (rate, advance) in rates.iter_mut().zip(scheme.advance) {
-                *rate = h * advance * of_q;
-            }
-        }
-        for (j, seeds) in within.rates.chunks_exact(n.max(1)).enumerate() {
-            for (rates, seed) in mu.chunks_exact_mut(count).zip(seeds) {
-                rates[j] += seed;
-            }
-        }
-        for l in 0..points {
-            by_q.fill(0.0);
-            by_v.fill(0.0);
-            let mut force: Vec<f64> = of_p.iter().map(|p| h * scheme.weights[l] * p).collect();
-            within.add_forces(l, &mut force);
-            self.bend_back(l, (&still, &force), &mut by_q, &mut by_v);
-            let row = l * count..(l + 1) * count;
-            let (position, velocity) = (&scheme.position[row.clone()], &scheme.velocity[row]);
-            for (a, rates) in mu.chunks_exact_mut(count).enumerate() {
-                for (j, rate) in rates.iter_mut().enumerate() {
-                    *rate += velocity[j] * by_v[a] + h * position[j] * by_q[a];
-                }
-            }
-        }
-        self.matrix.solve_transposed(&mut mu);
-        by_q.fill(0.0);
-        let zeros = || vec![0.0; points * n];
-        let mut seeds = Seeds {
-            momenta: zeros(),
-            forces: zeros(),
-            by_velocities: zeros(),
-        };
-        for l in 0..points {
-            let own = l * n..(l + 1) * n;
-            let momentum = &mut seeds.momenta[own.clone()];
-            let force = &mut seeds.forces[own.clone()];
-            for (a, mu) in mu.chunks_exact(count).enumerate() {
-                momentum[a] = 0.0;
-                force[a] = h * scheme.weights[l] * of_p[a];
-                for (i, mu) in mu.iter().enumerate() {
-                    momentum[a] -= scheme.momentum[i * points + l] * mu;
-                    force[a] += h * scheme.force[i * points + l] * mu;
-                }
-            }
-            within.add_forces(l, force);
-            let by_v = &mut seeds.by_velocities[own];
-            self.bend_back(l, (momentum, force), &mut by_q, by_v);
-        }
-        for (a, mu) in mu.chunks_exact(count).enumerate() {
-            of_p[a] += mu.iter().sum::<f64>();
-            of_q[a] += by_q[a];
-        }
-        seeds
-    }
-
-    /// Adds what weights of L_v and F at one point are of coordinates and of velocities.
-    fn bend_back(
-        &self,
-        l: usize,
-        (momentum, force): (&[f64], &[f64]),
-        by_q: &mut [f64],
-        by_v: &mut [f64],
-    ) {
-        for (block, row, column, value) in self.second(l) {
-            match block {
-                Block::ZZ => {}
-                Block::ZQ => {
-                    by_q[column] += value * momentum[row];
-                    by_v[row] += value * force[column];
-                }
-                Block::ForceZ => by_v[column] += value * force[row],
-                _ => by_q[column] += value * force[row],
-            }
-        }
+        self.respond_inside(&change, inside)
     }
 
     /// All of it: 2n × 2n, ordered (p, q); 2n applications and 4n² numbers.
     #[must_use]
     pub fn matrix(&self) -> DMatrix<f64> {
-        let size = self.size();
+        let (size, n) = (self.size(), self.end.q.len());
         let mut matrix = DMatrix::zeros(size, size);
+        let mut unit = vec![0.0; size];
         for (column, mut target) in matrix.column_iter_mut().enumerate() {
-            let (from_p, a) = (column < size / 2, column % (size / 2).max(1));
-            let end = self.respond(&Change {
-                shift: |_, b: usize| unit(!from_p && a == b),
-                lift: |_, _| 0.0,
-                push: |_, _| 0.0,
-                impulse: |b: usize| unit(from_p && a == b),
-                advance: |b: usize| unit(!from_p && a == b),
-            });
-            target.copy_from_slice(&end);
+            unit[column] = 1.0;
+            target.copy_from_slice(&self.respond_to(unit.split_at(n), None));
+            unit[column] = 0.0;
         }
         matrix
     }
 
     /// The end of the step after a change.
-    fn respond<S, L, F, P, A>(&self, change: &Change<S, L, F, P, A>) -> Vec<f64>
+    fn respond<S, L, F, P, A>(&self, change: &Change<'_, S, L, F, P, A>) -> Vec<f64>
     where
         S: Fn(usize, usize) -> f64,
         L: Fn(usize, usize) -> f64,
@@ -521,7 +421,7 @@ impl TransitionOperator {
     /// The same with the coefficients of the polynomials, where they are asked for.
     fn respond_inside<S, L, F, P, A>(
         &self,
-        change: &Change<S, L, F, P, A>,
+        change: &Change<'_, S, L, F, P, A>,
         mut inside: Option<&mut Vec<f64>>,
     ) -> Vec<f64>
     where
@@ -540,8 +440,11 @@ impl TransitionOperator {
             push,
             impulse,
             advance,
+            moved,
         } = change;
-        let mut rates = vec![0.0; n * count];
+        let held = self.held.as_ref();
+        let mut unknowns = vec![0.0; self.matrix.size()];
+        let (rates, multipliers) = unknowns.split_at_mut(n * count);
         let [mut q, mut v, mut momentum, mut force] =
             [vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]];
         for l in 0..points {
@@ -549,6 +452,10 @@ impl TransitionOperator {
                 (q[a], momentum[a], force[a]) = (shift(l, a), lift(l, a), push(l, a));
             }
             self.bend(l, &q, &v, &mut momentum, &mut force);
+            if let Some(held) = held {
+                held.bend(l, &q, &mut force);
+                held.miss(l, &q, *moved, (scheme.weights[l], h), multipliers);
+            }
             for (a, sides) in rates.chunks_exact_mut(count).enumerate() {
                 for (i, side) in sides.iter_mut().enumerate() {
                     let at = i * points + l;
@@ -556,13 +463,17 @@ impl TransitionOperator {
                 }
             }
         }
-        for (a, sides) in rates.chunks_exact_mut(count).enumerate() {
-            let impulse = impulse(a);
-            sides.iter_mut().for_each(|side| *side += impulse);
-        }
-        self.matrix.solve(&mut rates);
         let mut end: Vec<f64> = (0..n).map(impulse).chain((0..n).map(advance)).collect();
         let (end_p, end_q) = end.split_at_mut(n);
+        if let Some(held) = held {
+            held.miss_end(end_q, *moved, h, multipliers);
+            held.strike_before(*moved, end_p);
+        }
+        for (sides, impulse) in rates.chunks_exact_mut(count).zip(&*end_p) {
+            sides.iter_mut().for_each(|side| *side += impulse);
+        }
+        self.matrix.solve(&mut unknowns);
+        let (rates, multipliers) = unknowns.split_at(n * count);
         let product = |weights: &[f64], a: usize| -> f64 {
             let rates = &rates[a * count..(a + 1) * count];
             weights.iter().zip(rates).map(|(w, rate)| w * rate).sum()
@@ -574,29 +485,64 @@ impl TransitionOperator {
             }
             inside.resize(2 * inside.len(), 0.0);
         }
+        let jumps = match (held, &inside) {
+            (Some(_), Some(_)) => jumps(&scheme),
+            _ => Vec::new(),
+        };
         for l in 0..points {
             let row = l * count..(l + 1) * count;
             for a in 0..n {
                 q[a] = shift(l, a) + h * product(&scheme.position[row.clone()], a);
                 v[a] = product(&scheme.velocity[row.clone()], a);
-                force[a] = push(l, a);
+                (momentum[a], force[a]) = (lift(l, a), push(l, a));
             }
             self.bend(l, &q, &v, &mut momentum, &mut force);
+            if let Some(held) = held {
+                held.bend(l, &q, &mut force);
+                held.react(l, multipliers, &mut force);
+            }
             for (p, force) in end_p.iter_mut().zip(&force) {
                 *p += h * scheme.weights[l] * force;
             }
-            if let Some(inside) = &mut inside {
-                let half = inside.len() / 2;
-                let rows = inside[half..].chunks_exact_mut(n.max(1));
+            let Some(inside) = &mut inside else { continue };
+            let half = inside.len() / 2;
+            let rows = inside[half..].chunks_exact_mut(n.max(1));
+            if held.is_none() {
                 for (row, weights) in rows.zip(scheme.force_rate.chunks_exact(points)) {
                     add_multiple(row, h * weights[l], &force);
                 }
+                continue;
+            }
+            self.add_inertia(l, &v, &mut momentum);
+            for (row, weights) in rows.zip(jumps.chunks_exact(points + 2)) {
+                add_multiple(row, weights[l], &momentum);
             }
         }
         for (a, end) in end_q.iter_mut().enumerate() {
             *end += h * product(scheme.advance, a);
         }
+        let Some(held) = held else { return end };
+        held.strike(h, multipliers, end_p);
+        held.settle(end_p, end_q, *moved);
+        if let Some(inside) = inside {
+            let half = inside.len() / 2;
+            let rows = inside[half..].chunks_exact_mut(n.max(1));
+            let start: Vec<f64> = (0..n).map(impulse).collect();
+            for (row, weights) in rows.zip(jumps.chunks_exact(points + 2)) {
+                add_multiple(row, weights[points], &start);
+                add_multiple(row, weights[points + 1], end_p);
+            }
+        }
         end
+    }
+
+    /// Adds L_vv δv at one point.
+    fn add_inertia(&self, l: usize, v: &[f64], momentum: &mut [f64]) {
+        for (block, row, column, value) in self.second(l) {
+            if block == Block::ZZ {
+                momentum[row] += value * v[column];
+            }
+        }
     }
 
     /// Adds L_vq δq to `momentum`, F_v δv + F_q δq to `force`, at one point.
@@ -622,8 +568,4 @@ impl TransitionOperator {
         let both = places.iter().zip(values);
         both.map(|((block, row, column), value)| (*block, *row, *column, *value))
     }
-}
-
-fn unit(here: bool) -> f64 {
-    if here { 1.0 } else { 0.0 }
 }

@@ -250,4 +250,30 @@ impl<M: Model> Model for View<'_, M> {
     fn coordinate_name(&self, index: usize) -> CoordinateName {
         self.model.coordinate_name(index)
     }
+
+    fn constraints(&self) -> usize {
+        self.model.constraints()
+    }
+
+    fn constraint_name(&self, row: usize) -> CoordinateName {
+        self.model.constraint_name(row)
+    }
+
+    fn constraint_values<R: Real>(&self, t: R, q: &[R], values: &mut [R]) {
+        self.model.constraint_values(t, q, values);
+    }
+
+    fn constraint_rows<R: Real, E: Entries<R>>(
+        &self,
+        t: R,
+        q: &[R],
+        drift: &mut [R],
+        entries: &mut E,
+    ) {
+        self.model.constraint_rows(t, q, drift, entries);
+    }
+
+    fn constraint_second<R: Real, E: Entries<R>>(&self, t: R, q: &[R], mu: &[R], entries: &mut E) {
+        self.model.constraint_second(t, q, mu, entries);
+    }
 }

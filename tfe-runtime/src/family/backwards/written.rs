@@ -1,6 +1,7 @@
 //! Kernels of run-time length in numbers that write down their operations (T-149).
 
 use crate::family::model::{Gradient, Model};
+use crate::family::pattern::Pattern;
 use crate::lanes::Lanes;
 use crate::pull::Results;
 use crate::tape::{LANES, Operations, Row, Tape, Taped};
@@ -53,6 +54,50 @@ pub(super) fn add_of_place<M: Model>(
     let weights = weights.iter().map(|weight| [*weight, 0.0, 0.0, 0.0]);
     let weights: Vec<Row> = weights.collect();
     tape.read(ends.into_iter().zip(&weights));
+}
+
+/// Adds Σ weights · ∂(φ, a, A)/∂a at some points to the sum of every parameter a; A by the places of its pattern.
+pub(super) fn add_of_rows<M: Model>(
+    tape: &mut Tape,
+    model: &M,
+    (t, q): (Points, &[Points]),
+    pattern: &Pattern,
+    weights: [&[Points]; 3],
+) {
+    let ends = tape.record(|operations| {
+        let q: Vec<Taped> = q.iter().map(|value| Taped::of(value.0)).collect();
+        rows(model, Taped::time(t.0, operations), &q, pattern)
+    });
+    let weights = weights.into_iter().flatten().map(|weights| &weights.0);
+    tape.read(ends.into_iter().zip(weights));
+}
+
+/// The same at one place, without φ, with what weights have of coordinates in the places behind parameters.
+pub(super) fn add_of_rows_at<M: Model>(
+    tape: &mut Tape,
+    model: &M,
+    (t, q): (f64, &[f64]),
+    pattern: &Pattern,
+    (drift, entries): (&[f64], &[f64]),
+) {
+    let ends = tape.record(|operations| {
+        let q = variables(q, model.parameters(), operations);
+        rows(model, Taped::time([t; LANES], operations), &q, pattern)
+    });
+    let weights = drift.iter().map(|_| &0.0).chain(drift).chain(entries);
+    let weights: Vec<Row> = weights.map(|weight| [*weight, 0.0, 0.0, 0.0]).collect();
+    tape.read(ends.into_iter().zip(&weights));
+}
+
+/// Where the operations of φ, a and A stand.
+fn rows<M: Model>(model: &M, time: Taped<'_>, q: &[Taped<'_>], pattern: &Pattern) -> Vec<u32> {
+    let (m, zero) = (model.constraints(), Taped::of([0.0; LANES]));
+    let (mut phi, mut drift) = (vec![zero; m], vec![zero; m]);
+    let mut entries = vec![zero; pattern.places().len()];
+    model.constraint_values(time, q, &mut phi);
+    model.constraint_rows(time, q, &mut drift, &mut pattern.add_to(&mut entries));
+    let all = phi.iter().chain(&drift).chain(&entries);
+    all.map(Taped::place).collect()
 }
 
 fn variables<'t>(

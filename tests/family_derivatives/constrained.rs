@@ -1,0 +1,268 @@
+//! Derivatives of families on constraints: those of models of fixed size, column by column.
+
+use crate::largest::larger;
+use tfe::family::FamilyState;
+use tfe::length::RunTimeLength;
+use tfe::prelude::*;
+use tfe::sensitivity::Loss;
+use tfe::{Model, family};
+
+/// A chain of rods on a support that swings, with masses that grow to the sides, damping, and springs between next but one neighbours.
+#[dynamics(
+    coordinates(x[n], y[n]),
+    lagrangian = sum(i in 0..n, m[i]/2*(1 + s*x[i]^2)*(dot(x[i])^2 + dot(y[i])^2) - m[i]*g*y[i])
+        - sum(i in 0..n-2, k/2*((x[i+2] - x[i])^2 + (y[i+2] - y[i])^2)),
+    constraint(first) = (x[0] - a*sin(w*t))^2 + y[0]^2 - 1,
+    constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - l[i]^2,
+    force(x[i]) = -c*dot(x[i]),
+    output(height) = y[n-1] + b*dot(x[0])^2,
+)]
+#[derive(Clone)]
+struct Rods {
+    n: usize,
+    m: Vec<f64>,
+    l: Vec<f64>,
+    g: f64,
+    k: f64,
+    c: f64,
+    a: f64,
+    w: f64,
+    s: f64,
+    b: f64,
+}
+
+#[dynamics(
+    coordinates(x[3], y[3]),
+    lagrangian = sum(i in 0..3, m[i]/2*(1 + s*x[i]^2)*(dot(x[i])^2 + dot(y[i])^2) - m[i]*g*y[i])
+        - k/2*((x[2] - x[0])^2 + (y[2] - y[0])^2),
+    constraint(first) = (x[0] - a*sin(w*t))^2 + y[0]^2 - 1,
+    constraint(rod[i in 0..2]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - l[i]^2,
+    force(x[0]) = -c*dot(x[0]),
+    force(x[1]) = -c*dot(x[1]),
+    force(x[2]) = -c*dot(x[2]),
+    output(height) = y[2] + b*dot(x[0])^2,
+)]
+#[derive(Clone)]
+struct ThreeRods {
+    m: [f64; 3],
+    l: [f64; 2],
+    g: f64,
+    k: f64,
+    c: f64,
+    a: f64,
+    w: f64,
+    s: f64,
+    b: f64,
+}
+
+fn rods() -> (Rods, ThreeRods) {
+    let (m, l) = ([1.0, 0.5, 2.0], [0.8, 0.6]);
+    let (g, k, c, a, w, s, b) = (9.81, 0.7, 0.1, 0.2, 3.0, 0.3, 0.25);
+    let long = Rods {
+        n: 3,
+        m: m.to_vec(),
+        l: l.to_vec(),
+        g,
+        k,
+        c,
+        a,
+        w,
+        s,
+        b,
+    };
+    let fixed = ThreeRods {
+        m,
+        l,
+        g,
+        k,
+        c,
+        a,
+        w,
+        s,
+        b,
+    };
+    (long, fixed)
+}
+
+/// A start on the constraints at time 0, where the support moves with a ω.
+fn start(fixed: &ThreeRods) -> State<6> {
+    let angles = [0.4_f64, -0.3, 1.1];
+    let lengths = [1.0, fixed.l[0], fixed.l[1]];
+    let (mut x, mut y) = ([0.0; 3], [0.0; 3]);
+    let (mut vx, mut vy) = ([0.0; 3], [0.0; 3]);
+    let (mut at, mut moves) = ([0.0, 0.0], [fixed.a * fixed.w, 0.0]);
+    for i in 0..3 {
+        let (sin, cos) = angles[i].sin_cos();
+        let (length, rate) = (lengths[i], 0.5 - 0.3 * i as f64);
+        at = [at[0] + length * sin, at[1] - length * cos];
+        moves = [
+            moves[0] + length * cos * rate,
+            moves[1] + length * sin * rate,
+        ];
+        (x[i], y[i]) = (at[0], at[1]);
+        (vx[i], vy[i]) = (moves[0], moves[1]);
+    }
+    fixed.state(
+        [x[0], x[1], x[2], y[0], y[1], y[2]],
+        [vx[0], vx[1], vx[2], vy[0], vy[1], vy[2]],
+    )
+}
+
+fn of_heap<const N: usize>(state: &State<N>) -> FamilyState {
+    FamilyState {
+        q: state.q.to_vec(),
+        p: state.p.to_vec(),
+    }
+}
+
+/// The largest difference and the largest number.
+struct Seen {
+    off: f64,
+    size: f64,
+}
+
+impl Seen {
+    const NOTHING: Self = Self {
+        off: 0.0,
+        size: 0.0,
+    };
+
+    fn see(&mut self, ours: &[f64], theirs: &[f64]) {
+        assert_eq!(ours.len(), theirs.len());
+        for (a, b) in ours.iter().zip(theirs) {
+            self.off = larger(self.off, (a - b).abs());
+            self.size = larger(self.size, b.abs());
+        }
+    }
+
+    fn part(&self) -> f64 {
+        self.off / self.size
+    }
+}
+
+const ELEMENTS: [Element; 3] = [Element::mixed(2), Element::mixed(4), Element::mixed(6)];
+
+#[test]
+fn transition_matrices_are_those_of_fixed_size() {
+    let (long, fixed) = rods();
+    let state = start(&fixed);
+    for element in ELEMENTS {
+        for h in [0.05, -0.02, 1e-4] {
+            let ours = stability::transition_matrix(&long, element, &of_heap(&state), 0.0, h);
+            let theirs = stability::transition_matrix(&fixed, element, &state, 0.0, h);
+            let (ours, theirs) = (ours.expect("a matrix"), theirs.expect("a matrix"));
+            let off = (&ours - &theirs).amax() / theirs.amax();
+            // Roundings over h: constraints are held by h times their multipliers.
+            assert!(off < 1e-14 / h.abs(), "{element}, {h}: {off:e}");
+        }
+    }
+}
+
+/// Derivatives along a run, at nodes and between them, by the start and by all parameters; gradients of a loss with velocities, outputs and an integral.
+fn off<M: family::Model, F: Model<N>, const N: usize>(
+    long: &Simulation<'_, M, 0, RunTimeLength>,
+    fixed: &Simulation<'_, F, N>,
+    start: &State<N>,
+) -> [f64; 3] {
+    let span = 0.0..0.8;
+    let theirs = fixed.run_linearised(*start, span.clone()).expect("a run");
+    let ours = long.run_linearised(of_heap(start), span.clone());
+    let ours = ours.expect("a run");
+    let mut linearised = Seen::NOTHING;
+    linearised.see(ours.product().as_slice(), theirs.product().as_slice());
+
+    let theirs = fixed.run_sensitive(*start, span.clone()).expect("a run");
+    let ours = long.run_sensitive(of_heap(start), span.clone());
+    let ours = ours.expect("a run");
+    let mut sensitive = Seen::NOTHING;
+    assert_eq!(ours.parameters(), theirs.parameters());
+    for t in [0.0, 0.013, 0.26, 0.5, 0.777, 0.8] {
+        for name in theirs.parameters() {
+            let a = ours.by(name).at(t).expect("in the span");
+            let b = theirs.by(name).at(t).expect("in the span");
+            sensitive.see(&a.q, &b.q);
+            sensitive.see(&a.p, &b.p);
+            sensitive.see(&a.v, &b.v);
+        }
+        let a = ours.by_start().at(t).expect("in the span");
+        let b = theirs.by_start().at(t).expect("in the span");
+        sensitive.see(a.as_slice(), b.as_slice());
+    }
+
+    let mut gradient = Seen::NOTHING;
+    // Of momenta, velocities, an output at the end, and an integral.
+    let end = |q: &[f64], p: &[f64], v: &[f64]| q[1] * v[0] + p[N - 1] * v[2];
+    let loss = Loss::of_end(end).and(Loss::output_at_end("height"));
+    let loss = loss.and(Loss::integral("height").times(2.0));
+    let (theirs, by) = fixed.gradient(*start, span.clone(), &loss).expect("one");
+    let loss = Loss::of_end(end).and(Loss::output_at_end("height"));
+    let loss = loss.and(Loss::integral("height").times(2.0));
+    let ours = long.gradient(of_heap(start), span.clone(), &loss);
+    let (ours, our) = ours.expect("a gradient");
+    gradient.see(&[ours], &[theirs]);
+    gradient.see(our.by_parameters(), by.by_parameters());
+    gradient.see(&our.by_start().q, &by.by_start().q);
+    gradient.see(&our.by_start().p, &by.by_start().p);
+    [linearised.part(), sensitive.part(), gradient.part()]
+}
+
+#[test]
+fn derivatives_of_runs_are_those_of_fixed_size() {
+    let (long, fixed) = rods();
+    let state = start(&fixed);
+    for element in ELEMENTS {
+        let ours = Simulation::new(&long).element(element).step(0.02);
+        let theirs = Simulation::new(&fixed).element(element).step(0.02);
+        let off = off(&ours, &theirs, &state);
+        // 1e-13 of the largest derivative: roundings of forty steps.
+        assert!(off.iter().all(|off| *off < 2e-12), "{element}: {off:?}");
+    }
+}
+
+/// A long chain that hangs: forwards and backwards are the same, and so are the parts between recorded nodes.
+#[test]
+fn gradients_of_a_long_chain_are_its_derivatives() {
+    let n = 25;
+    let (three, _) = rods();
+    let chain = Rods {
+        n,
+        m: (0..n).map(|i| 0.5 + 0.1 * (i % 4) as f64).collect(),
+        l: (0..n - 1).map(|i| 0.3 + 0.05 * (i % 3) as f64).collect(),
+        a: 0.0,
+        ..three
+    };
+    let (mut x, mut y) = (vec![0.0; n], vec![0.0; n]);
+    let (mut at, mut length) = ([0.0, 0.0], 1.0);
+    for i in 0..n {
+        let angle = 0.3 + 0.02 * i as f64;
+        at = [at[0] + length * angle.sin(), at[1] - length * angle.cos()];
+        (x[i], y[i]) = (at[0], at[1]);
+        length = chain.l.get(i).copied().unwrap_or_default();
+    }
+    let q = [x, y].concat();
+    let start = || chain.state(q.clone(), vec![0.0; 2 * n]);
+    let run = Simulation::new(&chain).element(Mixed::<4>).step(0.02);
+    let loss = || {
+        let end = |q: &[f64], p: &[f64], v: &[f64]| q[n - 1] * v[2 * n - 1] + p[0];
+        Loss::of_end(end).and(Loss::output_at_end("height"))
+    };
+    let (_, plain) = run.gradient(start(), 0.0..0.3, &loss()).expect("one");
+    let run_in_parts = run.clone().record_every(5);
+    let (_, parts) = run_in_parts
+        .gradient(start(), 0.0..0.3, &loss())
+        .expect("one");
+    let mut seen = Seen::NOTHING;
+    seen.see(parts.by_parameters(), plain.by_parameters());
+    assert!(seen.part() < 1e-12, "{:e} of {:e}", seen.off, seen.size);
+    let forwards = run.run_sensitive(start(), 0.0..0.3).expect("a run");
+    let end = forwards.motion().last().clone();
+    let mut seen = Seen::NOTHING;
+    for (index, name) in forwards.parameters().iter().enumerate() {
+        let by = forwards.by(name).at(end.t).expect("the end");
+        let height = forwards.by(name).output("height").expect("an output");
+        let height = height.last().expect("the end");
+        let own = by.q[n - 1] * end.v[2 * n - 1] + end.q[n - 1] * by.v[2 * n - 1] + by.p[0];
+        seen.see(&[plain.by_parameters()[index]], &[own + height]);
+    }
+    assert!(seen.part() < 1e-11, "{:e} of {:e}", seen.off, seen.size);
+}

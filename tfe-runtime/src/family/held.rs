@@ -1,0 +1,555 @@
+//! What constraints add to the derivative of an element of run-time length: by its start, by parameters, and backwards (T-160).
+
+use super::blocked::Blocked;
+use super::model::{Block, Gradient, Model};
+use super::node::Node;
+use super::pattern::Pattern;
+use super::point;
+use super::rows::Rows;
+use crate::dual::Dual;
+use crate::error::StepError;
+use crate::scheme::{MAX_RATES, SchemeRef};
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Which entries A and Σ μ φ_qq have.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Places {
+    pub(super) rows: Pattern,
+    bends: Pattern,
+    /// The number of constraints.
+    pub(super) count: usize,
+}
+
+impl Places {
+    /// Of a model that has been checked.
+    pub(super) fn of<M: Model>(model: &M) -> Self {
+        match M::CONSTRAINED {
+            true => Self {
+                rows: Pattern::of_rows(model),
+                bends: Pattern::of_bends(model),
+                count: model.constraints(),
+            },
+            false => Self::default(),
+        }
+    }
+
+    /// The entries of A, or of what stands in their places: (constraint, coordinate, value).
+    fn rows<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = (usize, usize, f64)> + 'a {
+        let places = self.rows.places().iter().zip(values);
+        places.map(|((_, constraint, coordinate), value)| (*constraint, *coordinate, *value))
+    }
+
+    /// Σ μ φ_qq
+    fn bend<M: Model>(&self, model: &M, (t, q): (f64, &[f64]), mu: &[f64]) -> Vec<f64> {
+        let mut values = vec![0.0; self.bends.places().len()];
+        let mut entries = self.bends.scatter(&mut values);
+        model.constraint_second(t, q, mu, &mut entries);
+        values
+    }
+
+    /// sum += factor · Σ μ φ_qq q, for values of that matrix, which is symmetric.
+    fn add_bent(&self, values: &[f64], factor: f64, q: &[f64], sum: &mut [f64]) {
+        for ((_, row, column), value) in self.bends.places().iter().zip(values) {
+            sum[*row] += factor * (value * q[*column]);
+        }
+    }
+
+    /// sum += A q
+    fn add_product(&self, values: &[f64], q: &[f64], sum: &mut [f64]) {
+        for (constraint, coordinate, value) in self.rows(values) {
+            sum[constraint] += value * q[coordinate];
+        }
+    }
+
+    /// sum += factor · Aᵀ μ
+    fn add_transposed(&self, values: &[f64], factor: f64, mu: &[f64], sum: &mut [f64]) {
+        for (constraint, coordinate, value) in self.rows(values) {
+            sum[coordinate] += factor * (value * mu[constraint]);
+        }
+    }
+
+    /// The slopes of φ, A and a along time, coordinates and what the time carries.
+    fn slopes<M: Model>(&self, model: &M, t: Dual, q: &[Dual]) -> RowSlopes {
+        let zeros = |count: usize| vec![Dual::ZERO; count];
+        let mut phi = zeros(self.count);
+        let mut drift = zeros(self.count);
+        let mut rows = zeros(self.rows.places().len());
+        model.constraint_values(t, q, &mut phi);
+        model.constraint_rows(t, q, &mut drift, &mut self.rows.add_to(&mut rows));
+        let slopes = |values: &[Dual]| values.iter().map(|value| value.slope).collect();
+        RowSlopes {
+            phi: slopes(&phi),
+            drift: slopes(&drift),
+            rows: slopes(&rows),
+        }
+    }
+}
+
+/// The slopes of φ, a and A.
+struct RowSlopes {
+    phi: Vec<f64>,
+    drift: Vec<f64>,
+    rows: Vec<f64>,
+}
+
+/// Constraints at a point: A, μ̇, Σ μ̇ φ_qq, and P_j′.
+#[derive(Clone, Debug)]
+struct Point {
+    rows: Vec<f64>,
+    mu_rate: Vec<f64>,
+    bend: Vec<f64>,
+    slopes: [f64; MAX_RATES],
+}
+
+/// The constraints of an element at the solution of its equations.
+#[derive(Clone, Debug)]
+pub(super) struct Held {
+    places: Arc<Places>,
+    points: Vec<Point>,
+    /// At the start: coordinates, h m₀, A, and Σ h m₀ φ_qq.
+    start: Vec<f64>,
+    first: Vec<f64>,
+    start_rows: Vec<f64>,
+    start_bend: Vec<f64>,
+    end: Projection,
+}
+
+/// The step that was solved, as far as constraints matter.
+pub(super) struct Solved<'a> {
+    pub(super) scheme: &'a SchemeRef<'a>,
+    /// The places of second derivatives of the model.
+    pub(super) second: &'a Pattern,
+    pub(super) t: f64,
+    pub(super) h: f64,
+    pub(super) points: &'a [point::Point],
+    /// Of each constraint, one for each unknown rate.
+    pub(super) multipliers: &'a [f64],
+    /// Coordinates at the start.
+    pub(super) start: &'a [f64],
+    /// Coordinates and velocities at the end, where the node has been solved.
+    pub(super) end: (&'a [f64], &'a [f64]),
+    /// A at the start, and the rows at the end.
+    pub(super) start_rows: &'a [f64],
+    pub(super) end_rows: &'a Rows,
+    pub(super) node: &'a Node,
+}
+
+impl Solved<'_> {
+    /// h m₀
+    fn first_multipliers(&self) -> Vec<f64> {
+        let multipliers = self.multipliers.chunks_exact(self.scheme.unknowns());
+        multipliers.map(|own| self.h * own[0]).collect()
+    }
+}
+
+/// What a parameter changes at fixed unknowns; of a change of the start only what that makes of the impulse.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Moved {
+    /// h A₀ᵀ m₀, by coordinate.
+    impulse: Vec<f64>,
+    /// φ at the points, a row for each, and at the end.
+    phi: Vec<f64>,
+    end_phi: Vec<f64>,
+    /// At the end: L_v, Aᵀη and A v + a.
+    momentum: Vec<f64>,
+    reaction: Vec<f64>,
+    rate: Vec<f64>,
+}
+
+/// What a row λ of phase space weighs of constraints, times which derivatives by parameters are to be added.
+#[derive(Clone, Debug)]
+pub(super) struct Weights {
+    /// φ at the points, a row for each, and at the end.
+    pub(super) phi: Vec<f64>,
+    pub(super) end_phi: Vec<f64>,
+    /// A₀, A at the points, a row for each, A₁: by place.
+    pub(super) start_rows: Vec<f64>,
+    pub(super) rows: Vec<f64>,
+    pub(super) end_rows: Vec<f64>,
+    /// a and L_v at the end.
+    pub(super) end_drift: Vec<f64>,
+    pub(super) end_momentum: Vec<f64>,
+    /// Coordinates and velocities at both ends.
+    pub(super) start: Vec<f64>,
+    pub(super) end: (Vec<f64>, Vec<f64>),
+}
+
+impl Moved {
+    /// Of what changes the impulse at the start alone.
+    pub(super) fn impulse(impulse: Vec<f64>) -> Self {
+        Self {
+            impulse,
+            ..Self::default()
+        }
+    }
+}
+
+impl Held {
+    /// Of the step that was solved last; the rows stand at its end.
+    ///
+    /// # Errors
+    /// [`StepError`] where the matrix of the node is singular.
+    pub(super) fn of<M: Model>(
+        model: &M,
+        places: &Arc<Places>,
+        solved: &Solved<'_>,
+    ) -> Result<Self, StepError> {
+        let point = |(l, point): (usize, &point::Point)| {
+            let time = solved.t + solved.h * solved.scheme.nodes[l];
+            Point {
+                rows: point.rows.clone(),
+                mu_rate: point.mu_rate.clone(),
+                bend: places.bend(model, (time, &point.q), &point.mu_rate),
+                slopes: point.slopes,
+            }
+        };
+        let start = (solved.t, solved.start);
+        let end = (solved.t + solved.h, solved.end.0, solved.end.1);
+        let node = (solved.node, solved.end_rows);
+        let first = solved.first_multipliers();
+        Ok(Self {
+            points: solved.points.iter().enumerate().map(point).collect(),
+            start: solved.start.to_vec(),
+            start_rows: solved.start_rows.to_vec(),
+            start_bend: places.bend(model, start, &first),
+            first,
+            end: Projection::of(model, (places, solved.second), end, node)?,
+            places: Arc::clone(places),
+        })
+    }
+
+    /// What a parameter changes; forces at the points take up what it changes of reactions there.
+    pub(super) fn moved<M: Model>(
+        &self,
+        model: &M,
+        parameter: usize,
+        solved: &Solved<'_>,
+        end_momentum: Vec<f64>,
+        forces: &mut [Vec<f64>],
+    ) -> Moved {
+        let at = |t: f64, q: &[f64]| {
+            let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
+            let still: Vec<Dual> = q.iter().map(|q| Dual::new(*q, 0.0)).collect();
+            self.places.slopes(model, time, &still)
+        };
+        let mut moved = Moved {
+            momentum: end_momentum,
+            ..Moved::default()
+        };
+        for ((l, point), force) in solved.points.iter().enumerate().zip(forces) {
+            let time = solved.t + solved.h * solved.scheme.nodes[l];
+            let slopes = at(time, &point.q);
+            self.places
+                .add_transposed(&slopes.rows, -1.0, &point.mu_rate, force);
+            moved.phi.extend(slopes.phi);
+        }
+        let n = solved.start.len();
+        (moved.impulse, moved.reaction) = (vec![0.0; n], vec![0.0; n]);
+        let start = at(solved.t, solved.start);
+        self.places
+            .add_transposed(&start.rows, 1.0, &self.first, &mut moved.impulse);
+        let (q, v) = solved.end;
+        let end = at(solved.t + solved.h, q);
+        let eta = &self.end.eta;
+        self.places
+            .add_transposed(&end.rows, 1.0, eta, &mut moved.reaction);
+        moved.rate = end.drift;
+        self.places.add_product(&end.rows, v, &mut moved.rate);
+        moved.end_phi = end.phi;
+        moved
+    }
+
+    /// What coordinates at the start make of the impulse there.
+    pub(super) fn struck(&self, q: &[f64]) -> Moved {
+        let mut impulse = vec![0.0; q.len()];
+        self.places.add_bent(&self.start_bend, 1.0, q, &mut impulse);
+        Moved::impulse(impulse)
+    }
+
+    /// Takes from the momentum at the start what the impulse there has without its multipliers.
+    pub(super) fn strike_before(&self, moved: Option<&Moved>, p: &mut [f64]) {
+        if let Some(moved) = moved {
+            for (p, impulse) in p.iter_mut().zip(&moved.impulse) {
+                *p -= impulse;
+            }
+        }
+    }
+
+    /// What coordinates at point l make of the force of reactions there.
+    pub(super) fn bend(&self, l: usize, q: &[f64], force: &mut [f64]) {
+        self.places.add_bent(&self.points[l].bend, -1.0, q, force);
+    }
+
+    /// What multipliers make of forces at point l.
+    pub(super) fn react(&self, l: usize, multipliers: &[f64], force: &mut [f64]) {
+        let point = &self.points[l];
+        let count = multipliers.len() / self.places.count.max(1);
+        let rates = multipliers.chunks_exact(count.max(1)).map(|own| {
+            let pairs = own.iter().zip(point.slopes).skip(1);
+            pairs.map(|(own, slope)| own * slope).sum()
+        });
+        let rates: Vec<f64> = rates.collect();
+        self.places.add_transposed(&point.rows, -1.0, &rates, force);
+    }
+
+    /// What multipliers make of the momentum that the element begins with: h A₀ᵀ m₀.
+    pub(super) fn strike(&self, h: f64, multipliers: &[f64], p: &mut [f64]) {
+        let count = multipliers.len() / self.places.count.max(1);
+        let first = multipliers.chunks_exact(count.max(1)).map(|own| own[0]);
+        let first: Vec<f64> = first.collect();
+        self.places.add_transposed(&self.start_rows, -h, &first, p);
+    }
+
+    /// What coordinates at point l, and what moves φ besides, leave of the equations φ = 0.
+    pub(super) fn miss(
+        &self,
+        l: usize,
+        q: &[f64],
+        moved: Option<&Moved>,
+        (weight, h): (f64, f64),
+        sides: &mut [f64],
+    ) {
+        let point = &self.points[l];
+        let count = sides.len() / self.places.count.max(1);
+        let mut off = vec![0.0; self.places.count];
+        self.places.add_product(&point.rows, q, &mut off);
+        if let Some(moved) = moved {
+            add(&mut off, moved.phi.get(l * self.places.count..));
+        }
+        for (sides, off) in sides.chunks_exact_mut(count.max(1)).zip(off) {
+            for (side, slope) in sides.iter_mut().zip(point.slopes).skip(1) {
+                *side -= weight * slope * off / h;
+            }
+        }
+    }
+
+    /// The same at the end.
+    pub(super) fn miss_end(&self, q: &[f64], moved: Option<&Moved>, h: f64, sides: &mut [f64]) {
+        let count = sides.len() / self.places.count.max(1);
+        let mut off = vec![0.0; self.places.count];
+        self.places.add_product(&self.end.rows, q, &mut off);
+        if let Some(moved) = moved {
+            add(&mut off, Some(&moved.end_phi));
+        }
+        for (sides, off) in sides.chunks_exact_mut(count.max(1)).zip(off) {
+            sides[0] -= off / h;
+        }
+    }
+
+    /// Takes from the momentum that arrives at the end what constraints take up.
+    pub(super) fn settle(&self, p: &mut [f64], q: &[f64], moved: Option<&Moved>) {
+        self.end.apply(&self.places, p, q, moved);
+    }
+}
+
+/// Adds what there is.
+fn add(sum: &mut [f64], more: Option<&[f64]>) {
+    for (sum, more) in sum.iter_mut().zip(more.unwrap_or_default()) {
+        *sum += more;
+    }
+}
+
+/// Backwards.
+impl Held {
+    /// Takes λ from after the node at the end to before it.
+    pub(super) fn unsettle(&self, of_p: &mut [f64], of_q: &mut [f64]) -> Weights {
+        let (n, m) = (of_p.len(), self.places.count);
+        let w = self.end.pull(&self.places, of_p, of_q);
+        let rows = self.places.rows(&self.end.rows);
+        // Of (A v + a) and −Aᵀη.
+        let end_rows = rows.map(|(c, a, _)| w[n + c] * self.end.v[a] - of_p[a] * self.end.eta[c]);
+        Weights {
+            phi: vec![0.0; self.points.len() * m],
+            end_phi: vec![0.0; m],
+            start_rows: Vec::new(),
+            rows: Vec::new(),
+            end_rows: end_rows.collect(),
+            end_drift: w[n..].to_vec(),
+            end_momentum: w[..n].to_vec(),
+            start: Vec::new(),
+            end: (self.end.q.clone(), self.end.v.clone()),
+        }
+    }
+
+    /// What a row times the forces at point l is of multipliers.
+    pub(super) fn weigh(&self, l: usize, force: &[f64], sides: &mut [f64]) {
+        let point = &self.points[l];
+        let count = sides.len() / self.places.count.max(1);
+        let mut of_rate = vec![0.0; self.places.count];
+        self.places.add_product(&point.rows, force, &mut of_rate);
+        for (sides, of_rate) in sides.chunks_exact_mut(count.max(1)).zip(of_rate) {
+            for (side, slope) in sides.iter_mut().zip(point.slopes).skip(1) {
+                *side -= slope * of_rate;
+            }
+        }
+    }
+
+    /// What λ is of the first multipliers.
+    pub(super) fn weigh_start(&self, h: f64, of_p: &[f64], sides: &mut [f64]) {
+        let count = sides.len() / self.places.count.max(1);
+        let mut of_first = vec![0.0; self.places.count];
+        self.places
+            .add_product(&self.start_rows, of_p, &mut of_first);
+        for (sides, of_first) in sides.chunks_exact_mut(count.max(1)).zip(of_first) {
+            sides[0] -= h * of_first;
+        }
+    }
+
+    /// What the solution `mu` of the transposed equations weighs of φ, and with it of coordinates at point l.
+    pub(super) fn unmiss(
+        &self,
+        l: usize,
+        mu: &[f64],
+        (weight, h): (f64, f64),
+        by_q: &mut [f64],
+        weights: &mut Weights,
+    ) {
+        let point = &self.points[l];
+        let m = self.places.count;
+        let count = mu.len() / m.max(1);
+        let own = &mut weights.phi[l * m..(l + 1) * m];
+        for (own, mu) in own.iter_mut().zip(mu.chunks_exact(count.max(1))) {
+            let pairs = mu.iter().zip(point.slopes).skip(1);
+            *own -= weight / h * pairs.map(|(mu, slope)| mu * slope).sum::<f64>();
+        }
+        self.places.add_transposed(&point.rows, 1.0, own, by_q);
+    }
+
+    /// The same at the end.
+    pub(super) fn unmiss_end(&self, mu: &[f64], h: f64, by_q: &mut [f64], weights: &mut Weights) {
+        let count = mu.len() / self.places.count.max(1);
+        let own = &mut weights.end_phi;
+        for (own, mu) in own.iter_mut().zip(mu.chunks_exact(count.max(1))) {
+            *own -= mu[0] / h;
+        }
+        self.places.add_transposed(&self.end.rows, 1.0, own, by_q);
+    }
+
+    /// What λ before the impulse at the start is of coordinates there.
+    pub(super) fn unstrike(&self, of_p: &[f64], by_q: &mut [f64]) {
+        self.places.add_bent(&self.start_bend, -1.0, of_p, by_q);
+    }
+
+    /// What λ weighs of the entries of A at the start and at the points: of h A₀ᵀm₀ and Aᵀμ̇.
+    pub(super) fn weigh_rows(&self, of_p: &[f64], forces: &[f64], weights: &mut Weights) {
+        let n = of_p.len();
+        let places = || self.places.rows.places().iter();
+        let start = places().map(|(_, c, a)| -of_p[*a] * self.first[*c]);
+        weights.start_rows = start.collect();
+        weights.start = self.start.clone();
+        for (point, force) in self.points.iter().zip(forces.chunks_exact(n.max(1))) {
+            let rows = places().map(|(_, c, a)| -force[*a] * point.mu_rate[*c]);
+            weights.rows.extend(rows);
+        }
+    }
+}
+
+/// How the momentum at a node changes with what arrives there, and with the coordinates.
+///
+/// ```text
+/// p = p̃ − Aᵀη ,     L_v(q, v, t) + Aᵀη = p̃ ,     A v + a = 0                                          (T-74)
+/// ```
+#[derive(Clone, Debug)]
+pub(super) struct Projection {
+    /// [ L_vv Aᵀ ; A 0 ], factored.
+    matrix: Blocked,
+    rows: Vec<f64>,
+    /// ∂(A v + a)/∂q
+    rates: Vec<f64>,
+    /// L_vq
+    turn: Vec<(usize, usize, f64)>,
+    /// Σ η φ_qq
+    bend: Vec<f64>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    eta: Vec<f64>,
+}
+
+impl Projection {
+    /// At a node that was solved last, with the rows that are there.
+    ///
+    /// # Errors
+    /// [`StepError`] where the matrix is singular.
+    pub(super) fn of<M: Model>(
+        model: &M,
+        (places, second): (&Places, &Pattern),
+        (t, q, v): (f64, &[f64], &[f64]),
+        (node, rows): (&Node, &Rows),
+    ) -> Result<Self, StepError> {
+        let eta = node.multipliers().to_vec();
+        // φ is a function of coordinates and time: ∂(A v + a)/∂q is dA/dt along the motion.
+        let moving: Vec<Dual> = q.iter().zip(v).map(|(q, v)| Dual::new(*q, *v)).collect();
+        let along = places.slopes(model, Dual::new(t, 1.0), &moving);
+        Ok(Self {
+            matrix: node.clone().linearised(model, (t, q, v), rows)?,
+            rows: rows.values.clone(),
+            rates: along.rows,
+            turn: turn(model, second, (t, q, v)),
+            bend: places.bend(model, (t, q), &eta),
+            q: q.to_vec(),
+            v: v.to_vec(),
+            eta,
+        })
+    }
+
+    fn apply(&self, places: &Places, p: &mut [f64], q: &[f64], moved: Option<&Moved>) {
+        let (n, m) = (p.len(), places.count);
+        places.add_bent(&self.bend, -1.0, q, p);
+        let mut side = vec![0.0; n + m];
+        if let Some(moved) = moved {
+            for (p, reaction) in p.iter_mut().zip(&moved.reaction) {
+                *p -= reaction;
+            }
+            add(&mut side[..n], Some(&moved.momentum));
+            add(&mut side[n..], Some(&moved.rate));
+        }
+        for (row, column, value) in &self.turn {
+            side[*row] += value * q[*column];
+        }
+        places.add_product(&self.rates, q, &mut side[n..]);
+        for (side, p) in side.iter_mut().zip(&*p) {
+            *side -= p;
+        }
+        // With the opposite sign so far, and so is the solution.
+        self.matrix.solve(&mut side);
+        places.add_transposed(&self.rows, 1.0, &side[n..], p);
+    }
+
+    /// Takes λ back, and gives what it weighs of L_v and of A v + a.
+    fn pull(&self, places: &Places, of_p: &mut [f64], of_q: &mut [f64]) -> Vec<f64> {
+        let (n, m) = (of_p.len(), places.count);
+        let mut w = vec![0.0; n + m];
+        places.add_product(&self.rows, of_p, &mut w[n..]);
+        // The matrix is symmetric.
+        self.matrix.solve(&mut w);
+        for (of_p, w) in of_p.iter_mut().zip(&w) {
+            *of_p -= w;
+        }
+        for (row, column, value) in &self.turn {
+            of_q[*column] += value * w[*row];
+        }
+        places.add_bent(&self.bend, -1.0, of_p, of_q);
+        places.add_transposed(&self.rates, 1.0, &w[n..], of_q);
+        w
+    }
+}
+
+/// L_vq
+fn turn<M: Model>(
+    model: &M,
+    pattern: &Pattern,
+    (t, q, v): (f64, &[f64], &[f64]),
+) -> Vec<(usize, usize, f64)> {
+    let mut values = vec![0.0; pattern.places().len()];
+    let mut unused = [(); 3].map(|()| vec![0.0; q.len()]);
+    let [z, by_q, force] = &mut unused;
+    let first = Gradient { z, q: by_q, force };
+    model.second(t, q, v, first, &mut pattern.scatter(&mut values));
+    let entries = pattern.places().iter().zip(values);
+    let turned = entries.filter(|((block, ..), value)| *block == Block::ZQ && *value != 0.0);
+    turned
+        .map(|((_, row, column), value)| (*row, *column, value))
+        .collect()
+}

@@ -1,0 +1,59 @@
+//! Why a step of a family has no derivative.
+
+use crate::error::StepError;
+use crate::family::error::ModelError;
+use core::fmt;
+
+/// Why there is no derivative of a step of a family.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum OperatorError {
+    /// The model does not fit together, or families cannot do what was asked for.
+    Family(ModelError),
+    /// The step itself failed, or its tangent is singular.
+    Step(StepError),
+    /// The step is so long that it was made in pieces.
+    Cut,
+    /// A vector is not as long as the phase space.
+    Shape {
+        /// Numbers that are needed.
+        needed: usize,
+        /// Numbers that were given.
+        given: usize,
+    },
+}
+
+impl From<ModelError> for OperatorError {
+    fn from(error: ModelError) -> Self {
+        Self::Family(error)
+    }
+}
+
+impl From<StepError> for OperatorError {
+    fn from(error: StepError) -> Self {
+        Self::Step(error)
+    }
+}
+
+impl fmt::Display for OperatorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Family(error) => error.fmt(f),
+            Self::Step(error) => error.fmt(f),
+            Self::Cut => f.write_str("the step is so long that it was made in pieces"),
+            Self::Shape { needed, given } => {
+                write!(f, "the vector needs {needed} numbers, not {given}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for OperatorError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Family(error) => error.source(),
+            Self::Step(error) => error.source(),
+            _ => None,
+        }
+    }
+}
