@@ -7,7 +7,7 @@ use tfe_runtime::{Model, State};
 
 /// The velocities that belong to states of a model.
 pub trait Velocity<const N: usize, L: Length<N> = FixedLength>: Evaluate<N, L> {
-    /// dq/dt of a state at the time t: v with ∂L/∂v = p and on the constraints, or ∂H/∂p. NaN where the mass matrix is singular, where the iteration for v of a kinetic
+    /// dq/dt of a state at the time t: v with ∂L/∂v = p, or ∂H/∂p. Where the mass matrix is singular it is the velocity that constraints leave (theory.md (T-74)), NaN where they leave none, where the iteration for v of a kinetic
     /// energy that is not quadratic fails, or where the state is not as long as the model.
     ///
     /// ```

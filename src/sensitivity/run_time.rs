@@ -61,7 +61,7 @@ impl<'a, M: Model> Along<'a, M> {
             return along;
         }
         let factors = along.factored(0);
-        let is_regular = factors.is_invertible() || model.constraints() == 0;
+        let is_regular = model.constraints() == 0 || is_regular(&factors);
         along.factors = Some(factors);
         if !is_regular {
             let n = model.len();
@@ -161,6 +161,13 @@ impl<'a, M: Model> Along<'a, M> {
         self.model.first(time, q, z, first);
         by_z
     }
+}
+
+/// Whether constraints are not needed to tell velocities: pivots are small only beside their columns, which carry the units of their coordinates.
+fn is_regular(factors: &LU<f64, Dyn, Dyn>) -> bool {
+    let u = factors.u();
+    let mut columns = u.column_iter().enumerate();
+    columns.all(|(a, column)| u[(a, a)].abs() > 1e-10 * column.amax())
 }
 
 fn duals(values: &[f64], slopes: &[f64]) -> Vec<Dual> {

@@ -1,6 +1,7 @@
 //! Velocities and outputs differentiated along changes of states, times and parameters.
 
 use nalgebra::{DMatrix, DVector};
+use tfe_runtime::constrained::HeldVelocity;
 use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::{Direction, First, Form, Model, Parameter, State};
 
@@ -48,6 +49,8 @@ pub(crate) struct Along<'a, M, const N: usize> {
     place: Place<'a, N>,
     /// L_vv⁻¹ of a Lagrangian.
     inverse: Option<DMatrix<f64>>,
+    /// Where that is singular, and constraints leave one velocity.
+    held: Option<HeldVelocity<N>>,
 }
 
 impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
@@ -63,14 +66,17 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
                 Some(mass.try_inverse().unwrap_or_else(unknown))
             }
         };
+        let Place { t, state, v } = place;
+        let held = HeldVelocity::of(model, t, (&state.q, &state.p), v);
         Self {
             model,
             place,
             inverse,
+            held: held.unwrap_or_default(),
         }
     }
 
-    /// δv; NaN where the mass matrix is singular.
+    /// δv; NaN where the mass matrix is singular, for motions that constraints allow if there are any.
     pub(crate) fn velocity(&self, change: &Change<N>) -> [f64; N] {
         let Place { t, state, v } = self.place;
         let time = Dual::new(t, change.t).by_parameter(change.parameter);
@@ -83,8 +89,11 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
         };
         // p = L_v(q, v, t): L_vv δv = δp − ∂L_v/∂(t, q, a).
         self.model.first(time, &q, &duals(v, &[0.0; N]), &mut first);
-        let right = DVector::from_fn(N, |a, _| change.p[a] - first.z[a].slope);
-        let found = inverse * right;
+        let right = std::array::from_fn(|a| change.p[a] - first.z[a].slope);
+        if let Some(held) = &self.held {
+            return held.slope(self.model, (time, &q), v, &right);
+        }
+        let found = inverse * DVector::from_column_slice(&right);
         std::array::from_fn(|a| found[a])
     }
 

@@ -219,6 +219,74 @@ fn derivatives_of_runs_are_those_of_fixed_size() {
     }
 }
 
+/// Tops by unit quaternions, whose mass matrix is singular: constraints leave the velocity of a momentum.
+#[dynamics(
+    coordinates(a[n], b[n], c[n], d[n]),
+    lagrangian = sum(i in 0..n,
+        2*i1*(a[i]*dot(b[i]) - b[i]*dot(a[i]) + d[i]*dot(c[i]) - c[i]*dot(d[i]))^2
+        + 2*i2*(a[i]*dot(c[i]) - c[i]*dot(a[i]) + b[i]*dot(d[i]) - d[i]*dot(b[i]))^2
+        + 2*i3*(a[i]*dot(d[i]) - d[i]*dot(a[i]) + c[i]*dot(b[i]) - b[i]*dot(c[i]))^2
+        - mgd*(a[i]^2 - b[i]^2 - c[i]^2 + d[i]^2)),
+    constraint(unit[i in 0..n]) = (a[i]^2 + b[i]^2 + c[i]^2 + d[i]^2 - r)/2,
+    output(height) = a[0]*dot(b[0]) - b[0]*dot(a[0]) + d[0]*dot(c[0]) - c[0]*dot(d[0]),
+)]
+struct Tops {
+    n: usize,
+    i1: f64,
+    i2: f64,
+    i3: f64,
+    mgd: f64,
+    r: f64,
+}
+
+#[dynamics(
+    coordinates(e[4]),
+    let w = body_rate(e),
+    lagrangian = (i1*w[0]^2 + i2*w[1]^2 + i3*w[2]^2)/2 - mgd*(e[0]^2 - e[1]^2 - e[2]^2 + e[3]^2),
+    constraint(unit) = (inner(e, e) - r)/2,
+    output(height) = w[0]/2,
+)]
+struct Top {
+    i1: f64,
+    i2: f64,
+    i3: f64,
+    mgd: f64,
+    r: f64,
+}
+
+#[test]
+fn unit_quaternions_have_the_velocities_and_derivatives_of_fixed_size() {
+    let (i1, i2, i3, mgd, r) = (1.0, 1.3, 0.5, 1.0, 1.0);
+    let (n, fixed) = (1, Top { i1, i2, i3, mgd, r });
+    let long = Tops {
+        n,
+        i1,
+        i2,
+        i3,
+        mgd,
+        r,
+    };
+    // e = (0.8, 0, 0.6, 0), with the body rates 0.3, −0.5 and 4.
+    let start = fixed.state([0.8, 0.0, 0.6, 0.0], [0.15, 1.32, -0.2, 1.51]);
+    for element in ELEMENTS {
+        let ours = Simulation::new(&long).element(element).step(0.02);
+        let theirs = Simulation::new(&fixed).element(element).step(0.02);
+        let motion = ours.run(of_heap(&start), 0.0..0.8).expect("a run");
+        let other = theirs.run(start, 0.0..0.8).expect("a run");
+        let mut seen = Seen::NOTHING;
+        for (node, other) in motion.states().iter().zip(other.states()) {
+            seen.see(&node.v, &other.v);
+            seen.see(&long.velocity(node.t, &node.state()), &other.v);
+        }
+        seen.see(motion.energies(), other.energies());
+        let heights = motion.integral(&long, "height").expect("an integral");
+        seen.see(&heights, &other.integral(&fixed, "height").expect("one"));
+        assert!(seen.part() < 1e-13, "{element}: {:e}", seen.off);
+        let off = off(&ours, &theirs, &start);
+        assert!(off.iter().all(|off| *off < 2e-12), "{element}: {off:?}");
+    }
+}
+
 /// A long chain that hangs: forwards and backwards are the same, and so are the parts between recorded nodes.
 #[test]
 fn gradients_of_a_long_chain_are_its_derivatives() {

@@ -10,6 +10,7 @@ mod dual_runs;
 mod events;
 mod forwards;
 mod inside;
+mod quaternions;
 mod second;
 
 use differences::difference;

@@ -7,6 +7,8 @@ mod combine;
 mod derivative;
 pub(crate) mod element;
 #[cfg(feature = "alloc")]
+mod held_velocity;
+#[cfg(feature = "alloc")]
 mod instant;
 pub(crate) mod layout;
 pub(crate) mod node;
@@ -19,6 +21,8 @@ mod tangent;
 mod trail;
 
 pub use crate::control::START_TOLERANCE;
+#[cfg(feature = "alloc")]
+pub use held_velocity::HeldVelocity;
 #[cfg(feature = "alloc")]
 pub use instant::{Gradients, gradients, reactions};
 #[cfg(feature = "alloc")]

@@ -1,5 +1,6 @@
 //! What a loss has of outputs and velocities goes on to states and parameters: by one evaluation backwards for all of them (T-127, T-149).
 
+use crate::constrained::HeldVelocity;
 use crate::error::{ConstraintError, StepError, TransitionError};
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
@@ -185,9 +186,10 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
                 // p = L_v(q, v): δv = L_vv⁻¹ (δp − ∂L_v/∂(q, a)).
                 for (lane, place) in places.iter().enumerate() {
                     let mut own: [f64; N] = core::array::from_fn(|a| by_v[a][lane]);
-                    self.mass(place)?.solve(&mut own);
+                    let of_q = self.divide_by_mass(place, &mut own)?;
                     for a in 0..N {
                         by_p[a][lane] += own[a];
+                        by_q[a][lane] += of_q[a];
                         by_v[a][lane] = -own[a];
                     }
                 }
@@ -204,12 +206,54 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
         }))
     }
 
-    /// L_vv
-    fn mass(&self, place: &Sight<'_, State<N>, [f64; N]>) -> Result<Block<N>, StepError> {
-        let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
+    /// From weights of a velocity to those of its momentum; what constraints have of coordinates where they are needed for that, and of parameters.
+    fn divide_by_mass(
+        &mut self,
+        place: &Sight<'_, State<N>, [f64; N]>,
+        weights: &mut [f64; N],
+    ) -> Result<[f64; N], StepError> {
         let Sight { t, state, v, .. } = place;
+        if const { !M::CONSTRAINTS.is_empty() } {
+            let held = HeldVelocity::of(self.model, *t, (&state.q, &state.p), v)?;
+            if let Some(held) = held {
+                let (rows, drift) = held.pull(v, weights);
+                return Ok(self.pulled_rows(*t, &state.q, &rows, &drift));
+            }
+        }
+        let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
         (self.model).first_and_mass(*t, &state.q, v, &mut first, &mut zz);
-        Block::of(&zz).map_err(|_| ConstraintError::SingularMass.into())
+        let mass = Block::of(&zz).map_err(|_| ConstraintError::SingularMass)?;
+        mass.solve(weights);
+        Ok([0.0; N])
+    }
+
+    /// Weights of A and a at one place to q, and to the sums of parameters.
+    fn pulled_rows(
+        &mut self,
+        t: f64,
+        q: &[f64; N],
+        of_rows: &[[f64; N]],
+        of_drift: &[f64],
+    ) -> [f64; N] {
+        let (model, parameters) = (self.model, self.parameters);
+        let ends: Vec<u32> = self.tape.record(|operations| {
+            let q = variables(&q.map(|q| [q; LANES]), parameters, operations);
+            let zero = Taped::of([0.0; LANES]);
+            let mut rows = vec![[zero; N]; of_rows.len()];
+            let mut drift = vec![zero; of_drift.len()];
+            model.constraint_rows(
+                Taped::time([t; LANES], operations),
+                &q,
+                &mut rows,
+                &mut drift,
+            );
+            let all = rows.as_flattened().iter().chain(&drift);
+            all.map(Taped::place).collect()
+        });
+        let weights = of_rows.as_flattened().iter().chain(of_drift);
+        let weights: Vec<Row> = weights.map(|weight| [*weight, 0.0, 0.0, 0.0]).collect();
+        self.tape.read(ends.into_iter().zip(&weights));
+        core::array::from_fn(|a| self.tape.take_row(parameters + a)[0])
     }
 
     /// Weights of results to q and z, and to the sums of parameters.

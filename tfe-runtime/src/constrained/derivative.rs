@@ -414,6 +414,11 @@ impl<const N: usize> DualRows<N> {
         sum
     }
 
+    /// dA, one row of it.
+    pub(crate) fn row_slope(&self, c: usize) -> [f64; N] {
+        core::array::from_fn(|a| self.rows[c][a].slope)
+    }
+
     /// d(φ / h)
     fn value_over(&self, c: usize, h: f64, stretch: f64) -> f64 {
         (self.values[c].slope - self.values[c].value * stretch) / h

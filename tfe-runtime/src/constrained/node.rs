@@ -96,6 +96,19 @@ where
 /// A mass matrix with a relative pivot below this one leaves the velocity of a momentum to the constraints.
 const SINGULAR: f64 = 1e-10;
 
+/// Whether a mass matrix alone says the velocity of a momentum.
+pub(crate) fn is_regular<const N: usize>(mut zz: [[f64; N]; N]) -> bool {
+    // Columns carry the units of their coordinate: a pivot is small only beside its column.
+    let mut scales = [0.0_f64; N];
+    for row in &zz {
+        for (scale, entry) in scales.iter_mut().zip(row) {
+            *scale = scale.max(entry.abs());
+        }
+    }
+    lu::factor(N, zz.as_flattened_mut(), &mut [0; N]).is_ok()
+        && (0..N).all(|a| zz[a][a].abs() > SINGULAR * scales[a])
+}
+
 /// The velocity that a momentum has without regard to the constraints, `v` being the one with it: the same if the state is consistent.
 ///
 /// Where the mass matrix is singular up to rounding, as for quaternions, the momentum alone has no velocity: then it is `v`.
@@ -112,17 +125,7 @@ where
     if matches!(M::FORM, Form::Lagrangian) {
         let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
         model.first_and_mass(t, q, v, &mut first, &mut zz);
-        let mut pivots = [0; N];
-        // Columns carry the units of their coordinate: a pivot is small only beside its column.
-        let mut scales = [0.0_f64; N];
-        for row in &zz {
-            for (scale, entry) in scales.iter_mut().zip(row) {
-                *scale = scale.max(entry.abs());
-            }
-        }
-        let regular = lu::factor(N, zz.as_flattened_mut(), &mut pivots).is_ok()
-            && (0..N).all(|a| zz[a][a].abs() > SINGULAR * scales[a]);
-        if !regular {
+        if !is_regular(zz) {
             return *v;
         }
     }

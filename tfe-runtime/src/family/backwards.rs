@@ -227,8 +227,11 @@ impl<'m, M: Model> Backwards<'m, M> {
             empty => empty.insert(Node::new(model, &rows).ok_or(ModelError::TooLarge)?),
         };
         let sides = values.iter().copied();
-        let solution = node.solve_linear(model, at, &rows, sides);
-        values.copy_from_slice(solution?);
+        let solution = node.solve_linear(model, at, &rows, sides)?.to_vec();
+        if M::CONSTRAINED && !node.is_regular() {
+            return Err(StepError::SingularTangent { unknown: 0 }.into());
+        }
+        values.copy_from_slice(&solution);
         Ok(())
     }
 

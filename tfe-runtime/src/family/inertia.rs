@@ -3,7 +3,7 @@
 use super::error::ModelError;
 use super::model::{Block, Entries, FamilyState, Model, slope};
 #[cfg(feature = "sparse")]
-use super::{node::Node, rows::Rows};
+use super::{instant::Instant, node::Node, rows::Rows};
 use crate::double_double::DoubleDouble;
 use crate::model::Form;
 use alloc::vec;
@@ -57,6 +57,9 @@ pub(super) struct Legendre {
     /// Made when it is needed: for mass matrices that are not diagonal.
     #[cfg(feature = "sparse")]
     node: Option<Node>,
+    /// Where these are singular, with constraints.
+    #[cfg(feature = "sparse")]
+    instant: Option<Instant>,
 }
 
 impl Legendre {
@@ -67,10 +70,20 @@ impl Legendre {
         t: f64,
         state: &FamilyState,
     ) -> Result<Vec<f64>, ModelError> {
-        match M::FORM {
-            Form::Lagrangian => self.other(model, t, &state.q, &state.p),
-            Form::Hamiltonian => Ok(slope(model, t, &state.q, &state.p)),
+        if M::FORM == Form::Hamiltonian {
+            return Ok(slope(model, t, &state.q, &state.p));
         }
+        let own = self.other(model, t, &state.q, &state.p);
+        #[cfg(feature = "sparse")]
+        if M::CONSTRAINED && own.is_err() {
+            // A momentum alone has no velocity, as that of a unit quaternion: constraints leave one.
+            let instant = match &mut self.instant {
+                Some(instant) => instant,
+                empty => empty.insert(Instant::new(model).ok_or(ModelError::TooLarge)?),
+            };
+            return instant.velocity(model, t, state);
+        }
+        own
     }
 
     /// The momentum that belongs to a velocity of a Hamiltonian, or the velocity that belongs to a momentum of a Lagrangian: one step of
@@ -119,7 +132,11 @@ impl Legendre {
         let mut z = vec![0.0; model.len()];
         node.solve(model, (t, q), wanted, &free, &mut z)
             .map_err(|_| ModelError::NoVelocity)?;
-        Ok(z)
+        // Where constraints hold the motion the matrix may be singular up to roundings.
+        match M::CONSTRAINED && !node.is_regular() {
+            true => Err(ModelError::NoVelocity),
+            false => Ok(z),
+        }
     }
 
     #[cfg(not(feature = "sparse"))]

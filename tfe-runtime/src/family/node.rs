@@ -15,6 +15,9 @@ const MOST: u32 = 50;
 /// How often a step is halved.
 const MOST_HALVINGS: u32 = 20;
 
+/// How far a regular matrix of masses may be from giving a vector back: with fewer digits constraints say more of velocities than momenta do.
+const REGULAR: f64 = 1e-6;
+
 /// Solves, for z = v of a Lagrangian or z = p of a Hamiltonian,
 ///
 /// ```text
@@ -200,6 +203,26 @@ impl Node {
             }
             fraction *= 0.5;
         }
+    }
+
+    /// Whether the matrix that was factored last is so far from singular that a solution has digits: it gives back a vector that it is multiplied with.
+    pub(super) fn is_regular(&self) -> bool {
+        let n = self.slope.len();
+        // Irregular, so that no entry of a null vector is missed.
+        let vector: Vec<f64> = (0..n)
+            .map(|a| 1.0 + 0.5 * (1.7 * (a * a) as f64).sin())
+            .collect();
+        let mut product = vec![0.0; self.vector.len()];
+        let places = self.pattern.places().iter();
+        for ((_, row, column), value) in places.zip(&self.derivatives) {
+            product[*row] += value * vector[*column];
+        }
+        self.matrix.solve(&mut product);
+        let off = vector.iter().zip(&product).map(|(a, b)| (a - b).abs());
+        off.fold(
+            0.0,
+            |off: f64, one| if one > off || one.is_nan() { one } else { off },
+        ) < REGULAR
     }
 
     /// η of the last solution.

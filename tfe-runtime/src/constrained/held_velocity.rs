@@ -1,0 +1,134 @@
+//! How the velocity of a momentum moves with it where the mass matrix is singular and constraints leave one velocity (T-161).
+
+use super::derivative::DualRows;
+use super::node::is_regular;
+use super::states::chosen;
+use crate::constrained::rows::rows_len;
+use crate::dual::Dual;
+use crate::error::{ConstraintError, StepError};
+use crate::lu;
+use crate::model::{First, Form, Model};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// The linear equations of the velocity at a state, factored:
+///
+/// ```text
+/// [ L_vv  Aᵀ ] [ δv ]   [ δp − ∂L_v − ∂(Aᵀ)η ]
+/// [ A     0  ] [ δη ] = [ − ∂(A v + a)        ] ,     L_v(q, v, t) + Aᵀη = p                           (T-161)
+/// ```
+///
+/// with what time, coordinates and parameters change at a fixed velocity under ∂.
+#[derive(Clone, Debug)]
+pub struct HeldVelocity<const N: usize> {
+    matrix: Vec<f64>,
+    pivots: Vec<usize>,
+    active: Vec<usize>,
+    eta: Vec<f64>,
+}
+
+impl<const N: usize> HeldVelocity<N> {
+    /// At coordinates q with momenta p and their velocities v of a Lagrangian; `None` where L_vv alone says the velocity of a momentum, and without constraints.
+    ///
+    /// # Errors
+    /// [`ConstraintError::SingularMass`] where the kinetic energy is singular for motions that the constraints allow.
+    pub fn of<M: Model<N>>(
+        model: &M,
+        t: f64,
+        (q, p): (&[f64; N], &[f64; N]),
+        v: &[f64; N],
+    ) -> Result<Option<Self>, StepError> {
+        if const { M::CONSTRAINTS.is_empty() || matches!(M::FORM, Form::Hamiltonian) } {
+            return Ok(None);
+        }
+        let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
+        model.first_and_mass(t, q, v, &mut first, &mut zz);
+        if is_regular(zz) {
+            return Ok(None);
+        }
+        let count = M::CONSTRAINTS.len();
+        let size = N + count;
+        let mut numbers = vec![0.0; rows_len(N, count)];
+        let (rows, active) = chosen(model, (t, q), &mut numbers);
+        let mut matrix = vec![0.0; size * size];
+        for (row, masses) in matrix.chunks_exact_mut(size).zip(&zz) {
+            row[..N].copy_from_slice(masses);
+        }
+        for (c, mark) in active.iter().enumerate() {
+            let row = N + c;
+            if *mark == 0 {
+                matrix[row * size + row] = 1.0;
+                continue;
+            }
+            for a in 0..N {
+                matrix[row * size + a] = rows.rows[c][a];
+                matrix[a * size + row] = rows.rows[c][a];
+            }
+        }
+        let mut pivots = vec![0; size];
+        lu::factor(size, &mut matrix, &mut pivots).map_err(|_| ConstraintError::SingularMass)?;
+        let mut held = Self {
+            matrix,
+            pivots,
+            active,
+            eta: Vec::new(),
+        };
+        let mut off = vec![0.0; size];
+        for (off, (p, slope)) in off.iter_mut().zip(p.iter().zip(&first.z)) {
+            *off = p - slope;
+        }
+        held.solve(&mut off);
+        held.eta = off.split_off(N);
+        Ok(Some(held))
+    }
+
+    fn solve(&self, vector: &mut [f64]) {
+        lu::solve(vector.len(), &self.matrix, &self.pivots, vector);
+    }
+
+    /// δv, where time and coordinates carry slopes, and δp − ∂L_v is given.
+    #[must_use]
+    pub fn slope<M: Model<N>>(
+        &self,
+        model: &M,
+        (t, q): (Dual, &[Dual; N]),
+        v: &[f64; N],
+        given: &[f64; N],
+    ) -> [f64; N] {
+        let mut rows = DualRows::<N>::new(self.active.len());
+        rows.evaluate(model, t, q, v);
+        let mut sides = given.to_vec();
+        for (c, mark) in self.active.iter().enumerate() {
+            let is_active = *mark != 0;
+            sides.push(if is_active {
+                -rows.psi_slope(c, v)
+            } else {
+                0.0
+            });
+            if is_active {
+                let row = rows.row_slope(c);
+                for a in 0..N {
+                    sides[a] -= row[a] * self.eta[c];
+                }
+            }
+        }
+        self.solve(&mut sides);
+        core::array::from_fn(|a| sides[a])
+    }
+
+    /// Takes weights of the velocity to those of the momentum, and gives what they weigh of A, row by row, and of a.
+    pub(crate) fn pull(&self, v: &[f64; N], weights: &mut [f64; N]) -> (Vec<[f64; N]>, Vec<f64>) {
+        let mut w = weights.to_vec();
+        w.resize(N + self.active.len(), 0.0);
+        // The matrix is symmetric.
+        self.solve(&mut w);
+        weights.copy_from_slice(&w[..N]);
+        let drift: Vec<f64> = w[N..].iter().map(|taken| -taken).collect();
+        let row = |c: usize| match self.active[c] {
+            0 => [0.0; N],
+            _ => core::array::from_fn(|a| drift[c] * v[a] - weights[a] * self.eta[c]),
+        };
+        let rows = (0..self.active.len()).map(row).collect();
+        (rows, drift)
+    }
+}
