@@ -3,10 +3,13 @@
 //! A model with `constraint(name) = …` is run like any other; this module holds what is asked about it besides. Theory: `docs/theory.md`,
 //! constraints.
 
+pub(crate) mod allowed;
+
+use allowed::Held;
 use nalgebra::{DMatrix, DVector};
 use std::fmt;
 use tfe_runtime::constrained::{self, Residual};
-use tfe_runtime::{ConstraintError, LegendreError, Model, State, StepError, legendre};
+use tfe_runtime::{LegendreError, Model, State, StepError, legendre};
 
 /// A state on the constraints, and how far the values that were given lay from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -293,8 +296,7 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
     }
     let v = constrained::velocity(model, t, &state.q, &state.p, &[0.0; N])?;
     let gradients = constrained::gradients(model, t, state, &v)?;
-    // The gradients as columns, in (q, v); their complement is what they allow.
-    let mut columns: Vec<DVector<f64>> = Vec::new();
+    let mut held = Vec::new();
     for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
         if !gradients.independent[c] {
             continue;
@@ -302,19 +304,13 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
         let (row, psi_q) = (&gradients.rows[c], &gradients.psi_q[c]);
         let both = |q: &[f64; N], v: &[f64; N]| {
             let entries = q.iter().chain(v).copied();
-            DVector::from_iterator(2 * N, entries).normalize()
+            DVector::from_iterator(2 * N, entries)
         };
-        columns.push(both(psi_q, row));
+        held.push(both(psi_q, row));
         if constraint.kind.is_holonomic() {
-            columns.push(both(row, &[0.0; N]));
+            held.push(both(row, &[0.0; N]));
         }
     }
-    let rank = columns.len();
-    let mut square = DMatrix::zeros(2 * N, 2 * N);
-    for (k, column) in columns.iter().enumerate() {
-        square.set_column(k, column);
-    }
-    let complement = square.qr().q().columns(rank, 2 * N - rank).into_owned();
     let second = &gradients.second;
     let to_momenta = DMatrix::from_fn(2 * N, 2 * N, |row, column| {
         if row >= N {
@@ -325,33 +321,25 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
             second.zz[row][column - N]
         }
     });
-    Ok((to_momenta * complement).qr().q())
+    let held = Held {
+        gradients: held,
+        to_momenta,
+    };
+    Ok(held.basis())
 }
 
-/// The transition matrices of a chain on the motions that the constraints allow at its nodes: `size` rows and columns each, one after the other.
+/// The transition matrices of a chain on the motions that the constraints allow at its nodes.
 ///
 /// The last one leads back to the tangent space of the start, which is that of the end of a periodic motion.
 pub(crate) fn reduced<M: Model<N>, const N: usize>(
     model: &M,
     nodes: impl IntoIterator<Item = (f64, State<N>)>,
-    transitions: &[f64],
-) -> Result<(usize, Vec<f64>), StepError> {
+    transitions: &[DMatrix<f64>],
+) -> Result<Vec<DMatrix<f64>>, StepError> {
     let bases = nodes
         .into_iter()
-        .take(transitions.len() / (4 * N * N))
+        .take(transitions.len())
         .map(|(t, state)| tangent_basis(model, t, &state))
         .collect::<Result<Vec<_>, _>>()?;
-    let size = bases.first().map_or(2 * N, DMatrix::ncols);
-    let mut entries = Vec::with_capacity(size * size * bases.len());
-    for (element, matrix) in transitions.chunks_exact(4 * N * N).enumerate() {
-        let next = &bases[(element + 1) % bases.len()];
-        if next.ncols() != size {
-            // The rank of the constraints changed on the way.
-            return Err(ConstraintError::RankChanged.into());
-        }
-        let matrix = DMatrix::from_row_slice(2 * N, 2 * N, matrix);
-        let reduced = next.tr_mul(&(matrix * &bases[element]));
-        entries.extend(reduced.transpose().iter());
-    }
-    Ok((size, entries))
+    allowed::reduced(&bases, transitions.iter())
 }

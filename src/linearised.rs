@@ -57,31 +57,24 @@ impl<const N: usize> Linearised<N> {
         starts: &[(f64, State<N>)],
     ) -> Self {
         let reduced = (!starts.is_empty()).then(|| {
-            let entries: Vec<f64> = transitions
-                .iter()
-                .flat_map(|matrix| matrix.transpose().iter().copied().collect::<Vec<_>>())
-                .collect();
-            let (size, entries) = reduced(model, starts.iter().copied(), &entries)?;
-            let matrices = entries.chunks_exact((size * size).max(1));
-            Ok(matrices
-                .map(|entries| DMatrix::from_row_slice(size, size, entries))
-                .collect())
+            let starts = starts.iter().copied();
+            reduced(model, starts, &transitions)
         });
-        Self {
-            motion,
-            transitions,
-            reduced,
-        }
+        Self::with(motion, transitions, reduced)
     }
 }
 
 impl<const N: usize, L: Length<N>> Linearised<N, L> {
-    /// Of a model without constraints.
-    pub(crate) fn free(motion: Motion<N, L>, transitions: Vec<DMatrix<f64>>) -> Self {
+    /// With the matrices on the motions that constraints allow, if there are any.
+    pub(crate) fn with(
+        motion: Motion<N, L>,
+        transitions: Vec<DMatrix<f64>>,
+        reduced: Option<Result<Vec<DMatrix<f64>>, StepError>>,
+    ) -> Self {
         Self {
             motion,
             transitions,
-            reduced: None,
+            reduced,
         }
     }
 

@@ -29,12 +29,10 @@ pub use tfe_runtime::family::{OperatorError, TransitionOperator};
 pub use tfe_runtime::transition::TransitionError;
 pub use time_scales::TimeScales;
 
-use crate::constraints::tangent_basis;
 use eigenvalues::largest_modulus;
 use nalgebra::DMatrix;
 use std::ops::Range;
 use tfe_runtime::length::Declared;
-use tfe_runtime::transition::of_step;
 use tfe_runtime::{Element, Model, State};
 
 /// The transition matrix of one element: the derivative of the step map (p, q) ↦ (p, q) at `state`.
@@ -80,7 +78,7 @@ where
 }
 
 /// The transition matrix of one element on the motions that the constraints of the model allow: in the orthonormal bases
-/// [`tangent_basis`] B₀ and B₁ at the two ends of the element,
+/// [`tangent_basis`](crate::constraints::tangent_basis) B₀ and B₁ at the two ends of the element,
 ///
 /// ```text
 /// B₁ᵀ A B₀                                                                (theory.md (T-78))
@@ -109,21 +107,17 @@ where
 /// # Ok(())
 /// # }
 /// ```
-pub fn on_constraints<M: Model<N>, const N: usize>(
+pub fn on_constraints<M, const N: usize>(
     model: &M,
     element: impl Into<Element>,
-    state: &State<N>,
+    state: &<M::Length as Transitions<M, N>>::State,
     t: f64,
     h: f64,
-) -> Result<DMatrix<f64>, TransitionError> {
-    let mut entries = vec![0.0; 4 * N * N];
-    let end = of_step(model, element.into(), state, t, h, &mut entries)?;
-    let ambient = DMatrix::from_row_slice(2 * N, 2 * N, &entries);
-    let (before, after) = (
-        tangent_basis(model, t, state)?,
-        tangent_basis(model, t + h, &end)?,
-    );
-    Ok(after.tr_mul(&(ambient * before)))
+) -> Result<DMatrix<f64>, <M::Length as Transitions<M, N>>::Error>
+where
+    M: Declared<N, Length: Transitions<M, N>>,
+{
+    M::Length::on_constraints(model, element.into(), state, t, h)
 }
 
 /// Every interval of step size in which a motion about an equilibrium grows, however right the model: ascending, apart from each other.

@@ -5,15 +5,13 @@ mod sensitive;
 mod shooting;
 
 use super::error::OrbitError;
-use super::orbit::{Orbit, sort};
+use super::orbit::Orbit;
 use super::phase::Period;
 use super::problem::Global;
 use super::setup::{Guess, PeriodicOrbit};
 use crate::assembly::Mesh;
 use crate::length::RunTimeLength;
-use crate::periodic_schur::{self, Multiplier};
 use crate::simulation::Simulation;
-use nalgebra::DMatrix;
 use shooting::Shooting;
 use tfe_runtime::family::{self, FamilyState};
 
@@ -102,15 +100,8 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
 fn orbit_of<M: family::Model>(
     shooting: Shooting<'_, M>,
 ) -> Result<Orbit<'_, M, 0, RunTimeLength>, OrbitError> {
-    let floquet = floquet_of(&shooting.transitions)?;
+    let at = (&shooting.nodes[..], shooting.period);
+    let floquet = shooting.floquet_of(&shooting.transitions, at, shooting.model)?;
     let (trivial, unfolding) = (shooting.trivial(), shooting.unfolding());
     Ok(Orbit::of_solution(shooting, floquet, trivial, unfolding))
-}
-
-/// The multipliers of the matrices of elements, the largest first.
-fn floquet_of(transitions: &[DMatrix<f64>]) -> Result<Vec<Multiplier>, OrbitError> {
-    let floquet = periodic_schur::multipliers(transitions);
-    let mut floquet = floquet.map_err(OrbitError::Multipliers)?;
-    sort(&mut floquet);
-    Ok(floquet)
 }

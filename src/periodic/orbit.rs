@@ -308,9 +308,12 @@ pub(crate) fn multipliers_of<M: Model<N>, const N: usize>(
     } else {
         let times = problem.mesh.times(problem.start, problem.period);
         let nodes = times.zip(nodes.iter().copied());
-        let (size, reduced) =
-            reduced(problem.model, nodes, transitions).map_err(OrbitError::Constraints)?;
-        periodic_schur::multipliers_of(size, &reduced)
+        let matrices = transitions.chunks_exact(4 * N * N);
+        let matrices: Vec<_> = matrices
+            .map(|entries| DMatrix::from_row_slice(2 * N, 2 * N, entries))
+            .collect();
+        let reduced = reduced(problem.model, nodes, &matrices).map_err(OrbitError::Constraints)?;
+        periodic_schur::multipliers(&reduced)
     };
     let mut floquet = floquet.map_err(OrbitError::Multipliers)?;
     sort(&mut floquet);

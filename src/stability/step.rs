@@ -6,8 +6,12 @@ use tfe_runtime::length::FixedLength;
 use tfe_runtime::transition::{self, TransitionError};
 use tfe_runtime::{Element, Model, State};
 
+use crate::constraints::tangent_basis;
+
 #[cfg(feature = "sparse")]
 use super::arnoldi::{Dominant, DominantError, Iteration, dominant_of};
+#[cfg(feature = "sparse")]
+use crate::constraints::allowed::basis_of;
 #[cfg(feature = "sparse")]
 use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
@@ -37,6 +41,18 @@ pub trait Transitions<M, const N: usize> {
         t: f64,
         h: f64,
     ) -> Result<DMatrix<f64>, Self::Error>;
+
+    /// The same on the motions that constraints allow.
+    ///
+    /// # Errors
+    /// As [`on_constraints`](super::on_constraints).
+    fn on_constraints(
+        model: &M,
+        element: Element,
+        state: &Self::State,
+        t: f64,
+        h: f64,
+    ) -> Result<DMatrix<f64>, Self::Error>;
 }
 
 impl<M: Model<N>, const N: usize> Transitions<M, N> for FixedLength {
@@ -54,6 +70,23 @@ impl<M: Model<N>, const N: usize> Transitions<M, N> for FixedLength {
         transition::of_step(model, element, state, t, h, &mut entries)?;
         Ok(DMatrix::from_row_slice(2 * N, 2 * N, &entries))
     }
+
+    fn on_constraints(
+        model: &M,
+        element: Element,
+        state: &State<N>,
+        t: f64,
+        h: f64,
+    ) -> Result<DMatrix<f64>, TransitionError> {
+        let mut entries = vec![0.0; 4 * N * N];
+        let end = transition::of_step(model, element, state, t, h, &mut entries)?;
+        let ambient = DMatrix::from_row_slice(2 * N, 2 * N, &entries);
+        let (before, after) = (
+            tangent_basis(model, t, state)?,
+            tangent_basis(model, t + h, &end)?,
+        );
+        Ok(after.tr_mul(&(ambient * before)))
+    }
 }
 
 #[cfg(feature = "sparse")]
@@ -69,6 +102,21 @@ impl<M: family::Model> Transitions<M, 0> for RunTimeLength {
         h: f64,
     ) -> Result<DMatrix<f64>, family::OperatorError> {
         Ok(family::TransitionOperator::of_step(model, element, state, t, h)?.matrix())
+    }
+
+    fn on_constraints(
+        model: &M,
+        element: Element,
+        state: &FamilyState,
+        t: f64,
+        h: f64,
+    ) -> Result<DMatrix<f64>, family::OperatorError> {
+        let step = family::TransitionOperator::of_step(model, element, state, t, h)?;
+        let (before, after) = (
+            basis_of(model, t, state)?,
+            basis_of(model, t + h, step.end())?,
+        );
+        Ok(after.tr_mul(&(step.matrix() * before)))
     }
 }
 

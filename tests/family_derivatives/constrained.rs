@@ -1,6 +1,7 @@
 //! Derivatives of families on constraints: those of models of fixed size, column by column.
 
 use crate::largest::larger;
+use nalgebra::Complex;
 use tfe::family::FamilyState;
 use tfe::length::RunTimeLength;
 use tfe::prelude::*;
@@ -152,6 +153,13 @@ fn transition_matrices_are_those_of_fixed_size() {
             let theirs = stability::transition_matrix(&fixed, element, &state, 0.0, h);
             let (ours, theirs) = (ours.expect("a matrix"), theirs.expect("a matrix"));
             let off = (&ours - &theirs).amax() / theirs.amax();
+            let ours = stability::on_constraints(&long, element, &of_heap(&state), 0.0, h);
+            let theirs = stability::on_constraints(&fixed, element, &state, 0.0, h);
+            let singular = [ours.expect("a matrix"), theirs.expect("a matrix")];
+            let [ours, theirs] = singular.map(|matrix| matrix.singular_values());
+            // In other bases of the same motions.
+            let apart = (ours - theirs).amax();
+            assert!(apart < 1e-13 / h.abs(), "{element}, {h}: {apart:e}");
             // Roundings over h: constraints are held by h times their multipliers.
             assert!(off < 1e-14 / h.abs(), "{element}, {h}: {off:e}");
         }
@@ -333,4 +341,188 @@ fn gradients_of_a_long_chain_are_its_derivatives() {
         seen.see(&[plain.by_parameters()[index]], &[own + height]);
     }
     assert!(seen.part() < 1e-11, "{:e} of {:e}", seen.off, seen.size);
+}
+
+/// Two rods on a support, the second one driven; with springs that hold the angles.
+#[dynamics(
+    coordinates(x[n], y[n]),
+    lagrangian = sum(i in 0..n, m*(1 + s*x[i]^2)/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
+    constraint(first) = x[0]^2 + (y[0] - a*cos(omega*t))^2 - l^2,
+    constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - l^2,
+    force(x[i]) = -c*dot(x[i]),
+    force(x[n-1]) = f*cos(omega*t),
+)]
+struct DrivenRods {
+    n: usize,
+    m: f64,
+    s: f64,
+    g: f64,
+    l: f64,
+    a: f64,
+    c: f64,
+    f: f64,
+    omega: f64,
+}
+
+#[dynamics(
+    coordinates(x[2], y[2]),
+    lagrangian = sum(i in 0..2, m*(1 + s*x[i]^2)/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
+    constraint(first) = x[0]^2 + (y[0] - a*cos(omega*t))^2 - l^2,
+    constraint(rod) = (x[1] - x[0])^2 + (y[1] - y[0])^2 - l^2,
+    force(x[0]) = -c*dot(x[0]),
+    force(x[1]) = -c*dot(x[1]) + f*cos(omega*t),
+)]
+struct DrivenTwo {
+    m: f64,
+    s: f64,
+    g: f64,
+    l: f64,
+    a: f64,
+    c: f64,
+    f: f64,
+    omega: f64,
+}
+
+fn driven(f: f64, a: f64, c: f64) -> (DrivenRods, DrivenTwo) {
+    let (n, m, s, g, l, omega) = (2, 0.8, 0.1, 1.0, 1.1, 2.3);
+    let long = DrivenRods {
+        n,
+        m,
+        s,
+        g,
+        l,
+        a,
+        c,
+        f,
+        omega,
+    };
+    let fixed = DrivenTwo {
+        m,
+        s,
+        g,
+        l,
+        a,
+        c,
+        f,
+        omega,
+    };
+    (long, fixed)
+}
+
+/// Two angles, that swing with an amplitude and a phase, as coordinates and velocities.
+fn swing(t: f64, omega: f64, amplitude: f64, l: f64) -> ([f64; 4], [f64; 4]) {
+    let (sin, cos) = (omega * t).sin_cos();
+    let angles = [amplitude * cos, 1.4 * amplitude * cos];
+    let rates = [-amplitude * omega * sin, -1.4 * amplitude * omega * sin];
+    let (x, y) = (angles.map(|a| l * a.sin()), angles.map(|a| -l * a.cos()));
+    let vx = [0, 1].map(|i| l * angles[i].cos() * rates[i]);
+    let vy = [0, 1].map(|i| l * angles[i].sin() * rates[i]);
+    (
+        [x[0], x[0] + x[1], y[0], y[0] + y[1]],
+        [vx[0], vx[0] + vx[1], vy[0], vy[0] + vy[1]],
+    )
+}
+
+fn heap<const N: usize>((q, v): ([f64; N], [f64; N])) -> (Vec<f64>, Vec<f64>) {
+    (q.to_vec(), v.to_vec())
+}
+
+#[test]
+fn driven_orbits_are_those_of_fixed_size() {
+    for (f, a, c) in [(0.3, 0.0, 0.2), (0.2, 0.15, 0.1)] {
+        let (long, fixed) = driven(f, a, c);
+        let period = std::f64::consts::TAU / fixed.omega;
+        let guess = move |t: f64| swing(t, 2.3, -0.05, 1.1);
+        let ours = PeriodicOrbit::of(&long).element(Mixed::<5>).elements(30);
+        let ours = ours.period(period).guess(move |t| heap(guess(t)));
+        let theirs = PeriodicOrbit::of(&fixed).element(Mixed::<5>).elements(30);
+        let theirs = theirs.period(period).guess(guess);
+        let ours = ours.solve_sensitive().expect("an orbit");
+        let theirs = theirs.solve_sensitive().expect("an orbit");
+        let (one, other) = (ours.orbit(), theirs.orbit());
+        let mut seen = Seen::NOTHING;
+        seen.see(&one.start().q, &other.start().q);
+        seen.see(&one.start().p, &other.start().p);
+        assert!(seen.part() < 1e-11, "{:e}", seen.off);
+        assert_eq!(one.multipliers().len(), 4, "no zeros");
+        for (a, b) in one.multipliers().iter().zip(other.multipliers()) {
+            assert!((a - b).norm() < 1e-9, "{a} {b}");
+        }
+        assert!(one.motion().constraint_residual().position < 1e-13);
+        for name in ["m", "s", "g", "l", "a", "c", "f"] {
+            let (one, other) = (ours.by(name), theirs.by(name));
+            let mut seen = Seen::NOTHING;
+            seen.see(&one.start().q, &other.start().q);
+            seen.see(&one.start().p, &other.start().p);
+            assert!(
+                seen.off < 1e-9 * seen.size.max(1.0),
+                "{name}: {:e}",
+                seen.off
+            );
+        }
+    }
+}
+
+/// Rods without forces but weight.
+#[dynamics(
+    coordinates(x[n], y[n]),
+    lagrangian = sum(i in 0..n, m*(1 + s*x[i]^2)/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
+    constraint(first) = x[0]^2 + y[0]^2 - l^2,
+    constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - l^2,
+)]
+struct FreeRods {
+    n: usize,
+    m: f64,
+    s: f64,
+    g: f64,
+    l: f64,
+}
+
+#[dynamics(
+    coordinates(x[2], y[2]),
+    lagrangian = sum(i in 0..2, m*(1 + s*x[i]^2)/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
+    constraint(first) = x[0]^2 + y[0]^2 - l^2,
+    constraint(rod) = (x[1] - x[0])^2 + (y[1] - y[0])^2 - l^2,
+)]
+struct FreeTwo {
+    m: f64,
+    s: f64,
+    g: f64,
+    l: f64,
+}
+
+#[test]
+fn conservative_orbits_are_those_of_fixed_size() {
+    let (n, m, s, g, l) = (2, 0.8, 0.1, 1.0, 1.1);
+    let (long, fixed) = (FreeRods { n, m, s, g, l }, FreeTwo { m, s, g, l });
+    let guess = move |t: f64| swing(t, 0.73, 0.3, l);
+    let ours = PeriodicOrbit::of(&long).element(Mixed::<5>).elements(40);
+    let ours = ours.unknown_period(std::f64::consts::TAU / 0.73);
+    let theirs = PeriodicOrbit::of(&fixed).element(Mixed::<5>).elements(40);
+    let theirs = theirs.unknown_period(std::f64::consts::TAU / 0.73);
+    let ours = ours.guess(move |t| heap(guess(t))).solve_sensitive();
+    let theirs = theirs.guess(guess).solve_sensitive();
+    let (ours, theirs) = (ours.expect("an orbit"), theirs.expect("an orbit"));
+    let (one, other) = (ours.orbit(), theirs.orbit());
+    assert!((one.period() - other.period()).abs() < 1e-10);
+    assert!(one.motion().constraint_residual().position < 1e-13);
+    // Two pairs, one of them trivial and known to the root of roundings.
+    let angles =
+        |orbit: &[Complex<f64>]| orbit.iter().map(|one| one.arg().abs()).fold(0.0, f64::max);
+    assert_eq!((one.multipliers().len(), one.trivial().len()), (4, 2));
+    assert!((angles(one.multipliers()) - angles(other.multipliers())).abs() < 1e-8);
+    for name in ["m", "s", "g", "l"] {
+        let (ours, theirs) = (ours.by(name).period(), theirs.by(name).period());
+        assert!((ours - theirs).abs() < 1e-10, "{name}: {ours} {theirs}");
+    }
+    // The same of a run over the period.
+    let start = one.start();
+    let run = Simulation::new(&long)
+        .element(Mixed::<5>)
+        .step(one.period() / 40.0);
+    let run = run.run_linearised(start, 0.0..one.period()).expect("a run");
+    let multipliers = run.multipliers().expect("multipliers");
+    let multipliers: Vec<_> = multipliers.iter().map(|one| one.to_complex()).collect();
+    assert!((angles(&multipliers) - angles(one.multipliers())).abs() < 1e-8);
+    assert_eq!(run.on_constraints().expect("bases")[0].shape(), (4, 4));
 }

@@ -6,8 +6,8 @@ use super::super::orbit::Orbit;
 use super::super::problem::Global;
 use super::super::sensitive::{OrbitSlopes, SensitiveOrbit};
 use super::super::setup::PeriodicOrbit;
+use super::orbit_of;
 use super::shooting::{Shooting, component, step_failed};
-use super::{floquet_of, orbit_of};
 use crate::assembly::{AssemblyError, Chain};
 use crate::differences::places;
 use crate::length::RunTimeLength;
@@ -225,9 +225,10 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             let mut transitions = Vec::new();
             let each =
                 |transition: family::TransitionOperator| transitions.push(transition.matrix());
-            self.stepped(model, (&places, &moved(shift)), damping, each)
-                .ok()?;
-            floquet_of(&transitions).ok()
+            let nodes = moved(shift);
+            self.stepped(model, (&places, &nodes), damping, each).ok()?;
+            let period = self.period + shift * change.period;
+            self.floquet_of(&transitions, (&nodes, period), model).ok()
         };
         let distance = moving::distance(value, parts);
         moving::derivatives(orbit.floquet(), &orbit.trivial(), distance, at)

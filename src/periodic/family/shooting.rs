@@ -1,9 +1,12 @@
 //! Multiple shooting: the nodes of all elements as unknowns, each element solved by itself.
 
 use super::super::error::OrbitError;
+use super::super::orbit::sort;
 use super::super::phase::Phase;
 use super::super::problem::Global;
 use crate::assembly::{AssemblyError, Chain, Control, Convergence, Mesh};
+use crate::constraints::allowed::{self, basis_of};
+use crate::periodic_schur::{self, Multiplier};
 use nalgebra::DMatrix;
 use tfe_runtime::family::{self, FamilyState, Gradient};
 use tfe_runtime::{Element, Form, Statistics};
@@ -63,6 +66,29 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         let (t, first) = (self.start, &self.nodes[0]);
         let velocity = family::velocity(self.model, t, first).ok()?;
         Some(family::energy(self.model, t, first, &velocity))
+    }
+
+    /// The multipliers of the matrices of elements from such nodes, the largest first; with constraints, those of the motions that these allow.
+    pub(super) fn floquet_of(
+        &self,
+        transitions: &[DMatrix<f64>],
+        (nodes, period): (&[FamilyState], f64),
+        model: &M,
+    ) -> Result<Vec<Multiplier>, OrbitError> {
+        let floquet = if M::CONSTRAINED {
+            let times = self.mesh.times(self.start, period);
+            let bases = times.zip(nodes).take(transitions.len());
+            let bases = bases
+                .map(|(t, node)| basis_of(model, t, node))
+                .collect::<Result<Vec<_>, _>>();
+            let reduced = bases.and_then(|bases| allowed::reduced(&bases, transitions.iter()));
+            periodic_schur::multipliers(&reduced.map_err(OrbitError::Constraints)?)
+        } else {
+            periodic_schur::multipliers(transitions)
+        };
+        let mut floquet = floquet.map_err(OrbitError::Multipliers)?;
+        sort(&mut floquet);
+        Ok(floquet)
     }
 
     /// How many multipliers are one.

@@ -4,6 +4,8 @@ use super::super::setup::Simulation;
 use super::super::trail::Trail;
 #[cfg(feature = "sparse")]
 use super::super::trail::{Element, LONG_STEPS};
+#[cfg(feature = "sparse")]
+use crate::constraints::allowed::{self, basis_of};
 use crate::error::RunError;
 #[cfg(feature = "sparse")]
 use crate::error::RunErrorKind;
@@ -33,7 +35,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         #[cfg(not(feature = "sparse"))]
         {
             drop(trail);
-            Ok(Linearised::free(motion, Vec::new()))
+            Ok(Linearised::with(motion, Vec::new(), None))
         }
     }
 
@@ -57,7 +59,14 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let found =
             family::TransitionOperator::of_steps_by(&*self.model, element, asked, steps, each);
         let Err((number, error)) = found else {
-            return Ok(Linearised::free(motion, transitions));
+            let reduced = M::CONSTRAINED.then(|| {
+                let starts = elements.iter();
+                let bases =
+                    starts.map(|element| basis_of(&*self.model, element.t, &element.before));
+                let bases = bases.collect::<Result<Vec<_>, _>>()?;
+                allowed::reduced(&bases, transitions.iter())
+            });
+            return Ok(Linearised::with(motion, transitions, reduced));
         };
         let kind = operator_failed(error, Some((number, &elements[number])), "run_linearised");
         Err(RunError::new(kind, motion))

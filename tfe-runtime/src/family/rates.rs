@@ -52,6 +52,8 @@ pub(super) struct Rates<M> {
     step: Vec<f64>,
     /// The step that the factors belong to.
     factored: f64,
+    /// Whether starts beside the constraints are refused.
+    refuses: bool,
     pub(super) points: Vec<Point>,
     rows: Rows,
     /// A at the start.
@@ -82,6 +84,7 @@ impl<M> Rates<M> {
             unknowns: self.unknowns,
             step: self.step,
             factored: self.factored,
+            refuses: self.refuses,
             points: self.points,
             rows: self.rows,
             start_rows: self.start_rows,
@@ -130,6 +133,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             unknowns: vec![0.0; size],
             step: vec![0.0; size],
             factored: f64::NAN,
+            refuses: true,
             points,
             start_rows: vec![0.0; rows.values.len()],
             rows,
@@ -143,6 +147,13 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             force: vec![0.0; n],
             table,
         })
+    }
+
+    /// Steps may begin beside the constraints and far from their ends, as those of an iteration over many elements do: each ends on the constraints, and whoever iterates
+    /// sees whether they are one motion.
+    pub(super) fn begin_anywhere(&mut self) {
+        self.refuses = false;
+        self.control.solve = Solve::Trusting;
     }
 
     /// The next step continues none.
@@ -231,7 +242,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
 
     /// Refuses a start that is not on the constraints.
     fn check_start(&mut self, h: f64) -> Result<(), StepError> {
-        if self.constraints == 0 {
+        if self.constraints == 0 || !self.refuses {
             return Ok(());
         }
         let extent = largest(&self.start.q);

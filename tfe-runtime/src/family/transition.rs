@@ -99,15 +99,13 @@ impl TransitionOperator {
         t: f64,
         h: f64,
     ) -> Result<Self, OperatorError> {
-        let mut only = None;
-        Self::of_steps(model, element, 0.0, [(t, h, state)], |transition| {
-            only = Some(transition);
-        })
-        .map_err(|(_, error)| error)?;
-        only.ok_or(OperatorError::Step(StepError::NonFinite))
+        let table = Self::admitted::<M>(model, element)?;
+        let view = View::new(model, 0.0)?;
+        let mut rates = Rates::new(&view, table.clone(), Control::default())?;
+        Self::next(&view, &mut rates, &Ground::of(&view, table), state, (t, h))
     }
 
-    /// Those of several steps (t, h, state), with an additional force γ v, γ = `damping`, handed over one by one.
+    /// Those of several steps (t, h, state), with an additional force γ v, γ = `damping`, handed over one by one. They may begin beside the constraints, where iterations come to.
     ///
     /// # Errors
     /// As [`of_step`](Self::of_step), with the number of the step.
@@ -141,6 +139,7 @@ impl TransitionOperator {
         let view = View::new(model, damping).map_err(|error| refused(error.into()))?;
         let rates = Rates::new(&view, table.clone(), Control::default());
         let mut rates = rates.map_err(|error| refused(error.into()))?;
+        rates.begin_anywhere();
         let ground = Ground::of(&view, table);
         for (number, (t, h, state)) in steps.into_iter().enumerate() {
             let transition = Self::next(&view, &mut rates, &ground, state, (t, h));

@@ -1,0 +1,126 @@
+//! The motions that constraints allow, as columns: what is the same for models of either kind of length, and those of run-time length (T-78).
+
+use nalgebra::{DMatrix, DVector};
+use tfe_runtime::{ConstraintError, StepError};
+#[cfg(feature = "sparse")]
+use {
+    tfe_runtime::dual::Dual,
+    tfe_runtime::family::{self, Block, Entries, FamilyState, Gradient},
+};
+
+/// What keeps motions (δq, δv) at a state, and the matrix that makes (δp, δq) of them.
+pub(super) struct Held {
+    /// Gradients in (q, v), independent of each other.
+    pub(super) gradients: Vec<DVector<f64>>,
+    /// ```text
+    /// [ L_vq  L_vv ]
+    /// [ 1     0    ]
+    /// ```
+    pub(super) to_momenta: DMatrix<f64>,
+}
+
+impl Held {
+    /// An orthonormal basis of what is left, ordered (p, q).
+    pub(super) fn basis(&self) -> DMatrix<f64> {
+        let (size, rank) = (self.to_momenta.nrows(), self.gradients.len());
+        let mut square = DMatrix::zeros(size, size);
+        for (k, gradient) in self.gradients.iter().enumerate() {
+            square.set_column(k, &gradient.normalize());
+        }
+        let complement = square.qr().q().columns(rank, size - rank).into_owned();
+        (&self.to_momenta * complement).qr().q()
+    }
+}
+
+/// The matrices of a chain in the bases at its nodes; the last one leads back to the basis of the start, which is that of the end of a periodic motion.
+pub(crate) fn reduced<'a>(
+    bases: &[DMatrix<f64>],
+    matrices: impl Iterator<Item = &'a DMatrix<f64>>,
+) -> Result<Vec<DMatrix<f64>>, StepError> {
+    let elements = matrices.enumerate();
+    let reduced = elements.map(|(element, matrix)| {
+        let (before, after) = (&bases[element], &bases[(element + 1) % bases.len()]);
+        if before.ncols() != after.ncols() {
+            // The rank of the constraints changed on the way.
+            return Err(ConstraintError::RankChanged.into());
+        }
+        Ok(after.tr_mul(&(matrix * before)))
+    });
+    reduced.collect()
+}
+
+/// The basis of a model of run-time length at a state.
+///
+/// # Errors
+/// [`StepError`] if the model has no velocity at the state.
+#[cfg(feature = "sparse")]
+pub(crate) fn basis_of<M: family::Model>(
+    model: &M,
+    t: f64,
+    state: &FamilyState,
+) -> Result<DMatrix<f64>, StepError> {
+    let (n, m) = (model.len(), model.constraints());
+    if m == 0 {
+        return Ok(DMatrix::identity(2 * n, 2 * n));
+    }
+    let velocity = family::allowed_velocity(model, t, state);
+    let v = velocity.map_err(|_| StepError::Constraint(ConstraintError::SingularMass))?;
+    let mut parts = Parts {
+        n,
+        to_momenta: DMatrix::zeros(2 * n, 2 * n),
+        rows: vec![DVector::zeros(n); m],
+        rates: vec![DVector::zeros(n); m],
+    };
+    let mut unused = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+    let [z, q, force] = &mut unused;
+    let first = Gradient { z, q, force };
+    model.second(t, &state.q, &v, first, &mut parts);
+    // φ is a function of coordinates and time: ∂(A v + a)/∂q is dA/dt along the motion.
+    let pairs = state.q.iter().zip(&v);
+    let moving: Vec<Dual> = pairs.map(|(q, v)| Dual::new(*q, *v)).collect();
+    let mut drift = vec![Dual::ZERO; m];
+    model.constraint_rows(Dual::new(t, 1.0), &moving, &mut drift, &mut parts);
+    for a in 0..n {
+        parts.to_momenta[(n + a, a)] = 1.0;
+    }
+    let mut gradients = Vec::with_capacity(2 * m);
+    for (row, rate) in parts.rows.iter().zip(&parts.rates) {
+        let both = rate.iter().chain(row.iter()).copied();
+        gradients.push(DVector::from_iterator(2 * n, both));
+        let of_q = row.iter().copied().chain(std::iter::repeat_n(0.0, n));
+        gradients.push(DVector::from_iterator(2 * n, of_q));
+    }
+    let held = Held {
+        gradients,
+        to_momenta: parts.to_momenta,
+    };
+    Ok(held.basis())
+}
+
+/// Takes L_vv, L_vq, A and dA/dt.
+#[cfg(feature = "sparse")]
+struct Parts {
+    n: usize,
+    to_momenta: DMatrix<f64>,
+    rows: Vec<DVector<f64>>,
+    rates: Vec<DVector<f64>>,
+}
+
+#[cfg(feature = "sparse")]
+impl Entries<f64> for Parts {
+    fn add(&mut self, block: Block, row: usize, column: usize, value: f64) {
+        match block {
+            Block::ZZ => self.to_momenta[(row, self.n + column)] += value,
+            Block::ZQ => self.to_momenta[(row, column)] += value,
+            _ => {}
+        }
+    }
+}
+
+#[cfg(feature = "sparse")]
+impl Entries<Dual> for Parts {
+    fn add(&mut self, _: Block, row: usize, column: usize, value: Dual) {
+        self.rows[row][column] += value.value;
+        self.rates[row][column] += value.slope;
+    }
+}
