@@ -64,7 +64,7 @@ pub(super) enum Guess<'m, const N: usize, L: Length<N>> {
 /// The matrices A_e are dense, 2n × 2n, and so are the equations that close the chain and the multipliers: E (2n)² numbers of memory and of the order of
 /// 10 E (2n)³ operations an iteration. Tens of coordinates are quick, two hundred take minutes.
 ///
-/// The kinetic energy may be any of a Lagrangian; that of a Hamiltonian has to be ½ Σ p²/m. Constraints and [`advance`](Self::advance) are refused.
+/// The kinetic energy may be any of a Lagrangian; that of a Hamiltonian has to be ½ Σ p²/m. [`advance`](Self::advance) is refused.
 #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
 pub struct PeriodicOrbit<'m, M, const N: usize, L: Length<N> = FixedLength> {
     pub(super) model: &'m M,
