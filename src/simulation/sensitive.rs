@@ -7,6 +7,7 @@ use super::events::Severed;
 use super::events::act::{Near, state_after};
 use super::follow::{Follow, Passed};
 use super::setup::Simulation;
+use crate::constraints::tangent_basis;
 use crate::differences::SIXTH;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
@@ -18,7 +19,9 @@ use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Direction, Element, First, Form, InsideSlopes, Model, Share, State, StepError};
+use tfe_runtime::{
+    ConstraintError, Direction, Element, First, Form, InsideSlopes, Model, Share, State, StepError,
+};
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node by all parameters of the model and by the start.
@@ -98,6 +101,8 @@ pub struct Tangents<'m, M, const N: usize> {
     events: Vec<(usize, Vec<f64>)>,
     /// Solves elements that events have cut.
     probe: Option<Stepper<'m, M, N>>,
+    /// Where derivatives are counted from, of models with constraints: `None` before the first element.
+    counted_from: Option<(f64, State<N>)>,
 }
 
 /// The derivatives of an element.
@@ -144,6 +149,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             inside: None,
             events: Vec::new(),
             probe: None,
+            counted_from: None,
         }
     }
 
@@ -158,7 +164,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
     /// The derivatives since the start, or since this was last called, from where they are counted anew.
     pub(super) fn restart(&mut self) -> DMatrix<f64> {
         let columns = self.columns();
-        self.before.start = None;
+        (self.before.start, self.counted_from) = (None, None);
         std::mem::replace(&mut self.before.state, DMatrix::identity(2 * N, columns))
     }
 
@@ -174,8 +180,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         } = self.up_to(severed)?;
         let times = self.times(severed, (&at, &rate))?;
         // Where the element begins, by the state at the event at a fixed time.
-        let back = at.clone().try_inverse();
-        let back = back.ok_or(TransitionError::from(StepError::NonFinite))?;
+        let back = self.inverse(&at, severed)?;
         if let Some(moved) = &mut self.before.start {
             let row = DMatrix::from_row_slice(1, moved.len(), moved) * &back;
             *moved = row.iter().copied().collect();
@@ -186,6 +191,34 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             column.axpy(*dt, &rate.column(0), 1.0);
         }
         Ok(matrix)
+    }
+
+    /// The inverse of the derivative of an event's state by that at the point before; with constraints on the motions that these allow (T-78): of other directions nothing is left
+    /// at the event.
+    fn inverse(
+        &mut self,
+        at: &DMatrix<f64>,
+        severed: &Severed<'_, 'm, N>,
+    ) -> Result<DMatrix<f64>, TransitionError> {
+        let inverted = |matrix: DMatrix<f64>| {
+            let inverse = matrix.try_inverse();
+            inverse.ok_or(TransitionError::from(StepError::NonFinite))
+        };
+        if const { M::CONSTRAINTS.is_empty() } {
+            return inverted(at.clone());
+        }
+        let event = severed.event;
+        let here = (event.t, event.state());
+        let before = self.counted_from.replace(here);
+        let before = before.unwrap_or((severed.start, *severed.before));
+        let [before, here] =
+            [before, here].map(|(t, state)| tangent_basis(&*self.model, t, &state));
+        let (before, here) = (before?, here?);
+        if before.ncols() != here.ncols() {
+            return Err(StepError::from(ConstraintError::RankChanged).into());
+        }
+        let back = inverted(here.tr_mul(&(at * &before)))?;
+        Ok(before * (back * here.transpose()))
     }
 
     /// By how much every column moves the time of an event: g(t*, y(t*)) = 0, so ġ dt* = −δg.
@@ -431,6 +464,9 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
         passed: &Passed<'_, N>,
     ) -> Result<(), TransitionError> {
         let Across { end, inside, .. } = self.across(stepper, &[])?;
+        if const { !M::CONSTRAINTS.is_empty() } && self.counted_from.is_none() {
+            self.counted_from = Some((passed.start, *passed.before));
+        }
         self.keep(
             stepper,
             (passed.start, passed.start + passed.h),

@@ -160,6 +160,81 @@ fn sections_are_events_with_matrices() {
     assert!(matches!(error, RunErrorKind::NoEvent { .. }));
 }
 
+/// With constraints, whose matrices are singular: products along motions that these allow are derivatives of the points, of places and of velocities.
+#[test]
+fn sections_with_constraints_have_matrices_of_the_motions_allowed() {
+    #[dynamics(
+        coordinates(x[2], y[2]),
+        lagrangian = sum(i in 0..2, m/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
+        constraint(first) = x[0]^2 + y[0]^2 - 1,
+        constraint(rod) = (x[1] - x[0])^2 + (y[1] - y[0])^2 - 1,
+        event(place) = x[0] - 0.1,
+        event(turn) = dot(x[0]),
+    )]
+    struct Rods {
+        m: f64,
+        g: f64,
+    }
+    let rods = Rods { m: 0.8, g: 1.3 };
+    let start = |angles: [f64; 2], rates: [f64; 2]| {
+        let (x, y) = (angles.map(f64::sin), angles.map(|a| -a.cos()));
+        let vx = [0, 1].map(|i| angles[i].cos() * rates[i]);
+        let vy = [0, 1].map(|i| angles[i].sin() * rates[i]);
+        rods.state(
+            [x[0], x[0] + x[1], y[0], y[0] + y[1]],
+            [vx[0], vx[0] + vx[1], vy[0], vy[0] + vy[1]],
+        )
+    };
+    // Along one angle, or along its rate.
+    let moved = |which: usize, s: f64| {
+        let (mut angles, mut rates) = ([0.9, -0.4], [0.2, 0.1]);
+        match which.checked_sub(2) {
+            None => angles[which] += s,
+            Some(rate) => rates[rate] += s,
+        }
+        start(angles, rates)
+    };
+    let numbers = |state: &State<4>| [state.p, state.q].concat();
+    let difference = |of: &dyn Fn(f64) -> Vec<f64>| -> Vec<f64> {
+        let pair = |h: f64| {
+            let (high, low) = (of(h), of(-h));
+            let pairs = high.into_iter().zip(low);
+            pairs.map(|(a, b)| (a - b) / (2.0 * h)).collect::<Vec<_>>()
+        };
+        let (near, far) = (pair(1e-3), pair(2e-3));
+        let both = near.into_iter().zip(far);
+        both.map(|(near, far)| (4.0 * near - far) / 3.0).collect()
+    };
+    for (name, element) in [("place", Mixed::<6>.into()), ("turn", Element::mixed(8))] {
+        let run = Simulation::new(&rods).element(element).step(0.04);
+        let section = run.section(name, Crossing::Rising, moved(0, 0.0), 0.0);
+        let mut product = nalgebra::DMatrix::identity(8, 8);
+        for point in section.linearised().take(3) {
+            let point = point.expect("a point");
+            product = point.transition().expect("linearised") * product;
+        }
+        for which in 0..4 {
+            let third = |s: f64| {
+                let mut section = run.section(name, Crossing::Rising, moved(which, s), 0.0);
+                let point = section.nth(2).expect("endless").expect("a point");
+                numbers(&point.state())
+            };
+            let expected = difference(&third);
+            let begun = difference(&|s| numbers(&moved(which, s)));
+            let found = &product * nalgebra::DVector::from_vec(begun);
+            let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+            for (row, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                // Differences of fourth order.
+                let off = (found - expected).abs();
+                assert!(
+                    off < 1e-7 * size,
+                    "{name}, {which}, {row}: {found} for {expected}"
+                );
+            }
+        }
+    }
+}
+
 /// x″ + x = F cos ωt against a wall at x = 0 with restitution e: orbits with one impact in n periods of the forcing, in closed form.
 ///
 /// From an impact at t = 0 with the forcing F cos(ωt + ψ), γ = F/(1 − ω²), P = γ cos ψ, S = −γω sin ψ and T = 2πn/ω: x = a cos t + b sin t + γ cos(ωt + ψ) with a = −P and
