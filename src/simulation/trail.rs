@@ -3,6 +3,7 @@
 use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::setup::Simulation;
+use super::times::is_same as is_same_time;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::{Length, RunTimeLength};
 use crate::motion::{Motion, Node};
@@ -23,9 +24,28 @@ pub(super) struct Element {
     pub(super) h: f64,
     pub(super) before: FamilyState,
     after: FamilyState,
+    /// An impulse before it, of a model with constraints.
+    pub(super) kicked: Option<Kicked>,
+}
+
+/// Where impulses acted on a model with constraints, which take up a part of them at once.
+#[cfg_attr(not(feature = "sparse"), expect(dead_code))]
+pub(super) struct Kicked {
+    /// The state before.
+    pub(super) before: FamilyState,
+    /// Its momentum with the impulses, none of them taken up yet.
+    pub(super) with: FamilyState,
 }
 
 impl Element {
+    /// The state of the node where it begins: before impulses.
+    #[cfg(feature = "sparse")]
+    pub(super) fn node(&self) -> &FamilyState {
+        self.kicked
+            .as_ref()
+            .map_or(&self.before, |kicked| &kicked.before)
+    }
+
     /// Whether it ends where it did, now that it is solved once more.
     #[cfg(feature = "sparse")]
     pub(super) fn check(&self, again: &FamilyState) -> Result<(), family::OperatorError> {
@@ -58,6 +78,9 @@ pub(super) struct Trail {
     keeps_nodes: bool,
     /// An event has ended an element.
     is_cut: bool,
+    /// The impulses of a model with constraints, and the state at the last node.
+    impulses: Vec<(f64, Vec<f64>)>,
+    last: FamilyState,
 }
 
 impl Trail {
@@ -67,6 +90,22 @@ impl Trail {
             keeps_nodes: true,
             ..Self::default()
         }
+    }
+
+    /// The impulses at the node where an element begins.
+    fn kicked(&mut self, passed: &Passed<'_, 0, RunTimeLength>) -> Option<Kicked> {
+        let before = std::mem::replace(&mut self.last, passed.after.clone());
+        let mut acting = (self.impulses.iter())
+            .filter(|(time, _)| is_same_time(*time, passed.start))
+            .peekable();
+        acting.peek()?;
+        let mut with = before.clone();
+        for (_, impulse) in acting {
+            for (p, change) in with.p.iter_mut().zip(impulse) {
+                *p += change;
+            }
+        }
+        Some(Kicked { before, with })
     }
 
     /// Why a call has no derivatives of this motion: its elements are not those that are solved once more.
@@ -108,10 +147,9 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
             let of = "models of run-time length without the feature `sparse`";
             return Err(refused(of));
         }
-        if const { M::CONSTRAINED } && !self.impulses.is_empty() {
-            return Err(refused(
-                "models of run-time length with constraints and impulses",
-            ));
+        if const { M::CONSTRAINED } {
+            trail.impulses.clone_from(&self.impulses);
+            trail.last.clone_from(&start);
         }
         let motion = self.drive(start, span, identity, Some(&mut trail))?;
         match trail.refusal(&motion, call) {
@@ -127,11 +165,17 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail {
         _: &mut family::Stepper<'m, M>,
         passed: &Passed<'_, 0, RunTimeLength>,
     ) -> Result<(), TransitionError> {
+        let kicked = if self.impulses.is_empty() {
+            None
+        } else {
+            self.kicked(passed)
+        };
         self.elements.push(Element {
             t: passed.begin,
             h: passed.h,
             before: passed.before.clone(),
             after: passed.after.clone(),
+            kicked,
         });
         Ok(())
     }

@@ -247,30 +247,10 @@ fn derivatives_of_a_hundred_sites_are_differences_of_runs() {
 
 #[test]
 fn what_has_no_derivatives_is_told() {
-    #[dynamics(
-        coordinates(x[n], y[n]),
-        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
-        constraint(rod[i in 0..n]) = x[i]^2 + y[i]^2 - 1,
-    )]
-    struct Rods {
-        n: usize,
-    }
-    let rods = Rods { n: 2 };
-    let start = rods.state([1.0, 1.0, 0.0, 0.0], [0.0; 4]);
     let told = |error: RunError| match error.kind() {
         RunErrorKind::Unsupported { call, of } => format!("{call} {of}"),
         other => panic!("{other}"),
     };
-    let error = Simulation::new(&rods)
-        .step(0.1)
-        .impulse(0.5, vec![0.1; 4])
-        .run_sensitive(start, 0.0..1.0);
-    let text = told(error.expect_err("an impulse that constraints take a part of"));
-    assert_eq!(
-        text,
-        "run_sensitive models of run-time length with constraints and impulses"
-    );
-
     #[dynamics(
         coordinates(q[n]),
         lagrangian = sum(i in 0..n, dot(q[i])^2/2 - q[i]^2/2),

@@ -1,5 +1,6 @@
 //! Derivatives of families on constraints: those of models of fixed size, column by column.
 
+use crate::differences::difference;
 use crate::largest::larger;
 use nalgebra::Complex;
 use tfe::family::FamilyState;
@@ -172,6 +173,21 @@ fn off<M: family::Model, F: Model<N>, const N: usize>(
     fixed: &Simulation<'_, F, N>,
     start: &State<N>,
 ) -> [f64; 3] {
+    off_at(
+        long,
+        fixed,
+        start,
+        (&[0.0, 0.013, 0.26, 0.5, 0.777, 0.8], 2.0),
+    )
+}
+
+/// The same at such times, with so many times the integral.
+fn off_at<M: family::Model, F: Model<N>, const N: usize>(
+    long: &Simulation<'_, M, 0, RunTimeLength>,
+    fixed: &Simulation<'_, F, N>,
+    start: &State<N>,
+    (times, integral): (&[f64], f64),
+) -> [f64; 3] {
     let span = 0.0..0.8;
     let theirs = fixed.run_linearised(*start, span.clone()).expect("a run");
     let ours = long.run_linearised(of_heap(start), span.clone());
@@ -184,7 +200,7 @@ fn off<M: family::Model, F: Model<N>, const N: usize>(
     let ours = ours.expect("a run");
     let mut sensitive = Seen::NOTHING;
     assert_eq!(ours.parameters(), theirs.parameters());
-    for t in [0.0, 0.013, 0.26, 0.5, 0.777, 0.8] {
+    for t in times.iter().copied() {
         for name in theirs.parameters() {
             let a = ours.by(name).at(t).expect("in the span");
             let b = theirs.by(name).at(t).expect("in the span");
@@ -201,10 +217,10 @@ fn off<M: family::Model, F: Model<N>, const N: usize>(
     // Of momenta, velocities, an output at the end, and an integral.
     let end = |q: &[f64], p: &[f64], v: &[f64]| q[1] * v[0] + p[N - 1] * v[2];
     let loss = Loss::of_end(end).and(Loss::output_at_end("height"));
-    let loss = loss.and(Loss::integral("height").times(2.0));
+    let loss = loss.and(Loss::integral("height").times(integral));
     let (theirs, by) = fixed.gradient(*start, span.clone(), &loss).expect("one");
     let loss = Loss::of_end(end).and(Loss::output_at_end("height"));
-    let loss = loss.and(Loss::integral("height").times(2.0));
+    let loss = loss.and(Loss::integral("height").times(integral));
     let ours = long.gradient(of_heap(start), span.clone(), &loss);
     let (ours, our) = ours.expect("a gradient");
     gradient.see(&[ours], &[theirs]);
@@ -224,6 +240,52 @@ fn derivatives_of_runs_are_those_of_fixed_size() {
         let off = off(&ours, &theirs, &state);
         // 1e-13 of the largest derivative: roundings of forty steps.
         assert!(off.iter().all(|off| *off < 2e-12), "{element}: {off:?}");
+    }
+}
+
+/// Impulses, of which constraints take up a part at once; one at the start.
+#[test]
+fn derivatives_across_impulses_are_those_of_fixed_size() {
+    let (long, fixed) = rods();
+    let state = start(&fixed);
+    let blows = [
+        (0.0, [0.1, -0.2, 0.3, 0.2, 0.0, 0.1]),
+        (0.3, [-0.3, 0.2, 0.1, 0.1, 0.4, -0.2]),
+        (0.3, [0.1, 0.0, 0.0, 0.2, 0.0, 0.0]),
+        (0.52, [0.2, 0.0, -0.1, 0.0, 0.3, 0.1]),
+    ];
+    for element in ELEMENTS {
+        let mut ours = Simulation::new(&long).element(element).step(0.02);
+        let mut theirs = Simulation::new(&fixed).element(element).step(0.02);
+        for (t, blow) in blows {
+            ours = ours.impulse(t, blow.to_vec());
+            theirs = theirs.impulse(t, blow);
+        }
+        // In the elements that begin with impulses momenta are other polynomials: nodes are the same.
+        let looks = (&[0.26, 0.5, 0.777, 0.8][..], 0.0);
+        let apart = off_at(&ours, &theirs, &state, looks);
+        assert!(apart.iter().all(|off| *off < 2e-12), "{element}: {apart:?}");
+        // By the weight, which leaves the start on the constraints, an integral beside differences of runs.
+        let integral = |g: f64| {
+            let other = Rods { g, ..long.clone() };
+            let mut run = Simulation::new(&other).element(element).step(0.02);
+            for (t, blow) in blows {
+                run = run.impulse(t, blow.to_vec());
+            }
+            let motion = run.run(of_heap(&state), 0.0..0.8).expect("a run");
+            let all = motion.integral(&other, "height").expect("an integral");
+            [all[all.len() - 1]]
+        };
+        let [expected] = difference(integral, long.g);
+        for run in [ours.clone(), ours.record_every(7)] {
+            let loss = Loss::integral("height");
+            let (_, found) = run.gradient(of_heap(&state), 0.0..0.8, &loss).expect("one");
+            let found = found.by("g");
+            assert!(
+                (found - expected).abs() < 1e-10,
+                "{element}: {found} {expected}"
+            );
+        }
     }
 }
 

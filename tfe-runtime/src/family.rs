@@ -19,6 +19,8 @@ mod inertia;
 #[cfg(feature = "sparse")]
 mod instant;
 mod kernel;
+#[cfg(feature = "sparse")]
+mod kick;
 mod lanes;
 mod model;
 #[cfg(feature = "sparse")]
@@ -28,6 +30,8 @@ mod node;
 mod pattern;
 #[cfg(feature = "sparse")]
 mod point;
+#[cfg(feature = "sparse")]
+mod projection;
 #[cfg(feature = "sparse")]
 mod rates;
 mod registers;
@@ -49,6 +53,8 @@ pub use backwards::Backwards;
 pub use controlled::Controlled;
 pub use dense::DenseElement;
 pub use error::ModelError;
+#[cfg(feature = "sparse")]
+pub use kick::Kick;
 pub use model::{Block, Entries, FamilyState, Gradient, Model, STRIDE, Sweep};
 pub use pattern::{Pattern, Values};
 pub use stepper::{Stepper, Suspended};

@@ -48,7 +48,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::NoOutput`](crate::RunErrorKind::NoOutput) and [`RunErrorKind::Loss`](crate::RunErrorKind::Loss) for a loss that does not belong to the model
-    /// and the span. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for impulses on models with constraints, for events that change the state or end the run, and where
+    /// and the span. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for events that change the state or end the run, and where
     /// steps were so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn gradient(
@@ -211,6 +211,9 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 let place = (element.t, element.h);
                 let end = backwards.pass(place, &element.before, inside.first())?;
                 element.check(&end)?;
+                if let Some(kicked) = &element.kicked {
+                    backwards.kick(element.t, &kicked.with)?;
+                }
             }
         };
         go().map_err(|failure| match failure {

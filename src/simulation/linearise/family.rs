@@ -20,7 +20,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Elements are solved once more for their matrices, which are dense: 4n² numbers an element, and 2n solutions with sparse factors.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for impulses on models with constraints, for events that change the state or end the run, and where steps were
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for events that change the state or end the run, and where steps were
     /// so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_linearised(
@@ -50,8 +50,18 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let steps = elements.iter();
         let steps = steps.map(|element| (element.t, element.h, &element.before));
         let each = |transition: family::TransitionOperator| {
-            elements[transitions.len()].check(transition.end())?;
-            transitions.push(transition.matrix());
+            let element: &Element = &elements[transitions.len()];
+            element.check(transition.end())?;
+            let mut matrix = transition.matrix();
+            if let Some(kicked) = &element.kicked {
+                let kick = family::Kick::of(&*self.model, element.t, &kicked.with, &[])?;
+                let mut kicks = nalgebra::DMatrix::identity(matrix.nrows(), matrix.ncols());
+                for mut column in kicks.column_iter_mut() {
+                    kick.apply(column.as_mut_slice());
+                }
+                matrix *= kicks;
+            }
+            transitions.push(matrix);
             Ok(())
         };
         let element = self.chosen_element();
@@ -61,8 +71,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let Err((number, error)) = found else {
             let reduced = M::CONSTRAINED.then(|| {
                 let starts = elements.iter();
-                let bases =
-                    starts.map(|element| basis_of(&*self.model, element.t, &element.before));
+                let bases = starts.map(|element| basis_of(&*self.model, element.t, element.node()));
                 let bases = bases.collect::<Result<Vec<_>, _>>()?;
                 allowed::reduced(&bases, transitions.iter())
             });

@@ -25,7 +25,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// ([`record_every`](Self::record_every) keeps fewer nodes).
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for impulses on models with constraints, for events that change the state or end the run, and where steps were
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for events that change the state or end the run, and where steps were
     /// so long that they were cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_sensitive(
@@ -69,6 +69,17 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let each = |transition: family::TransitionOperator| {
             let element = &trail.elements[passed];
             element.check(transition.end())?;
+            if let Some(kicked) = &element.kicked {
+                let kick = family::Kick::of(model, element.t, &kicked.with, &parameters)?;
+                for mut column in current.column_iter_mut() {
+                    kick.apply(column.as_mut_slice());
+                }
+                let by_parameters = kick.by_parameters().iter();
+                for (by, mut column) in by_parameters.zip(current.column_iter_mut().skip(size)) {
+                    let mut of_p = column.rows_mut(0, size / 2);
+                    of_p += DVector::from_column_slice(by);
+                }
+            }
             let mut next = DMatrix::zeros(current.nrows(), current.ncols());
             let mut along = Vec::new();
             for (from, mut to) in current.column_iter().zip(next.column_iter_mut()) {

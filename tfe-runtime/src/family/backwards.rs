@@ -6,6 +6,7 @@ mod written;
 
 use super::error::ModelError;
 use super::inertia::Inertia;
+use super::kick::Kick;
 use super::model::{FamilyState, Model};
 use super::node::Node;
 use super::rates::Rates;
@@ -276,6 +277,18 @@ impl<'m, M: Model> Backwards<'m, M> {
         let parameters = model.parameters();
         for (a, of_q) in of_q.iter_mut().enumerate() {
             *of_q += self.tape.take(parameters + a);
+        }
+        Ok(())
+    }
+
+    /// Goes back from behind an impulse to before it, of a model with constraints: `kicked` has the momentum with the impulse, before constraints take up what is against them.
+    ///
+    /// # Errors
+    /// As [`Kick::of`].
+    pub fn kick(&mut self, t: f64, kicked: &FamilyState) -> Result<(), OperatorError> {
+        let weights = Kick::of(self.view.model(), t, kicked, &[])?.pull(&mut self.lambda);
+        if self.view.model().parameters() > 0 {
+            self.take_derivatives_of_node(t, &weights);
         }
         Ok(())
     }

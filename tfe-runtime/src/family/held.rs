@@ -1,98 +1,16 @@
 //! What constraints add to the derivative of an element of run-time length: by its start, by parameters, and backwards (T-160).
 
-use super::blocked::Blocked;
-use super::model::{Block, Gradient, Model};
+use super::model::Model;
 use super::node::Node;
 use super::pattern::Pattern;
 use super::point;
+use super::projection::{Moved, NodeWeights, Places, Projection, add};
 use super::rows::Rows;
-use crate::dual::Dual;
 use crate::error::StepError;
 use crate::scheme::{MAX_RATES, SchemeRef};
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
-
-/// Which entries A and Σ μ φ_qq have.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Places {
-    pub(super) rows: Pattern,
-    bends: Pattern,
-    /// The number of constraints.
-    pub(super) count: usize,
-}
-
-impl Places {
-    /// Of a model that has been checked.
-    pub(super) fn of<M: Model>(model: &M) -> Self {
-        match M::CONSTRAINED {
-            true => Self {
-                rows: Pattern::of_rows(model),
-                bends: Pattern::of_bends(model),
-                count: model.constraints(),
-            },
-            false => Self::default(),
-        }
-    }
-
-    /// The entries of A, or of what stands in their places: (constraint, coordinate, value).
-    fn rows<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = (usize, usize, f64)> + 'a {
-        let places = self.rows.places().iter().zip(values);
-        places.map(|((_, constraint, coordinate), value)| (*constraint, *coordinate, *value))
-    }
-
-    /// Σ μ φ_qq
-    fn bend<M: Model>(&self, model: &M, (t, q): (f64, &[f64]), mu: &[f64]) -> Vec<f64> {
-        let mut values = vec![0.0; self.bends.places().len()];
-        let mut entries = self.bends.scatter(&mut values);
-        model.constraint_second(t, q, mu, &mut entries);
-        values
-    }
-
-    /// sum += factor · Σ μ φ_qq q, for values of that matrix, which is symmetric.
-    fn add_bent(&self, values: &[f64], factor: f64, q: &[f64], sum: &mut [f64]) {
-        for ((_, row, column), value) in self.bends.places().iter().zip(values) {
-            sum[*row] += factor * (value * q[*column]);
-        }
-    }
-
-    /// sum += A q
-    fn add_product(&self, values: &[f64], q: &[f64], sum: &mut [f64]) {
-        for (constraint, coordinate, value) in self.rows(values) {
-            sum[constraint] += value * q[coordinate];
-        }
-    }
-
-    /// sum += factor · Aᵀ μ
-    fn add_transposed(&self, values: &[f64], factor: f64, mu: &[f64], sum: &mut [f64]) {
-        for (constraint, coordinate, value) in self.rows(values) {
-            sum[coordinate] += factor * (value * mu[constraint]);
-        }
-    }
-
-    /// The slopes of φ, A and a along time, coordinates and what the time carries.
-    fn slopes<M: Model>(&self, model: &M, t: Dual, q: &[Dual]) -> RowSlopes {
-        let zeros = |count: usize| vec![Dual::ZERO; count];
-        let mut phi = zeros(self.count);
-        let mut drift = zeros(self.count);
-        let mut rows = zeros(self.rows.places().len());
-        model.constraint_values(t, q, &mut phi);
-        model.constraint_rows(t, q, &mut drift, &mut self.rows.add_to(&mut rows));
-        let slopes = |values: &[Dual]| values.iter().map(|value| value.slope).collect();
-        RowSlopes {
-            phi: slopes(&phi),
-            drift: slopes(&drift),
-            rows: slopes(&rows),
-        }
-    }
-}
-
-/// The slopes of φ, a and A.
-struct RowSlopes {
-    phi: Vec<f64>,
-    drift: Vec<f64>,
-    rows: Vec<f64>,
-}
 
 /// Constraints at a point: A, μ̇, Σ μ̇ φ_qq, and P_j′.
 #[derive(Clone, Debug)]
@@ -144,46 +62,17 @@ impl Solved<'_> {
     }
 }
 
-/// What a parameter changes at fixed unknowns; of a change of the start only what that makes of the impulse.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Moved {
-    /// h A₀ᵀ m₀, by coordinate.
-    impulse: Vec<f64>,
-    /// φ at the points, a row for each, and at the end.
-    phi: Vec<f64>,
-    end_phi: Vec<f64>,
-    /// At the end: L_v, Aᵀη and A v + a.
-    momentum: Vec<f64>,
-    reaction: Vec<f64>,
-    rate: Vec<f64>,
-}
-
 /// What a row λ of phase space weighs of constraints, times which derivatives by parameters are to be added.
 #[derive(Clone, Debug)]
 pub(super) struct Weights {
-    /// φ at the points, a row for each, and at the end.
+    /// φ at the points, a row for each.
     pub(super) phi: Vec<f64>,
-    pub(super) end_phi: Vec<f64>,
-    /// A₀, A at the points, a row for each, A₁: by place.
+    /// A₀, and A at the points, a row for each: by place.
     pub(super) start_rows: Vec<f64>,
     pub(super) rows: Vec<f64>,
-    pub(super) end_rows: Vec<f64>,
-    /// a and L_v at the end.
-    pub(super) end_drift: Vec<f64>,
-    pub(super) end_momentum: Vec<f64>,
-    /// Coordinates and velocities at both ends.
+    /// Coordinates at the start.
     pub(super) start: Vec<f64>,
-    pub(super) end: (Vec<f64>, Vec<f64>),
-}
-
-impl Moved {
-    /// Of what changes the impulse at the start alone.
-    pub(super) fn impulse(impulse: Vec<f64>) -> Self {
-        Self {
-            impulse,
-            ..Self::default()
-        }
-    }
+    pub(super) end: NodeWeights,
 }
 
 impl Held {
@@ -229,15 +118,12 @@ impl Held {
         end_momentum: Vec<f64>,
         forces: &mut [Vec<f64>],
     ) -> Moved {
-        let at = |t: f64, q: &[f64]| {
-            let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
-            let still: Vec<Dual> = q.iter().map(|q| Dual::new(*q, 0.0)).collect();
-            self.places.slopes(model, time, &still)
-        };
-        let mut moved = Moved {
-            momentum: end_momentum,
-            ..Moved::default()
-        };
+        let at = |t: f64, q: &[f64]| self.places.by_parameter(model, (t, q), parameter);
+        let mut moved = self.end.moved(
+            &self.places,
+            at(solved.t + solved.h, solved.end.0),
+            end_momentum,
+        );
         for ((l, point), force) in solved.points.iter().enumerate().zip(forces) {
             let time = solved.t + solved.h * solved.scheme.nodes[l];
             let slopes = at(time, &point.q);
@@ -246,18 +132,10 @@ impl Held {
             moved.phi.extend(slopes.phi);
         }
         let n = solved.start.len();
-        (moved.impulse, moved.reaction) = (vec![0.0; n], vec![0.0; n]);
+        moved.impulse = vec![0.0; n];
         let start = at(solved.t, solved.start);
         self.places
             .add_transposed(&start.rows, 1.0, &self.first, &mut moved.impulse);
-        let (q, v) = solved.end;
-        let end = at(solved.t + solved.h, q);
-        let eta = &self.end.eta;
-        self.places
-            .add_transposed(&end.rows, 1.0, eta, &mut moved.reaction);
-        moved.rate = end.drift;
-        self.places.add_product(&end.rows, v, &mut moved.rate);
-        moved.end_phi = end.phi;
         moved
     }
 
@@ -344,32 +222,17 @@ impl Held {
     }
 }
 
-/// Adds what there is.
-fn add(sum: &mut [f64], more: Option<&[f64]>) {
-    for (sum, more) in sum.iter_mut().zip(more.unwrap_or_default()) {
-        *sum += more;
-    }
-}
-
 /// Backwards.
 impl Held {
     /// Takes λ from after the node at the end to before it.
     pub(super) fn unsettle(&self, of_p: &mut [f64], of_q: &mut [f64]) -> Weights {
-        let (n, m) = (of_p.len(), self.places.count);
-        let w = self.end.pull(&self.places, of_p, of_q);
-        let rows = self.places.rows(&self.end.rows);
-        // Of (A v + a) and −Aᵀη.
-        let end_rows = rows.map(|(c, a, _)| w[n + c] * self.end.v[a] - of_p[a] * self.end.eta[c]);
+        let end = self.end.pull(&self.places, of_p, of_q);
         Weights {
-            phi: vec![0.0; self.points.len() * m],
-            end_phi: vec![0.0; m],
+            phi: vec![0.0; self.points.len() * self.places.count],
             start_rows: Vec::new(),
             rows: Vec::new(),
-            end_rows: end_rows.collect(),
-            end_drift: w[n..].to_vec(),
-            end_momentum: w[..n].to_vec(),
             start: Vec::new(),
-            end: (self.end.q.clone(), self.end.v.clone()),
+            end,
         }
     }
 
@@ -420,7 +283,7 @@ impl Held {
     /// The same at the end.
     pub(super) fn unmiss_end(&self, mu: &[f64], h: f64, by_q: &mut [f64], weights: &mut Weights) {
         let count = mu.len() / self.places.count.max(1);
-        let own = &mut weights.end_phi;
+        let own = &mut weights.end.phi;
         for (own, mu) in own.iter_mut().zip(mu.chunks_exact(count.max(1))) {
             *own -= mu[0] / h;
         }
@@ -444,112 +307,4 @@ impl Held {
             weights.rows.extend(rows);
         }
     }
-}
-
-/// How the momentum at a node changes with what arrives there, and with the coordinates.
-///
-/// ```text
-/// p = p̃ − Aᵀη ,     L_v(q, v, t) + Aᵀη = p̃ ,     A v + a = 0                                          (T-74)
-/// ```
-#[derive(Clone, Debug)]
-pub(super) struct Projection {
-    /// [ L_vv Aᵀ ; A 0 ], factored.
-    matrix: Blocked,
-    rows: Vec<f64>,
-    /// ∂(A v + a)/∂q
-    rates: Vec<f64>,
-    /// L_vq
-    turn: Vec<(usize, usize, f64)>,
-    /// Σ η φ_qq
-    bend: Vec<f64>,
-    q: Vec<f64>,
-    v: Vec<f64>,
-    eta: Vec<f64>,
-}
-
-impl Projection {
-    /// At a node that was solved last, with the rows that are there.
-    ///
-    /// # Errors
-    /// [`StepError`] where the matrix is singular.
-    pub(super) fn of<M: Model>(
-        model: &M,
-        (places, second): (&Places, &Pattern),
-        (t, q, v): (f64, &[f64], &[f64]),
-        (node, rows): (&Node, &Rows),
-    ) -> Result<Self, StepError> {
-        let eta = node.multipliers().to_vec();
-        // φ is a function of coordinates and time: ∂(A v + a)/∂q is dA/dt along the motion.
-        let moving: Vec<Dual> = q.iter().zip(v).map(|(q, v)| Dual::new(*q, *v)).collect();
-        let along = places.slopes(model, Dual::new(t, 1.0), &moving);
-        Ok(Self {
-            matrix: node.clone().linearised(model, (t, q, v), rows)?,
-            rows: rows.values.clone(),
-            rates: along.rows,
-            turn: turn(model, second, (t, q, v)),
-            bend: places.bend(model, (t, q), &eta),
-            q: q.to_vec(),
-            v: v.to_vec(),
-            eta,
-        })
-    }
-
-    fn apply(&self, places: &Places, p: &mut [f64], q: &[f64], moved: Option<&Moved>) {
-        let (n, m) = (p.len(), places.count);
-        places.add_bent(&self.bend, -1.0, q, p);
-        let mut side = vec![0.0; n + m];
-        if let Some(moved) = moved {
-            for (p, reaction) in p.iter_mut().zip(&moved.reaction) {
-                *p -= reaction;
-            }
-            add(&mut side[..n], Some(&moved.momentum));
-            add(&mut side[n..], Some(&moved.rate));
-        }
-        for (row, column, value) in &self.turn {
-            side[*row] += value * q[*column];
-        }
-        places.add_product(&self.rates, q, &mut side[n..]);
-        for (side, p) in side.iter_mut().zip(&*p) {
-            *side -= p;
-        }
-        // With the opposite sign so far, and so is the solution.
-        self.matrix.solve(&mut side);
-        places.add_transposed(&self.rows, 1.0, &side[n..], p);
-    }
-
-    /// Takes λ back, and gives what it weighs of L_v and of A v + a.
-    fn pull(&self, places: &Places, of_p: &mut [f64], of_q: &mut [f64]) -> Vec<f64> {
-        let (n, m) = (of_p.len(), places.count);
-        let mut w = vec![0.0; n + m];
-        places.add_product(&self.rows, of_p, &mut w[n..]);
-        // The matrix is symmetric.
-        self.matrix.solve(&mut w);
-        for (of_p, w) in of_p.iter_mut().zip(&w) {
-            *of_p -= w;
-        }
-        for (row, column, value) in &self.turn {
-            of_q[*column] += value * w[*row];
-        }
-        places.add_bent(&self.bend, -1.0, of_p, of_q);
-        places.add_transposed(&self.rates, 1.0, &w[n..], of_q);
-        w
-    }
-}
-
-/// L_vq
-fn turn<M: Model>(
-    model: &M,
-    pattern: &Pattern,
-    (t, q, v): (f64, &[f64], &[f64]),
-) -> Vec<(usize, usize, f64)> {
-    let mut values = vec![0.0; pattern.places().len()];
-    let mut unused = [(); 3].map(|()| vec![0.0; q.len()]);
-    let [z, by_q, force] = &mut unused;
-    let first = Gradient { z, q: by_q, force };
-    model.second(t, q, v, first, &mut pattern.scatter(&mut values));
-    let entries = pattern.places().iter().zip(values);
-    let turned = entries.filter(|((block, ..), value)| *block == Block::ZQ && *value != 0.0);
-    turned
-        .map(|((_, row, column), value)| (*row, *column, value))
-        .collect()
 }

@@ -4,6 +4,7 @@ use super::Backwards;
 use super::written::{Points, add_of_points, add_of_rows};
 use crate::family::held::Weights;
 use crate::family::model::Model;
+use crate::family::projection::NodeWeights;
 use crate::lanes::Lanes;
 use crate::scheme::Tables as _;
 use alloc::vec;
@@ -39,28 +40,31 @@ impl<M: Model> Backwards<'_, M> {
                 [&phi, &none, &of_rows],
             );
         }
-        // Both ends in one group.
-        let (q, v) = &weights.end;
-        let both = |start: &[f64], end: &[f64]| -> Vec<Points> {
-            let pairs = start.iter().zip(end);
-            pairs.map(|(a, b)| Lanes([*a, *b, *b, *b])).collect()
+        let fours = |values: &[f64]| -> Vec<Points> {
+            values.iter().map(|value| Lanes([*value; 4])).collect()
         };
-        let of_both = |start: &[f64], end: &[f64]| -> Vec<Points> {
-            let pairs = start.iter().zip(end);
-            pairs.map(|(a, b)| Lanes([*a, *b, 0.0, 0.0])).collect()
-        };
-        let still = vec![0.0; m];
-        let times = Lanes([start, end, end, end]);
-        let q_of_both = both(&weights.start, q);
-        let of_phi = of_both(&still, &weights.end_phi);
-        let of_drift = of_both(&still, &weights.end_drift);
-        let of_rows = of_both(&weights.start_rows, &weights.end_rows);
-        let place = (times, &q_of_both[..]);
-        let all = [&of_phi[..], &of_drift, &of_rows];
+        let place = (Lanes([start; 4]), &fours(&weights.start)[..]);
+        let of_start = grouped(&weights.start_rows, entries, 0..1);
+        let all = [&none[..], &none, &of_start];
         add_of_rows(&mut self.tape, model, place, rows, all);
-        let momentum = of_both(&vec![0.0; n], &weights.end_momentum);
-        let zeros = vec![Lanes([0.0; 4]); n];
-        let place = (times, &q_of_both[..], &both(v, v)[..]);
+        self.take_derivatives_of_node(end, &weights.end);
+    }
+
+    /// The same at a node.
+    pub(super) fn take_derivatives_of_node(&mut self, t: f64, weights: &NodeWeights) {
+        let model = self.view.model();
+        let fours = |values: &[f64]| -> Vec<Points> {
+            values.iter().map(|value| Lanes([*value; 4])).collect()
+        };
+        let first = |values: &[f64]| grouped(values, values.len(), 0..1);
+        let (t, q) = (Lanes([t; 4]), fours(&weights.q));
+        let of_rows = [&weights.phi, &weights.drift, &weights.rows].map(|own| first(own));
+        let all = [&of_rows[0][..], &of_rows[1], &of_rows[2]];
+        let rows = &self.ground.places.rows;
+        add_of_rows(&mut self.tape, model, (t, &q), rows, all);
+        let momentum = first(&weights.momentum);
+        let zeros = vec![Lanes([0.0; 4]); q.len()];
+        let place = (t, &q[..], &fours(&weights.v)[..]);
         add_of_points(&mut self.tape, model, place, [&momentum, &zeros, &zeros]);
     }
 }

@@ -1,0 +1,304 @@
+//! How the momentum at a node changes with what arrives there, under constraints (T-160).
+
+use super::blocked::Blocked;
+use super::model::{Block, Gradient, Model};
+use super::node::Node;
+use super::pattern::Pattern;
+use super::rows::Rows;
+use crate::dual::Dual;
+use crate::error::StepError;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Which entries A and Σ μ φ_qq have.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Places {
+    pub(super) rows: Pattern,
+    pub(super) bends: Pattern,
+    /// The number of constraints.
+    pub(super) count: usize,
+}
+
+impl Places {
+    /// Of a model that has been checked.
+    pub(super) fn of<M: Model>(model: &M) -> Self {
+        match M::CONSTRAINED {
+            true => Self {
+                rows: Pattern::of_rows(model),
+                bends: Pattern::of_bends(model),
+                count: model.constraints(),
+            },
+            false => Self::default(),
+        }
+    }
+
+    /// The entries of A, or of what stands in their places: (constraint, coordinate, value).
+    pub(super) fn rows<'a>(
+        &'a self,
+        values: &'a [f64],
+    ) -> impl Iterator<Item = (usize, usize, f64)> + 'a {
+        let places = self.rows.places().iter().zip(values);
+        places.map(|((_, constraint, coordinate), value)| (*constraint, *coordinate, *value))
+    }
+
+    /// Σ μ φ_qq
+    pub(super) fn bend<M: Model>(&self, model: &M, (t, q): (f64, &[f64]), mu: &[f64]) -> Vec<f64> {
+        let mut values = vec![0.0; self.bends.places().len()];
+        let mut entries = self.bends.scatter(&mut values);
+        model.constraint_second(t, q, mu, &mut entries);
+        values
+    }
+
+    /// sum += factor · Σ μ φ_qq q, for values of that matrix, which is symmetric.
+    pub(super) fn add_bent(&self, values: &[f64], factor: f64, q: &[f64], sum: &mut [f64]) {
+        for ((_, row, column), value) in self.bends.places().iter().zip(values) {
+            sum[*row] += factor * (value * q[*column]);
+        }
+    }
+
+    /// sum += A q
+    pub(super) fn add_product(&self, values: &[f64], q: &[f64], sum: &mut [f64]) {
+        for (constraint, coordinate, value) in self.rows(values) {
+            sum[constraint] += value * q[coordinate];
+        }
+    }
+
+    /// sum += factor · Aᵀ μ
+    pub(super) fn add_transposed(&self, values: &[f64], factor: f64, mu: &[f64], sum: &mut [f64]) {
+        for (constraint, coordinate, value) in self.rows(values) {
+            sum[coordinate] += factor * (value * mu[constraint]);
+        }
+    }
+
+    /// What a parameter changes of φ, A and a.
+    pub(super) fn by_parameter<M: Model>(
+        &self,
+        model: &M,
+        (t, q): (f64, &[f64]),
+        parameter: usize,
+    ) -> RowSlopes {
+        let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
+        let still: Vec<Dual> = q.iter().map(|q| Dual::new(*q, 0.0)).collect();
+        self.slopes(model, time, &still)
+    }
+
+    /// The slopes of φ, A and a along time, coordinates and what the time carries.
+    pub(super) fn slopes<M: Model>(&self, model: &M, t: Dual, q: &[Dual]) -> RowSlopes {
+        let zeros = |count: usize| vec![Dual::ZERO; count];
+        let mut phi = zeros(self.count);
+        let mut drift = zeros(self.count);
+        let mut rows = zeros(self.rows.places().len());
+        model.constraint_values(t, q, &mut phi);
+        model.constraint_rows(t, q, &mut drift, &mut self.rows.add_to(&mut rows));
+        let slopes = |values: &[Dual]| values.iter().map(|value| value.slope).collect();
+        RowSlopes {
+            phi: slopes(&phi),
+            drift: slopes(&drift),
+            rows: slopes(&rows),
+        }
+    }
+}
+
+/// The slopes of φ, a and A.
+pub(super) struct RowSlopes {
+    pub(super) phi: Vec<f64>,
+    pub(super) drift: Vec<f64>,
+    pub(super) rows: Vec<f64>,
+}
+
+/// What a parameter changes at fixed unknowns; of a change of the start only what that makes of the impulse.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Moved {
+    /// h A₀ᵀ m₀, by coordinate.
+    pub(super) impulse: Vec<f64>,
+    /// φ at the points, a row for each, and at the end.
+    pub(super) phi: Vec<f64>,
+    pub(super) end_phi: Vec<f64>,
+    /// At the end: L_v, Aᵀη and A v + a.
+    pub(super) momentum: Vec<f64>,
+    pub(super) reaction: Vec<f64>,
+    pub(super) rate: Vec<f64>,
+}
+
+impl Moved {
+    /// Of what changes the impulse at the start alone.
+    pub(super) fn impulse(impulse: Vec<f64>) -> Self {
+        Self {
+            impulse,
+            ..Self::default()
+        }
+    }
+}
+
+/// What a row λ of phase space weighs at a node, times which derivatives by parameters are to be added.
+#[derive(Clone, Debug)]
+pub(super) struct NodeWeights {
+    pub(super) q: Vec<f64>,
+    pub(super) v: Vec<f64>,
+    /// φ, a, and A by place.
+    pub(super) phi: Vec<f64>,
+    pub(super) drift: Vec<f64>,
+    pub(super) rows: Vec<f64>,
+    /// L_v
+    pub(super) momentum: Vec<f64>,
+}
+
+/// How the momentum at a node changes with what arrives there, and with the coordinates.
+///
+/// ```text
+/// p = p̃ − Aᵀη ,     L_v(q, v, t) + Aᵀη = p̃ ,     A v + a = 0                                          (T-74)
+/// ```
+#[derive(Clone, Debug)]
+pub(super) struct Projection {
+    /// [ L_vv Aᵀ ; A 0 ], factored.
+    matrix: Blocked,
+    pub(super) rows: Vec<f64>,
+    /// ∂(A v + a)/∂q
+    pub(super) rates: Vec<f64>,
+    /// L_vq
+    turn: Vec<(usize, usize, f64)>,
+    /// Σ η φ_qq
+    pub(super) bend: Vec<f64>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    pub(super) eta: Vec<f64>,
+}
+
+impl Projection {
+    /// At a node that was solved last, with the rows that are there.
+    ///
+    /// # Errors
+    /// [`StepError`] where the matrix is singular.
+    pub(super) fn of<M: Model>(
+        model: &M,
+        (places, second): (&Places, &Pattern),
+        (t, q, v): (f64, &[f64], &[f64]),
+        (node, rows): (&Node, &Rows),
+    ) -> Result<Self, StepError> {
+        let eta = node.multipliers().to_vec();
+        // φ is a function of coordinates and time: ∂(A v + a)/∂q is dA/dt along the motion.
+        let moving: Vec<Dual> = q.iter().zip(v).map(|(q, v)| Dual::new(*q, *v)).collect();
+        let along = places.slopes(model, Dual::new(t, 1.0), &moving);
+        Ok(Self {
+            matrix: node.clone().linearised(model, (t, q, v), rows)?,
+            rows: rows.values.clone(),
+            rates: along.rows,
+            turn: turn(model, second, (t, q, v)),
+            bend: places.bend(model, (t, q), &eta),
+            q: q.to_vec(),
+            v: v.to_vec(),
+            eta,
+        })
+    }
+
+    /// What a parameter changes at the node, from what it changes of the rows and of L_v there.
+    pub(super) fn moved(&self, places: &Places, slopes: RowSlopes, momentum: Vec<f64>) -> Moved {
+        let (mut reaction, mut rate) = (vec![0.0; momentum.len()], slopes.drift);
+        places.add_transposed(&slopes.rows, 1.0, &self.eta, &mut reaction);
+        places.add_product(&slopes.rows, &self.v, &mut rate);
+        Moved {
+            end_phi: slopes.phi,
+            momentum,
+            reaction,
+            rate,
+            ..Moved::default()
+        }
+    }
+
+    /// ∂p/∂a at a fixed p̃, by a parameter.
+    pub(super) fn by_parameter<M: Model>(
+        &self,
+        model: &M,
+        places: &Places,
+        t: f64,
+        (parameter, momentum): (usize, Vec<f64>),
+    ) -> Vec<f64> {
+        let n = momentum.len();
+        let slopes = places.by_parameter(model, (t, &self.q), parameter);
+        let moved = self.moved(places, slopes, momentum);
+        let mut p = vec![0.0; n];
+        self.apply(places, &mut p, &vec![0.0; n], Some(&moved));
+        p
+    }
+
+    /// The velocities at the node.
+    pub(super) fn velocity(&self) -> &[f64] {
+        &self.v
+    }
+
+    /// Writes δp for δp̃.
+    pub(super) fn apply(&self, places: &Places, p: &mut [f64], q: &[f64], moved: Option<&Moved>) {
+        let (n, m) = (p.len(), places.count);
+        places.add_bent(&self.bend, -1.0, q, p);
+        let mut side = vec![0.0; n + m];
+        if let Some(moved) = moved {
+            for (p, reaction) in p.iter_mut().zip(&moved.reaction) {
+                *p -= reaction;
+            }
+            add(&mut side[..n], Some(&moved.momentum));
+            add(&mut side[n..], Some(&moved.rate));
+        }
+        for (row, column, value) in &self.turn {
+            side[*row] += value * q[*column];
+        }
+        places.add_product(&self.rates, q, &mut side[n..]);
+        for (side, p) in side.iter_mut().zip(&*p) {
+            *side -= p;
+        }
+        // With the opposite sign so far, and so is the solution.
+        self.matrix.solve(&mut side);
+        places.add_transposed(&self.rows, 1.0, &side[n..], p);
+    }
+
+    /// Takes λ back, and gives what it weighs of L_v, A v + a and −Aᵀη.
+    pub(super) fn pull(&self, places: &Places, of_p: &mut [f64], of_q: &mut [f64]) -> NodeWeights {
+        let (n, m) = (of_p.len(), places.count);
+        let mut w = vec![0.0; n + m];
+        places.add_product(&self.rows, of_p, &mut w[n..]);
+        // The matrix is symmetric.
+        self.matrix.solve(&mut w);
+        for (of_p, w) in of_p.iter_mut().zip(&w) {
+            *of_p -= w;
+        }
+        for (row, column, value) in &self.turn {
+            of_q[*column] += value * w[*row];
+        }
+        places.add_bent(&self.bend, -1.0, of_p, of_q);
+        places.add_transposed(&self.rates, 1.0, &w[n..], of_q);
+        let rows = places.rows(&self.rows);
+        let rows = rows.map(|(c, a, _)| w[n + c] * self.v[a] - of_p[a] * self.eta[c]);
+        NodeWeights {
+            rows: rows.collect(),
+            q: self.q.clone(),
+            v: self.v.clone(),
+            phi: vec![0.0; m],
+            drift: w[n..].to_vec(),
+            momentum: w[..n].to_vec(),
+        }
+    }
+}
+
+/// L_vq
+fn turn<M: Model>(
+    model: &M,
+    pattern: &Pattern,
+    (t, q, v): (f64, &[f64], &[f64]),
+) -> Vec<(usize, usize, f64)> {
+    let mut values = vec![0.0; pattern.places().len()];
+    let mut unused = [(); 3].map(|()| vec![0.0; q.len()]);
+    let [z, by_q, force] = &mut unused;
+    let first = Gradient { z, q: by_q, force };
+    model.second(t, q, v, first, &mut pattern.scatter(&mut values));
+    let entries = pattern.places().iter().zip(values);
+    let turned = entries.filter(|((block, ..), value)| *block == Block::ZQ && *value != 0.0);
+    turned
+        .map(|((_, row, column), value)| (*row, *column, value))
+        .collect()
+}
+
+/// Adds what there is.
+pub(super) fn add(sum: &mut [f64], more: Option<&[f64]>) {
+    for (sum, more) in sum.iter_mut().zip(more.unwrap_or_default()) {
+        *sum += more;
+    }
+}
