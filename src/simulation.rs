@@ -18,6 +18,7 @@ pub(crate) mod mesh;
 mod pieces;
 mod progress;
 mod recorder;
+mod resolution;
 mod run;
 mod section;
 mod sensitive;

@@ -604,3 +604,33 @@ fn two_halves_are_one_run_to_the_bit() {
         );
     }
 }
+
+/// A bead in a bowl drives a mass by its own one, and has almost no inertia left at the bottom, which it passes in a thousandth of a second. A step that has to be cut there is looked at, whatever its
+/// number.
+#[test]
+fn steps_that_are_cut_are_looked_at() {
+    #[dynamics(
+        coordinates(x, y, z),
+        lagrangian = dot(x)^2/2 + j*dot(x)*dot(y) + dot(y)^2/2 + dot(z)^2/2 - z,
+        constraint(bowl) = z - y^2/2,
+    )]
+    struct Bead {
+        j: f64,
+    }
+    let bead = Bead { j: 0.999 };
+    let start = bead.state([0.3, 0.5, 0.125], [0.2, 0.4, 0.2]);
+    let run = |h: f64| {
+        let run = Simulation::new(&bead).step(h).run(start, 0.0..1.0);
+        run.expect("a run")
+    };
+    let fine = run(1e-3);
+    assert_eq!(fine.warnings(), []);
+    let coarse = run(0.05);
+    let off = (coarse.last().q[1] - fine.last().q[1]).abs();
+    assert!(off > 0.02 && coarse.statistics().cuts == 1, "{off}");
+    let told = coarse.warnings();
+    assert!(
+        matches!(told, [Warning::Unresolved { time, .. }] if (time - 0.7).abs() < 1e-9),
+        "{told:?}"
+    );
+}

@@ -5,7 +5,6 @@ mod run_time;
 
 use super::mesh::{Grid, Mesh};
 use super::watch::Watch;
-use super::watch::resolution::{Again, Examined, Resolution};
 use crate::error::RunErrorKind;
 use crate::evaluate::Evaluate;
 use crate::length::Length;
@@ -205,26 +204,6 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// # Errors
     /// What is wrong with it.
     fn check_restart(&self, t: f64, h: f64, state: &L::State) -> Result<(), RunErrorKind>;
-
-    /// What an element is examined with a second time, if that is done.
-    fn resolution<'m>(again: Again<'m, Self>) -> Option<Resolution<'m, Self, N>>
-    where
-        Self: 'm;
-
-    /// Examines an element that was passed.
-    fn examine(
-        resolution: &mut Option<Resolution<'_, Self, N>>,
-        statistics: &Statistics,
-        element: Examined<'_, N, L>,
-    );
-
-    /// What is doubtful about a run that has come to a state.
-    fn doubt(resolution: &Option<Resolution<'_, Self, N>>, last: &L::State) -> Option<Warning>;
-
-    /// Goes on with other parameters.
-    fn exchange_in<'m>(resolution: &mut Option<Resolution<'m, Self, N>>, model: Share<'m, Self>)
-    where
-        Self: 'm;
 
     /// Looks at an element before it is passed, or after it has failed.
     fn look(

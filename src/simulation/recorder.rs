@@ -4,8 +4,8 @@ use super::events::Severed;
 use super::follow::{Follow, Follower, Passed};
 use super::kind::Simulated;
 use super::pieces::{Broken, Observe, Piece, Side};
+use super::resolution::{Examined, Resolution};
 use super::setup::Simulation;
-use super::watch::resolution::{Examined, Resolution};
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;
 use crate::length::Length;
@@ -19,7 +19,7 @@ pub(super) struct Recorder<'f, 'm, M, const N: usize, L: Length<N>> {
     motion: Motion<N, L>,
     follower: Follower<'f, 'm, M, N, L>,
     watch: Watch,
-    resolution: Option<Resolution<'m, M, N>>,
+    resolution: Resolution<'m, M, N, L>,
     record_every: usize,
     /// Whether the energy is kept, by the model and since the last recorded node.
     is_conserved: bool,
@@ -43,7 +43,7 @@ where
         watch.pass(Recorded::last_of(&motion, false));
         watch.add(simulation.model.weigh(motion.last()));
         Self {
-            resolution: M::resolution(simulation.again()),
+            resolution: Resolution::new(simulation.again()),
             motion,
             follower,
             watch,
@@ -118,7 +118,7 @@ where
         stepper: &L::Stepper<'m, M>,
         last: &L::State,
     ) -> Motion<N, L> {
-        self.watch.add(M::doubt(&self.resolution, last));
+        self.watch.add(self.resolution.warning(last));
         self.motion.set_statistics(*M::statistics(stepper));
         self.motion.set_warnings(self.watch.into_warnings());
         self.motion
@@ -204,7 +204,7 @@ where
                 before: piece.before,
                 after: piece.after,
             };
-            M::examine(&mut self.resolution, M::statistics(stepper), examined);
+            self.resolution.look(M::statistics(stepper), examined);
         }
     }
 
@@ -231,7 +231,7 @@ where
     }
 
     fn changed(&mut self, model: &Share<'m, M>, values: &[(usize, f64)]) {
-        M::exchange_in(&mut self.resolution, model.clone());
+        self.resolution.set_model(model.clone());
         let names = model.parameter_names();
         self.motion.set_parameters(&names, values);
     }

@@ -4,7 +4,7 @@ use super::events::remodel::remodel;
 use super::events::watching::Watching;
 use super::kind::{Chosen, Simulated};
 use super::mesh::Grid;
-use super::watch::resolution::Again;
+use super::resolution::Again;
 use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
 use tfe_runtime::Share;
@@ -257,16 +257,9 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
 
     /// With what elements are looked at a second time.
     pub(super) fn again(&self) -> Again<'m, M> {
-        let Chosen {
-            element,
-            control,
-            at_kinks,
-        } = self.chosen();
         Again {
             model: self.model.clone(),
-            element,
-            control,
-            at_kinks,
+            chosen: self.chosen(),
         }
     }
 

@@ -4,8 +4,8 @@ use super::course::{Course, Leg};
 use super::follow::Follow;
 use super::kind::Simulated;
 use super::pieces::{Left, Observe, Piece, Pieces, Planned, Side};
+use super::resolution::{Again, Examined, Resolution};
 use super::times::Endless;
-use super::watch::resolution::{Again, Examined, Resolution};
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
@@ -24,7 +24,7 @@ pub struct Steps<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// Nodes at events that are to be told yet.
     nodes: VecDeque<Result<Node<N, L>, RunErrorKind>>,
     watch: Watch,
-    resolution: Option<Resolution<'m, M, N>>,
+    resolution: Resolution<'m, M, N, L>,
 }
 
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Steps<'_, M, N, L> {
@@ -144,7 +144,7 @@ where
         impulses: Vec<L::Impulse>,
         again: Again<'m, M>,
     ) -> Self {
-        let mut watch = Watch::new(again.element);
+        let mut watch = Watch::new(again.chosen.element);
         let (q, _) = L::parts(&start);
         let mut velocity = L::zero(q);
         let mut way = Way::new(model, beginning, start, impulses);
@@ -160,7 +160,7 @@ where
             velocity,
             nodes: VecDeque::new(),
             watch,
-            resolution: M::resolution(again),
+            resolution: Resolution::new(again),
         }
     }
 
@@ -168,7 +168,7 @@ where
     /// the energy nor unstable steps are.
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = self.watch.warnings().to_vec();
-        warnings.extend(M::doubt(&self.resolution, &self.way.state));
+        warnings.extend(self.resolution.warning(&self.way.state));
         warnings
     }
 
@@ -278,7 +278,7 @@ where
                     before: &before,
                     after: state,
                 };
-                M::examine(resolution, M::statistics(stepper), examined);
+                resolution.look(M::statistics(stepper), examined);
             }
             let is_conserved = !has_impulses && M::CONSERVES;
             watch.pass(Recorded::of(&**model, &node, is_conserved));
@@ -295,7 +295,7 @@ struct Nodes<'a, 'm, M, const N: usize, L: Length<N>> {
     /// The time of the last one.
     last: f64,
     watch: &'a mut Watch,
-    resolution: &'a mut Option<Resolution<'m, M, N>>,
+    resolution: &'a mut Resolution<'m, M, N, L>,
 }
 
 impl<'m, M, const N: usize, L> Nodes<'_, 'm, M, N, L>
@@ -337,12 +337,12 @@ where
                 before: piece.before,
                 after: piece.after,
             };
-            M::examine(self.resolution, M::statistics(stepper), examined);
+            self.resolution.look(M::statistics(stepper), examined);
         }
     }
 
     fn changed(&mut self, model: &Share<'m, M>, _: &[(usize, f64)]) {
-        M::exchange_in(self.resolution, model.clone());
+        self.resolution.set_model(model.clone());
     }
 
     fn at_event(

@@ -1,7 +1,5 @@
 //! What a run notices about itself: steps at which the method grows, not the model.
 
-pub(super) mod resolution;
-
 use crate::evaluate::Evaluate;
 use crate::length::Length;
 use crate::motion::{Motion, Node, Warning};

@@ -1,6 +1,7 @@
 //! The calls of the surface on models of run-time length: what works gives what a model of fixed size gives, what does not is one typed error.
 
 use crate::common::distance;
+use tfe::Warning;
 use tfe::family;
 use tfe::prelude::*;
 
@@ -74,6 +75,46 @@ fn steps_tell_costs_and_doubts() {
     assert_eq!(node, *motion.last());
     assert_eq!(steps.statistics(), *motion.statistics());
     assert_eq!(steps.warnings(), []);
+}
+
+/// Driven, damped, without an energy to compare: two steps of 1 to 3 from 100 states. An end that is wrong by a fifth of the way is told, as of models of fixed size.
+#[test]
+fn steps_that_do_not_resolve_a_driven_motion_are_told() {
+    #[dynamics(
+        coordinates(x[n]),
+        lagrangian = sum(i in 0..n, dot(x[i])^2/2 + x[i]^2/2 - x[i]^4/4),
+        force(x[i]) = 0.3*cos(1.2*t) - 0.2*dot(x[i]),
+    )]
+    struct Duffing {
+        n: usize,
+    }
+    let model = Duffing { n: 1 };
+    let (mut wrong, mut told) = (0, 0);
+    for k in 0..100 {
+        let part = |factor: u32| f64::from(k * factor % 100) / 100.0;
+        let start = model.state([3.0 * part(7) - 1.5], [3.0 * part(31) - 1.5]);
+        let h = 1.0 + 2.0 * part(1);
+        let fine = Simulation::new(&model).element(Mixed::<8>).step(0.01);
+        let fine = fine.run(start.clone(), 0.0..2.0 * h).expect("a fine run");
+        assert!(fine.warnings().is_empty(), "{:?}", fine.warnings());
+        let ways = fine.states().windows(2);
+        let way: f64 = ways.map(|pair| (pair[1].q[0] - pair[0].q[0]).abs()).sum();
+        for element in [Element::mixed(3), Element::radau(3)] {
+            let long = Simulation::new(&model).element(element).step(h);
+            let Ok(motion) = long.run(start.clone(), 0.0..2.0 * h) else {
+                continue;
+            };
+            let is_told =
+                (motion.warnings().iter()).any(|one| matches!(one, Warning::Unresolved { .. }));
+            told += u32::from(is_told);
+            let off = (motion.last().q[0] - fine.last().q[0]).abs();
+            if off > way / 5.0 {
+                wrong += 1;
+                assert!(is_told, "{element}, h = {h}: off by {off:.2} of {way:.2}");
+            }
+        }
+    }
+    assert!(told > wrong && wrong > 1, "{wrong} wrong, {told} told");
 }
 
 #[test]

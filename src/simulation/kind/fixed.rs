@@ -2,7 +2,6 @@
 
 use super::super::checks::{check_constraints, check_start, conserves_energy};
 use super::super::mesh::{Grid, Mesh, within};
-use super::super::watch::resolution::{Again, Examined, Resolution};
 use super::super::watch::{Watch, mass_signs};
 use super::{Chosen, Simulated, second};
 use crate::error::RunErrorKind;
@@ -245,37 +244,6 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     fn check_restart(&self, t: f64, h: f64, state: &State<N>) -> Result<(), RunErrorKind> {
         check_start(state)?;
         check_constraints(self, t, h, state)
-    }
-
-    fn resolution<'m>(again: Again<'m, M>) -> Option<Resolution<'m, M, N>>
-    where
-        M: 'm,
-    {
-        Some(Resolution::new(again))
-    }
-
-    #[inline(always)]
-    fn examine(
-        resolution: &mut Option<Resolution<'_, M, N>>,
-        statistics: &Statistics,
-        element: Examined<'_, N>,
-    ) {
-        if let Some(resolution) = resolution {
-            resolution.look(statistics, element);
-        }
-    }
-
-    fn doubt(resolution: &Option<Resolution<'_, M, N>>, last: &State<N>) -> Option<Warning> {
-        resolution.as_ref()?.warning(last)
-    }
-
-    fn exchange_in<'m>(resolution: &mut Option<Resolution<'m, M, N>>, model: Share<'m, M>)
-    where
-        M: 'm,
-    {
-        if let Some(resolution) = resolution {
-            resolution.set_model(model);
-        }
     }
 
     fn look(

@@ -4,7 +4,6 @@ use super::super::checks::{check_finite, conserves_energies};
 use super::super::mesh::{Grid, Mesh};
 use super::super::times::is_same;
 use super::super::watch::Watch;
-use super::super::watch::resolution::{Again, Examined, Resolution};
 use super::{Chosen, Simulated, second};
 use crate::error::RunErrorKind;
 use crate::evaluate::names;
@@ -248,30 +247,6 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
 
     fn check_restart(&self, _: f64, _: f64, state: &FamilyState) -> Result<(), RunErrorKind> {
         check_lengths(self.len(), state)
-    }
-
-    fn resolution<'m>(_: Again<'m, M>) -> Option<Resolution<'m, M, 0>>
-    where
-        M: 'm,
-    {
-        None
-    }
-
-    fn examine(
-        _: &mut Option<Resolution<'_, M, 0>>,
-        _: &Statistics,
-        _: Examined<'_, 0, RunTimeLength>,
-    ) {
-    }
-
-    fn doubt(_: &Option<Resolution<'_, M, 0>>, _: &FamilyState) -> Option<Warning> {
-        None
-    }
-
-    fn exchange_in<'m>(_: &mut Option<Resolution<'m, M, 0>>, _: Share<'m, M>)
-    where
-        M: 'm,
-    {
     }
 
     fn look(&self, _: &mut Watch, _: usize, _: (f64, f64), _: &FamilyState, _: bool) {}

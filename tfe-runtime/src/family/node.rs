@@ -207,22 +207,24 @@ impl Node {
 
     /// Whether the matrix that was factored last is so far from singular that a solution has digits: it gives back a vector that it is multiplied with.
     pub(super) fn is_regular(&self) -> bool {
-        let n = self.slope.len();
-        // Irregular, so that no entry of a null vector is missed.
-        let vector: Vec<f64> = (0..n)
-            .map(|a| 1.0 + 0.5 * (1.7 * (a * a) as f64).sin())
-            .collect();
+        let entries = || self.pattern.places().iter().zip(&self.derivatives);
+        // As large as the units of each coordinate have it, and irregular, so that no null vector is missed.
+        let mut vector = vec![1.0; self.slope.len()];
+        for ((_, row, column), value) in entries() {
+            if row == column && value.abs() > 0.0 {
+                vector[*row] = 1.0 / value.abs().sqrt();
+            }
+        }
+        for (a, entry) in vector.iter_mut().enumerate() {
+            *entry *= 1.0 + 0.5 * (1.7 * (a * a) as f64).sin();
+        }
         let mut product = vec![0.0; self.vector.len()];
-        let places = self.pattern.places().iter();
-        for ((_, row, column), value) in places.zip(&self.derivatives) {
+        for ((_, row, column), value) in entries() {
             product[*row] += value * vector[*column];
         }
         self.matrix.solve(&mut product);
-        let off = vector.iter().zip(&product).map(|(a, b)| (a - b).abs());
-        off.fold(
-            0.0,
-            |off: f64, one| if one > off || one.is_nan() { one } else { off },
-        ) < REGULAR
+        let mut pairs = vector.iter().zip(&product);
+        pairs.all(|(wanted, found)| (wanted - found).abs() < REGULAR * wanted)
     }
 
     /// η of the last solution.
