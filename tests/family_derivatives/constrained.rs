@@ -5,6 +5,7 @@ use crate::largest::larger;
 use nalgebra::Complex;
 use tfe::family::FamilyState;
 use tfe::length::RunTimeLength;
+use tfe::periodic_schur::Multiplier;
 use tfe::prelude::*;
 use tfe::sensitivity::Loss;
 use tfe::{Model, family};
@@ -584,7 +585,7 @@ fn conservative_orbits_are_those_of_fixed_size() {
         .step(one.period() / 40.0);
     let run = run.run_linearised(start, 0.0..one.period()).expect("a run");
     let multipliers = run.multipliers().expect("multipliers");
-    let multipliers: Vec<_> = multipliers.iter().map(|one| one.to_complex()).collect();
+    let multipliers: Vec<_> = multipliers.iter().map(Multiplier::to_complex).collect();
     assert!((angles(&multipliers) - angles(one.multipliers())).abs() < 1e-8);
     assert_eq!(run.on_constraints().expect("bases")[0].shape(), (4, 4));
 }

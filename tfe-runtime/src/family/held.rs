@@ -4,7 +4,7 @@ use super::model::Model;
 use super::node::Node;
 use super::pattern::Pattern;
 use super::point;
-use super::projection::{Moved, NodeWeights, Places, Projection, add};
+use super::projection::{Explicit, NodeWeights, Places, Projection, add};
 use super::rows::Rows;
 use crate::error::StepError;
 use crate::scheme::{MAX_RATES, SchemeRef};
@@ -110,16 +110,16 @@ impl Held {
     }
 
     /// What a parameter changes; forces at the points take up what it changes of reactions there.
-    pub(super) fn moved<M: Model>(
+    pub(super) fn explicit<M: Model>(
         &self,
         model: &M,
         parameter: usize,
         solved: &Solved<'_>,
         end_momentum: Vec<f64>,
         forces: &mut [Vec<f64>],
-    ) -> Moved {
+    ) -> Explicit {
         let at = |t: f64, q: &[f64]| self.places.by_parameter(model, (t, q), parameter);
-        let mut moved = self.end.moved(
+        let mut explicit = self.end.explicit(
             &self.places,
             at(solved.t + solved.h, solved.end.0),
             end_momentum,
@@ -129,27 +129,27 @@ impl Held {
             let slopes = at(time, &point.q);
             self.places
                 .add_transposed(&slopes.rows, -1.0, &point.mu_rate, force);
-            moved.phi.extend(slopes.phi);
+            explicit.phi.extend(slopes.phi);
         }
         let n = solved.start.len();
-        moved.impulse = vec![0.0; n];
+        explicit.impulse = vec![0.0; n];
         let start = at(solved.t, solved.start);
         self.places
-            .add_transposed(&start.rows, 1.0, &self.first, &mut moved.impulse);
-        moved
+            .add_transposed(&start.rows, 1.0, &self.first, &mut explicit.impulse);
+        explicit
     }
 
     /// What coordinates at the start make of the impulse there.
-    pub(super) fn struck(&self, q: &[f64]) -> Moved {
+    pub(super) fn impulse_of(&self, q: &[f64]) -> Explicit {
         let mut impulse = vec![0.0; q.len()];
         self.places.add_bent(&self.start_bend, 1.0, q, &mut impulse);
-        Moved::impulse(impulse)
+        Explicit::impulse(impulse)
     }
 
     /// Takes from the momentum at the start what the impulse there has without its multipliers.
-    pub(super) fn strike_before(&self, moved: Option<&Moved>, p: &mut [f64]) {
-        if let Some(moved) = moved {
-            for (p, impulse) in p.iter_mut().zip(&moved.impulse) {
+    pub(super) fn subtract_impulse(&self, explicit: Option<&Explicit>, p: &mut [f64]) {
+        if let Some(explicit) = explicit {
+            for (p, impulse) in p.iter_mut().zip(&explicit.impulse) {
                 *p -= impulse;
             }
         }
@@ -161,7 +161,7 @@ impl Held {
     }
 
     /// What multipliers make of forces at point l.
-    pub(super) fn react(&self, l: usize, multipliers: &[f64], force: &mut [f64]) {
+    pub(super) fn add_reactions(&self, l: usize, multipliers: &[f64], force: &mut [f64]) {
         let point = &self.points[l];
         let count = multipliers.len() / self.places.count.max(1);
         let rates = multipliers.chunks_exact(count.max(1)).map(|own| {
@@ -173,7 +173,7 @@ impl Held {
     }
 
     /// What multipliers make of the momentum that the element begins with: h A₀ᵀ m₀.
-    pub(super) fn strike(&self, h: f64, multipliers: &[f64], p: &mut [f64]) {
+    pub(super) fn add_first_multipliers(&self, h: f64, multipliers: &[f64], p: &mut [f64]) {
         let count = multipliers.len() / self.places.count.max(1);
         let first = multipliers.chunks_exact(count.max(1)).map(|own| own[0]);
         let first: Vec<f64> = first.collect();
@@ -181,11 +181,11 @@ impl Held {
     }
 
     /// What coordinates at point l, and what moves φ besides, leave of the equations φ = 0.
-    pub(super) fn miss(
+    pub(super) fn add_constraint_sides(
         &self,
         l: usize,
         q: &[f64],
-        moved: Option<&Moved>,
+        explicit: Option<&Explicit>,
         (weight, h): (f64, f64),
         sides: &mut [f64],
     ) {
@@ -193,8 +193,8 @@ impl Held {
         let count = sides.len() / self.places.count.max(1);
         let mut off = vec![0.0; self.places.count];
         self.places.add_product(&point.rows, q, &mut off);
-        if let Some(moved) = moved {
-            add(&mut off, moved.phi.get(l * self.places.count..));
+        if let Some(explicit) = explicit {
+            add(&mut off, explicit.phi.get(l * self.places.count..));
         }
         for (sides, off) in sides.chunks_exact_mut(count.max(1)).zip(off) {
             for (side, slope) in sides.iter_mut().zip(point.slopes).skip(1) {
@@ -204,12 +204,18 @@ impl Held {
     }
 
     /// The same at the end.
-    pub(super) fn miss_end(&self, q: &[f64], moved: Option<&Moved>, h: f64, sides: &mut [f64]) {
+    pub(super) fn add_end_sides(
+        &self,
+        q: &[f64],
+        explicit: Option<&Explicit>,
+        h: f64,
+        sides: &mut [f64],
+    ) {
         let count = sides.len() / self.places.count.max(1);
         let mut off = vec![0.0; self.places.count];
         self.places.add_product(&self.end.rows, q, &mut off);
-        if let Some(moved) = moved {
-            add(&mut off, Some(&moved.end_phi));
+        if let Some(explicit) = explicit {
+            add(&mut off, Some(&explicit.end_phi));
         }
         for (sides, off) in sides.chunks_exact_mut(count.max(1)).zip(off) {
             sides[0] -= off / h;
@@ -217,15 +223,15 @@ impl Held {
     }
 
     /// Takes from the momentum that arrives at the end what constraints take up.
-    pub(super) fn settle(&self, p: &mut [f64], q: &[f64], moved: Option<&Moved>) {
-        self.end.apply(&self.places, p, q, moved);
+    pub(super) fn project(&self, p: &mut [f64], q: &[f64], explicit: Option<&Explicit>) {
+        self.end.apply(&self.places, p, q, explicit);
     }
 }
 
 /// Backwards.
 impl Held {
     /// Takes λ from after the node at the end to before it.
-    pub(super) fn unsettle(&self, of_p: &mut [f64], of_q: &mut [f64]) -> Weights {
+    pub(super) fn pull_projection(&self, of_p: &mut [f64], of_q: &mut [f64]) -> Weights {
         let end = self.end.pull(&self.places, of_p, of_q);
         Weights {
             phi: vec![0.0; self.points.len() * self.places.count],
@@ -237,7 +243,7 @@ impl Held {
     }
 
     /// What a row times the forces at point l is of multipliers.
-    pub(super) fn weigh(&self, l: usize, force: &[f64], sides: &mut [f64]) {
+    pub(super) fn pull_reactions(&self, l: usize, force: &[f64], sides: &mut [f64]) {
         let point = &self.points[l];
         let count = sides.len() / self.places.count.max(1);
         let mut of_rate = vec![0.0; self.places.count];
@@ -250,7 +256,7 @@ impl Held {
     }
 
     /// What λ is of the first multipliers.
-    pub(super) fn weigh_start(&self, h: f64, of_p: &[f64], sides: &mut [f64]) {
+    pub(super) fn pull_first_multipliers(&self, h: f64, of_p: &[f64], sides: &mut [f64]) {
         let count = sides.len() / self.places.count.max(1);
         let mut of_first = vec![0.0; self.places.count];
         self.places
@@ -261,7 +267,7 @@ impl Held {
     }
 
     /// What the solution `mu` of the transposed equations weighs of φ, and with it of coordinates at point l.
-    pub(super) fn unmiss(
+    pub(super) fn pull_constraint_sides(
         &self,
         l: usize,
         mu: &[f64],
@@ -281,7 +287,13 @@ impl Held {
     }
 
     /// The same at the end.
-    pub(super) fn unmiss_end(&self, mu: &[f64], h: f64, by_q: &mut [f64], weights: &mut Weights) {
+    pub(super) fn pull_end_sides(
+        &self,
+        mu: &[f64],
+        h: f64,
+        by_q: &mut [f64],
+        weights: &mut Weights,
+    ) {
         let count = mu.len() / self.places.count.max(1);
         let own = &mut weights.end.phi;
         for (own, mu) in own.iter_mut().zip(mu.chunks_exact(count.max(1))) {
@@ -291,7 +303,7 @@ impl Held {
     }
 
     /// What λ before the impulse at the start is of coordinates there.
-    pub(super) fn unstrike(&self, of_p: &[f64], by_q: &mut [f64]) {
+    pub(super) fn pull_impulse(&self, of_p: &[f64], by_q: &mut [f64]) {
         self.places.add_bent(&self.start_bend, -1.0, of_p, by_q);
     }
 

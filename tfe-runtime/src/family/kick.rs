@@ -16,6 +16,8 @@ use alloc::vec::Vec;
 /// ```text
 /// p = p̃ − Aᵀη = L_v(q, v, t) ,     A v + a = 0                                                         (T-74)
 /// ```
+///
+/// n coordinates take an n + m square sparse matrix, factored once; [`apply`](Self::apply) is one solution with it. Runs with derivatives across impulses use it (`Simulation::run_sensitive` of the crate `tfe`).
 #[derive(Clone, Debug)]
 pub struct Kick {
     places: Places,

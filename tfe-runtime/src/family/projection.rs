@@ -108,7 +108,7 @@ pub(super) struct RowSlopes {
 
 /// What a parameter changes at fixed unknowns; of a change of the start only what that makes of the impulse.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Moved {
+pub(super) struct Explicit {
     /// h A₀ᵀ m₀, by coordinate.
     pub(super) impulse: Vec<f64>,
     /// φ at the points, a row for each, and at the end.
@@ -120,7 +120,7 @@ pub(super) struct Moved {
     pub(super) rate: Vec<f64>,
 }
 
-impl Moved {
+impl Explicit {
     /// Of what changes the impulse at the start alone.
     pub(super) fn impulse(impulse: Vec<f64>) -> Self {
         Self {
@@ -192,16 +192,21 @@ impl Projection {
     }
 
     /// What a parameter changes at the node, from what it changes of the rows and of L_v there.
-    pub(super) fn moved(&self, places: &Places, slopes: RowSlopes, momentum: Vec<f64>) -> Moved {
+    pub(super) fn explicit(
+        &self,
+        places: &Places,
+        slopes: RowSlopes,
+        momentum: Vec<f64>,
+    ) -> Explicit {
         let (mut reaction, mut rate) = (vec![0.0; momentum.len()], slopes.drift);
         places.add_transposed(&slopes.rows, 1.0, &self.eta, &mut reaction);
         places.add_product(&slopes.rows, &self.v, &mut rate);
-        Moved {
+        Explicit {
             end_phi: slopes.phi,
             momentum,
             reaction,
             rate,
-            ..Moved::default()
+            ..Explicit::default()
         }
     }
 
@@ -215,9 +220,9 @@ impl Projection {
     ) -> Vec<f64> {
         let n = momentum.len();
         let slopes = places.by_parameter(model, (t, &self.q), parameter);
-        let moved = self.moved(places, slopes, momentum);
+        let explicit = self.explicit(places, slopes, momentum);
         let mut p = vec![0.0; n];
-        self.apply(places, &mut p, &vec![0.0; n], Some(&moved));
+        self.apply(places, &mut p, &vec![0.0; n], Some(&explicit));
         p
     }
 
@@ -227,16 +232,22 @@ impl Projection {
     }
 
     /// Writes δp for δp̃.
-    pub(super) fn apply(&self, places: &Places, p: &mut [f64], q: &[f64], moved: Option<&Moved>) {
+    pub(super) fn apply(
+        &self,
+        places: &Places,
+        p: &mut [f64],
+        q: &[f64],
+        explicit: Option<&Explicit>,
+    ) {
         let (n, m) = (p.len(), places.count);
         places.add_bent(&self.bend, -1.0, q, p);
         let mut side = vec![0.0; n + m];
-        if let Some(moved) = moved {
-            for (p, reaction) in p.iter_mut().zip(&moved.reaction) {
+        if let Some(explicit) = explicit {
+            for (p, reaction) in p.iter_mut().zip(&explicit.reaction) {
                 *p -= reaction;
             }
-            add(&mut side[..n], Some(&moved.momentum));
-            add(&mut side[n..], Some(&moved.rate));
+            add(&mut side[..n], Some(&explicit.momentum));
+            add(&mut side[n..], Some(&explicit.rate));
         }
         for (row, column, value) in &self.turn {
             side[*row] += value * q[*column];

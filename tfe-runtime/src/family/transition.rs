@@ -11,7 +11,7 @@ use super::error::ModelError;
 use super::held::Held;
 use super::model::{Block, FamilyState, Gradient, Model};
 use super::pattern::Pattern;
-use super::projection::{Moved, Places};
+use super::projection::{Explicit, Places};
 use super::rates::Rates;
 use super::view::View;
 use crate::condense::add_multiple;
@@ -85,7 +85,7 @@ struct Change<'a, S, L, F, P, A> {
     push: F,
     impulse: P,
     advance: A,
-    moved: Option<&'a Moved>,
+    explicit: Option<&'a Explicit>,
 }
 
 impl TransitionOperator {
@@ -246,14 +246,14 @@ impl TransitionOperator {
         };
         let h = self.h;
         let impulse = rates.impulse_of_start().iter().map(|impulse| impulse / h);
-        let stretched = Moved::impulse(impulse.collect());
+        let stretched = Explicit::impulse(impulse.collect());
         let by_length = self.respond(&Change {
             shift: |l: usize, a: usize| sum(&scheme.position[l * count..(l + 1) * count], a),
             lift: |_, _| 0.0,
             push: |l: usize, a: usize| rates.points[l].force[a] / h,
             impulse: |_| 0.0,
             advance: |a| sum(scheme.advance, a),
-            moved: self.held.as_ref().map(|_| &stretched),
+            explicit: self.held.as_ref().map(|_| &stretched),
         });
         let by_damping = self.respond(&Change {
             shift: |_, _| 0.0,
@@ -261,7 +261,7 @@ impl TransitionOperator {
             push: |l: usize, a: usize| rates.points[l].v[a],
             impulse: |_| 0.0,
             advance: |_| 0.0,
-            moved: None,
+            explicit: None,
         });
         (self.by_length, self.by_damping) = (by_length, by_damping);
     }
@@ -285,12 +285,12 @@ impl TransitionOperator {
                 momenta.push(by.momentum);
                 forces.push(by.force);
             }
-            let moved = self.held.as_ref().map(|held| {
+            let explicit = self.held.as_ref().map(|held| {
                 let scheme = self.table.view();
                 let solved = rates.solved(&scheme, (t, h), &self.pattern);
                 let (q, v) = solved.end;
                 let end = view.by_parameter(t + h, q, v, *parameter).momentum;
-                held.moved(view, *parameter, &solved, end, &mut forces)
+                held.explicit(view, *parameter, &solved, end, &mut forces)
             });
             let mut inside = Vec::new();
             let change = Change {
@@ -299,7 +299,7 @@ impl TransitionOperator {
                 push: |l: usize, a: usize| forces[l][a],
                 impulse: |_| 0.0,
                 advance: |_| 0.0,
-                moved: moved.as_ref(),
+                explicit: explicit.as_ref(),
             };
             let end = self.respond_inside(&change, Some(&mut inside));
             self.by_parameters.push(end);
@@ -380,14 +380,14 @@ impl TransitionOperator {
 
     /// The end of the step after a change of its start.
     fn respond_to(&self, (p, q): (&[f64], &[f64]), inside: Option<&mut Vec<f64>>) -> Vec<f64> {
-        let moved = self.held.as_ref().map(|held| held.struck(q));
+        let explicit = self.held.as_ref().map(|held| held.impulse_of(q));
         let change = Change {
             shift: |_, a: usize| q[a],
             lift: |_, _| 0.0,
             push: |_, _| 0.0,
             impulse: |a: usize| p[a],
             advance: |a: usize| q[a],
-            moved: moved.as_ref(),
+            explicit: explicit.as_ref(),
         };
         self.respond_inside(&change, inside)
     }
@@ -440,7 +440,7 @@ impl TransitionOperator {
             push,
             impulse,
             advance,
-            moved,
+            explicit,
         } = change;
         let held = self.held.as_ref();
         let mut unknowns = vec![0.0; self.matrix.size()];
@@ -454,7 +454,7 @@ impl TransitionOperator {
             self.bend(l, &q, &v, &mut momentum, &mut force);
             if let Some(held) = held {
                 held.bend(l, &q, &mut force);
-                held.miss(l, &q, *moved, (scheme.weights[l], h), multipliers);
+                held.add_constraint_sides(l, &q, *explicit, (scheme.weights[l], h), multipliers);
             }
             for (a, sides) in rates.chunks_exact_mut(count).enumerate() {
                 for (i, side) in sides.iter_mut().enumerate() {
@@ -466,8 +466,8 @@ impl TransitionOperator {
         let mut end: Vec<f64> = (0..n).map(impulse).chain((0..n).map(advance)).collect();
         let (end_p, end_q) = end.split_at_mut(n);
         if let Some(held) = held {
-            held.miss_end(end_q, *moved, h, multipliers);
-            held.strike_before(*moved, end_p);
+            held.add_end_sides(end_q, *explicit, h, multipliers);
+            held.subtract_impulse(*explicit, end_p);
         }
         for (sides, impulse) in rates.chunks_exact_mut(count).zip(&*end_p) {
             sides.iter_mut().for_each(|side| *side += impulse);
@@ -499,7 +499,7 @@ impl TransitionOperator {
             self.bend(l, &q, &v, &mut momentum, &mut force);
             if let Some(held) = held {
                 held.bend(l, &q, &mut force);
-                held.react(l, multipliers, &mut force);
+                held.add_reactions(l, multipliers, &mut force);
             }
             for (p, force) in end_p.iter_mut().zip(&force) {
                 *p += h * scheme.weights[l] * force;
@@ -522,8 +522,8 @@ impl TransitionOperator {
             *end += h * product(scheme.advance, a);
         }
         let Some(held) = held else { return end };
-        held.strike(h, multipliers, end_p);
-        held.settle(end_p, end_q, *moved);
+        held.add_first_multipliers(h, multipliers, end_p);
+        held.project(end_p, end_q, *explicit);
         if let Some(inside) = inside {
             let half = inside.len() / 2;
             let rows = inside[half..].chunks_exact_mut(n.max(1));

@@ -44,7 +44,7 @@ impl TransitionOperator {
                 add_multiple(of_p, weights[points + 1], row);
             }
         }
-        let mut held_weights = held.map(|held| held.unsettle(of_p, of_q));
+        let mut held_weights = held.map(|held| held.pull_projection(of_p, of_q));
         let mut mu = vec![0.0; self.matrix.size()];
         let (rates, multipliers) = mu.split_at_mut(n * count);
         let (mut by_q, mut by_v) = (vec![0.0; n], vec![0.0; n]);
@@ -67,7 +67,7 @@ impl TransitionOperator {
                 None => within.add_forces(l, &mut force),
                 Some(held) => {
                     held.bend(l, &force, &mut by_q);
-                    held.weigh(l, &force, multipliers);
+                    held.pull_reactions(l, &force, multipliers);
                     self.add_inertia(l, momentum, &mut by_v);
                 }
             }
@@ -81,7 +81,7 @@ impl TransitionOperator {
             }
         }
         if let Some(held) = held {
-            held.weigh_start(h, of_p, multipliers);
+            held.pull_first_multipliers(h, of_p, multipliers);
         }
         self.matrix.solve_transposed(&mut mu);
         let (rates, multipliers) = mu.split_at(n * count);
@@ -109,7 +109,7 @@ impl TransitionOperator {
                 (Some(held), Some(weights)) => {
                     held.bend(l, force, &mut by_q);
                     let scale = (scheme.weights[l], h);
-                    held.unmiss(l, multipliers, scale, &mut by_q, weights);
+                    held.pull_constraint_sides(l, multipliers, scale, &mut by_q, weights);
                 }
                 _ => within.add_forces(l, force),
             }
@@ -119,8 +119,8 @@ impl TransitionOperator {
             of_p[a] += mu.iter().sum::<f64>();
         }
         if let (Some(held), Some(weights)) = (held, &mut held_weights) {
-            held.unmiss_end(multipliers, h, &mut by_q, weights);
-            held.unstrike(of_p, &mut by_q);
+            held.pull_end_sides(multipliers, h, &mut by_q, weights);
+            held.pull_impulse(of_p, &mut by_q);
             held.weigh_rows(of_p, &seeds.forces, weights);
         }
         add_multiple(of_p, 1.0, &of_start);
