@@ -5,7 +5,7 @@ use super::phase::Phase;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem};
 use tfe_runtime::condenser::Direction;
 use tfe_runtime::dual::{Dual, duals};
-use tfe_runtime::{Form, LegendreError, Model, State, legendre};
+use tfe_runtime::{First, Form, LegendreError, Model, State, StepError, constrained, legendre};
 
 /// What the global unknowns of an orbit are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,6 +103,38 @@ pub(crate) fn orthogonal_to_flow<const N: usize>(
     weights[last * 2 * N..].fill(0.0);
 }
 
+/// The velocity of a momentum; where it has none of its own, the one that constraints leave.
+fn velocity_of<M: Model<N>, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+) -> Result<[f64; N], LegendreError> {
+    let found = constrained::velocity_of(model, t, &state.q, &state.p, &[0.0; N]);
+    found.map_err(|error| match error {
+        StepError::Legendre(error) => error,
+        StepError::NonFinite => LegendreError::NonFinite,
+        _ => LegendreError::Singular { coordinate: 0 },
+    })
+}
+
+/// H with (H_p, H_q).
+fn energy_slopes<M: Model<N>, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+) -> Result<(f64, [f64; N], [f64; N]), LegendreError> {
+    let mut first = First::ZERO;
+    if M::FORM == Form::Hamiltonian {
+        model.first(t, &state.q, &state.p, &mut first);
+        let energy = model.energy_function(t, &state.q, &state.p);
+        return Ok((energy, first.z, first.q));
+    }
+    let v = velocity_of(model, t, state)?;
+    model.first(t, &state.q, &v, &mut first);
+    let energy = legendre::energy_at(model, t, &state.q, &state.p, &v);
+    Ok((energy, v, first.q.map(|slope| -slope)))
+}
+
 /// ∂H/∂a at fixed coordinates and momenta, which is −∂L/∂a at fixed velocities.
 fn energy_by<M: Model<N>, const N: usize>(
     model: &M,
@@ -112,10 +144,7 @@ fn energy_by<M: Model<N>, const N: usize>(
 ) -> Result<f64, LegendreError> {
     let (z, sign) = match M::FORM {
         Form::Hamiltonian => (state.p, 1.0),
-        Form::Lagrangian => {
-            let view = legendre::hamiltonian_view(model, t, &state.q, &state.p)?;
-            (view.v, -1.0)
-        }
+        Form::Lagrangian => (velocity_of(model, t, state)?, -1.0),
     };
     let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
     let still = |values: &[f64; N]| duals(values, &[0.0; N]);
@@ -198,12 +227,11 @@ impl<M: Model<N>, const N: usize> Problem<N> for Periodic<'_, M, N> {
             Some(Phase::Orthogonal) | None => {}
         }
         if let Some(energy) = self.energy {
-            let view = legendre::hamiltonian_view(self.model, self.start, &first.q, &first.p)?;
-            for a in 0..N {
-                closure.first[row * 2 * N + a] = view.first.z[a];
-                closure.first[row * 2 * N + N + a] = view.first.q[a];
-            }
-            closure.right[row] = energy - view.hamiltonian;
+            let (present, by_p, by_q) = energy_slopes(self.model, self.start, first)?;
+            let slopes = &mut closure.first[row * 2 * N..(row + 1) * 2 * N];
+            slopes[..N].copy_from_slice(&by_p);
+            slopes[N..].copy_from_slice(&by_q);
+            closure.right[row] = energy - present;
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh};
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Motion;
 use crate::simulation::Simulation;
-use tfe_runtime::{Element, Mixed, Model, constrained, legendre};
+use tfe_runtime::{Element, LegendreError, Mixed, Model, constrained, legendre};
 
 /// A curve t ↦ (q, dq/dt).
 type Around<'m, V> = Box<dyn Fn(f64) -> (V, V) + 'm>;
@@ -317,9 +317,12 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             return Ok(energy);
         }
         let (q, v) = curve(self.start);
-        let energy = legendre::state(self.model, self.start, &q, &v)
-            .and_then(|state| legendre::energy(self.model, self.start, &state.q, &state.p))
-            .map_err(AssemblyError::Legendre)?;
+        let state = legendre::state(self.model, self.start, &q, &v);
+        let p = state.map_err(AssemblyError::Legendre)?.p;
+        let energy = legendre::energy_at(self.model, self.start, &q, &p, &v);
+        if !energy.is_finite() {
+            return Err(AssemblyError::Legendre(LegendreError::NonFinite).into());
+        }
         Ok(energy)
     }
 }

@@ -142,3 +142,55 @@ fn a_free_swing() {
         assert!((multiplier - 1.0).norm() < 1e-5, "{multiplier}");
     }
 }
+
+/// A body about a fixed point, by a unit quaternion, whose mass matrix is singular: it swings about its first axis, as a pendulum in one angle does. A spring keeps its axis from turning about the vertical.
+#[test]
+fn a_swing_of_a_unit_quaternion() {
+    #[dynamics(
+        coordinates(e[4]),
+        let w = body_rate(e),
+        let axis = rotate(e, [0, 0, 1]),
+        lagrangian = (i1*w[0]^2 + i2*w[1]^2 + i3*w[2]^2)/2 - mgd*axis[2] - s/2*axis[0]^2,
+        constraint(unit) = (inner(e, e) - 1)/2,
+    )]
+    struct Body {
+        i1: f64,
+        i2: f64,
+        i3: f64,
+        mgd: f64,
+        s: f64,
+    }
+    #[dynamics(coordinates(theta), lagrangian = i1*dot(theta)^2/2 - mgd*cos(theta))]
+    struct Plane {
+        i1: f64,
+        mgd: f64,
+    }
+    let (i1, i2, i3, mgd, s) = (1.2, 1.0, 0.9, 1.1, 0.7);
+    let body = Body {
+        i1,
+        i2,
+        i3,
+        mgd,
+        s,
+    };
+    let plane = Plane { i1, mgd };
+    let angle = std::f64::consts::PI + 1.0;
+    let half = angle / 2.0;
+    let start = body.state([half.cos(), half.sin(), 0.0, 0.0], [0.0; 4]);
+    let guess = 6.7 * (i1 / mgd).sqrt();
+    let ours = PeriodicOrbit::of(&body).element(Mixed::<6>).elements(40);
+    let ours = ours.unknown_period(guess).guess_from(start);
+    let theirs = PeriodicOrbit::of(&plane).element(Mixed::<6>).elements(40);
+    let theirs = theirs.unknown_period(guess);
+    let theirs = theirs.guess_from(plane.state([angle], [0.0]));
+    let (ours, theirs) = (ours.solve_sensitive(), theirs.solve_sensitive());
+    let (ours, theirs) = (ours.expect("an orbit"), theirs.expect("an orbit"));
+    // The elements are other ones in other coordinates: of tenth order.
+    let (one, other) = (ours.orbit(), theirs.orbit());
+    assert!((one.period() - other.period()).abs() < 1e-7);
+    assert_eq!((one.multipliers().len(), one.trivial().len()), (6, 2));
+    for name in ["i1", "mgd"] {
+        let (ours, theirs) = (ours.by(name).period(), theirs.by(name).period());
+        assert!((ours - theirs).abs() < 1e-6, "{name}: {ours} {theirs}");
+    }
+}
