@@ -2,9 +2,9 @@
 
 use super::arc::Row;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Problem};
-use crate::periodic::problem::Periodic;
+use crate::periodic::problem::{Periodic, energy_slopes};
 use tfe_runtime::condenser::{Direction, Parameter};
-use tfe_runtime::{LegendreError, Model, legendre};
+use tfe_runtime::{LegendreError, Model};
 
 /// The field of a model that is the parameter.
 pub(super) type Field<'c, M> = dyn Fn(&mut M) -> &mut f64 + 'c;
@@ -117,7 +117,8 @@ impl<M: Model<N> + Clone, const N: usize> Problem<N> for Continued<'_, M, N> {
         // The energy is the last row, the parameter the last column.
         if let (Some(entry), Some(first)) = (closure.global.last_mut(), iterate.nodes.first()) {
             *entry = self.difference(|model| {
-                legendre::energy(model, orbit.start, &first.q, &first.p).unwrap_or(f64::NAN)
+                let found = energy_slopes(model, orbit.start, first);
+                found.map_or(f64::NAN, |(energy, ..)| energy)
             });
         }
         Ok(())

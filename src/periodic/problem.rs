@@ -118,7 +118,7 @@ fn velocity_of<M: Model<N>, const N: usize>(
 }
 
 /// H with (H_p, H_q).
-fn energy_slopes<M: Model<N>, const N: usize>(
+pub(crate) fn energy_slopes<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,
     state: &State<N>,

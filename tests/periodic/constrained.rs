@@ -166,13 +166,7 @@ fn a_swing_of_a_unit_quaternion() {
         mgd: f64,
     }
     let (i1, i2, i3, mgd, s) = (1.2, 1.0, 0.9, 1.1, 0.7);
-    let body = Body {
-        i1,
-        i2,
-        i3,
-        mgd,
-        s,
-    };
+    let body = Body { i1, i2, i3, mgd, s };
     let plane = Plane { i1, mgd };
     let angle = std::f64::consts::PI + 1.0;
     let half = angle / 2.0;

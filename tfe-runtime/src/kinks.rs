@@ -6,6 +6,7 @@
 mod search;
 mod watched;
 
+use crate::constrained::velocity_of;
 use crate::cut::{Halving, Instant};
 use crate::error::StepError;
 use crate::model::{Form, Model};
@@ -77,7 +78,7 @@ pub(crate) fn switches<M, const N: usize>(
 {
     let z = match M::FORM {
         Form::Lagrangian => {
-            let velocity = crate::legendre::velocity(model, t, &state.q, &state.p, &[0.0; N]);
+            let velocity = velocity_of(model, t, &state.q, &state.p, &[0.0; N]);
             let Ok(velocity) = velocity else { return };
             velocity
         }
