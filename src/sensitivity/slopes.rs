@@ -55,19 +55,20 @@ pub(crate) struct Along<'a, M, const N: usize> {
 
 impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
     pub(crate) fn new(model: &'a M, place: Place<'a, N>) -> Self {
-        let inverse = match M::FORM {
-            Form::Hamiltonian => None,
-            Form::Lagrangian => {
+        let Place { t, state, v } = place;
+        let unknown = || DMatrix::from_element(N, N, f64::NAN);
+        let held = HeldVelocity::of(model, t, (&state.q, &state.p), v);
+        let inverse = match (M::FORM, &held) {
+            (Form::Hamiltonian, _) => None,
+            // Not even constraints leave one velocity.
+            (Form::Lagrangian, Err(_)) => Some(unknown()),
+            (Form::Lagrangian, Ok(_)) => {
                 let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
-                let Place { t, state, v } = place;
                 model.first_and_mass(t, &state.q, v, &mut first, &mut zz);
                 let mass = DMatrix::from_fn(N, N, |a, b| zz[a][b]);
-                let unknown = || DMatrix::from_element(N, N, f64::NAN);
                 Some(mass.try_inverse().unwrap_or_else(unknown))
             }
         };
-        let Place { t, state, v } = place;
-        let held = HeldVelocity::of(model, t, (&state.q, &state.p), v);
         Self {
             model,
             place,

@@ -193,6 +193,13 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         Ok(matrix)
     }
 
+    /// Derivatives are counted from here, if they are not yet from anywhere.
+    fn count_from(&mut self, t: f64, state: &State<N>) {
+        if const { !M::CONSTRAINTS.is_empty() } && self.counted_from.is_none() {
+            self.counted_from = Some((t, *state));
+        }
+    }
+
     /// The inverse of the derivative of an event's state by that at the point before; with constraints on the motions that these allow (T-78): of other directions nothing is left
     /// at the event.
     fn inverse(
@@ -464,9 +471,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
         passed: &Passed<'_, N>,
     ) -> Result<(), TransitionError> {
         let Across { end, inside, .. } = self.across(stepper, &[])?;
-        if const { !M::CONSTRAINTS.is_empty() } && self.counted_from.is_none() {
-            self.counted_from = Some((passed.start, *passed.before));
-        }
+        self.count_from(passed.start, passed.before);
         self.keep(
             stepper,
             (passed.start, passed.start + passed.h),
@@ -492,6 +497,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
             more: rate,
             inside,
         } = self.up_to(severed)?;
+        self.count_from(severed.start, severed.before);
         let event = severed.event;
         let state = event.state();
         let model = self.model.clone();
