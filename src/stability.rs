@@ -74,7 +74,7 @@ pub fn transition_matrix<M, const N: usize>(
 where
     M: Declared<N, Length: Transitions<M, N>>,
 {
-    M::Length::matrix(model, element.into(), state, t, h)
+    Ok(M::Length::step(model, element.into(), state, t, h)?.0)
 }
 
 /// The transition matrix of one element on the motions that the constraints of the model allow: in the orthonormal bases
@@ -117,7 +117,12 @@ pub fn on_constraints<M, const N: usize>(
 where
     M: Declared<N, Length: Transitions<M, N>>,
 {
-    M::Length::on_constraints(model, element.into(), state, t, h)
+    let (matrix, end) = M::Length::step(model, element.into(), state, t, h)?;
+    let (before, after) = (
+        M::Length::basis(model, t, state)?,
+        M::Length::basis(model, t + h, &end)?,
+    );
+    Ok(after.tr_mul(&(matrix * before)))
 }
 
 /// Every interval of step size in which a motion about an equilibrium grows, however right the model: ascending, apart from each other.

@@ -30,62 +30,43 @@ pub trait Transitions<M, const N: usize> {
     /// Why there is no matrix.
     type Error: Error;
 
-    /// The matrix of one element.
+    /// The matrix of one element, and where it ends.
     ///
     /// # Errors
     /// As [`transition_matrix`](super::transition_matrix).
-    fn matrix(
+    fn step(
         model: &M,
         element: Element,
         state: &Self::State,
         t: f64,
         h: f64,
-    ) -> Result<DMatrix<f64>, Self::Error>;
+    ) -> Result<(DMatrix<f64>, Self::State), Self::Error>;
 
-    /// The same on the motions that constraints allow.
+    /// An orthonormal basis of the motions that constraints allow at a state.
     ///
     /// # Errors
     /// As [`on_constraints`](super::on_constraints).
-    fn on_constraints(
-        model: &M,
-        element: Element,
-        state: &Self::State,
-        t: f64,
-        h: f64,
-    ) -> Result<DMatrix<f64>, Self::Error>;
+    fn basis(model: &M, t: f64, state: &Self::State) -> Result<DMatrix<f64>, Self::Error>;
 }
 
 impl<M: Model<N>, const N: usize> Transitions<M, N> for FixedLength {
     type State = State<N>;
     type Error = TransitionError;
 
-    fn matrix(
+    fn step(
         model: &M,
         element: Element,
         state: &State<N>,
         t: f64,
         h: f64,
-    ) -> Result<DMatrix<f64>, TransitionError> {
-        let mut entries = vec![0.0; 4 * N * N];
-        transition::of_step(model, element, state, t, h, &mut entries)?;
-        Ok(DMatrix::from_row_slice(2 * N, 2 * N, &entries))
-    }
-
-    fn on_constraints(
-        model: &M,
-        element: Element,
-        state: &State<N>,
-        t: f64,
-        h: f64,
-    ) -> Result<DMatrix<f64>, TransitionError> {
+    ) -> Result<(DMatrix<f64>, State<N>), TransitionError> {
         let mut entries = vec![0.0; 4 * N * N];
         let end = transition::of_step(model, element, state, t, h, &mut entries)?;
-        let ambient = DMatrix::from_row_slice(2 * N, 2 * N, &entries);
-        let (before, after) = (
-            tangent_basis(model, t, state)?,
-            tangent_basis(model, t + h, &end)?,
-        );
-        Ok(after.tr_mul(&(ambient * before)))
+        Ok((DMatrix::from_row_slice(2 * N, 2 * N, &entries), end))
+    }
+
+    fn basis(model: &M, t: f64, state: &State<N>) -> Result<DMatrix<f64>, TransitionError> {
+        Ok(tangent_basis(model, t, state)?)
     }
 }
 
@@ -94,29 +75,23 @@ impl<M: family::Model> Transitions<M, 0> for RunTimeLength {
     type State = FamilyState;
     type Error = family::OperatorError;
 
-    fn matrix(
+    fn step(
         model: &M,
         element: Element,
         state: &FamilyState,
         t: f64,
         h: f64,
-    ) -> Result<DMatrix<f64>, family::OperatorError> {
-        Ok(family::TransitionOperator::of_step(model, element, state, t, h)?.matrix())
+    ) -> Result<(DMatrix<f64>, FamilyState), family::OperatorError> {
+        let step = family::TransitionOperator::of_step(model, element, state, t, h)?;
+        Ok((step.matrix(), step.end().clone()))
     }
 
-    fn on_constraints(
+    fn basis(
         model: &M,
-        element: Element,
-        state: &FamilyState,
         t: f64,
-        h: f64,
+        state: &FamilyState,
     ) -> Result<DMatrix<f64>, family::OperatorError> {
-        let step = family::TransitionOperator::of_step(model, element, state, t, h)?;
-        let (before, after) = (
-            basis_of(model, t, state)?,
-            basis_of(model, t + h, step.end())?,
-        );
-        Ok(after.tr_mul(&(step.matrix() * before)))
+        Ok(basis_of(model, t, state)?)
     }
 }
 

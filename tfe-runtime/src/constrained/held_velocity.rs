@@ -1,8 +1,9 @@
 //! How the velocity of a momentum moves with it where the mass matrix is singular and constraints leave one velocity (T-161).
 
 use super::derivative::DualRows;
-use super::node::is_regular;
+use super::node::{border, is_regular};
 use super::states::chosen;
+use crate::condense::add_multiple;
 use crate::constrained::rows::rows_len;
 use crate::dual::Dual;
 use crate::error::{ConstraintError, StepError};
@@ -52,20 +53,7 @@ impl<const N: usize> HeldVelocity<N> {
         let mut numbers = vec![0.0; rows_len(N, count)];
         let (rows, active) = chosen(model, (t, q), &mut numbers);
         let mut matrix = vec![0.0; size * size];
-        for (row, masses) in matrix.chunks_exact_mut(size).zip(&zz) {
-            row[..N].copy_from_slice(masses);
-        }
-        for (c, mark) in active.iter().enumerate() {
-            let row = N + c;
-            if *mark == 0 {
-                matrix[row * size + row] = 1.0;
-                continue;
-            }
-            for a in 0..N {
-                matrix[row * size + a] = rows.rows[c][a];
-                matrix[a * size + row] = rows.rows[c][a];
-            }
-        }
+        border(&mut matrix, &zz, &rows, &active);
         let mut pivots = vec![0; size];
         lu::factor(size, &mut matrix, &mut pivots).map_err(|_| ConstraintError::SingularMass)?;
         let mut held = Self {
@@ -100,18 +88,12 @@ impl<const N: usize> HeldVelocity<N> {
         rows.evaluate(model, t, q, v);
         let mut sides = given.to_vec();
         for (c, mark) in self.active.iter().enumerate() {
-            let is_active = *mark != 0;
-            sides.push(if is_active {
-                -rows.psi_slope(c, v)
-            } else {
-                0.0
-            });
-            if is_active {
-                let row = rows.row_slope(c);
-                for a in 0..N {
-                    sides[a] -= row[a] * self.eta[c];
-                }
+            if *mark == 0 {
+                sides.push(0.0);
+                continue;
             }
+            sides.push(-rows.psi_slope(c, v));
+            add_multiple(&mut sides[..N], -self.eta[c], &rows.row_slope(c));
         }
         self.solve(&mut sides);
         core::array::from_fn(|a| sides[a])

@@ -52,21 +52,12 @@ where
                 first.z = view.p;
             }
         }
+        border(matrix, &zz, rows, active);
         for a in 0..N {
             vector[a] = p[a] - first.z[a];
-            matrix[a * size..a * size + N].copy_from_slice(&zz[a]);
         }
         for (c, mark) in active.iter().enumerate() {
-            let row = N + c;
-            if *mark == 0 {
-                (matrix[row * size + row], vector[row]) = (1.0, 0.0);
-                continue;
-            }
-            vector[row] = -rows.psi(c, &v);
-            for a in 0..N {
-                matrix[row * size + a] = rows.rows[c][a];
-                matrix[a * size + row] = rows.rows[c][a];
-            }
+            vector[N + c] = if *mark == 0 { 0.0 } else { -rows.psi(c, &v) };
         }
         lu::factor(size, matrix, pivots).map_err(|_| ConstraintError::SingularMass)?;
         // The multiplier is solved for anew each time: it enters linearly.
@@ -91,6 +82,30 @@ where
         residual: last,
     }
     .into())
+}
+
+/// Writes [ L_vv Aᵀ ; A 0 ] with the marked rows, and a one on the diagonal for each of the others, into zeros.
+pub(super) fn border<const N: usize>(
+    matrix: &mut [f64],
+    zz: &[[f64; N]; N],
+    rows: &Rows<'_, N>,
+    active: &[usize],
+) {
+    let size = N + active.len();
+    for (row, masses) in matrix.chunks_exact_mut(size).zip(zz) {
+        row[..N].copy_from_slice(masses);
+    }
+    for (c, mark) in active.iter().enumerate() {
+        let row = N + c;
+        if *mark == 0 {
+            matrix[row * size + row] = 1.0;
+            continue;
+        }
+        for a in 0..N {
+            matrix[row * size + a] = rows.rows[c][a];
+            matrix[a * size + row] = rows.rows[c][a];
+        }
+    }
 }
 
 /// A mass matrix with a relative pivot below this one leaves the velocity of a momentum to the constraints.

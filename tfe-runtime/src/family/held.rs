@@ -4,8 +4,9 @@ use super::model::Model;
 use super::node::Node;
 use super::pattern::Pattern;
 use super::point;
-use super::projection::{Explicit, NodeWeights, Places, Projection, add};
+use super::projection::{Explicit, NodeWeights, Places, Projection};
 use super::rows::Rows;
+use crate::condense::add_multiple;
 use crate::error::StepError;
 use crate::scheme::{MAX_RATES, SchemeRef};
 use alloc::sync::Arc;
@@ -128,6 +129,7 @@ impl Held {
             let time = solved.t + solved.h * solved.scheme.nodes[l];
             let slopes = at(time, &point.q);
             self.places
+                .rows
                 .add_transposed(&slopes.rows, -1.0, &point.mu_rate, force);
             explicit.phi.extend(slopes.phi);
         }
@@ -135,6 +137,7 @@ impl Held {
         explicit.impulse = vec![0.0; n];
         let start = at(solved.t, solved.start);
         self.places
+            .rows
             .add_transposed(&start.rows, 1.0, &self.first, &mut explicit.impulse);
         explicit
     }
@@ -142,22 +145,24 @@ impl Held {
     /// What coordinates at the start make of the impulse there.
     pub(super) fn impulse_of(&self, q: &[f64]) -> Explicit {
         let mut impulse = vec![0.0; q.len()];
-        self.places.add_bent(&self.start_bend, 1.0, q, &mut impulse);
+        self.places
+            .bends
+            .add_product(&self.start_bend, 1.0, q, &mut impulse);
         Explicit::impulse(impulse)
     }
 
     /// Takes from the momentum at the start what the impulse there has without its multipliers.
     pub(super) fn subtract_impulse(&self, explicit: Option<&Explicit>, p: &mut [f64]) {
         if let Some(explicit) = explicit {
-            for (p, impulse) in p.iter_mut().zip(&explicit.impulse) {
-                *p -= impulse;
-            }
+            add_multiple(p, -1.0, &explicit.impulse);
         }
     }
 
     /// What coordinates at point l make of the force of reactions there.
     pub(super) fn bend(&self, l: usize, q: &[f64], force: &mut [f64]) {
-        self.places.add_bent(&self.points[l].bend, -1.0, q, force);
+        self.places
+            .bends
+            .add_product(&self.points[l].bend, -1.0, q, force);
     }
 
     /// What multipliers make of forces at point l.
@@ -169,7 +174,9 @@ impl Held {
             pairs.map(|(own, slope)| own * slope).sum()
         });
         let rates: Vec<f64> = rates.collect();
-        self.places.add_transposed(&point.rows, -1.0, &rates, force);
+        self.places
+            .rows
+            .add_transposed(&point.rows, -1.0, &rates, force);
     }
 
     /// What multipliers make of the momentum that the element begins with: h A₀ᵀ m₀.
@@ -177,7 +184,9 @@ impl Held {
         let count = multipliers.len() / self.places.count.max(1);
         let first = multipliers.chunks_exact(count.max(1)).map(|own| own[0]);
         let first: Vec<f64> = first.collect();
-        self.places.add_transposed(&self.start_rows, -h, &first, p);
+        self.places
+            .rows
+            .add_transposed(&self.start_rows, -h, &first, p);
     }
 
     /// What coordinates at point l, and what moves φ besides, leave of the equations φ = 0.
@@ -192,9 +201,10 @@ impl Held {
         let point = &self.points[l];
         let count = sides.len() / self.places.count.max(1);
         let mut off = vec![0.0; self.places.count];
-        self.places.add_product(&point.rows, q, &mut off);
+        self.places.rows.add_product(&point.rows, 1.0, q, &mut off);
         if let Some(explicit) = explicit {
-            add(&mut off, explicit.phi.get(l * self.places.count..));
+            let phi = explicit.phi.get(l * self.places.count..);
+            add_multiple(&mut off, 1.0, phi.unwrap_or_default());
         }
         for (sides, off) in sides.chunks_exact_mut(count.max(1)).zip(off) {
             for (side, slope) in sides.iter_mut().zip(point.slopes).skip(1) {
@@ -213,9 +223,11 @@ impl Held {
     ) {
         let count = sides.len() / self.places.count.max(1);
         let mut off = vec![0.0; self.places.count];
-        self.places.add_product(&self.end.rows, q, &mut off);
+        self.places
+            .rows
+            .add_product(&self.end.rows, 1.0, q, &mut off);
         if let Some(explicit) = explicit {
-            add(&mut off, Some(&explicit.end_phi));
+            add_multiple(&mut off, 1.0, &explicit.end_phi);
         }
         for (sides, off) in sides.chunks_exact_mut(count.max(1)).zip(off) {
             sides[0] -= off / h;
@@ -247,7 +259,9 @@ impl Held {
         let point = &self.points[l];
         let count = sides.len() / self.places.count.max(1);
         let mut of_rate = vec![0.0; self.places.count];
-        self.places.add_product(&point.rows, force, &mut of_rate);
+        self.places
+            .rows
+            .add_product(&point.rows, 1.0, force, &mut of_rate);
         for (sides, of_rate) in sides.chunks_exact_mut(count.max(1)).zip(of_rate) {
             for (side, slope) in sides.iter_mut().zip(point.slopes).skip(1) {
                 *side -= slope * of_rate;
@@ -260,7 +274,8 @@ impl Held {
         let count = sides.len() / self.places.count.max(1);
         let mut of_first = vec![0.0; self.places.count];
         self.places
-            .add_product(&self.start_rows, of_p, &mut of_first);
+            .rows
+            .add_product(&self.start_rows, 1.0, of_p, &mut of_first);
         for (sides, of_first) in sides.chunks_exact_mut(count.max(1)).zip(of_first) {
             sides[0] -= h * of_first;
         }
@@ -283,7 +298,7 @@ impl Held {
             let pairs = mu.iter().zip(point.slopes).skip(1);
             *own -= weight / h * pairs.map(|(mu, slope)| mu * slope).sum::<f64>();
         }
-        self.places.add_transposed(&point.rows, 1.0, own, by_q);
+        self.places.rows.add_transposed(&point.rows, 1.0, own, by_q);
     }
 
     /// The same at the end.
@@ -299,12 +314,16 @@ impl Held {
         for (own, mu) in own.iter_mut().zip(mu.chunks_exact(count.max(1))) {
             *own -= mu[0] / h;
         }
-        self.places.add_transposed(&self.end.rows, 1.0, own, by_q);
+        self.places
+            .rows
+            .add_transposed(&self.end.rows, 1.0, own, by_q);
     }
 
     /// What λ before the impulse at the start is of coordinates there.
     pub(super) fn pull_impulse(&self, of_p: &[f64], by_q: &mut [f64]) {
-        self.places.add_bent(&self.start_bend, -1.0, of_p, by_q);
+        self.places
+            .bends
+            .add_product(&self.start_bend, -1.0, of_p, by_q);
     }
 
     /// What λ weighs of the entries of A at the start and at the points: of h A₀ᵀm₀ and Aᵀμ̇.

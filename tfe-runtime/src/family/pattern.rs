@@ -110,6 +110,22 @@ impl Pattern {
         &self.places
     }
 
+    /// sum += factor · M x, for values of M in these places.
+    #[cfg(feature = "sparse")]
+    pub(super) fn add_product(&self, values: &[f64], factor: f64, x: &[f64], sum: &mut [f64]) {
+        for ((_, row, column), value) in self.places.iter().zip(values) {
+            sum[*row] += factor * (value * x[*column]);
+        }
+    }
+
+    /// sum += factor · Mᵀ x
+    #[cfg(feature = "sparse")]
+    pub(super) fn add_transposed(&self, values: &[f64], factor: f64, x: &[f64], sum: &mut [f64]) {
+        for ((_, row, column), value) in self.places.iter().zip(values) {
+            sum[*column] += factor * (value * x[*row]);
+        }
+    }
+
     /// What a kernel adds to, one value a place: `values` is set to zero first.
     pub fn scatter<'a>(&'a self, values: &'a mut [f64]) -> Values<'a> {
         values.fill(0.0);

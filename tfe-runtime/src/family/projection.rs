@@ -5,6 +5,7 @@ use super::model::{Block, Gradient, Model};
 use super::node::Node;
 use super::pattern::Pattern;
 use super::rows::Rows;
+use crate::condense::add_multiple;
 use crate::dual::Dual;
 use crate::error::StepError;
 use alloc::vec;
@@ -32,42 +33,12 @@ impl Places {
         }
     }
 
-    /// The entries of A, or of what stands in their places: (constraint, coordinate, value).
-    pub(super) fn rows<'a>(
-        &'a self,
-        values: &'a [f64],
-    ) -> impl Iterator<Item = (usize, usize, f64)> + 'a {
-        let places = self.rows.places().iter().zip(values);
-        places.map(|((_, constraint, coordinate), value)| (*constraint, *coordinate, *value))
-    }
-
     /// Σ μ φ_qq
     pub(super) fn bend<M: Model>(&self, model: &M, (t, q): (f64, &[f64]), mu: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; self.bends.places().len()];
         let mut entries = self.bends.scatter(&mut values);
         model.constraint_second(t, q, mu, &mut entries);
         values
-    }
-
-    /// sum += factor · Σ μ φ_qq q, for values of that matrix, which is symmetric.
-    pub(super) fn add_bent(&self, values: &[f64], factor: f64, q: &[f64], sum: &mut [f64]) {
-        for ((_, row, column), value) in self.bends.places().iter().zip(values) {
-            sum[*row] += factor * (value * q[*column]);
-        }
-    }
-
-    /// sum += A q
-    pub(super) fn add_product(&self, values: &[f64], q: &[f64], sum: &mut [f64]) {
-        for (constraint, coordinate, value) in self.rows(values) {
-            sum[constraint] += value * q[coordinate];
-        }
-    }
-
-    /// sum += factor · Aᵀ μ
-    pub(super) fn add_transposed(&self, values: &[f64], factor: f64, mu: &[f64], sum: &mut [f64]) {
-        for (constraint, coordinate, value) in self.rows(values) {
-            sum[coordinate] += factor * (value * mu[constraint]);
-        }
     }
 
     /// What a parameter changes of φ, A and a.
@@ -199,8 +170,12 @@ impl Projection {
         momentum: Vec<f64>,
     ) -> Explicit {
         let (mut reaction, mut rate) = (vec![0.0; momentum.len()], slopes.drift);
-        places.add_transposed(&slopes.rows, 1.0, &self.eta, &mut reaction);
-        places.add_product(&slopes.rows, &self.v, &mut rate);
+        places
+            .rows
+            .add_transposed(&slopes.rows, 1.0, &self.eta, &mut reaction);
+        places
+            .rows
+            .add_product(&slopes.rows, 1.0, &self.v, &mut rate);
         Explicit {
             end_phi: slopes.phi,
             momentum,
@@ -240,44 +215,38 @@ impl Projection {
         explicit: Option<&Explicit>,
     ) {
         let (n, m) = (p.len(), places.count);
-        places.add_bent(&self.bend, -1.0, q, p);
+        places.bends.add_product(&self.bend, -1.0, q, p);
         let mut side = vec![0.0; n + m];
         if let Some(explicit) = explicit {
-            for (p, reaction) in p.iter_mut().zip(&explicit.reaction) {
-                *p -= reaction;
-            }
-            add(&mut side[..n], Some(&explicit.momentum));
-            add(&mut side[n..], Some(&explicit.rate));
+            add_multiple(p, -1.0, &explicit.reaction);
+            add_multiple(&mut side[..n], 1.0, &explicit.momentum);
+            add_multiple(&mut side[n..], 1.0, &explicit.rate);
         }
         for (row, column, value) in &self.turn {
             side[*row] += value * q[*column];
         }
-        places.add_product(&self.rates, q, &mut side[n..]);
-        for (side, p) in side.iter_mut().zip(&*p) {
-            *side -= p;
-        }
+        places.rows.add_product(&self.rates, 1.0, q, &mut side[n..]);
+        add_multiple(&mut side, -1.0, p);
         // With the opposite sign so far, and so is the solution.
         self.matrix.solve(&mut side);
-        places.add_transposed(&self.rows, 1.0, &side[n..], p);
+        places.rows.add_transposed(&self.rows, 1.0, &side[n..], p);
     }
 
     /// Takes λ back, and gives what it weighs of L_v, A v + a and −Aᵀη.
     pub(super) fn pull(&self, places: &Places, of_p: &mut [f64], of_q: &mut [f64]) -> NodeWeights {
         let (n, m) = (of_p.len(), places.count);
         let mut w = vec![0.0; n + m];
-        places.add_product(&self.rows, of_p, &mut w[n..]);
+        places.rows.add_product(&self.rows, 1.0, of_p, &mut w[n..]);
         // The matrix is symmetric.
         self.matrix.solve(&mut w);
-        for (of_p, w) in of_p.iter_mut().zip(&w) {
-            *of_p -= w;
-        }
+        add_multiple(of_p, -1.0, &w);
         for (row, column, value) in &self.turn {
             of_q[*column] += value * w[*row];
         }
-        places.add_bent(&self.bend, -1.0, of_p, of_q);
-        places.add_transposed(&self.rates, 1.0, &w[n..], of_q);
-        let rows = places.rows(&self.rows);
-        let rows = rows.map(|(c, a, _)| w[n + c] * self.v[a] - of_p[a] * self.eta[c]);
+        places.bends.add_product(&self.bend, -1.0, of_p, of_q);
+        places.rows.add_transposed(&self.rates, 1.0, &w[n..], of_q);
+        let rows = places.rows.places().iter();
+        let rows = rows.map(|(_, c, a)| w[n + c] * self.v[*a] - of_p[*a] * self.eta[*c]);
         NodeWeights {
             rows: rows.collect(),
             q: self.q.clone(),
@@ -305,11 +274,4 @@ fn turn<M: Model>(
     turned
         .map(|((_, row, column), value)| (*row, *column, value))
         .collect()
-}
-
-/// Adds what there is.
-pub(super) fn add(sum: &mut [f64], more: Option<&[f64]>) {
-    for (sum, more) in sum.iter_mut().zip(more.unwrap_or_default()) {
-        *sum += more;
-    }
 }

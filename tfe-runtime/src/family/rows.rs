@@ -58,17 +58,13 @@ impl Rows {
 
     /// sum ← sum + factor · Aᵀ μ, with A as `values`.
     pub(super) fn add_reaction(&self, values: &[f64], factor: f64, mu: &[f64], sum: &mut [f64]) {
-        for ((constraint, coordinate), value) in self.places().zip(values) {
-            sum[coordinate] += factor * (value * mu[constraint]);
-        }
+        self.pattern.add_transposed(values, factor, mu, sum);
     }
 
     /// A v + a
     pub(super) fn rate(&self, v: &[f64], rate: &mut [f64]) {
         rate.copy_from_slice(&self.drift);
-        for ((constraint, coordinate), value) in self.places().zip(&self.values) {
-            rate[constraint] += value * v[coordinate];
-        }
+        self.pattern.add_product(&self.values, 1.0, v, rate);
     }
 
     /// |A| of each row.

@@ -51,8 +51,9 @@ pub struct TransitionOperator {
     values: Vec<f64>,
     end: FamilyState,
     dense: DenseElement,
-    /// What constraints add.
+    /// What constraints add, and what takes momenta to the polynomial then.
     held: Option<Held>,
+    jumps: Arc<[f64]>,
     by_length: Vec<f64>,
     by_damping: Vec<f64>,
     by_parameters: Vec<Vec<f64>>,
@@ -65,15 +66,22 @@ pub(super) struct Ground {
     pub(super) table: SchemeTable,
     pub(super) pattern: Arc<Pattern>,
     pub(super) places: Arc<Places>,
+    /// What takes momenta of an element to its polynomial, with constraints.
+    jumps: Arc<[f64]>,
 }
 
 impl Ground {
     /// Of a model that has been checked.
     pub(super) fn of<V: Model>(view: &V, table: SchemeTable) -> Self {
+        let jumps = match V::CONSTRAINED {
+            true => jumps(&table.view()),
+            false => Vec::new(),
+        };
         Self {
             table,
             pattern: Arc::new(Pattern::of(view)),
             places: Arc::new(Places::of(view)),
+            jumps: jumps.into(),
         }
     }
 }
@@ -227,6 +235,7 @@ impl TransitionOperator {
             end,
             dense: rates.dense(t, t + h),
             held,
+            jumps: Arc::clone(&ground.jumps),
             by_length: Vec::new(),
             by_damping: Vec::new(),
             by_parameters: Vec::new(),
@@ -485,10 +494,6 @@ impl TransitionOperator {
             }
             inside.resize(2 * inside.len(), 0.0);
         }
-        let jumps = match (held, &inside) {
-            (Some(_), Some(_)) => jumps(&scheme),
-            _ => Vec::new(),
-        };
         for l in 0..points {
             let row = l * count..(l + 1) * count;
             for a in 0..n {
@@ -514,7 +519,7 @@ impl TransitionOperator {
                 continue;
             }
             self.add_inertia(l, &v, &mut momentum);
-            for (row, weights) in rows.zip(jumps.chunks_exact(points + 2)) {
+            for (row, weights) in rows.zip(self.jumps.chunks_exact(points + 2)) {
                 add_multiple(row, weights[l], &momentum);
             }
         }
@@ -528,7 +533,7 @@ impl TransitionOperator {
             let half = inside.len() / 2;
             let rows = inside[half..].chunks_exact_mut(n.max(1));
             let start: Vec<f64> = (0..n).map(impulse).collect();
-            for (row, weights) in rows.zip(jumps.chunks_exact(points + 2)) {
+            for (row, weights) in rows.zip(self.jumps.chunks_exact(points + 2)) {
                 add_multiple(row, weights[points], &start);
                 add_multiple(row, weights[points + 1], end_p);
             }

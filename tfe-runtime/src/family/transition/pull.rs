@@ -2,7 +2,6 @@
 
 use super::TransitionOperator;
 use crate::condense::add_multiple;
-use crate::family::dense::jumps;
 use crate::family::held::Weights;
 use crate::family::model::Block;
 use crate::inside::{InsideLoss, Seeds as Within};
@@ -34,9 +33,9 @@ impl TransitionOperator {
         let mut through = vec![0.0; points * n];
         let mut of_start = vec![0.0; n];
         if let (Some(_), Some(inside)) = (held, inside) {
-            let (jumps, rows) = (jumps(&scheme), inside.coefficients.chunks_exact(n.max(1)));
+            let rows = inside.coefficients.chunks_exact(n.max(1));
             let rows = rows.skip(scheme.rates());
-            for (weights, row) in jumps.chunks_exact(points + 2).zip(rows) {
+            for (weights, row) in self.jumps.chunks_exact(points + 2).zip(rows) {
                 for (through, weight) in through.chunks_exact_mut(n.max(1)).zip(weights) {
                     add_multiple(through, *weight, row);
                 }
