@@ -35,7 +35,7 @@ pub enum RunErrorKind {
     AccuracyMissed {
         /// What was asked for.
         asked: f64,
-        /// The estimated error of the motion, as [`Estimated::error_estimate`](crate::accuracy::Estimated::error_estimate) measures it.
+        /// The estimated error of the motion, as [`Estimated::error_estimate`](crate::accuracy::Estimated::error_estimate) measures it, but no less than a rounding.
         estimate: f64,
         /// The last time up to which it is as small as asked; `None` where it is larger from the first comparison on.
         until: Option<f64>,
@@ -49,7 +49,7 @@ pub enum RunErrorKind {
     },
     /// Values of a loss that cannot be used.
     Loss {
-        /// Their output.
+        /// Their output, or the parameter by which they are differentiated.
         name: String,
         /// What is wrong with them.
         why: &'static str,

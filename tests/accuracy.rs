@@ -336,6 +336,36 @@ struct DrivenDuffing {
     w: f64,
 }
 
+/// Both runs of a pendulum at rest agree to the last bit, which is no reason to promise what numbers cannot hold.
+#[test]
+fn less_than_a_rounding_is_refused_at_once() {
+    let start = Pendulum.state([2.0], [0.0]);
+    let at_rest = Pendulum.state([0.0], [0.0]);
+    for (start, asked) in [1e-17, 1e-20, 1e-100, 1e-300]
+        .into_iter()
+        .flat_map(|asked| [(start, asked), (at_rest, asked)])
+    {
+        let outcome = Simulation::new(&Pendulum)
+            .accuracy(asked)
+            .run(start, 0.0..1.0);
+        let error = outcome.expect_err("roundings");
+        let RunErrorKind::AccuracyMissed {
+            asked: told,
+            estimate,
+            until,
+        } = *error.kind()
+        else {
+            panic!("{error}");
+        };
+        assert!(
+            told == asked && estimate > 1e-16 && until.is_none(),
+            "{error}"
+        );
+        assert!(estimate < 1e-14, "{error}");
+        assert!(error.partial().statistics().steps < 100);
+    }
+}
+
 /// All runs of a search, in evaluations, beside a run with the fewest equal steps of the same element from which on the accuracy is met, none of them cut.
 #[test]
 fn a_search_costs_a_few_runs() {

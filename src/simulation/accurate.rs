@@ -66,6 +66,9 @@ fn estimated<R: Repeatable<N>, const N: usize>(
     }
 }
 
+/// Half a unit of the last place of one: numbers are no nearer to a motion, even where two runs agree to the last bit.
+const ROUNDING: f64 = f64::EPSILON / 2.0;
+
 /// A run with the element and the step that meet an accuracy (T-99).
 fn accurate<R: Repeatable<N>, const N: usize>(
     run: &R,
@@ -74,6 +77,11 @@ fn accurate<R: Repeatable<N>, const N: usize>(
     steps: Steps,
 ) -> Result<Estimated<R::Motion>, Broken<R::Motion>> {
     let t0 = asked.span.start;
+    let wanted = asked.accuracy;
+    let asked = &Asked {
+        accuracy: wanted.max(ROUNDING),
+        ..asked.clone()
+    };
     let mut kept = Kept::Nothing;
     let mut work = Statistics::NONE;
     let outcome = match (steps, run.nodes()) {
@@ -108,13 +116,15 @@ fn accurate<R: Repeatable<N>, const N: usize>(
     };
     let (times, errors) = (found.times, found.errors);
     let estimated = Estimated::new(motion, times, errors, run.outputs(), Some(found.picked));
-    if found.is_met {
+    let is_possible = wanted >= ROUNDING;
+    if found.is_met && is_possible {
         return Ok(estimated);
     }
+    let until = estimated.horizon(wanted);
     let kind = RunErrorKind::AccuracyMissed {
-        asked: asked.accuracy,
-        estimate: estimated.error_estimate(),
-        until: estimated.horizon(asked.accuracy),
+        asked: wanted,
+        estimate: larger(estimated.error_estimate(), ROUNDING),
+        until: until.filter(|_| is_possible),
     };
     Err(Box::new((kind, estimated.into_motion())))
 }

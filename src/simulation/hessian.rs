@@ -131,7 +131,8 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
                 let distance = self.distance(*index);
                 let found = self.column(&indices, (distance, nearer), gradient)?;
                 let is_enough = found.off < WELL_KNOWN;
-                if best.as_ref().is_none_or(|best| found.off < best.off) {
+                let is_better = |best: &Column| found.off < best.off || best.off.is_nan();
+                if best.as_ref().is_none_or(is_better) {
                     best = Some(found);
                 }
                 if is_enough {
@@ -139,6 +140,12 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
                 }
             }
             if let Some(best) = best {
+                if !best.slopes.iter().all(|slope| slope.is_finite()) {
+                    return Err(refused(RunErrorKind::Loss {
+                        name: names[j].clone(),
+                        why: "second derivatives by this parameter are not finite",
+                    }));
+                }
                 columns.set_column(j, &best.slopes);
                 errors.set_column(j, &best.errors);
             }

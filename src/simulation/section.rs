@@ -28,7 +28,8 @@ where
     /// The points at which a motion crosses the surface on which an event or output of the model vanishes: an endless iterator, in constant memory. Other [events](Self::on) are looked for
     /// as in [`steps`](Self::steps), and do what they do.
     ///
-    /// Points are as accurate as nodes, and none is missed (see [`on`](Self::on)). The motion itself is that of `steps`: it does not know of the section.
+    /// Points are as accurate as nodes, and none is missed (see [`on`](Self::on)). The motion itself is that of `steps`: it does not know of the section. One that never comes back to the surface
+    /// is followed for ever; an event that [stops](Act::Stop) it, such as `event(late) = t - 1000`, bounds the search.
     ///
     /// ```
     /// use tfe::prelude::*;

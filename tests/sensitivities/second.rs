@@ -158,3 +158,19 @@ fn what_cannot_be_differentiated_twice_is_told() {
     let fixed = fixed.expect_err("a field that cannot be copied");
     assert_eq!(*fixed.kind(), RunErrorKind::ParametersFixed);
 }
+
+/// Differences by a parameter of 1e-308 divide by what has no reciprocal.
+#[test]
+fn second_derivatives_that_are_not_finite_are_refused() {
+    let model = Oscillator {
+        m: 1.3,
+        k: 1e-308,
+        c: 0.0,
+    };
+    let loss = Loss::output_at_end("place");
+    let run = Simulation::new(&model).step(0.1);
+    let error = run.hessian(model.state([1.0], [0.0]), 0.0..1.0, &loss, ["k"]);
+    let error = error.expect_err("no number");
+    assert!(matches!(error.kind(), RunErrorKind::Loss { name, .. } if name == "k"));
+    assert_eq!(error.partial().states().len(), 11);
+}

@@ -26,6 +26,8 @@ where
     /// Picks element and step so that the estimated error is at or below `accuracy` wherever it is estimated: of coordinates over the largest coordinate, of
     /// momenta over the largest momentum, of each declared output over its largest value.
     ///
+    /// Less than a rounding, ε/2 = 1.1e-16, is never met: [`RunErrorKind::AccuracyMissed`] then, with the best motion.
+    ///
     /// An element chosen before stays, a step given before is the longest one allowed. The motion comes with its error and says what was picked and why. Two to
     /// four runs over the span are made with shorter and shorter steps, and one more that verifies the last: with an element of one node more over the same steps, which tells the
     /// error as [`run_estimated`](Self::run_estimated) does (`docs/theory.md` §14.3). What is verified is the error of the steps and of their iterations at the times of comparison; that both
