@@ -47,11 +47,11 @@ pub enum RunErrorKind {
         /// Those that there are.
         known: Vec<String>,
     },
-    /// Values of a loss that cannot be used.
+    /// A loss whose values or derivatives cannot be used.
     Loss {
-        /// Their output, or the parameter by which they are differentiated.
+        /// An output, the parameter by which it is differentiated, or `start`.
         name: String,
-        /// What is wrong with them.
+        /// What is wrong.
         why: &'static str,
     },
     /// The ends of the span are not finite.
@@ -306,7 +306,9 @@ impl fmt::Display for RunErrorKind {
                 };
                 write!(f, "there is no output `{name}`: the model declares {known}")
             }
-            Self::Loss { name, why } => write!(f, "the values of `{name}` in the loss: {why}"),
+            Self::Loss { name, why } => {
+                write!(f, "the loss cannot be used, because of `{name}`: {why}")
+            }
             Self::NoEvent { name, known } if known.is_empty() => {
                 write!(
                     f,

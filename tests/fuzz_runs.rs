@@ -2,6 +2,10 @@
 //! state or an energy that is not finite without saying so. `FUZZ_RUNS=1000000 cargo test --release --test fuzz_runs` tries as many,
 //! `FUZZ_SEED=2` others.
 
+#[path = "common/random.rs"]
+mod random;
+
+use random::{Random, setting};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use tfe::prelude::*;
 use tfe::runtime::Model;
@@ -71,51 +75,6 @@ struct VanDerPol {
 struct Oscillator {
     m: f64,
     k: f64,
-}
-
-/// Numbers that are the same in every run.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        let Self(state) = self;
-        *state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, from: f64, to: f64) -> f64 {
-        from + (to - from) * self.unit()
-    }
-
-    fn below(&mut self, count: u32) -> u32 {
-        (self.unit() * f64::from(count)) as u32
-    }
-
-    /// Mostly of the size one, now and then nothing, tiny, huge or negative.
-    fn number(&mut self) -> f64 {
-        match self.below(20) {
-            0 => 0.0,
-            1 => 10_f64.powf(self.between(-300.0, 300.0)),
-            2 => -10_f64.powf(self.between(-10.0, 10.0)),
-            3 | 4 => 10_f64.powf(self.between(-8.0, 8.0)),
-            _ => self.between(-2.0, 2.0),
-        }
-    }
-
-    fn element(&mut self) -> Element {
-        let nodes = 2 + self.below(6) as usize;
-        match self.below(8) {
-            0 => Element::primal(nodes),
-            1 => Element::primal(nodes).reduced(),
-            2 => Element::primal(nodes).lobatto(),
-            3 => Element::radau(nodes),
-            4 => Element::three_field(nodes),
-            5 => Element::energy_conserving(nodes),
-            _ => Element::mixed(nodes),
-        }
-    }
 }
 
 /// What has come of the runs.
@@ -215,12 +174,8 @@ where
 
 #[test]
 fn random_runs_neither_panic_nor_hide_what_is_not_finite() {
-    let number = |name: &str| {
-        let text = std::env::var(name).ok()?;
-        Some(text.parse().expect("a number"))
-    };
-    let runs = number("FUZZ_RUNS").unwrap_or(3000);
-    let mut random = Random(number("FUZZ_SEED").unwrap_or(1).into());
+    let runs = setting("FUZZ_RUNS").unwrap_or(3000);
+    let mut random = Random(setting("FUZZ_SEED").unwrap_or(1).into());
     let mut count = Count::default();
     for run in 0..runs {
         let Random(seed) = random;

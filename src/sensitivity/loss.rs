@@ -1,7 +1,7 @@
 //! Losses: numbers of a motion that are to be small, and their gradients.
 
 use crate::differences::SIXTH;
-use crate::error::RunErrorKind;
+use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
 use crate::motion::{Motion, Node};
@@ -265,7 +265,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
             if !((value - before).is_finite() && looks[first..].iter().all(is_finite)) {
                 return Err(RunErrorKind::Loss {
                     name: term.name().to_owned(),
-                    why: "they or their derivatives are not finite",
+                    why: "its values or their derivatives are not finite",
                 });
             }
         }
@@ -360,22 +360,37 @@ pub struct LossGradient<const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<const N: usize, L: Length<N>> LossGradient<N, L> {
-    /// From the derivatives by the start, ordered (p, q).
+    /// From the derivatives by the start, ordered (p, q); an error where one is not finite.
     pub(crate) fn new(
         motion: Motion<N, L>,
         names: Vec<String>,
         by_parameters: Vec<f64>,
         by_start: &[f64],
-    ) -> Self {
+    ) -> Result<Self, RunError<N, L>> {
+        let is_lost = |one: &f64| !one.is_finite();
+        let lost = match by_parameters.iter().position(is_lost) {
+            Some(at) => Some((
+                names[at].clone(),
+                "the derivative by this parameter is not finite",
+            )),
+            None if by_start.iter().any(is_lost) => Some((
+                "start".to_owned(),
+                "the derivatives by the start are not finite",
+            )),
+            None => None,
+        };
+        if let Some((name, why)) = lost {
+            return Err(RunError::new(RunErrorKind::Loss { name, why }, motion));
+        }
         let like = &motion.last().q;
         let (of_p, of_q) = by_start.split_at(like.as_ref().len());
         let by_start = L::state(L::from_fn(like, |a| of_q[a]), L::from_fn(like, |a| of_p[a]));
-        Self {
+        Ok(Self {
             motion,
             names,
             by_parameters,
             by_start,
-        }
+        })
     }
 
     /// The derivative by a parameter.

@@ -78,7 +78,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
         let motion = run.drive(start, &span, identity, None)?;
         match run.descended(&motion, &span, loss) {
-            Ok(Some((value, sums))) => Ok((value, run.gathered(motion, sums))),
+            Ok(Some((value, sums))) => Ok((value, run.gathered(motion, sums)?)),
             // A long step that was cut, or not, where it now is not, or is.
             Ok(None) => run.record_every(1).forwards(start, span, loss),
             Err(kind) => Err(RunError::new(kind, motion)),
@@ -146,7 +146,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let found = loss.seen(&motion, &*self.model);
         let summed = found.and_then(|(value, seen)| Ok((value, self.summed(&sensitive, &seen)?)));
         match summed {
-            Ok((value, gradient)) => Ok((value, self.gathered(motion, gradient))),
+            Ok((value, gradient)) => Ok((value, self.gathered(motion, gradient)?)),
             Err(kind) => Err(RunError::new(kind, motion)),
         }
     }
@@ -177,7 +177,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         })
     }
 
-    fn gathered(&self, motion: Motion<N>, sums: Sums) -> LossGradient<N> {
+    fn gathered(&self, motion: Motion<N>, sums: Sums) -> Result<LossGradient<N>, RunError<N>> {
         let names =
             (0..self.model.parameters()).map(|at| self.model.parameter_name(at).to_string());
         LossGradient::new(motion, names.collect(), sums.by_parameters, &sums.by_start)

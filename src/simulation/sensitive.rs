@@ -300,11 +300,12 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         }
         let matrix = DMatrix::from_row_slice(2 * N, all, &entries);
         let more = matrix.columns(all - more.len(), more.len()).into_owned();
-        Ok(Across {
-            end: self.before.through(&matrix, None),
-            more,
-            inside,
-        })
+        let end = self.before.through(&matrix, None);
+        // Of many elements, each of which may be finite.
+        if !end.iter().all(|one| one.is_finite()) {
+            return Err(StepError::NonFinite.into());
+        }
+        Ok(Across { end, more, inside })
     }
 
     /// Keeps the derivatives along an element that `stepper` has done last, whose end moves where it is said how.

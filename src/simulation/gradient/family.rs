@@ -83,10 +83,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         {
             drop(trail);
             let by_start = vec![0.0; 2 * self.model.len()];
-            Ok((
-                f64::NAN,
-                LossGradient::new(motion, Vec::new(), Vec::new(), &by_start),
-            ))
+            let gradient = LossGradient::new(motion, Vec::new(), Vec::new(), &by_start)?;
+            Ok((f64::NAN, gradient))
         }
     }
 
@@ -107,7 +105,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             Ok(backwards)
         });
         match gone {
-            Ok(backwards) => Ok((value, self.gathered(motion, &backwards))),
+            Ok(backwards) => Ok((value, self.gathered(motion, &backwards)?)),
             Err(kind) => Err(RunError::new(kind, motion)),
         }
     }
@@ -123,7 +121,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let motion = self.drive(start.clone(), span, identity, None)?;
         match self.descended(&motion, span, loss) {
             Ok(Some((value, backwards))) => {
-                let gradient = self.gathered(motion, &backwards);
+                let gradient = self.gathered(motion, &backwards)?;
                 Ok(Some((value, gradient)))
             }
             Ok(None) => Ok(None),
@@ -230,7 +228,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         &self,
         motion: Motion<0, RunTimeLength>,
         backwards: &family::Backwards<'_, M>,
-    ) -> LossGradient<0, RunTimeLength> {
+    ) -> Result<LossGradient<0, RunTimeLength>, RunError<0, RunTimeLength>> {
         let names = 0..self.model.parameters();
         let names = names.map(|at| self.model.parameter_name(at).to_string());
         let (by_parameters, by_start) = (backwards.by_parameters(), backwards.by_state());

@@ -15,6 +15,7 @@ use {
     crate::sensitivity::inside::Inside,
     crate::sensitivity::run_time::Along,
     nalgebra::{DMatrix, DVector},
+    tfe_runtime::StepError,
 };
 
 impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
@@ -95,6 +96,10 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 .zip(next.column_iter_mut().skip(size))
             {
                 to += DVector::from_column_slice(by);
+            }
+            // Of many elements, each of which may be finite.
+            if !next.iter().all(|one| one.is_finite()) {
+                return Err(StepError::NonFinite.into());
             }
             if keeps {
                 let rows = along.len() / current.ncols();
