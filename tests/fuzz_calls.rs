@@ -12,7 +12,7 @@ use tfe::prelude::*;
 use tfe::runtime::Model;
 use tfe::runtime::length::{Declared, FixedLength};
 use tfe::sensitivity::Loss;
-use tfe::{Driven, Occurrence};
+use tfe::{Driven, Occurrence, RunError};
 
 #[dynamics(
     coordinates(x),
@@ -104,6 +104,29 @@ fn is_finite<const N: usize>(state: &State<N>) -> bool {
     are_finite(state.q.iter().chain(&state.p))
 }
 
+fn all_finite<const N: usize>(nodes: &[Node<N>]) -> bool {
+    nodes.iter().all(|node| is_finite(&node.state()))
+}
+
+fn told(error: &dyn std::error::Error) {
+    assert!(!error.to_string().is_empty());
+}
+
+/// Looks at what a call gave; false where it was refused.
+fn found<T, E: std::error::Error>(outcome: Result<T, E>, look: impl FnOnce(T)) -> bool {
+    outcome.inspect_err(|error| told(error)).map(look).is_ok()
+}
+
+/// The same of a run, with what there is of it where it was refused.
+fn ran<T, const N: usize>(outcome: Result<T, RunError<N>>, look: impl FnOnce(T)) -> bool {
+    if let Err(error) = &outcome {
+        // The start itself may be what was refused.
+        let behind = error.partial().states().get(1..).unwrap_or_default();
+        assert!(all_finite(behind), "partial");
+    }
+    found(outcome, look)
+}
+
 /// An act of its own, or one that shows the state reached.
 fn act<const N: usize>(
     random: &mut Random,
@@ -181,9 +204,8 @@ where
             [random.number()],
         ),
     };
-    let told = |error: &dyn std::error::Error| assert!(!error.to_string().is_empty());
-    let outcome = match which {
-        "run and its output" => run.run(start, span).map(|motion| {
+    Some(match which {
+        "run and its output" => ran(run.run(start, span), |motion| {
             // Velocities are NaN where a mass is zero, as their page says.
             for node in motion.states() {
                 assert!(is_finite(&node.state()), "{node:?}");
@@ -191,24 +213,23 @@ where
                 assert!(is_finite(&here.state()), "{here:?}");
             }
         }),
-        "run_sensitive" => run.run_sensitive(start, span).map(|sensitive| {
+        "run_sensitive" => ran(run.run_sensitive(start, span), |sensitive| {
             for name in sensitive.parameters() {
-                let states = sensitive.by(name).states();
-                assert!(states.iter().all(|node| is_finite(&node.state())), "{name}");
+                assert!(all_finite(&sensitive.by(name).states()), "{name}");
             }
             assert!(
                 are_finite(sensitive.by_start().last().iter()),
                 "by the start"
             );
         }),
-        "gradient" => run.gradient(start, span, &loss).map(|(value, gradient)| {
+        "gradient" => ran(run.gradient(start, span, &loss), |(value, gradient)| {
             assert!(value.is_finite() && are_finite(gradient.by_parameters()));
             assert!(is_finite(&gradient.by_start()));
         }),
-        "hessian" => run.hessian(start, span, &loss, ["k"]).map(|hessian| {
+        "hessian" => ran(run.hessian(start, span, &loss, ["k"]), |hessian| {
             assert!(are_finite(hessian.matrix().iter()));
         }),
-        "run_linearised" => run.run_linearised(start, span).map(|linearised| {
+        "run_linearised" => ran(run.run_linearised(start, span), |linearised| {
             for matrix in linearised.transitions() {
                 assert!(are_finite(matrix.iter()));
             }
@@ -219,22 +240,16 @@ where
                 return None;
             }
             let run = run.on("late", Crossing::Rising, |_| Act::Stop);
-            for point in run
-                .section("place", Crossing::Either, start, span.start)
+            run.section("place", Crossing::Either, start, span.start)
                 .take(3)
-            {
-                match point {
-                    Ok(point) => assert!(are_finite(point.q.iter().chain(&point.p))),
-                    Err(kind) => {
-                        told(&kind);
-                        return Some(false);
-                    }
-                }
-            }
-            Ok(())
+                .all(|point| {
+                    found(point, |point| {
+                        assert!(are_finite(point.q.iter().chain(&point.p)));
+                    })
+                })
         }
-        "run_estimated" => run.run_estimated(start, span).map(|motion| {
-            assert!(motion.states().iter().all(|node| is_finite(&node.state())));
+        "run_estimated" => ran(run.run_estimated(start, span), |motion| {
+            assert!(all_finite(motion.states()));
             assert!(!motion.error_estimate().is_nan());
         }),
         "Ensemble::run" => {
@@ -248,17 +263,12 @@ where
             let starts: Vec<_> = starts.collect();
             let ensemble = Ensemble::new(model).element(element).step(step);
             let ends = ensemble.at_kinks(random.below(2) == 0).run(&starts, span);
-            return Some(match ends {
-                Ok(ends) => {
-                    assert!(ends.nodes().all(|node| is_finite(&node.state())));
-                    ends.failures().for_each(|failure| told(failure.kind));
-                    ends.nodes().count() > 0
-                }
-                Err(error) => {
-                    told(&error);
-                    false
-                }
-            });
+            let mut arrived = 0;
+            found(ends, |ends| {
+                assert!(ends.nodes().all(|node| is_finite(&node.state())));
+                ends.failures().for_each(|failure| told(failure.kind));
+                arrived = ends.nodes().count();
+            }) && arrived > 0
         }
         "PeriodicOrbit::solve" => {
             let period = random.between(0.5, 8.0);
@@ -270,42 +280,16 @@ where
                 0 => orbit.period(period),
                 _ => orbit.unknown_period(period),
             };
-            return Some(match orbit.solve() {
-                Ok(orbit) => {
-                    assert!(orbit.period().is_finite() && is_finite(&orbit.start()));
-                    true
-                }
-                Err(error) => {
-                    told(&error);
-                    false
-                }
-            });
+            found(orbit.solve(), |orbit| {
+                assert!(orbit.period().is_finite() && is_finite(&orbit.start()));
+            })
         }
         _ => {
             let end = std::array::from_fn(|_| random.number());
             let problem = BoundaryValue::of(model).element(element).elements(3);
-            return Some(match problem.from_to(start.q, end, span).solve() {
-                Ok(arc) => {
-                    assert!(arc.nodes().iter().all(|node| is_finite(&node.state())));
-                    true
-                }
-                Err(error) => {
-                    told(&error);
-                    false
-                }
-            });
-        }
-    };
-    Some(match outcome {
-        Ok(()) => true,
-        Err(error) => {
-            told(&error);
-            let states = error.partial().states();
-            assert!(
-                states.iter().skip(1).all(|node| is_finite(&node.state())),
-                "partial"
-            );
-            false
+            found(problem.from_to(start.q, end, span).solve(), |arc| {
+                assert!(all_finite(&arc.nodes()));
+            })
         }
     })
 }
