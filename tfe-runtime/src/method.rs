@@ -71,6 +71,17 @@ pub(crate) struct Last<const N: usize> {
     pub(crate) end: State<N>,
 }
 
+impl<const N: usize> Last<N> {
+    /// To be filled.
+    pub(crate) const NONE: Self = Self {
+        t: 0.0,
+        h: 0.0,
+        start: State::ZERO,
+        start_low: State::ZERO,
+        end: State::ZERO,
+    };
+}
+
 impl<const N: usize> State<N> {
     pub(crate) const ZERO: Self = Self {
         q: [0.0; N],

@@ -203,41 +203,43 @@ impl Monitor {
     #[cfg_attr(feature = "alloc", inline(always))]
     #[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
     pub(crate) fn judge(&mut self, increment: Increment) -> Result<Verdict, StepError> {
-        let size = increment.relative;
+        let (size, last) = (increment.relative, self.last);
         self.position = increment.position;
         if !(size < f64::INFINITY) {
             return Err(StepError::NonFinite);
         }
-        if size < 0.5 * self.best && size * size > self.tolerance * self.last {
+        let is_better = size < 0.5 * self.best;
+        if is_better && size * size > self.tolerance * last {
             // Most increments, neither the first nor the last: what follows, without what does not apply.
-            self.rate = size / self.last;
-            if size > Evidence::FAR {
-                self.wildest = self.wildest.max(self.rate);
-            }
-            (self.last, self.best, self.idle, self.risen) = (size, size, 0, 0);
+            (self.rate, self.last) = (size / last, size);
+            self.see_rate();
+            (self.best, self.idle, self.risen) = (size, 0, 0);
             return Ok(Verdict::GoOn);
         }
-        let (last, first) = (self.last, self.last.is_infinite());
+        if is_better && last == f64::INFINITY {
+            // The first one tells no rate.
+            (self.last, self.best) = (size, size);
+            return Ok(if size <= self.tolerance {
+                Verdict::Converged
+            } else {
+                Verdict::GoOn
+            });
+        }
         // What is left is the rest of a geometric series, size · ρ/(1 − ρ). Written without quotients: what follows waits for this decision.
-        let memory = self.memory * self.rate;
-        let converged = if first || size >= last {
+        let converged = if size >= last {
             size <= self.tolerance
         } else {
-            let by_rate = size * size <= self.tolerance * (last - size);
-            by_rate & (size * memory <= self.tolerance * (1.0 - memory))
+            let memory = self.memory * self.rate;
+            size * size <= self.tolerance * (last - size)
+                && size * memory <= self.tolerance * (1.0 - memory)
         };
-        let rate = if size == 0.0 { 0.0 } else { size / last };
+        self.rate = if size == 0.0 { 0.0 } else { size / last };
         self.last = size;
-        self.rate = if first { 1.0 } else { rate };
-        if size > Evidence::FAR {
-            // Of the first one the rate is zero.
-            self.wildest = self.wildest.max(rate);
-        }
+        self.see_rate();
         if converged {
             return Ok(Verdict::Converged);
         }
-        if size < 0.5 * self.best {
-            // Then it is smaller than the last one, too, and nothing stalls.
+        if is_better {
             (self.best, self.idle, self.risen) = (size, 0, 0);
             return Ok(Verdict::GoOn);
         }
@@ -253,6 +255,19 @@ impl Monitor {
         } else {
             Verdict::GoOn
         })
+    }
+
+    /// Remembers the rate of the last increment if that tells something of the root.
+    #[inline(always)]
+    fn see_rate(&mut self) {
+        let rate = if self.last > Evidence::FAR {
+            self.rate
+        } else {
+            0.0
+        };
+        if self.wildest < rate {
+            self.wildest = rate;
+        }
     }
 
     /// Whether the last increment is the rounding of a stiff residual: with a matrix made just before it, Newton's method would have halved anything else.

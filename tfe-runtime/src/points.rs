@@ -24,6 +24,7 @@ pub(crate) mod arrangement;
 #[cfg(feature = "alloc")]
 mod computed;
 pub(crate) mod end;
+pub(crate) mod evaluation;
 pub(crate) mod first_order;
 #[cfg(feature = "alloc")]
 pub(crate) mod reach;
@@ -45,6 +46,7 @@ use crate::registers::storage::{Fixed, Keep, List, MAX_GROUPS, Row, Storage};
 use crate::scheme::{SchemeRef, Tables};
 use crate::workspace::width;
 use core::marker::PhantomData;
+use evaluation::Places;
 
 /// What steps with all points at once carry from one to the next: rows for groups of four points.
 #[derive(Clone, Debug)]
@@ -58,6 +60,7 @@ pub(crate) struct Points<const N: usize, S: Storage> {
     /// The velocity at its start, in equations of second order.
     velocity: [f64; N],
     work: S::Kept<Work<N, S>>,
+    places: S::Kept<Places<N>>,
     is_warm: bool,
     last_step: f64,
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -91,8 +94,10 @@ struct Work<const N: usize, S: Storage> {
 /// A constant mass matrix.
 #[derive(Clone, Debug)]
 pub(crate) struct Inertia<const N: usize, S: Storage> {
-    /// Its diagonal, if it has nothing else.
-    pub(crate) diagonal: Option<[f64; N]>,
+    /// Whether it has nothing beside its diagonal.
+    has_diagonal_alone: bool,
+    /// That diagonal; of no meaning where there is more.
+    pub(crate) masses: [f64; N],
     /// The diagonal of the inverse; ones where that is not constant.
     pub(crate) inverse_diagonal: [f64; N],
     /// What rounding took from the inverse of the diagonal.
@@ -124,8 +129,9 @@ pub(crate) enum Together {
 
 /// What has come of its iteration.
 struct Outcome<const N: usize> {
-    /// The end of the step, and what rounding took from it.
-    end: Result<(State<N>, State<N>), StepError>,
+    /// The end of the step, and what rounding took from it; of no meaning after a failure. Not in one with it: the numbers would be taken to pieces.
+    end: (State<N>, State<N>),
+    failure: Option<StepError>,
     iterations: u32,
     /// The ratio of the last increment to that before.
     contraction: f64,
@@ -146,6 +152,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
             rates: List::filled([[0.0; 4]; N], first),
             velocity: [0.0; N],
             work: Keep::keep(|| Work::new(&Needed::by::<M, N>(groups))),
+            places: Keep::keep(|| Places::None),
             tables,
             is_warm: false,
             last_step: 0.0,
@@ -412,7 +419,8 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
     {
         if !M::FACTS.constant_mass {
             return Some(Self {
-                diagonal: None,
+                has_diagonal_alone: false,
+                masses: [1.0; N],
                 inverse_diagonal: [1.0; N],
                 inverse_low: [0.0; N],
                 inverse: List::filled([0.0; N], 0),
@@ -439,7 +447,8 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
             (inverse_diagonal[a], rows[a]) = (inverse[a][a], inverse[a]);
         }
         Some(Self {
-            diagonal: None,
+            has_diagonal_alone: false,
+            masses: [1.0; N],
             inverse_diagonal,
             inverse_low: [0.0; N],
             inverse: rows,
@@ -465,7 +474,8 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
             inverse_low[a] = exact.minus(DoubleDouble::new(inverse[a])).high;
         }
         Some(Self {
-            diagonal: Some(masses),
+            has_diagonal_alone: true,
+            masses,
             inverse_diagonal: inverse,
             inverse_low,
             inverse: List::filled([0.0; N], 0),

@@ -71,7 +71,7 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
             step,
             steps: 0,
             memory: Memory::new(),
-            points: if const { S::GROUPS > 0 } {
+            points: if const { S::GROUPS > 0 } && step.is_finite() && step != 0.0 {
                 Points::new(model, Tables::new(tables))
             } else {
                 None
@@ -118,20 +118,57 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
     where
         M: Model<N>,
     {
-        let (t, h) = (self.time(), self.step);
+        let place = (self.time(), self.step);
+        match self.together((model, scheme), place, state) {
+            Together::Arrived => {}
+            other => self.otherwise((model, scheme), place, state, other)?,
+        }
+        self.steps += 1;
+        Ok(())
+    }
+
+    /// All points at once, where that is possible.
+    #[inline(always)]
+    fn together<M, const P: usize, const U: usize>(
+        &mut self,
+        (model, scheme): (&M, &Scheme<P, U>),
+        place: (f64, f64),
+        state: &mut State<N>,
+    ) -> Together
+    where
+        M: Model<N>,
+    {
+        match &mut self.points {
+            Some(points) if const { S::GROUPS > 0 } => {
+                points.step((model, scheme, &Standard), &mut self.memory, place, state)
+            }
+            _ => Together::LeftToOthers,
+        }
+    }
+
+    /// What is left of a step that has not been done with all points at once. Not written into the places of its call: it is long, and seldom needed.
+    #[cfg_attr(feature = "alloc", inline(never))]
+    fn otherwise<M, const P: usize, const U: usize>(
+        &mut self,
+        (model, scheme): (&M, &Scheme<P, U>),
+        (t, h): (f64, f64),
+        state: &mut State<N>,
+        together: Together,
+    ) -> Result<(), StepError>
+    where
+        M: Model<N>,
+    {
         let mut run = Run {
             engine: self,
             model,
             scheme,
         };
-        match run.whole(t, h, state, &[]) {
+        match run.continued(together, (t, h), state) {
             Err(error) if IS_LARGE && may_be_cut(&error, M::FACTS.linear, Solve::Auto) => {
-                run.in_pieces((t, h), state, error)?;
+                run.in_pieces((t, h), state, error)
             }
-            outcome => outcome?,
+            outcome => outcome,
         }
-        self.steps += 1;
-        Ok(())
     }
 }
 
@@ -164,28 +201,9 @@ impl<
         state: &mut State<N>,
         _: &[Infallible],
     ) -> Result<(), StepError> {
-        let Self {
-            engine,
-            model,
-            scheme,
-        } = self;
-        if const { S::GROUPS > 0 }
-            && let Some(points) = &mut engine.points
-            && h.is_finite()
-            && h != 0.0
-        {
-            let method = (*model, *scheme, &Standard);
-            match points.step(method, &mut engine.memory, (t, h), state) {
-                Together::Arrived => return Ok(()),
-                Together::Stalled(error) => return Err(error),
-                Together::LeftToOthers => {
-                    // An ordinary step continues what is in its workspace.
-                    points.write_back::<M>(*scheme, &mut engine.numbers);
-                    points.forget();
-                }
-            }
-        }
-        self.ordinary((t, h), state)
+        let method = (self.model, self.scheme);
+        let together = self.engine.together(method, (t, h), state);
+        self.continued(together, (t, h), state)
     }
 
     /// Nobody asks for the inside of a step.
@@ -202,6 +220,29 @@ impl<
     const PIVOTS: usize,
 > Run<'_, M, Specialised<N, S, NUMBERS, PIVOTS>, P, U>
 {
+    /// What becomes of a step that has been tried with all points at once.
+    #[inline]
+    fn continued(
+        &mut self,
+        together: Together,
+        place: (f64, f64),
+        state: &mut State<N>,
+    ) -> Result<(), StepError> {
+        match together {
+            Together::Arrived => return Ok(()),
+            Together::Stalled(error) => return Err(error),
+            Together::LeftToOthers => {}
+        }
+        if const { S::GROUPS > 0 }
+            && let Some(points) = &mut self.engine.points
+        {
+            // An ordinary step continues what is in its workspace.
+            points.write_back::<M>(self.scheme, &mut self.engine.numbers);
+            points.forget();
+        }
+        self.ordinary(place, state)
+    }
+
     /// One point after the other. Not written into the places of its call, of which there are two.
     #[cfg_attr(feature = "alloc", inline(never))]
     fn ordinary(&mut self, place: (f64, f64), state: &mut State<N>) -> Result<(), StepError> {

@@ -31,7 +31,7 @@ pub struct Statistics {
     pub contraction: Contraction,
 }
 
-/// The ratio of two successive increments, in parts per million.
+/// The ratio of two successive increments, to seven digits. Kept as the bits of a number that is not negative, which are in the order of the numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Contraction(u32);
 
@@ -41,25 +41,19 @@ impl Contraction {
 
     /// Of a ratio; what is no number counts as no contraction.
     pub(crate) fn of(ratio: f64) -> Self {
-        let parts = 1e6 * ratio;
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "below 10⁹, and zero where it is negative"
-        )]
-        Self(if parts < 1e9 {
-            parts as u32
-        } else if ratio.is_nan() {
-            1_000_000
-        } else {
-            1_000_000_000
-        })
+        #[allow(clippy::cast_possible_truncation, reason = "seven digits do")]
+        Self((ratio as f32).to_bits())
     }
 
     /// The ratio.
     #[must_use]
     pub fn ratio(self) -> f64 {
-        f64::from(self.0) * 1e-6
+        let ratio = f64::from(f32::from_bits(self.0));
+        if ratio.is_nan() {
+            1.0
+        } else {
+            ratio.min(1000.0)
+        }
     }
 }
 

@@ -6,8 +6,8 @@ use super::products::sum;
 use super::second_order::largest;
 use super::step::Step;
 use crate::model::Model;
-use crate::points::arrangement::Evaluation;
 use crate::points::end::moved;
+use crate::points::evaluation::Evaluation;
 use crate::registers::pair::Eight;
 use crate::registers::side::load;
 
@@ -36,11 +36,11 @@ where
         group: &mut Group<N>,
         work: &mut Work<N>,
         mask: V::Mask,
+        evaluation: &mut Evaluation<V, N>,
         refresh: bool,
     ) -> Increments<V> {
-        let mut evaluation = Evaluation::zero(like);
         let (at, rows) = self.rows::<V>(group, work, mask);
-        let (changed, size) = rows.sweep_velocity(like, self.model, &at, &mut evaluation, refresh);
+        let (changed, size) = rows.sweep_velocity(like, self.model, &at, evaluation, refresh);
         let (changed, size) = (changed.by_lane(), size.by_lane());
         let start = largest(like, &load(like, &group.start.q));
         let position = self.relative(start, size, changed);
@@ -59,11 +59,11 @@ where
         group: &mut Group<N>,
         work: &mut Work<N>,
         mask: V::Mask,
+        evaluation: &mut Evaluation<V, N>,
         which: (bool, bool),
     ) -> Increments<V> {
-        let mut evaluation = Evaluation::zero(like);
         let (at, rows) = self.rows::<V>(group, work, mask);
-        let [of_rates, of_forces] = rows.sweep_phase(like, self.model, &at, &mut evaluation, which);
+        let [of_rates, of_forces] = rows.sweep_phase(like, self.model, &at, evaluation, which);
         let (changed, size) = (of_rates.0.by_lane(), of_rates.1.by_lane());
         let start = largest(like, &load(like, &group.start.q));
         let position = self.relative(start, size, changed);

@@ -5,8 +5,8 @@ use super::judge::Increments;
 use super::products::{apply, sum};
 use super::step::Step;
 use crate::model::Model;
-use crate::points::arrangement::Evaluation;
 use crate::points::end::moved;
+use crate::points::evaluation::Evaluation;
 use crate::points::second_order::velocity_of;
 use crate::registers::pair::Eight;
 use crate::registers::side::load;
@@ -25,11 +25,11 @@ where
     ) {
         let momenta = load(like, &group.start.p);
         let missing = load(like, &group.low.p);
-        if let Some(mass) = &self.inertia.diagonal {
+        if self.inertia.is_diagonal() {
             for a in 0..N {
                 let inverse = like.like(self.inertia.inverse_diagonal[a]);
                 let p = (momenta[a], missing[a]);
-                let (v, v_low) = velocity_of(p, like.like(mass[a]), inverse);
+                let (v, v_low) = velocity_of(p, like.like(self.inertia.masses[a]), inverse);
                 (work.velocity[a], work.velocity_low[a]) = (v.lanes(), v_low.lanes());
             }
         } else {
@@ -55,6 +55,7 @@ where
         group: &mut Group<N>,
         work: &mut Work<N>,
         mask: V::Mask,
+        evaluation: &mut Evaluation<V, N>,
         iteration: u32,
     ) -> Increments<V> {
         let table = &self.tables.twice;
@@ -67,9 +68,8 @@ where
                 forces.set_exact_drift(like, &at);
             }
         }
-        let mut evaluation = Evaluation::zero(like);
         let (at, forces) = self.accelerated::<V>(group, work, mask);
-        let (changed, size) = forces.sweep(like, self.model, &at, &mut evaluation);
+        let (changed, size) = forces.sweep(like, self.model, &at, evaluation);
         let (changed, size) = (changed.by_lane(), size.by_lane());
         let speed = largest(like, &load(like, &work.velocity));
         let distance = largest(like, &load(like, &group.start.q));
@@ -96,7 +96,7 @@ where
         let h = like.like(self.h);
         let force = sum::<_, N, EXACT>(like, &self.tables.weights, &group.forces, a);
         let lever = &self.tables.lever;
-        let lever = if self.inertia.diagonal.is_some() {
+        let lever = if self.inertia.is_diagonal() {
             let (sum, low) = sum::<_, N, EXACT>(like, lever, &group.forces, a);
             let inverse = like.like(self.inertia.inverse_diagonal[a]);
             let inverse_low = like.like(self.inertia.inverse_low[a]);
@@ -118,7 +118,7 @@ where
     /// Accelerations at the end of the iteration, where each follows from several forces.
     #[inline(always)]
     pub(super) fn prepare_end<V: Eight>(&self, like: V, group: &Group<N>, work: &mut Work<N>) {
-        if self.inertia.diagonal.is_some() {
+        if self.inertia.is_diagonal() {
             return;
         }
         for (acceleration, force) in work.velocities.iter_mut().zip(&group.forces) {

@@ -6,6 +6,7 @@ use super::products::apply;
 use super::together::Together;
 use crate::model::Model;
 use crate::newton::{Control, PATIENCE, Solve};
+use crate::points::evaluation::Evaluation;
 use crate::points::tables::Tables;
 use crate::points::{Inertia, is_phase, is_second_order};
 use crate::registers::pair::{Eight, LANES};
@@ -154,10 +155,10 @@ where
         let zero = like.like(0.0);
         let mut judge = Judge::new(like, self.control.tolerance, self.control.solve);
         let (mut active, mut arrived, mut count, mut rates) = (wanted, zero, zero, zero);
-        let mut iteration = 0;
+        let (mut evaluation, mut iteration) = (Evaluation::zero(like), 0);
         while iteration < most {
             let mask = zero.less(active);
-            let increments = self.sweep(like, group, work, mask, iteration);
+            let increments = self.sweep(like, group, work, mask, &mut evaluation, iteration);
             count += active;
             let (done, going) = judge.judge(increments, active);
             // Lanes that have converged before keep their last rate.
@@ -201,17 +202,18 @@ where
         group: &mut Group<N>,
         work: &mut Work<N>,
         mask: V::Mask,
+        at: &mut Evaluation<V, N>,
         iteration: u32,
     ) -> Increments<V> {
         // Constant conditions, so that of the three iterations one is compiled.
         if const { is_second_order::<M, N>() } {
-            return self.sweep_second_order(like, group, work, mask, iteration);
+            return self.sweep_second_order(like, group, work, mask, at, iteration);
         }
         let refresh = const { !M::FACTS.constant_mass } && REFRESHED.contains(&iteration);
         if const { is_phase::<M, N>() } {
-            self.sweep_phase(like, group, work, mask, (iteration == 0, refresh))
+            self.sweep_phase(like, group, work, mask, at, (iteration == 0, refresh))
         } else {
-            self.sweep_velocity(like, group, work, mask, refresh)
+            self.sweep_velocity(like, group, work, mask, at, refresh)
         }
     }
 

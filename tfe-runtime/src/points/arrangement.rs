@@ -2,7 +2,6 @@
 
 use super::Inertia;
 use crate::model::{First, Model};
-use crate::real::Real;
 use crate::registers::side::Side;
 use crate::registers::storage::{Fixed, Matrix, Storage};
 
@@ -72,28 +71,4 @@ pub(crate) trait Size<V>: Copy {
 
     /// The same for a value of which others tell whether it is finite.
     fn raise_finite(&mut self, value: V);
-}
-
-/// Where a kernel is evaluated, and what it writes there. Entries that are always zero are never written, so one serves for all points of a step: with many coordinates it takes as
-/// long to fill them with zeros as to evaluate a kernel.
-pub(crate) struct Evaluation<V, const N: usize> {
-    pub(crate) q: [V; N],
-    pub(crate) z: [V; N],
-    pub(crate) first: First<V, N>,
-}
-
-impl<V: Real, const N: usize> Evaluation<V, N> {
-    #[inline(always)]
-    pub(crate) fn zero(like: V) -> Self {
-        let zero = [like.like(0.0); N];
-        Self {
-            q: zero,
-            z: zero,
-            first: First {
-                z: zero,
-                q: zero,
-                force: zero,
-            },
-        }
-    }
 }

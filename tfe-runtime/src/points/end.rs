@@ -13,9 +13,15 @@ impl<const N: usize, S: Storage> Work<N, S> {
         &self,
         like: V,
         leg: &Leg<'_, N, S>,
-    ) -> (State<N>, State<N>) {
-        let (mut end, mut end_low) = (State::ZERO, State::ZERO);
+        (end, end_low): (&mut State<N>, &mut State<N>),
+    ) {
         let (weights, h) = (&leg.tables.weights, like.like(leg.h));
+        if const { matches!(N, 1 | 2) } {
+            let forces = (weights, &*self.forces);
+            let rates = weights.sums_beside::<_, N, EXACT>(like, &self.rates, forces);
+            (*end, *end_low) = apart(moved::<_, EXACT>(h, rates, leg.both(like)));
+            return;
+        }
         for at in (0..N).step_by(4) {
             let velocity = weights.sums::<_, N, EXACT>(like, &self.rates, at);
             let force = weights.sums::<_, N, EXACT>(like, &self.forces, at);
@@ -28,7 +34,6 @@ impl<const N: usize, S: Storage> Work<N, S> {
             put(q_low, &mut end_low.q, at);
             put(p_low, &mut end_low.p, at);
         }
-        (end, end_low)
     }
 
     /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) of second-order equations.
@@ -37,34 +42,44 @@ impl<const N: usize, S: Storage> Work<N, S> {
         &self,
         like: V,
         leg: &Leg<'_, N, S>,
-    ) -> (State<N>, State<N>) {
-        let (mut end, mut end_low) = (State::ZERO, State::ZERO);
+        (end, end_low): (&mut State<N>, &mut State<N>),
+    ) {
+        let (tables, h) = (leg.tables, like.like(leg.h));
+        if const { matches!(N, 1 | 2) } {
+            let force = (&tables.weights, &*self.forces);
+            let mut sums = (tables.lever).sums_beside::<_, N, EXACT>(like, &self.forces, force);
+            let force = sums;
+            if !leg.inertia.is_diagonal() {
+                let (State { q, .. }, State { q: q_low, .. }) = apart(sums);
+                let (high, low) = leg.inertia.of_both(&q, &q_low);
+                sums = (beside(like, &high, &high), beside(like, &low, &low));
+            }
+            // What is made of the forces here is left behind.
+            let acceleration = self.accelerations::<_, EXACT>(like, leg, sums, 0);
+            let v = (self.velocity, self.velocity_low);
+            let v = (beside(like, &v.0, &v.0), beside(like, &v.1, &v.1));
+            let velocity = moved::<_, EXACT>(h, acceleration, v);
+            let rates = (
+                first_of::<_, N>(velocity.0, force.0),
+                first_of::<_, N>(velocity.1, force.1),
+            );
+            (*end, *end_low) = apart(moved::<_, EXACT>(h, rates, leg.both(like)));
+            return;
+        }
         let (mut lever, mut lever_low) = ([0.0; N], [0.0; N]);
-        let (forces, h) = (&self.forces, like.like(leg.h));
+        let forces = &self.forces;
         for at in (0..N).step_by(4) {
-            let (sum, low) = leg.tables.lever.sums::<_, N, EXACT>(like, forces, at);
+            let (sum, low) = tables.lever.sums::<_, N, EXACT>(like, forces, at);
             put(sum, &mut lever, at);
             put(low, &mut lever_low, at);
         }
-        if leg.inertia.diagonal.is_none() {
+        if !leg.inertia.is_diagonal() {
             (lever, lever_low) = leg.inertia.of_both(&lever, &lever_low);
         }
         for at in (0..N).step_by(4) {
-            let mut acceleration = (block(like, &lever, at), block(like, &lever_low, at));
-            if leg.inertia.diagonal.is_some() {
-                // Times 1/m, which has a low word of its own: one rounding of it would be the same in every step.
-                let inverse = block(like, &leg.inertia.inverse_diagonal, at);
-                let inverse_low = block(like, &leg.inertia.inverse_low, at);
-                if const { EXACT } {
-                    let (product, rest) = inverse.product(acceleration.0);
-                    let rest = inverse_low.times_plus(acceleration.0, rest);
-                    let rest = inverse.times_plus(acceleration.1, rest);
-                    acceleration = (product, rest);
-                } else {
-                    acceleration.0 = inverse * acceleration.0;
-                }
-            }
-            let force = leg.tables.weights.sums::<_, N, EXACT>(like, forces, at);
+            let lever = (block(like, &lever, at), block(like, &lever_low, at));
+            let acceleration = self.accelerations::<_, EXACT>(like, leg, lever, at);
+            let force = tables.weights.sums::<_, N, EXACT>(like, forces, at);
             let v = (
                 block(like, &self.velocity, at),
                 block(like, &self.velocity_low, at),
@@ -78,8 +93,76 @@ impl<const N: usize, S: Storage> Work<N, S> {
             put(q_low, &mut end_low.q, at);
             put(p_low, &mut end_low.p, at);
         }
-        (end, end_low)
     }
+
+    /// Four of them from coordinate `at` on: what a mass matrix with more than a diagonal has made of forces already, else forces over masses.
+    #[inline(always)]
+    fn accelerations<V: Four, const EXACT: bool>(
+        &self,
+        like: V,
+        leg: &Leg<'_, N, S>,
+        forces: (V, V),
+        at: usize,
+    ) -> (V, V) {
+        let inertia = leg.inertia;
+        if !inertia.is_diagonal() {
+            return forces;
+        }
+        let inverse = block(like, &inertia.inverse_diagonal, at);
+        if const { !EXACT } {
+            return (inverse * forces.0, forces.1);
+        }
+        // Times 1/m, which has a low word of its own: one rounding of it would be the same in every step.
+        let (product, rest) = inverse.product(forces.0);
+        let rest = block(like, &inertia.inverse_low, at).times_plus(forces.0, rest);
+        (product, inverse.times_plus(forces.1, rest))
+    }
+}
+
+impl<const N: usize, S: Storage> Leg<'_, N, S> {
+    /// The start, and what it is more than its rounded numbers: coordinates beside momenta.
+    #[inline(always)]
+    fn both<V: Four>(&self, like: V) -> (V, V) {
+        (
+            beside(like, &self.start.q, &self.start.p),
+            beside(like, &self.low.q, &self.low.p),
+        )
+    }
+}
+
+/// Numbers of one or two coordinates beside those of their momenta, as in [`sums_beside`](crate::registers::storage::Weights::sums_beside).
+#[inline(always)]
+fn beside<V: Four, const N: usize>(like: V, q: &[f64; N], p: &[f64; N]) -> V {
+    let mut lanes = [0.0; 4];
+    for (lane, number) in lanes.iter_mut().enumerate() {
+        let a = lane % (2 * N);
+        *number = if a < N { q[a] } else { p[a - N] };
+    }
+    like.with(lanes)
+}
+
+/// The coordinates of one, and the momenta of another.
+#[inline(always)]
+fn first_of<V: Four, const N: usize>(one: V, other: V) -> V {
+    let (coordinates, mut lanes) = (one.lanes(), other.lanes());
+    for (lane, number) in lanes.iter_mut().enumerate() {
+        if lane % (2 * N) < N {
+            *number = coordinates[lane];
+        }
+    }
+    one.with(lanes)
+}
+
+/// States from numbers that lie beside each other.
+#[inline(always)]
+fn apart<V: Four, const N: usize>((high, low): (V, V)) -> (State<N>, State<N>) {
+    let (mut end, mut end_low) = (State::ZERO, State::ZERO);
+    let (high, low) = (high.lanes(), low.lanes());
+    for a in 0..N {
+        (end.q[a], end.p[a]) = (high[a], high[N + a]);
+        (end_low.q[a], end_low.p[a]) = (low[a], low[N + a]);
+    }
+    (end, end_low)
 }
 
 /// start + h · rate, to twice the precision or to the working one.

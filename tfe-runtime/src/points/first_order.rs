@@ -1,6 +1,7 @@
 //! Equations of first order, velocities or the rates of phase space as unknowns: one text for four points of a trajectory side by side and for eight trajectories.
 
-use super::arrangement::{Arrangement, Evaluation, Row, Size};
+use super::arrangement::{Arrangement, Row, Size};
+use super::evaluation::Evaluation;
 use crate::model::Model;
 use crate::registers::side::{Side, factor, solve, store};
 

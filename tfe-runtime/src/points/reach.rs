@@ -126,12 +126,11 @@ impl<const N: usize> Points<N, Heap> {
         }
         if is_second_order::<M, N>() {
             for a in 0..N {
-                let change = match &self.inertia.diagonal {
-                    Some(_) => self.inertia.inverse_diagonal[a].abs() * stages[a],
-                    None => {
-                        let row = self.inertia.inverse[a].iter().zip(&stages);
-                        row.map(|(inverse, stage)| inverse.abs() * stage).sum()
-                    }
+                let change = if self.inertia.is_diagonal() {
+                    self.inertia.inverse_diagonal[a].abs() * stages[a]
+                } else {
+                    let row = self.inertia.inverse[a].iter().zip(&stages);
+                    row.map(|(inverse, stage)| inverse.abs() * stage).sum()
                 };
                 let (velocity, change) = (self.velocity[a], size * change);
                 let distance = size * weights.whole * (velocity.abs() + change);

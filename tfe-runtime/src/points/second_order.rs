@@ -1,6 +1,7 @@
 //! M q̈ = f(q, q̇), forces as the only unknowns: one text for four points of a trajectory side by side and for eight trajectories.
 
-use super::arrangement::{Arrangement, Evaluation, Row, Size};
+use super::arrangement::{Arrangement, Row, Size};
+use super::evaluation::Evaluation;
 use crate::model::{Form, Model};
 use crate::precise::Precise;
 use crate::registers::side::Side;
@@ -45,7 +46,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         A: Arrangement<V, L, N, Number = X>,
     {
         let (tables, inertia) = (at.tables(), at.inertia());
-        let is_diagonal = inertia.diagonal.is_some();
+        let is_diagonal = inertia.is_diagonal();
         at.apply(like, &tables.twice_low, self.forces, self.more_products);
         let h = like.like(at.h());
         // What the one rounding of h² takes, the same in every step.
@@ -92,7 +93,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         M: Model<N>,
     {
         let inertia = at.inertia();
-        let is_diagonal = inertia.diagonal.is_some();
+        let is_diagonal = inertia.is_diagonal();
         if const { M::FACTS.forced } {
             at.apply(like, &at.tables().once, self.forces, self.more_products);
         }

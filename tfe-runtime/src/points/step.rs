@@ -1,13 +1,12 @@
 //! A step of one trajectory: start of the iteration, the iteration, the end.
 
-use super::arrangement::Evaluation;
+use super::evaluation::{Evaluation, FEW, Placed};
 use super::{Leg, Outcome, Points, Together, Work, is_finite, is_phase, is_second_order, largest};
 use crate::error::StepError;
 use crate::method::{Last, Memory};
 use crate::model::{Model, State};
 use crate::newton::{Asked, Control, Monitor, PATIENCE, Solve, Verdict};
-use crate::registers::four::Four;
-use crate::registers::storage::{List, Storage};
+use crate::registers::storage::{Keep, List, Storage};
 use crate::scheme;
 use crate::statistics::Contraction;
 
@@ -62,18 +61,13 @@ where
         if let Some(isa) = self.points.isa {
             return isa.vectorize(InRegisters { job: self, isa });
         }
-        self.step_apart()
-    }
-
-    /// Where there are no registers. Not written into the place of its call, of which there are several.
-    #[inline(never)]
-    fn step_apart(self) -> Together {
-        self.step(crate::Lanes([0.0; 4]))
+        let method = (self.model, self.tables, self.asked);
+        step_apart(self.points, method, self.memory, self.place, self.state)
     }
 
     /// The whole step.
     #[inline(always)]
-    fn step<V: Four>(self, like: V) -> Together {
+    fn step<V: Placed>(self, like: V) -> Together {
         let Self {
             points,
             model,
@@ -116,32 +110,53 @@ where
         statistics.fixed_point_iterations += iterations;
         statistics.residual_evaluations += iterations * points.tables.points as u64;
         statistics.contraction = Contraction::of(outcome.contraction);
-        let (end, end_low) = match outcome.end {
-            Ok(end) => end,
-            Err(_) if yielding => {
+        if let Some(error) = outcome.failure {
+            if yielding {
                 memory.preference.leave_fixed_point();
                 memory.statistics.fallbacks += 1;
                 return Together::LeftToOthers;
             }
-            Err(error) => {
-                memory.last = None;
-                return Together::Stalled(error);
-            }
-        };
+            memory.last = None;
+            return Together::Stalled(error);
+        }
+        let (end, end_low) = outcome.end;
         (points.is_warm, points.last_step) = (true, h);
-        memory.last = Some(Last {
-            t,
-            h,
-            start: *state,
-            start_low: memory.low,
-            end,
-        });
+        // In place: with many coordinates copies of it take time.
+        let last = memory.last.get_or_insert(Last::NONE);
+        (last.t, last.h) = (t, h);
+        (last.start, last.start_low, last.end) = (*state, memory.low, end);
         (*state, memory.low) = (end, end_low);
         memory.preference.confirm_fixed_point();
         memory.statistics.steps += 1;
         memory.forget_factors();
         Together::Arrived
     }
+}
+
+/// A step where there are no registers. Not written into the place of its call, of which there are several; and by its parts, which then need not lie in memory for it.
+#[inline(never)]
+fn step_apart<M, T, A, S: Storage, const N: usize>(
+    points: &mut Points<N, S>,
+    (model, tables, asked): (&M, &T, &A),
+    memory: &mut Memory<N>,
+    place: (f64, f64),
+    state: &mut State<N>,
+) -> Together
+where
+    M: Model<N>,
+    T: scheme::Tables,
+    A: Asked,
+{
+    let job = Job {
+        points,
+        model,
+        tables,
+        asked,
+        memory,
+        place,
+        state,
+    };
+    job.step(crate::Lanes([0.0; 4]))
 }
 
 /// The iteration of a step.
@@ -163,7 +178,7 @@ where
 {
     /// From its start to the end of the step.
     #[inline(always)]
-    fn run<V: Four>(self, like: V) -> Outcome<N> {
+    fn run<V: Placed>(self, like: V) -> Outcome<N> {
         let Self {
             points,
             model,
@@ -224,15 +239,19 @@ where
         } else if !is_rough {
             work.rows().set_low(like, &leg);
         }
-        let mut at = Evaluation::zero(like);
+        let mut new_place = None;
+        let at = match points.places.kept() {
+            Some(kept) if const { N > FEW } => like.place(kept),
+            _ => new_place.insert(Evaluation::zero(like)),
+        };
         while iterations < most {
             // Constant conditions, so that of the three iterations one is compiled.
             let increment = if const { is_second_order::<M, N>() } {
-                work.sweep_second_order::<V, M>(like, model, &leg, &mut at)
+                work.sweep_second_order::<V, M>(like, model, &leg, at)
             } else if const { is_phase::<M, N>() } {
-                work.sweep_phase::<V, M>(like, model, &leg, &mut at, (iterations == 0, refresh))
+                work.sweep_phase::<V, M>(like, model, &leg, at, (iterations == 0, refresh))
             } else {
-                work.sweep_velocity::<V, M>(like, model, &leg, &mut at, refresh)
+                work.sweep_velocity::<V, M>(like, model, &leg, at, refresh)
             };
             iterations += 1;
             match monitor.judge(increment) {
@@ -257,35 +276,37 @@ where
         converged |= monitor.is_at_round_off();
         // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
         let evidence = monitor.evidence(yielding).check(control.solve);
-        let end = if converged && evidence.is_ok() {
-            let (state, low) = if const { is_second_order::<M, N>() } {
+        let (mut end, mut failure) = ((State::ZERO, State::ZERO), None);
+        if converged && evidence.is_ok() {
+            let place = (&mut end.0, &mut end.1);
+            if const { is_second_order::<M, N>() } {
                 if is_rough {
-                    work.finish_second_order::<V, false>(like, &leg)
+                    work.finish_second_order::<V, false>(like, &leg, place);
                 } else {
-                    work.finish_second_order::<V, true>(like, &leg)
+                    work.finish_second_order::<V, true>(like, &leg, place);
                 }
             } else if is_rough {
-                work.finish::<V, false>(like, &leg)
+                work.finish::<V, false>(like, &leg, place);
             } else {
-                work.finish::<V, true>(like, &leg)
-            };
-            if is_finite(&state) {
+                work.finish::<V, true>(like, &leg, place);
+            }
+            if is_finite(&end.0) {
                 // What a failed step would have to start from is kept until here.
                 points.forces.take(&mut work.forces);
                 points.rates.take(&mut work.rates);
                 points.velocity = work.velocity;
-                Ok((state, low))
             } else {
-                Err(StepError::NonFinite)
+                failure = Some(StepError::NonFinite);
             }
         } else {
-            Err(match evidence {
+            failure = Some(match evidence {
                 Err(unproven) if converged => unproven,
                 _ => monitor.stalled(iterations, &control),
-            })
-        };
+            });
+        }
         Outcome {
             end,
+            failure,
             iterations,
             contraction: monitor.rate(),
         }

@@ -1,6 +1,7 @@
 //! What all iterations share, and how points of one trajectory lie side by side.
 
-use super::arrangement::{Arrangement, Evaluation, Size};
+use super::arrangement::{Arrangement, Size};
+use super::evaluation::Evaluation;
 use super::first_order::Rows;
 use super::second_order::{Forces, velocity_of};
 use super::{Inertia, Leg, Row, Work};
@@ -34,11 +35,13 @@ impl<V: Four> Size<V> for Magnitude<V> {
 }
 
 impl<V: Four> Magnitude<V> {
-    /// Of all lanes.
+    /// Of all lanes of two.
     #[inline(always)]
-    pub(crate) fn get(self) -> f64 {
-        let [a, b, c, d] = self.0.lanes();
-        larger(larger(a, b), larger(c, d))
+    fn of_both(one: Self, other: Self) -> (f64, f64) {
+        let ([a, b, c, d], [e, f, g, h]) = (one.0.lanes(), other.0.lanes());
+        let left = one.0.with([a, e, c, g]);
+        let [a, e, c, g] = left.larger(left.with([b, f, d, h])).lanes();
+        (larger(a, c), larger(e, g))
     }
 }
 
@@ -220,11 +223,12 @@ impl<const N: usize, S: Storage> Work<N, S> {
     #[inline(always)]
     pub(super) fn begin_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
         let inertia = &leg.inertia;
-        if let Some(mass) = &inertia.diagonal {
+        if inertia.is_diagonal() {
             for at in (0..N).step_by(4) {
                 let p = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
                 let inverse = block(like, &inertia.inverse_diagonal, at);
-                let (v, v_low) = velocity_of(p, block(like, mass, at), inverse);
+                let mass = block(like, &inertia.masses, at);
+                let (v, v_low) = velocity_of(p, mass, inverse);
                 put(v, &mut self.velocity, at);
                 put(v_low, &mut self.velocity_low, at);
             }
@@ -259,7 +263,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         M: Model<N>,
     {
         let (changed, size) = self.accelerated().sweep(like, model, leg, at);
-        let (changed, size) = (changed.get(), size.get());
+        let (changed, size) = Magnitude::of_both(changed, size);
         if changed == 0.0 {
             return Increment::NONE;
         }
@@ -287,7 +291,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         M: Model<N>,
     {
         let (changed, size) = (self.rows()).sweep_velocity(like, model, leg, at, refresh);
-        let (changed, size) = (changed.get(), size.get());
+        let (changed, size) = Magnitude::of_both(changed, size);
         let position = relative(leg.h, self.distance, size, changed);
         // The momentum at the end is as good as the velocities, whatever the step; what is left of an increment reaches it through forces
         // only, hence the factor.
@@ -314,9 +318,9 @@ impl<const N: usize, S: Storage> Work<N, S> {
         M: Model<N>,
     {
         let [of_rates, of_forces] = self.rows().sweep_phase(like, model, leg, at, which);
-        let (changed, size) = (of_rates.0.get(), of_rates.1.get());
+        let (changed, size) = Magnitude::of_both(of_rates.0, of_rates.1);
         let position = relative(leg.h, self.distance, size, changed);
-        let (changed, size) = (of_forces.0.get(), of_forces.1.get());
+        let (changed, size) = Magnitude::of_both(of_forces.0, of_forces.1);
         let momentum = relative(leg.h, self.speed, size, changed);
         let relative = if (position + momentum).is_nan() {
             f64::NAN
@@ -328,11 +332,17 @@ impl<const N: usize, S: Storage> Work<N, S> {
 }
 
 impl<const N: usize, S: Storage> Inertia<N, S> {
+    /// Whether a constant mass matrix has nothing beside its diagonal: one number always has not.
+    #[inline(always)]
+    pub(crate) fn is_diagonal(&self) -> bool {
+        N == 1 || self.has_diagonal_alone
+    }
+
     /// The constant M⁻¹ (or H_pp) times a vector for each of several points.
     #[inline(always)]
     pub(crate) fn times<V: Precise>(&self, like: V, vector: &[V; N]) -> [V; N] {
         let mut product = [like.like(0.0); N];
-        if self.diagonal.is_some() {
+        if self.is_diagonal() {
             for a in 0..N {
                 product[a] = like.like(self.inverse_diagonal[a]) * vector[a];
             }
@@ -349,7 +359,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
     /// Sets how far accelerations reach in a step of length h.
     #[inline(always)]
     pub(crate) fn set_step<V: Four>(&mut self, like: V, h: f64) {
-        if self.diagonal.is_none() || self.step == h {
+        if !self.is_diagonal() || self.step == h {
             return;
         }
         self.step = h;
@@ -373,7 +383,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         row: &[[f64; L]; N],
         a: usize,
     ) -> V {
-        if self.diagonal.is_some() {
+        if self.is_diagonal() {
             return like.like(self.inverse_diagonal[a]) * like.with(row[a]);
         }
         let mut sum = like.like(0.0);

@@ -177,32 +177,42 @@ impl<S: Storage> Weights<S> {
         rows: &[Row<N>],
         from: usize,
     ) -> (V, V) {
-        let (mut high, mut low) = ([like.like(0.0); 4], [like.like(0.0); 4]);
-        for (group, ([weight, weight_low], row)) in self.0.iter().zip(rows).enumerate() {
-            let (weight, weight_low) = (like.with(*weight), like.with(*weight_low));
+        let mut sums = [(like.like(0.0), like.like(0.0)); 4];
+        for (group, (weight, row)) in self.0.iter().zip(rows).enumerate() {
+            let weight = both(like, weight);
             for a in 0..4.min(N - from) {
                 let value = like.with(row[from + a]);
-                if const { !EXACT } {
-                    high[a] = weight.times_plus(value, high[a]);
-                    continue;
-                }
-                let term = exact_term((weight, weight_low), value);
-                let mut sum = (high[a], low[a]);
-                if group == 0 {
-                    sum = term;
-                } else {
-                    add_exactly(&mut sum, term);
-                }
-                (high[a], low[a]) = sum;
+                add_term::<_, EXACT>(&mut sums[a], weight, value, group == 0);
+            }
+        }
+        // From a register for each coordinate to one for each of four points.
+        sum_of_lanes::<_, EXACT>(sums)
+    }
+
+    /// The sums of all coordinates, and those that other weights make of other numbers: [q, p, q, p] of one coordinate, [q₁, q₂, p₁, p₂] of two.
+    #[inline(always)]
+    pub(crate) fn sums_beside<V: Four, const N: usize, const EXACT: bool>(
+        &self,
+        like: V,
+        rows: &[Row<N>],
+        (others, other_rows): (&Self, &[Row<N>]),
+    ) -> (V, V) {
+        let mut sums = [(like.like(0.0), like.like(0.0)); 4];
+        let ours = self.0.iter().zip(rows);
+        let theirs = others.0.iter().zip(other_rows);
+        for (group, ((weight, row), (other, other_row))) in ours.zip(theirs).enumerate() {
+            let (weight, other) = (both(like, weight), both(like, other));
+            for a in 0..N {
+                let value = like.with(row[a]);
+                add_term::<_, EXACT>(&mut sums[a], weight, value, group == 0);
+                let value = like.with(other_row[a]);
+                add_term::<_, EXACT>(&mut sums[N + a], other, value, group == 0);
             }
         }
         if const { N == 1 } {
-            // One number at four points: nothing fills registers.
-            let (high, low) = sum_of::<_, EXACT>(high[0].lanes(), low[0].lanes());
-            return (like.like(high), like.like(low));
+            (sums[2], sums[3]) = (sums[0], sums[1]);
         }
-        // From a register for each coordinate to one for each of four points.
-        sum_of::<_, EXACT>(transposed(high), transposed(low))
+        sum_of_lanes::<_, EXACT>(sums)
     }
 
     /// The weight of one point and what rounding took from it.
@@ -212,6 +222,39 @@ impl<S: Storage> Weights<S> {
         let [weight, low] = &self.0[point / 4];
         (weight[point % 4], low[point % 4])
     }
+}
+
+/// A weight and what rounding took from it, of four points.
+#[inline(always)]
+fn both<V: Four>(like: V, [weight, low]: &[[f64; 4]; 2]) -> (V, V) {
+    (like.with(*weight), like.with(*low))
+}
+
+/// Adds weight · value.
+#[inline(always)]
+fn add_term<V: Precise, const EXACT: bool>(
+    sum: &mut (V, V),
+    weight: (V, V),
+    value: V,
+    is_first: bool,
+) {
+    if const { !EXACT } {
+        sum.0 = weight.0.times_plus(value, sum.0);
+    } else if is_first {
+        *sum = exact_term(weight, value);
+    } else {
+        add_exactly(sum, exact_term(weight, value));
+    }
+}
+
+/// The sum over the lanes of each of four.
+#[inline(always)]
+fn sum_of_lanes<V: Four, const EXACT: bool>(sums: [(V, V); 4]) -> (V, V) {
+    let [a, b, c, d] = sums;
+    sum_of::<_, EXACT>(
+        transposed([a.0, b.0, c.0, d.0]),
+        transposed([a.1, b.1, c.1, d.1]),
+    )
 }
 
 /// The sum of four numbers and what rounding takes from it, and from each.
@@ -227,27 +270,32 @@ fn sum_of<V: Precise, const EXACT: bool>([a, b, c, d]: [V; 4], [e, f, g, h]: [V;
     (all, ((e + f) + (g + h)) + lost)
 }
 
+/// In two steps of two registers each, as processors do it.
 #[inline(always)]
-fn transposed<V: Four>(rows: [V; 4]) -> [V; 4] {
-    let like = rows[0];
-    let lanes = [
-        rows[0].lanes(),
-        rows[1].lanes(),
-        rows[2].lanes(),
-        rows[3].lanes(),
-    ];
-    let mut columns = [[0.0; 4]; 4];
-    for i in 0..4 {
-        for j in 0..4 {
-            columns[i][j] = lanes[j][i];
-        }
-    }
-    [
-        like.with(columns[0]),
-        like.with(columns[1]),
-        like.with(columns[2]),
-        like.with(columns[3]),
-    ]
+fn transposed<V: Four>([a, b, c, d]: [V; 4]) -> [V; 4] {
+    let ((first, second), (third, fourth)) = (paired(a, b), paired(c, d));
+    let ((left, right), (more_left, more_right)) = (halves(first, third), halves(second, fourth));
+    [left, more_left, right, more_right]
+}
+
+/// [a₀, b₀, a₂, b₂] and [a₁, b₁, a₃, b₃].
+#[inline(always)]
+fn paired<V: Four>(a: V, b: V) -> (V, V) {
+    let (a, b, like) = (a.lanes(), b.lanes(), a);
+    (
+        like.with([a[0], b[0], a[2], b[2]]),
+        like.with([a[1], b[1], a[3], b[3]]),
+    )
+}
+
+/// [a₀, a₁, b₀, b₁] and [a₂, a₃, b₂, b₃].
+#[inline(always)]
+fn halves<V: Four>(a: V, b: V) -> (V, V) {
+    let (a, b, like) = (a.lanes(), b.lanes(), a);
+    (
+        like.with([a[0], a[1], b[0], b[1]]),
+        like.with([a[2], a[3], b[2], b[3]]),
+    )
 }
 
 #[cfg(all(test, feature = "alloc"))]

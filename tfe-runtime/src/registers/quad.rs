@@ -419,10 +419,15 @@ impl Quad {
     /// Whether all lanes are within limits.
     #[inline(always)]
     fn is_within(self, (low, high): (f64, f64)) -> bool {
-        let isa = self.isa;
-        let above = isa.less_than_or_equal_f64s(self.like(low).value, self.value);
-        let below = isa.less_than_or_equal_f64s(self.value, self.like(high).value);
-        isa.first_true_m64s(isa.not_m64x4(isa.and_m64x4(above, below))) == 4
+        let (isa, high_value) = (self.isa, self.like(high).value);
+        // Constants: one comparison does where limits are opposite.
+        let within = if low == -high {
+            isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), high_value)
+        } else {
+            let above = isa.less_than_or_equal_f64s(self.like(low).value, self.value);
+            isa.and_m64x4(above, isa.less_than_or_equal_f64s(self.value, high_value))
+        };
+        isa.first_true_m64s(isa.not_m64x4(within)) == 4
     }
 
     /// Runs work in a function of its own.
