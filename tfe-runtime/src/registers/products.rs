@@ -103,10 +103,20 @@ impl<S: Storage> Matrix<S> {
                 add(like, &mut sums, columns, &row[a]);
             }
             if let Some(row) = rows.get(whole.len()) {
-                for (column, value) in rest.iter().zip(&row[a]) {
-                    let value = like.like(*value);
-                    for c in 0..C {
-                        sums[0][c] = like.with(column[c]).times_plus(value, sums[0][c]);
+                let (even, [x, y, z, _]) = (&mut sums[0], &row[a]);
+                // Written out: with few points a loop takes longer than what is in it.
+                match rest {
+                    [] => {}
+                    [one] => add_column(like, even, one, *x),
+                    [one, two] => {
+                        add_column(like, even, one, *x);
+                        add_column(like, even, two, *y);
+                    }
+                    // Of four there would be one more that is whole.
+                    [one, two, three, ..] => {
+                        add_column(like, even, one, *x);
+                        add_column(like, even, two, *y);
+                        add_column(like, even, three, *z);
                     }
                 }
             }
@@ -157,11 +167,21 @@ fn add<V: Four, const C: usize>(
     values: &[f64],
 ) {
     for (lane, (column, value)) in columns.iter().zip(values).enumerate() {
-        let value = like.like(*value);
-        for c in 0..C {
-            let sum = &mut sums[lane % 2][c];
-            *sum = like.with(column[c]).times_plus(value, *sum);
-        }
+        add_column(like, &mut sums[lane % 2], column, *value);
+    }
+}
+
+/// Adds the product of a column with its value.
+#[inline(always)]
+fn add_column<V: Four, const C: usize>(
+    like: V,
+    sums: &mut [V; C],
+    column: &[[f64; 4]; C],
+    value: f64,
+) {
+    let value = like.like(value);
+    for c in 0..C {
+        sums[c] = like.with(column[c]).times_plus(value, sums[c]);
     }
 }
 
