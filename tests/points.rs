@@ -65,6 +65,37 @@ struct Charge {
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + 3*dot(x) - cos(x))]
 struct Shifted {}
 
+/// Lagrange's top: two of three coordinates are ignorable, in velocities.
+#[dynamics(
+    coordinates(phi, theta, psi),
+    lagrangian = a/2*(dot(theta)^2 + sin(theta)^2*dot(phi)^2) + c/2*(dot(psi) + cos(theta)*dot(phi))^2 - w*cos(theta),
+)]
+struct Top {
+    a: f64,
+    c: f64,
+    w: f64,
+}
+
+/// A cart under a spring: the place of the cart is ignorable, in equations of second order with a mass matrix that is not diagonal.
+#[dynamics(
+    coordinates(cart, spring),
+    lagrangian = m*dot(cart)^2/2 + dot(cart)*dot(spring) + dot(spring)^2/2 - spring^2/2 - spring^4,
+    force(spring) = -c*dot(spring),
+)]
+struct Cart {
+    m: f64,
+    c: f64,
+}
+
+/// The same without the coupling.
+#[dynamics(
+    coordinates(spring, cart), momenta(p, j),
+    hamiltonian = p^2/2 + j^2/(2*m) + spring^2/2 + spring^4,
+)]
+struct Loose {
+    m: f64,
+}
+
 const STEPS: usize = 30;
 
 /// The end after some steps, and the polynomial and the matrix of the last one.
@@ -172,6 +203,66 @@ fn phase_space() {
         p: [0.2, 0.5],
     };
     compare(&Spherical {}, start);
+}
+
+/// Eight trajectories side by side, against one.
+fn compare_side_by_side<M: Model<N> + Sync, const N: usize>(model: &M, start: State<N>) {
+    let starts: Vec<_> = (0..8)
+        .map(|lane| {
+            let mut start = start;
+            start.p[0] += 0.01 * f64::from(lane);
+            start
+        })
+        .collect();
+    let few = |element: &Element| [3, 9].contains(&element.nodes());
+    for element in elements().into_iter().filter(few) {
+        let run = Ensemble::new(model).element(element).step(0.1);
+        let ends = run.run(&starts, 0.0..3.0).expect("a good plan");
+        for (start, end) in starts.iter().zip(&ends) {
+            let alone = Simulation::new(model).element(element).step(0.1);
+            let alone = alone.run(*start, 0.0..3.0).expect("a regular motion");
+            let end = end.as_ref().expect("a regular motion");
+            for a in 0..N {
+                let differences = [end.q[a] - alone.last().q[a], end.p[a] - alone.last().p[a]];
+                for difference in differences {
+                    assert!(difference.abs() < 2e-13, "{element}: {difference:.1e}");
+                }
+            }
+        }
+    }
+}
+
+/// They are left out of iterations, and must be found at ends, inside, and in matrices.
+#[test]
+fn ignorable_coordinates() {
+    let top = Top {
+        a: 1.2,
+        c: 0.3,
+        w: 1.0,
+    };
+    assert_eq!(<Top as Model<3>>::IGNORABLE, [true, false, true]);
+    let start = top.state([0.3, 1.1, -0.2], [0.2, 0.1, 0.5]);
+    compare(&top, start);
+    compare_side_by_side(&top, start);
+    let cart = Cart { m: 3.0, c: 0.1 };
+    assert_eq!(<Cart as Model<2>>::IGNORABLE, [true, false]);
+    let start = cart.state([0.3, 0.9], [0.4, 0.1]);
+    compare(&cart, start);
+    compare_side_by_side(&cart, start);
+    let loose = Loose { m: 3.0 };
+    assert_eq!(<Loose as Model<2>>::IGNORABLE, [false, true]);
+    let start = State {
+        q: [0.9, 0.3],
+        p: [0.1, 0.4],
+    };
+    compare(&loose, start);
+    compare_side_by_side(&loose, start);
+    let start = State {
+        q: [1.0, 0.0],
+        p: [0.2, 0.5],
+    };
+    assert_eq!(<Spherical as Model<2>>::IGNORABLE, [false, true]);
+    compare_side_by_side(&Spherical {}, start);
 }
 
 /// What a run does must not depend on whether somebody looks inside its elements.

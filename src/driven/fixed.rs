@@ -27,6 +27,7 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
             .energy_function_with(&self.sources.values(t), t, q, z)
     }
 
+    const IGNORABLE: [bool; N] = M::IGNORABLE;
     const LANES: bool = M::LANES;
 
     #[inline(always)]

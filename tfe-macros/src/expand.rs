@@ -318,6 +318,7 @@ impl<'a> Kernels<'a> {
             Form::Hamiltonian => quote!(Hamiltonian),
         };
         let facts = page::facts(self.derivation, &quote!(__tfe));
+        let ignorable = page::ignorable(self.derivation, dof);
         let coordinate_name = self.coordinate_name();
         let (observable_names, observables) = self.observables();
         let names = (self.coordinates.as_slice(), &self.places);
@@ -379,6 +380,7 @@ impl<'a> Kernels<'a> {
                 impl #impl_generics __tfe::Model<#dof> for #name #type_generics #where_clause {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;
+                    #ignorable
 
                     #kernels
 

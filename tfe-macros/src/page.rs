@@ -214,6 +214,15 @@ pub(crate) fn facts(derivation: &Derivation, path: &TokenStream) -> TokenStream 
     }
 }
 
+/// The constant of `Model` that tells which coordinates are ignorable; nothing if none is.
+pub(crate) fn ignorable(derivation: &Derivation, dof: &TokenStream) -> Option<TokenStream> {
+    let structure = derivation.structure();
+    let ignorable = &structure.ignorable;
+    let count = usize::try_from(structure.dof.as_constant()?).ok()?;
+    let flags = (0..count).map(|index| ignorable.contains(&index));
+    (!ignorable.is_empty()).then(|| quote!(const IGNORABLE: [bool; #dof] = [#(#flags),*];))
+}
+
 /// All operations, each counted once.
 pub(crate) fn total(counts: &Counts) -> usize {
     let all = operations(counts);

@@ -295,7 +295,7 @@ impl<M: Model<N>, S: Storage, const N: usize> Apart for Velocities<'_, M, S, N> 
         let mut local = None;
         let groups = points.tables.groups;
         let work = Work::<N, S>::of::<M>(&mut points.work, &mut local, groups);
-        (points.tables.once).apply(like, &points.forces, &mut work.products);
+        (points.tables.once).apply(like, &[true; N], &points.forces, &mut work.products);
         let (rows, step) = (rates.as_chunks_mut::<N>().0, like.like(points.last_step));
         for (products, rows) in work.products.iter().zip(rows.chunks_mut(4)) {
             for a in 0..N {
@@ -498,6 +498,19 @@ fn diagonal_of<const N: usize>(matrix: &[[f64; N]; N]) -> Option<[f64; N]> {
         }
     }
     Some(diagonal)
+}
+
+/// The coordinates that are iterated for: all that are not ignorable.
+pub(crate) const fn acting<M, const N: usize>() -> [bool; N]
+where
+    M: Model<N>,
+{
+    let (mut acting, mut a) = ([true; N], 0);
+    while a < N {
+        acting[a] = !M::IGNORABLE[a];
+        a += 1;
+    }
+    acting
 }
 
 /// Whether the equations are M q̈ = f.

@@ -70,6 +70,24 @@ fn coordinates_that_cancel_are_cyclic() {
     assert!(!first(text).contains("E_q[1]"), "{}", first(text));
 }
 
+/// Cyclic ones on which no force acts, and on which none depends, not even by a sign.
+#[test]
+fn ignorable_coordinates_are_in_no_equation() {
+    let ignorable = |rest: &str| {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - x^4{rest}");
+        derivation(&text).structure().ignorable.clone()
+    };
+    assert_eq!(ignorable(""), [1]);
+    assert_eq!(ignorable(", force(x) = -dot(x)"), [1]);
+    assert_eq!(ignorable(", force(x) = -dot(x)*dot(y)"), [1]);
+    assert_eq!(ignorable(", force(y) = -1"), []);
+    assert_eq!(ignorable(", force(x) = -y*dot(x)"), []);
+    assert_eq!(ignorable(", force(x) = -select(y > 1, dot(x), 0)"), []);
+    assert_eq!(ignorable(" + x*sign(y)"), []);
+    assert_eq!(ignorable(", constraint(rod) = y - x"), []);
+    assert_eq!(ignorable(", constraint(still) = dot(x)"), []);
+}
+
 #[test]
 fn a_hamiltonian_that_is_not_quadratic() {
     let derivation = derivation("coordinates(x), momenta(p), hamiltonian = sqrt(1 + p^2) + x^4");

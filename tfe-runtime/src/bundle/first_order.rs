@@ -25,7 +25,7 @@ where
         mask: V::Mask,
     ) {
         let (at, rows) = self.rows::<V>(group, work, mask);
-        rows.set_low(like, &at);
+        rows.set_low::<_, _, M>(like, &at);
     }
 
     /// An iteration of a Lagrangian's velocities.

@@ -5,16 +5,18 @@ use crate::precise::{add_exactly, exact_term};
 use crate::registers::pair::{Apart, Eight};
 use crate::registers::storage::{Heap, Matrix, Weights};
 
-/// The product of a K × K matrix with a vector over the points, for every coordinate.
+/// The product of a K × K matrix with a vector over the points, for every coordinate that is wanted.
 #[inline(always)]
 pub(super) fn apply<V: Eight, const N: usize>(
     like: V,
     matrix: &Matrix<Heap>,
+    wanted: &[bool; N],
     rows: &[Row<N>],
     products: &mut [Row<N>],
 ) {
     like.apart(Product {
         matrix,
+        wanted,
         rows,
         products,
     });
@@ -23,6 +25,7 @@ pub(super) fn apply<V: Eight, const N: usize>(
 /// A product to be computed. No model is part of its type, so that all places of its call share what the compiler makes of it.
 struct Product<'a, const N: usize> {
     matrix: &'a Matrix<Heap>,
+    wanted: &'a [bool; N],
     rows: &'a [Row<N>],
     products: &'a mut [Row<N>],
 }
@@ -75,6 +78,9 @@ impl<const N: usize> Product<'_, N> {
             return;
         };
         for a in 0..N {
+            if !self.wanted[a] {
+                continue;
+            }
             let mut sums = [like; B];
             for j in 0..K {
                 let (column, value) = (columns[j].as_flattened(), like.with(rows[j][a]));
@@ -97,6 +103,9 @@ impl<const N: usize> Product<'_, N> {
     #[inline(always)]
     fn block<V: Eight, const B: usize>(&mut self, like: V, from: usize) {
         for a in 0..N {
+            if !self.wanted[a] {
+                continue;
+            }
             let mut sums = [like.like(0.0); B];
             for (column, row) in self.matrix.columns().zip(self.rows) {
                 let (column, value) = (&column[from..from + B], like.with(row[a]));
@@ -160,7 +169,13 @@ mod tests {
                 }
             }
             let mut products = rows.clone();
-            apply(Pair(like, like), &tables.once, &rows, &mut products);
+            apply(
+                Pair(like, like),
+                &tables.once,
+                &[true; 3],
+                &rows,
+                &mut products,
+            );
             for l in 0..points {
                 for a in 0..3 {
                     for lane in 0..LANES {

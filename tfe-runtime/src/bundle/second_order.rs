@@ -5,6 +5,7 @@ use super::judge::Increments;
 use super::products::{apply, sum};
 use super::step::Step;
 use crate::model::Model;
+use crate::points::acting;
 use crate::points::end::moved;
 use crate::points::evaluation::Evaluation;
 use crate::points::second_order::velocity_of;
@@ -58,14 +59,14 @@ where
         evaluation: &mut Evaluation<V, N>,
         iteration: u32,
     ) -> Increments<V> {
-        let table = &self.tables.twice;
-        apply(like, table, &group.forces, &mut work.products);
+        let (table, acting) = (&self.tables.twice, &const { acting::<M, N>() });
+        apply(like, table, acting, &group.forces, &mut work.products);
         if iteration == 0 {
             let (at, forces) = self.accelerated(group, work, mask);
             if self.control.is_rough() {
-                forces.set_drift(like, &at);
+                forces.set_drift::<_, _, M>(like, &at);
             } else {
-                forces.set_exact_drift(like, &at);
+                forces.set_exact_drift::<_, _, M>(like, &at);
             }
         }
         let (at, forces) = self.accelerated::<V>(group, work, mask);

@@ -122,7 +122,13 @@ where
         unknowns: &mut Vec<Row<N>>,
         products: &mut Vec<Row<N>>,
     ) {
-        apply(like, self.tables.continued(), unknowns, products);
+        apply(
+            like,
+            self.tables.continued(),
+            &[true; N],
+            unknowns,
+            products,
+        );
         if *warm == [true; LANES] {
             core::mem::swap(unknowns, products);
             return;

@@ -72,8 +72,15 @@ impl<M, V: Eight, const N: usize> Arrangement<V, LANES, N> for Trajectories<'_, 
     }
 
     #[inline(always)]
-    fn apply(&self, like: V, table: &Matrix<Heap>, rows: &[Row<N>], products: &mut [Row<N>]) {
-        apply(like, table, rows, products);
+    fn apply(
+        &self,
+        like: V,
+        table: &Matrix<Heap>,
+        wanted: &[bool; N],
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
+        apply(like, table, wanted, rows, products);
     }
 
     #[inline(always)]

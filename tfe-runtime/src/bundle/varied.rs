@@ -96,6 +96,7 @@ impl<M: Model<N>, const N: usize> Model<N> for Varied<'_, M> {
         constant_mass: false,
         ..M::FACTS
     };
+    const IGNORABLE: [bool; N] = M::IGNORABLE;
     const LANES: bool = M::LANES;
 
     fn energy_function<R: Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {

@@ -41,11 +41,12 @@ pub(crate) trait Arrangement<V: Side<L>, const L: usize, const N: usize> {
     /// What rounding took from them.
     fn low(&self, like: V, a: usize) -> (V, V);
 
-    /// The product of a table with a vector over the points, for every coordinate.
+    /// The product of a table with a vector over the points, for every coordinate that is wanted.
     fn apply(
         &self,
         like: V,
         table: &Matrix<Self::Memory>,
+        wanted: &[bool; N],
         rows: &[Row<L, N>],
         products: &mut [Row<L, N>],
     );

@@ -1,5 +1,6 @@
 //! Equations of first order, velocities or the rates of phase space as unknowns: one text for four points of a trajectory side by side and for eight trajectories.
 
+use super::acting;
 use super::arrangement::{Arrangement, Row, Size};
 use super::evaluation::Evaluation;
 use crate::model::Model;
@@ -27,28 +28,39 @@ pub(crate) struct Rows<'a, const L: usize, const N: usize> {
 impl<const L: usize, const N: usize> Rows<'_, L, N> {
     /// What low words of the start and of the tables add at the points.
     #[inline(always)]
-    pub(crate) fn set_low<V, A>(self, like: V, at: &A)
+    pub(crate) fn set_low<V, A, M>(self, like: V, at: &A)
     where
         V: Side<L>,
         A: Arrangement<V, L, N>,
+        M: Model<N>,
     {
+        let acting = &const { acting::<M, N>() };
         let (tables, h) = (at.tables(), like.like(at.h()));
         let of_rates = match tables.projected.first() {
             None => &tables.once_low,
             Some(projection) => &projection.position_low,
         };
-        at.apply(like, of_rates, self.rates, self.products);
-        at.apply(like, &tables.once_low, self.forces, self.more_products);
+        at.apply(like, of_rates, acting, self.rates, self.products);
+        at.apply(
+            like,
+            &tables.once_low,
+            acting,
+            self.forces,
+            self.more_products,
+        );
         for (low, product) in self.low_position.iter_mut().zip(self.products) {
             for a in 0..N {
+                if M::IGNORABLE[a] {
+                    continue;
+                }
                 let product = like.with(product[a]);
                 low[a] = h.times_plus(product, at.low(like, a).0).lanes();
             }
         }
         for (low, product) in self.low_momentum.iter_mut().zip(self.more_products) {
             for a in 0..N {
-                let product = like.with(product[a]);
-                low[a] = h.times_plus(product, at.low(like, a).1).lanes();
+                let of_start = at.low(like, a).1;
+                low[a] = with_product::<V, M, L, N>(h, (product, a), of_start).lanes();
             }
         }
     }
@@ -80,15 +92,18 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
         let nodes = &A::entries(&tables.nodes)[..count];
         let masses = self.masses;
         let projection = tables.projected.first();
+        let acting = &const { acting::<M, N>() };
         match projection {
-            None => at.apply(like, &tables.once, rates, products),
-            Some(projection) => at.apply(like, &projection.position, rates, products),
+            None => at.apply(like, &tables.once, acting, rates, products),
+            Some(projection) => at.apply(like, &projection.position, acting, rates, products),
         }
         for c in 0..count {
             let Evaluation { q, z: v, first } = evaluation;
             for a in 0..N {
-                let low = like.with(low_position[c][a]);
-                q[a] = at.start(like, a).0 + h.times_plus(like.with(products[c][a]), low);
+                if !M::IGNORABLE[a] {
+                    let low = like.with(low_position[c][a]);
+                    q[a] = at.start(like, a).0 + h.times_plus(like.with(products[c][a]), low);
+                }
                 v[a] = like.with(rates[c][a]);
             }
             let t = at.time(like, nodes[c]);
@@ -107,9 +122,10 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
         }
         if let Some(projection) = projection {
             more_products.copy_from_slice(momenta);
-            at.apply(like, &projection.onto_rates, more_products, momenta);
+            let (onto_rates, all) = (&projection.onto_rates, &[true; N]);
+            at.apply(like, onto_rates, all, more_products, momenta);
         }
-        at.apply(like, &tables.once, forces, products);
+        at.apply(like, &tables.once, acting, forces, products);
         let (mut changed, mut size) = (A::Size::none(like), A::Size::none(like));
         // The loops apart: the one without projection is what most elements go through.
         if let Some(projection) = projection {
@@ -121,7 +137,8 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                 }
             }
             // With one mass matrix for all points these would lie among the rates already.
-            at.apply(like, &projection.onto_rates, more_products, products);
+            let (onto_rates, all) = (&projection.onto_rates, &[true; N]);
+            at.apply(like, onto_rates, all, more_products, products);
             for c in 0..count {
                 for a in 0..N {
                     let step = like.with(products[c][a]);
@@ -174,25 +191,27 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
         let low_momentum = &self.low_momentum[..count];
         let nodes = &A::entries(&tables.nodes)[..count];
         let masses = self.masses;
-        at.apply(like, &tables.once, forces, products);
+        let acting = &const { acting::<M, N>() };
+        at.apply(like, &tables.once, acting, forces, products);
         for c in 0..count {
-            let mut change = [zero; N];
+            let mut changes = [zero; N];
             for a in 0..N {
                 let low = like.with(low_momentum[c][a]);
-                let p = at.start(like, a).1 + h.times_plus(like.with(products[c][a]), low);
-                change[a] = p - like.with(momenta[c][a]);
+                let change = with_product::<V, M, L, N>(h, (&products[c], a), low);
+                let p = at.start(like, a).1 + change;
+                changes[a] = p - like.with(momenta[c][a]);
                 momenta[c][a] = p.lanes();
             }
             let mut by_change = [zero; N];
             if const { M::FACTS.constant_mass } {
                 if !is_first {
-                    by_change = at.inertia().times(like, &change);
+                    by_change = at.inertia().times(like, &changes);
                 }
             } else if !is_first {
                 for a in 0..N {
                     for b in 0..N {
                         let mass = like.with(masses[c][a][b]);
-                        by_change[a] = mass.times_plus(change[b], by_change[a]);
+                        by_change[a] = mass.times_plus(changes[b], by_change[a]);
                     }
                 }
             }
@@ -200,14 +219,16 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                 velocities[c][a] = (like.with(rates[c][a]) + by_change[a]).lanes();
             }
         }
-        at.apply(like, &tables.once, velocities, products);
+        at.apply(like, &tables.once, acting, velocities, products);
         let none = A::Size::none(like);
         let [mut of_rates, mut of_forces] = [(none, none); 2];
         for c in 0..count {
             let Evaluation { q, z: p, first } = evaluation;
             for a in 0..N {
-                let low = like.with(low_position[c][a]);
-                q[a] = at.start(like, a).0 + h.times_plus(like.with(products[c][a]), low);
+                if !M::IGNORABLE[a] {
+                    let low = like.with(low_position[c][a]);
+                    q[a] = at.start(like, a).0 + h.times_plus(like.with(products[c][a]), low);
+                }
                 p[a] = like.with(momenta[c][a]);
             }
             let t = at.time(like, nodes[c]);
@@ -233,6 +254,23 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
     }
 }
 
+/// low + h · a product with forces, which is zero where no forces are.
+#[inline(always)]
+fn with_product<V, M, const L: usize, const N: usize>(
+    h: V,
+    (products, a): (&Row<L, N>, usize),
+    low: V,
+) -> V
+where
+    V: Side<L>,
+    M: Model<N>,
+{
+    if M::IGNORABLE[a] {
+        return low;
+    }
+    h.times_plus(h.with(products[a]), low)
+}
+
 /// M⁻¹ times what momenta lack: from products of the tables with forces, low words, and what the momenta are more than that at the start.
 #[inline(always)]
 fn missing_velocity<V, A, M, const L: usize, const N: usize>(
@@ -248,7 +286,7 @@ where
 {
     let (h, mut step) = (like.like(at.h()), [like.like(0.0); N]);
     for a in 0..N {
-        let wanted = h.times_plus(like.with(products[a]), like.with(low[a]));
+        let wanted = with_product::<V, M, L, N>(h, (products, a), like.with(low[a]));
         step[a] = wanted - like.with(momenta[a]);
     }
     if const { M::FACTS.constant_mass } {

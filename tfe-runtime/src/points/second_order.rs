@@ -1,5 +1,6 @@
 //! M q̈ = f(q, q̇), forces as the only unknowns: one text for four points of a trajectory side by side and for eight trajectories.
 
+use super::acting;
 use super::arrangement::{Arrangement, Row, Size};
 use super::evaluation::Evaluation;
 use crate::model::{Form, Model};
@@ -23,16 +24,20 @@ pub(crate) struct Forces<'a, X, const L: usize, const N: usize> {
 impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
     /// How far the velocity at the start reaches, to the working precision.
     #[inline(always)]
-    pub(crate) fn set_drift<V, A>(self, like: V, at: &A)
+    pub(crate) fn set_drift<V, A, M>(self, like: V, at: &A)
     where
         V: Side<L>,
         A: Arrangement<V, L, N, Number = X>,
+        M: Model<N>,
     {
         let h = like.like(at.h());
         let reach = A::entries(&at.tables().reach);
         for (drift, reach) in self.drift.iter_mut().zip(reach) {
             let reach = h * A::entry(like, *reach);
             for a in 0..N {
+                if M::IGNORABLE[a] {
+                    continue;
+                }
                 drift[a] = (reach * at.number(like, self.velocity[a])).lanes();
             }
         }
@@ -40,14 +45,22 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
 
     /// The same with what low words of state and tables add. The products are A² f, those with its low part follow here.
     #[inline(always)]
-    pub(crate) fn set_exact_drift<V, A>(self, like: V, at: &A)
+    pub(crate) fn set_exact_drift<V, A, M>(self, like: V, at: &A)
     where
         V: Side<L>,
         A: Arrangement<V, L, N, Number = X>,
+        M: Model<N>,
     {
         let (tables, inertia) = (at.tables(), at.inertia());
         let is_diagonal = inertia.is_diagonal();
-        at.apply(like, &tables.twice_low, self.forces, self.more_products);
+        let acting = &const { acting::<M, N>() };
+        at.apply(
+            like,
+            &tables.twice_low,
+            acting,
+            self.forces,
+            self.more_products,
+        );
         let h = like.like(at.h());
         // What the one rounding of h² takes, the same in every step.
         let (square, square_low) = h.product(h);
@@ -60,6 +73,9 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         for c in 0..count {
             let (reach, reach_low) = (A::entry(like, reach[c]), A::entry(like, reach_low[c]));
             for a in 0..N {
+                if M::IGNORABLE[a] {
+                    continue;
+                }
                 let low = if is_diagonal {
                     let by_square = like.like(inertia.reach_low[a]) * like.with(products[c][a]);
                     let more = like.with(products_low[c][a]);
@@ -95,7 +111,9 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         let inertia = at.inertia();
         let is_diagonal = inertia.is_diagonal();
         if const { M::FACTS.forced } {
-            at.apply(like, &at.tables().once, self.forces, self.more_products);
+            let acting = &const { acting::<M, N>() };
+            let once = &at.tables().once;
+            at.apply(like, once, acting, self.forces, self.more_products);
         }
         let h = like.like(at.h());
         let (mut changed, mut size) = (A::Size::none(like), A::Size::none(like));
@@ -109,9 +127,9 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
             let Evaluation { q, z, first } = evaluation;
             let far = (&products[c], &drift[c]);
             if is_diagonal {
-                positions::<V, A, true, L, N>(like, at, far, q);
+                positions::<V, A, M, true, L, N>(like, at, far, q);
             } else {
-                positions::<V, A, false, L, N>(like, at, far, q);
+                positions::<V, A, M, false, L, N>(like, at, far, q);
             }
             if const { M::FACTS.forced } {
                 for a in 0..N {
@@ -129,6 +147,9 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
             }
             A::first(model, at.time(like, nodes[c]), (q, z), first, None);
             for a in 0..N {
+                if M::IGNORABLE[a] {
+                    continue;
+                }
                 let given = match M::FORM {
                     Form::Lagrangian => first.q[a],
                     Form::Hamiltonian => -first.q[a],
@@ -152,7 +173,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
 
 /// Coordinates: start + drift + h² M⁻¹ · products.
 #[inline(always)]
-fn positions<V, A, const DIAGONAL: bool, const L: usize, const N: usize>(
+fn positions<V, A, M, const DIAGONAL: bool, const L: usize, const N: usize>(
     like: V,
     at: &A,
     (products, drift): (&Row<L, N>, &Row<L, N>),
@@ -160,9 +181,13 @@ fn positions<V, A, const DIAGONAL: bool, const L: usize, const N: usize>(
 ) where
     V: Side<L>,
     A: Arrangement<V, L, N>,
+    M: Model<N>,
 {
     let (inertia, square) = (at.inertia(), like.like(at.h() * at.h()));
     for a in 0..N {
+        if M::IGNORABLE[a] {
+            continue;
+        }
         let drift = like.with(drift[a]);
         let moved = if const { DIAGONAL } {
             like.like(inertia.reach[a])

@@ -1,7 +1,8 @@
 //! A step of one trajectory: start of the iteration, the iteration, the end.
 
 use super::evaluation::{Evaluation, FEW, Placed};
-use super::{Leg, Outcome, Points, Together, Work, is_finite, is_phase, is_second_order, largest};
+use super::{Leg, Outcome, Points, Together, Work};
+use super::{acting, is_finite, is_phase, is_second_order, largest};
 use crate::error::StepError;
 use crate::method::{Last, Memory};
 use crate::model::{Model, State};
@@ -189,15 +190,16 @@ where
         let mut local = None;
         let groups = points.tables.groups;
         let work = Work::<N, S>::of::<M>(&mut points.work, &mut local, groups);
+        let acting = &const { acting::<M, N>() };
         if points.is_warm {
             if const { is_second_order::<M, N>() || is_phase::<M, N>() } {
-                (points.tables.continued()).apply(like, &points.forces, &mut work.forces);
+                (points.tables.continued()).apply(like, acting, &points.forces, &mut work.forces);
             } else {
                 // The first iteration takes what low words of the tables make of them.
                 work.forces.copy_from_slice(&points.forces);
             }
             if const { !is_second_order::<M, N>() } {
-                (points.tables.continued()).apply(like, &points.rates, &mut work.rates);
+                (points.tables.continued()).apply(like, &[true; N], &points.rates, &mut work.rates);
             }
         } else {
             work.forces.copy_from_slice(&points.forces);
@@ -230,14 +232,14 @@ where
         };
         let (mut iterations, mut refresh, mut converged) = (0, true, false);
         if const { is_second_order::<M, N>() } {
-            work.integrate_twice(like, &leg);
+            work.integrate_twice::<_, M>(like, &leg);
             if is_rough {
-                work.accelerated().set_drift(like, &leg);
+                work.accelerated().set_drift::<_, _, M>(like, &leg);
             } else {
-                work.accelerated().set_exact_drift(like, &leg);
+                work.accelerated().set_exact_drift::<_, _, M>(like, &leg);
             }
         } else if !is_rough {
-            work.rows().set_low(like, &leg);
+            work.rows().set_low::<_, _, M>(like, &leg);
         }
         let mut new_place = None;
         let at = match points.places.kept() {
@@ -270,7 +272,7 @@ where
                 break;
             }
             if const { is_second_order::<M, N>() } {
-                work.integrate_twice(like, &leg);
+                work.integrate_twice::<_, M>(like, &leg);
             }
         }
         converged |= monitor.is_at_round_off();

@@ -4,7 +4,7 @@ use super::arrangement::{Arrangement, Size};
 use super::evaluation::Evaluation;
 use super::first_order::Rows;
 use super::second_order::{Forces, velocity_of};
-use super::{Inertia, Leg, Row, Work};
+use super::{Inertia, Leg, Row, Work, acting};
 use crate::double_double::DoubleDouble;
 use crate::equations::Increment;
 use crate::model::{First, Model};
@@ -165,8 +165,15 @@ impl<V: Four, const N: usize, S: Storage> Arrangement<V, 4, N> for Leg<'_, N, S>
     }
 
     #[inline(always)]
-    fn apply(&self, like: V, table: &Matrix<S>, rows: &[Row<N>], products: &mut [Row<N>]) {
-        table.apply(like, rows, products);
+    fn apply(
+        &self,
+        like: V,
+        table: &Matrix<S>,
+        wanted: &[bool; N],
+        rows: &[Row<N>],
+        products: &mut [Row<N>],
+    ) {
+        table.apply(like, wanted, rows, products);
     }
 
     #[inline(always)]
@@ -246,8 +253,12 @@ impl<const N: usize, S: Storage> Work<N, S> {
 
     /// A² f
     #[inline(always)]
-    pub(super) fn integrate_twice<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
-        (leg.tables.twice).apply(like, &self.forces, &mut self.products);
+    pub(super) fn integrate_twice<V: Four, M>(&mut self, like: V, leg: &Leg<'_, N, S>)
+    where
+        M: Model<N>,
+    {
+        let acting = &const { acting::<M, N>() };
+        (leg.tables.twice).apply(like, acting, &self.forces, &mut self.products);
     }
 
     /// An iteration of the forces of M q̈ = f.

@@ -29,10 +29,11 @@ pub(crate) trait Four: Side<4> {
         (self.sin_cos(), other.sin_cos())
     }
 
-    /// The product of a table with a vector over the points, for every coordinate.
+    /// The product of a table with a vector over the points, for every coordinate that is wanted.
     fn apply<S: Storage, const N: usize>(
         self,
         matrix: &Matrix<S>,
+        wanted: &[bool; N],
         rows: &[Row<N>],
         products: &mut [Row<N>],
     );
@@ -123,10 +124,11 @@ impl Four for Lanes<4> {
     fn apply<S: Storage, const N: usize>(
         self,
         matrix: &Matrix<S>,
+        wanted: &[bool; N],
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
-        matrix.apply_inline(self, rows, products);
+        matrix.apply_inline(self, wanted, rows, products);
     }
 
     #[inline(never)]

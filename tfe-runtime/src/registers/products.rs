@@ -5,38 +5,40 @@ use super::storage::{MAX_GROUPS, Matrix, Row, Storage, Weights};
 use crate::precise::{Precise, add_exactly, exact_term};
 
 impl<S: Storage> Matrix<S> {
-    /// The product with a vector over the points for every coordinate.
+    /// The product with a vector over the points for every coordinate that is wanted; the others stay as they are.
     #[inline(always)]
     pub(crate) fn apply<V: Four, const N: usize>(
         &self,
         like: V,
+        wanted: &[bool; N],
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
-        like.apply(self, rows, products);
+        like.apply(self, wanted, rows, products);
     }
 
     #[inline(always)]
     pub(super) fn apply_inline<V: Four, const N: usize>(
         &self,
         like: V,
+        wanted: &[bool; N],
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
         // Without optimisation nothing is gained by a text for each number of groups, and a third of the time of compiling is lost.
         if const { S::GROUPS == 0 } && cfg!(debug_assertions) {
-            self.apply_in_turn(like, rows, products);
+            self.apply_in_turn(like, wanted, rows, products);
             return;
         }
         // Conditions that are constants, so that of a known size one is compiled.
         if const { S::GROUPS == 1 } || const { S::GROUPS == 0 } && rows.len() == 1 {
-            self.apply_to::<V, N, 1>(like, rows, products);
+            self.apply_to::<V, N, 1>(like, wanted, rows, products);
         } else if const { S::GROUPS == 2 } || const { S::GROUPS == 0 } && rows.len() == 2 {
-            self.apply_to::<V, N, 2>(like, rows, products);
+            self.apply_to::<V, N, 2>(like, wanted, rows, products);
         } else if const { S::GROUPS == 3 } || const { S::GROUPS == 0 } && rows.len() == 3 {
-            self.apply_to::<V, N, 3>(like, rows, products);
+            self.apply_to::<V, N, 3>(like, wanted, rows, products);
         } else {
-            self.apply_to::<V, N, MAX_GROUPS>(like, rows, products);
+            self.apply_to::<V, N, MAX_GROUPS>(like, wanted, rows, products);
         }
     }
 
@@ -45,6 +47,7 @@ impl<S: Storage> Matrix<S> {
     fn apply_in_turn<V: Four, const N: usize>(
         &self,
         like: V,
+        wanted: &[bool; N],
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
@@ -52,6 +55,9 @@ impl<S: Storage> Matrix<S> {
         let points = self.columns.len() / groups;
         let (has_gaps, paired) = (points != 4 * groups, points / 4 * 4);
         for a in 0..N {
+            if !wanted[a] {
+                continue;
+            }
             for c in 0..groups {
                 let mut sums = [like.like(0.0); 2];
                 for point in 0..points {
@@ -73,6 +79,7 @@ impl<S: Storage> Matrix<S> {
     fn apply_to<V: Four, const N: usize, const C: usize>(
         &self,
         like: V,
+        wanted: &[bool; N],
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
@@ -86,6 +93,9 @@ impl<S: Storage> Matrix<S> {
         if let ([whole], []) = (whole.as_chunks::<C>().0, rest) {
             // Groups without gaps are written out by the compiler.
             for a in 0..N {
+                if !wanted[a] {
+                    continue;
+                }
                 let mut sums = first_two(like, &whole[0], &rows[0][a]);
                 add(like, &mut sums, &whole[0][2..], &rows[0][a][2..]);
                 for (columns, row) in whole[1..].iter().zip(&rows[1..]) {
@@ -98,6 +108,9 @@ impl<S: Storage> Matrix<S> {
             return;
         }
         for a in 0..N {
+            if !wanted[a] {
+                continue;
+            }
             let mut sums = [[zero; C]; 2];
             for (columns, row) in whole.iter().zip(rows) {
                 add(like, &mut sums, columns, &row[a]);
@@ -346,8 +359,8 @@ mod tests {
         let (matrix, rows) = given::<N>(points);
         let like = Lanes([0.0; 4]);
         let mut products = [[[[f64::NAN; 4]; N]; C]; 2];
-        matrix.apply_to::<_, N, C>(like, &rows, &mut products[0]);
-        matrix.apply_in_turn(like, &rows, &mut products[1]);
+        matrix.apply_to::<_, N, C>(like, &[true; N], &rows, &mut products[0]);
+        matrix.apply_in_turn(like, &[true; N], &rows, &mut products[1]);
         let [written_out, in_turn] = products.map(|one| one.as_flattened().as_flattened().to_vec());
         for (a, b) in written_out.iter().zip(&in_turn) {
             assert_eq!(a.to_bits(), b.to_bits(), "{points} points: {a} and {b}");

@@ -25,10 +25,11 @@ impl Four for Quad {
     fn apply<S: Storage, const N: usize>(
         self,
         matrix: &Matrix<S>,
+        wanted: &[bool; N],
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
-        matrix.apply_inline(self, rows, products);
+        matrix.apply_inline(self, wanted, rows, products);
     }
 
     #[inline(always)]

@@ -49,6 +49,8 @@ pub struct Structure {
     pub cyclic: Vec<usize>,
     /// Those of them on which no force acts: their momenta are constant.
     pub conserved: Vec<usize>,
+    /// Those of them on which no force depends either: what is left of the equations does not hold them at all. None where there are constraints.
+    pub ignorable: Vec<usize>,
     /// Pattern of ∂²/∂z∂z
     pub zz: Pattern,
     /// Pattern of ∂²/∂z∂q; row z
@@ -119,6 +121,10 @@ impl Structure {
         let zz = pattern(Array::ZZ);
         let cyclic = cyclic(dof, entries);
         let conserved = conserved(&cyclic, entries);
+        let ignorable = match constraints {
+            true => Vec::new(),
+            false => ignorable(graph, &conserved, entries),
+        };
         Self {
             form,
             dof: dof.clone(),
@@ -132,6 +138,7 @@ impl Structure {
             symmetric_forces: of(Array::ForceZ).next().is_none() && is_symmetric(entries),
             cyclic,
             conserved,
+            ignorable,
             diagonal_mass: zz.is_diagonal(),
             zz,
             zq: pattern(Array::ZQ),
@@ -228,6 +235,30 @@ fn conserved(cyclic: &[usize], entries: &[Entry]) -> Vec<usize> {
     let is_free =
         |index: &&usize| i64::try_from(**index).is_ok_and(|index| !pushed.contains(&index));
     cyclic.iter().filter(is_free).copied().collect()
+}
+
+/// The conserved coordinates that no first derivative, force or entry of the mass matrix holds, not even in a condition; none where one holds a coordinate whose index is not literal.
+fn ignorable(graph: &Graph, conserved: &[usize], entries: &[Entry]) -> Vec<usize> {
+    let roots: Vec<ExprId> = entries
+        .iter()
+        .filter(|entry| {
+            matches!(
+                entry.place.array,
+                Array::ByZ | Array::ByQ | Array::Force | Array::ZZ
+            )
+        })
+        .map(|entry| entry.value)
+        .collect();
+    let indices = (graph.reachable(&roots).into_iter()).filter_map(|id| match graph.node(id) {
+        Node::Input(Input::Coordinate(index)) => Some(index.as_constant()),
+        _ => None,
+    });
+    let held: Option<SortedSet<i64>> = indices.collect();
+    let Some(held) = held else {
+        return Vec::new();
+    };
+    let is_free = |index: &&usize| i64::try_from(**index).is_ok_and(|index| !held.contains(&index));
+    conserved.iter().filter(is_free).copied().collect()
 }
 
 impl Pattern {
