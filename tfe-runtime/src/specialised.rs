@@ -49,7 +49,8 @@ where
 pub struct Specialised<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize> {
     start: f64,
     step: f64,
-    steps: u64,
+    /// A whole number, as what the time is computed from in each step.
+    steps: f64,
     memory: Memory<N>,
     /// All points at once, where model and element allow it.
     points: Option<Points<N, S>>,
@@ -69,7 +70,7 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
         Self {
             start: 0.0,
             step,
-            steps: 0,
+            steps: 0.0,
             memory: Memory::new(),
             points: if const { S::GROUPS > 0 } && step.is_finite() && step != 0.0 {
                 Points::new(model, Tables::new(tables))
@@ -84,12 +85,12 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
     /// The time of the next step's start.
     #[must_use]
     pub fn time(&self) -> f64 {
-        self.start + self.steps as f64 * self.step
+        self.start + self.steps * self.step
     }
 
     /// Makes the next step start at `time`.
     pub fn set_time(&mut self, time: f64) {
-        (self.start, self.steps) = (time, 0);
+        (self.start, self.steps) = (time, 0.0);
     }
 
     /// The length of a step.
@@ -123,7 +124,7 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
             Together::Arrived => {}
             other => self.otherwise((model, scheme), place, state, other)?,
         }
-        self.steps += 1;
+        self.steps += 1.0;
         Ok(())
     }
 

@@ -52,12 +52,14 @@ impl<const N: usize, S: Storage> Work<N, S> {
             if !leg.inertia.is_diagonal() {
                 let (State { q, .. }, State { q: q_low, .. }) = apart(sums);
                 let (high, low) = leg.inertia.of_both(&q, &q_low);
-                sums = (beside(like, &high, &high), beside(like, &low, &low));
+                sums = (block(like, &high, 0), block(like, &low, 0));
             }
             // What is made of the forces here is left behind.
             let acceleration = self.accelerations::<_, EXACT>(like, leg, sums, 0);
-            let v = (self.velocity, self.velocity_low);
-            let v = (beside(like, &v.0, &v.0), beside(like, &v.1, &v.1));
+            let v = (
+                block(like, &self.velocity, 0),
+                block(like, &self.velocity_low, 0),
+            );
             let velocity = moved::<_, EXACT>(h, acceleration, v);
             let rates = (
                 first_of::<_, N>(velocity.0, force.0),

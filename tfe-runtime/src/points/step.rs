@@ -62,8 +62,8 @@ where
         if let Some(isa) = self.points.isa {
             return isa.vectorize(InRegisters { job: self, isa });
         }
-        let method = (self.model, self.tables, self.asked);
-        step_apart(self.points, method, self.memory, self.place, self.state)
+        let (of, memory) = ((self.model, self.asked), self.memory);
+        step_apart(self.points, of, self.tables, memory, self.place, self.state)
     }
 
     /// The whole step.
@@ -138,7 +138,8 @@ where
 #[inline(never)]
 fn step_apart<M, T, A, S: Storage, const N: usize>(
     points: &mut Points<N, S>,
-    (model, tables, asked): (&M, &T, &A),
+    (model, asked): (&M, &A),
+    tables: &T,
     memory: &mut Memory<N>,
     place: (f64, f64),
     state: &mut State<N>,

@@ -38,6 +38,19 @@ pub(crate) trait Four: Side<4> {
         products: &mut [Row<N>],
     );
 
+    /// Rows from columns.
+    #[inline(always)]
+    fn transposed(rows: [Self; 4]) -> [Self; 4] {
+        let (mut lanes, mut columns) = ([[0.0; 4]; 4], rows);
+        for i in 0..4 {
+            lanes[i] = rows[i].lanes();
+        }
+        for i in 0..4 {
+            columns[i] = rows[i].with([lanes[0][i], lanes[1][i], lanes[2][i], lanes[3][i]]);
+        }
+        columns
+    }
+
     /// The kernel of first derivatives at four points.
     fn first<M, const N: usize>(
         model: &M,

@@ -285,8 +285,8 @@ fn add_term<V: Precise, const EXACT: bool>(
 fn sum_of_lanes<V: Four, const EXACT: bool>(sums: [(V, V); 4]) -> (V, V) {
     let [a, b, c, d] = sums;
     sum_of::<_, EXACT>(
-        transposed([a.0, b.0, c.0, d.0]),
-        transposed([a.1, b.1, c.1, d.1]),
+        V::transposed([a.0, b.0, c.0, d.0]),
+        V::transposed([a.1, b.1, c.1, d.1]),
     )
 }
 
@@ -301,34 +301,6 @@ fn sum_of<V: Precise, const EXACT: bool>([a, b, c, d]: [V; 4], [e, f, g, h]: [V;
     let (all, all_low) = left.exact_sum(right);
     let lost = (left_low + right_low) + all_low;
     (all, ((e + f) + (g + h)) + lost)
-}
-
-/// In two steps of two registers each, as processors do it.
-#[inline(always)]
-fn transposed<V: Four>([a, b, c, d]: [V; 4]) -> [V; 4] {
-    let ((first, second), (third, fourth)) = (paired(a, b), paired(c, d));
-    let ((left, right), (more_left, more_right)) = (halves(first, third), halves(second, fourth));
-    [left, more_left, right, more_right]
-}
-
-/// [a₀, b₀, a₂, b₂] and [a₁, b₁, a₃, b₃].
-#[inline(always)]
-fn paired<V: Four>(a: V, b: V) -> (V, V) {
-    let (a, b, like) = (a.lanes(), b.lanes(), a);
-    (
-        like.with([a[0], b[0], a[2], b[2]]),
-        like.with([a[1], b[1], a[3], b[3]]),
-    )
-}
-
-/// [a₀, a₁, b₀, b₁] and [a₂, a₃, b₂, b₃].
-#[inline(always)]
-fn halves<V: Four>(a: V, b: V) -> (V, V) {
-    let (a, b, like) = (a.lanes(), b.lanes(), a);
-    (
-        like.with([a[0], a[1], b[0], b[1]]),
-        like.with([a[2], a[3], b[2], b[3]]),
-    )
 }
 
 #[cfg(all(test, feature = "alloc"))]

@@ -33,6 +33,11 @@ impl Four for Quad {
     }
 
     #[inline(always)]
+    fn transposed(rows: [Self; 4]) -> [Self; 4] {
+        Self::transposed(rows)
+    }
+
+    #[inline(always)]
     fn apart<W: Apart>(self, work: W) {
         self.apart(work);
     }
