@@ -8,6 +8,7 @@ mod coupled;
 mod lanes;
 mod models;
 mod second_order;
+mod side_by_side;
 mod tables;
 
 pub use coupled::CoupledStepper;
@@ -15,7 +16,8 @@ pub use models::{
     DoublePendulum, Fput, HeavyTop, HenonHeiles, Kepler, Pendulum, Planets, VanDerPol,
 };
 pub use pulp::x86::V3;
-pub use second_order::SecondOrderStepper;
+pub use second_order::{SecondOrder, SecondOrderStepper};
+pub use side_by_side::{LANES, SideBySide};
 
 /// Below one rounding, as [`Control`](tfe::runtime::step::Control) has it.
 const TOLERANCE: f64 = 0.05 * f64::EPSILON;

@@ -1,13 +1,14 @@
 //! Steps of emitted solvers and of the general stepper beside steppers written by hand: instructions, nanoseconds, iterations, errors.
 //!
 //! `cargo bench --bench solvers` prints the table; `cargo bench --bench solvers -- pendulum kepler` only these scenes; and `-- --instructions` no times, for a machine that is busy with other
-//! things. All three take the same steps to the same tolerance, from and to memory, one call a step. Errors are those of the end, of coordinates, over the largest one, by a run of
+//! things; and `-- starts` thousands of starts alone: lanes written by hand, an ensemble on one core, emitted solvers one start after the other. All three take the same steps to the same tolerance, from and to memory, one call a step. Errors are those of the end, of coordinates, over the largest one, by a run of
 //! `Mixed::<12>` in steps half as long. Instructions are counted where valgrind is installed; what is written by hand runs where the processor has AVX2.
 
 #[cfg(target_arch = "x86_64")]
 mod by_hand;
 mod count;
 mod scenes;
+mod starts;
 
 use std::time::Duration;
 
@@ -165,6 +166,9 @@ fn main() -> Result<(), Failure> {
         if names.is_empty() || names.iter().any(|name| *name == scene.name) {
             show(scene, &measure(scene, counts, times)?);
         }
+    }
+    if times && (names.is_empty() || names.iter().any(|name| *name == "starts")) {
+        starts::show_all()?;
     }
     Ok(())
 }

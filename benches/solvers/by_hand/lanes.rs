@@ -104,6 +104,14 @@ impl Quad {
     }
 
     #[inline(always)]
+    pub fn smaller(self, other: Self) -> Self {
+        Self {
+            value: self.isa.min_f64x4(self.value, other.value),
+            ..self
+        }
+    }
+
+    #[inline(always)]
     pub fn largest_lane(self) -> f64 {
         let [a, b, c, d] = self.lanes();
         let (left, right) = (if a > b { a } else { b }, if c > d { c } else { d });

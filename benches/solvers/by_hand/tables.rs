@@ -1,41 +1,39 @@
-//! Tables of a Gauss element of K points in C registers.
+//! Tables of a Gauss element of K points, and in C registers.
 
 use super::lanes::Quad;
 use tfe::prelude::Element;
 use tfe::runtime::scheme::{SchemeTable, Tables as _};
 
-/// A matrix by columns, its rows in registers.
-pub type Matrix<const K: usize, const C: usize> = [[[f64; 4]; C]; K];
-
-pub struct Tables<const K: usize, const C: usize> {
-    pub once: Matrix<K, C>,
-    pub twice: Matrix<K, C>,
+/// The coefficients of a Gauss element of K points.
+pub struct Coefficients<const K: usize> {
+    pub once: [[f64; K]; K],
+    pub twice: [[f64; K]; K],
     /// From the rates of the last element to those of this one.
-    pub start: Matrix<K, C>,
+    pub start: [[f64; K]; K],
     /// A² times this.
-    pub start_twice: Matrix<K, C>,
-    pub nodes: [[f64; 4]; C],
-    pub weights: [[f64; 4]; C],
+    pub start_twice: [[f64; K]; K],
+    pub nodes: [f64; K],
+    pub weights: [f64; K],
     /// bᵀA
-    pub lever: [[f64; 4]; C],
+    pub lever: [f64; K],
 }
 
-impl<const K: usize, const C: usize> Tables<K, C> {
+impl<const K: usize> Coefficients<K> {
     /// Of `Mixed` with K points.
     pub fn new() -> Self {
         let table = SchemeTable::new(Element::mixed(K + 1)).expect("a valid element");
         let view = table.view();
-        let (mut a, mut twice, mut lever) = ([[0.0; K]; K], [[0.0; K]; K], [0.0; K]);
+        let (mut once, mut twice, mut lever) = ([[0.0; K]; K], [[0.0; K]; K], [0.0; K]);
         for i in 0..K {
             for j in 0..K {
-                a[i][j] = view.position[i * K + j];
+                once[i][j] = view.position[i * K + j];
             }
         }
         for i in 0..K {
             for j in 0..K {
-                lever[i] += view.weights[j] * a[j][i];
+                lever[i] += view.weights[j] * once[j][i];
                 for k in 0..K {
-                    twice[i][j] += a[i][k] * a[k][j];
+                    twice[i][j] += once[i][k] * once[k][j];
                 }
             }
         }
@@ -53,14 +51,47 @@ impl<const K: usize, const C: usize> Tables<K, C> {
                 start_twice[i][j] = (0..K).map(|k| twice[i][k] * start[k][j]).sum();
             }
         }
+        let (mut nodes, mut weights) = ([0.0; K], [0.0; K]);
+        nodes.copy_from_slice(c);
+        weights.copy_from_slice(view.weights);
         Self {
-            once: columns(&a),
-            twice: columns(&twice),
-            start: columns(&start),
-            start_twice: columns(&start_twice),
-            nodes: row(c),
-            weights: row(view.weights),
-            lever: row(&lever),
+            once,
+            twice,
+            start,
+            start_twice,
+            nodes,
+            weights,
+            lever,
+        }
+    }
+}
+
+/// A matrix by columns, its rows in registers.
+pub type Matrix<const K: usize, const C: usize> = [[[f64; 4]; C]; K];
+
+/// The same with all points of a trajectory in registers.
+pub struct Tables<const K: usize, const C: usize> {
+    pub once: Matrix<K, C>,
+    pub twice: Matrix<K, C>,
+    pub start: Matrix<K, C>,
+    pub start_twice: Matrix<K, C>,
+    pub nodes: [[f64; 4]; C],
+    pub weights: [[f64; 4]; C],
+    pub lever: [[f64; 4]; C],
+}
+
+impl<const K: usize, const C: usize> Tables<K, C> {
+    /// Of `Mixed` with K points.
+    pub fn new() -> Self {
+        let of = Coefficients::<K>::new();
+        Self {
+            once: columns(&of.once),
+            twice: columns(&of.twice),
+            start: columns(&of.start),
+            start_twice: columns(&of.start_twice),
+            nodes: row(&of.nodes),
+            weights: row(&of.weights),
+            lever: row(&of.lever),
         }
     }
 }

@@ -87,6 +87,34 @@ impl<V: Real> Judge<V> {
         self.rate
     }
 
+    /// Zero where a lane is not active, or where its increment is neither the first nor the last and falls as most do; then [`go_on`](Self::go_on) says what
+    /// [`judge`](Self::judge) says, and says it in a tenth of the operations.
+    #[inline(always)]
+    pub(super) fn extraordinary(&self, increments: Increments<V>, active: V) -> V {
+        let (size, zero) = (increments.relative, active.like(0.0));
+        // Comparisons with a NaN are false.
+        let far = V::select((self.tolerance * self.last).less(size * size), zero, active);
+        V::select(size.less(size.like(0.5) * self.best), far, active)
+    }
+
+    /// Remembers increments of which none is extraordinary.
+    #[inline(always)]
+    pub(super) fn go_on(&mut self, increments: Increments<V>) {
+        let (size, zero) = (increments.relative, increments.relative.like(0.0));
+        self.rate = size / self.last;
+        let seen = V::select(size.like(Evidence::FAR).less(size), self.rate, zero);
+        self.worst = V::select(self.worst.less(seen), seen, self.worst);
+        (self.last, self.best, self.idle, self.risen) = (size, size, zero, zero);
+    }
+
+    /// Zero where a lane is not active, or where its rate and its last increment are so small that it is surely hopeful if eight iterations are left.
+    #[inline(always)]
+    pub(super) fn doubtful(&self, active: V) -> V {
+        let (rate, zero) = (self.rate, active.like(0.0));
+        let slow = V::select(rate.less(rate.like(0.05)), zero, active);
+        V::select(self.last.less_or_equal(rate.like(1e-4)), slow, active)
+    }
+
     /// Which of the `active` lanes have converged, and which go on; those in neither have lost their numbers.
     #[inline(always)]
     pub(super) fn judge(&mut self, increments: Increments<V>, active: V) -> (V, V) {
@@ -180,7 +208,7 @@ mod tests {
 
     #[test]
     fn several_at_once_are_judged_as_one() {
-        let (mut converged, mut failed, mut hopeless) = (0, 0, 0);
+        let (mut converged, mut failed, mut hopeless, mut short) = (0, 0, 0, 0);
         for seed in 0..4000 {
             let lanes = [0, 1, 2, 3].map(|lane| sequence(4 * seed + lane));
             let like = Lanes([0.0; 4]);
@@ -194,8 +222,21 @@ mod tests {
                     Lanes([0, 1, 2, 3].map(|lane| lanes[lane][step].1)),
                 );
                 let flags = Lanes(active.map(|lane| f64::from(u8::from(lane))));
-                let (done, going) = judge.judge(increments, flags);
-                let hopeful = judge.hopeful(going, 24 - step as u32);
+                let rest = 24 - step as u32;
+                // The short ways, where no lane needs the long ones.
+                let ordinary = judge.extraordinary(increments, flags).0 == [0.0; 4];
+                let (done, going) = if ordinary {
+                    judge.go_on(increments);
+                    (Lanes([0.0; 4]), flags)
+                } else {
+                    judge.judge(increments, flags)
+                };
+                let hopeful = if rest >= 8 && judge.doubtful(going).0 == [0.0; 4] {
+                    going
+                } else {
+                    judge.hopeful(going, rest)
+                };
+                short += u32::from(ordinary);
                 for lane in 0..4 {
                     if !active[lane] {
                         assert_eq!((done.0[lane], going.0[lane]), (0.0, 0.0));
@@ -216,7 +257,7 @@ mod tests {
                     active[lane] = expected.1 > 0.0;
                     if active[lane] {
                         assert_eq!(judge.rates().0[lane], monitor.rate());
-                        let lost = monitor.is_hopeless(24 - step as u32);
+                        let lost = monitor.is_hopeless(rest);
                         assert_eq!(hopeful.0[lane] == 0.0, lost);
                         hopeless += u32::from(lost);
                     }
@@ -224,6 +265,6 @@ mod tests {
             }
         }
         // All kinds have been there.
-        assert!(converged > 1000 && failed > 100 && hopeless > 1000);
+        assert!(converged > 1000 && failed > 100 && hopeless > 1000 && short > 1000);
     }
 }

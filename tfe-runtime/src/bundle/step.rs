@@ -166,16 +166,23 @@ where
             let mask = zero.less(active);
             let increments = self.sweep(like, group, work, mask, &mut evaluation, iteration);
             count += active;
-            let (done, going) = judge.judge(increments, active);
+            let mut may_be_over = judge.extraordinary(increments, active).any_positive();
+            if may_be_over {
+                let (done, going) = judge.judge(increments, active);
+                arrived += done;
+                active = going;
+            } else {
+                judge.go_on(increments);
+            }
             // Lanes that have converged before keep their last rate.
             rates = V::select(mask, judge.rates(), rates);
-            arrived += done;
-            active = going;
-            if yielding && iteration >= 2 {
-                active = judge.hopeful(active, most - iteration);
+            let rest = most - iteration;
+            if yielding && iteration >= 2 && (rest < 8 || judge.doubtful(active).any_positive()) {
+                active = judge.hopeful(active, rest);
+                may_be_over = true;
             }
             iteration += 1;
-            if !active.any_positive() {
+            if may_be_over && !active.any_positive() {
                 break;
             }
         }

@@ -29,6 +29,20 @@ pub(crate) trait Four: Side<4> {
         (self.sin_cos(), other.sin_cos())
     }
 
+    /// sin of `self`, and of `other`.
+    #[cfg(feature = "alloc")]
+    #[inline(always)]
+    fn sin_of_two(self, other: Self) -> (Self, Self) {
+        (self.sin(), other.sin())
+    }
+
+    /// cos of `self`, and of `other`.
+    #[cfg(feature = "alloc")]
+    #[inline(always)]
+    fn cos_of_two(self, other: Self) -> (Self, Self) {
+        (self.cos(), other.cos())
+    }
+
     /// The product of a table with a vector over the points, for every coordinate that is wanted.
     fn apply<S: Storage, const N: usize>(
         self,

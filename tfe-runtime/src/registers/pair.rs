@@ -60,6 +60,13 @@ impl<V: Four> Side<LANES> for Pair<V> {
 
 impl<V: Four> Eight for Pair<V> {
     #[inline(always)]
+    fn any_positive(self) -> bool {
+        let [a, b, c, d] = self.0.larger(self.1).lanes();
+        let (left, right) = (if a < b { b } else { a }, if c < d { d } else { c });
+        left > 0.0 || right > 0.0
+    }
+
+    #[inline(always)]
     fn apart<W: Apart>(self, work: W) {
         self.0.apart(Paired(work));
     }
@@ -154,8 +161,19 @@ impl<V: Four> Real for Pair<V> {
         (Self(first.0, second.0), Self(first.1, second.1))
     }
 
+    #[inline(always)]
+    fn sin(self) -> Self {
+        let (first, second) = self.0.sin_of_two(self.1);
+        Self(first, second)
+    }
+
+    #[inline(always)]
+    fn cos(self) -> Self {
+        let (first, second) = self.0.cos_of_two(self.1);
+        Self(first, second)
+    }
+
     half_by_half! {
-        sin(); cos();
         tan(); asin(); acos(); atan(); atan2(x); sinh(); cosh(); tanh(); asinh(); acosh(); atanh(); exp(); ln(); hypot(other);
         powf(exponent); sign(); min(other); max(other); sqrt(); abs();
     }

@@ -8,7 +8,7 @@
 use crate::real::Real;
 use crate::registers::four::Apart;
 use crate::registers::pair::Pair;
-use crate::trigonometry::{LIMIT, Turn, reduced};
+use crate::trigonometry::{LIMIT, Turn, cos_of_small, reduced, sin_of_small};
 use pulp::x86::V3;
 use pulp::{Simd, f64x4, m64x4, u64x4};
 
@@ -476,11 +476,39 @@ impl Quad {
         });
     }
 
-    /// sin and cos of both: the chains of operations overlap.
+    /// Whether all lanes of both have sines of these modules.
+    #[inline(always)]
+    fn are_turns(self, other: Self) -> bool {
+        let (isa, limit) = (self.isa, self.like(LIMIT).value);
+        let one = isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), limit);
+        let two = isa.less_than_or_equal_f64s(isa.abs_f64s(other.value), limit);
+        isa.first_true_m64s(isa.not_m64x4(isa.and_m64x4(one, two))) == 4
+    }
+
+    /// sin of both: the chains of operations overlap, and constants are loaded once.
+    #[inline(always)]
+    pub(crate) fn sin_of_two(self, other: Self) -> (Self, Self) {
+        if !self.are_turns(other) {
+            return (self.sin(), other.sin());
+        }
+        let sin = sin_of_small(Pair(self, other));
+        (sin.0, sin.1)
+    }
+
+    /// cos of both.
+    #[inline(always)]
+    pub(crate) fn cos_of_two(self, other: Self) -> (Self, Self) {
+        if !self.are_turns(other) {
+            return (self.cos(), other.cos());
+        }
+        let cos = cos_of_small(Pair(self, other));
+        (cos.0, cos.1)
+    }
+
+    /// sin and cos of both.
     #[inline(always)]
     pub(crate) fn sin_cos_of_two(self, other: Self) -> ((Self, Self), (Self, Self)) {
-        let limits = (-LIMIT, LIMIT);
-        if !(self.is_within(limits) & other.is_within(limits)) {
+        if !self.are_turns(other) {
             return (self.sin_cos(), other.sin_cos());
         }
         let (sin, cos) = reduced(Pair(self, other));
@@ -544,6 +572,15 @@ mod tests {
             let both = register.sin_cos();
             assert_eq!(bits(both.0.lanes()), bits(sin));
             assert_eq!(bits(both.1.lanes()), bits(cos));
+            // Two registers, of which the other one is within limits more often.
+            let pair = Pair(register, Quad::of(isa, x.map(|x| 1e-2 * x)));
+            for (of_two, alone) in [
+                (pair.sin(), [pair.0.sin(), pair.1.sin()]),
+                (pair.cos(), [pair.0.cos(), pair.1.cos()]),
+            ] {
+                assert_eq!(bits(of_two.0.lanes()), bits(alone[0].lanes()));
+                assert_eq!(bits(of_two.1.lanes()), bits(alone[1].lanes()));
+            }
             assert_eq!(
                 bits(register.sin().lanes()),
                 bits(crate::trigonometry::sin(&x))

@@ -48,6 +48,16 @@ impl Four for Quad {
     }
 
     #[inline(always)]
+    fn sin_of_two(self, other: Self) -> (Self, Self) {
+        self.sin_of_two(other)
+    }
+
+    #[inline(always)]
+    fn cos_of_two(self, other: Self) -> (Self, Self) {
+        self.cos_of_two(other)
+    }
+
+    #[inline(always)]
     fn first<M, const N: usize>(
         model: &M,
         t: Self,
