@@ -166,13 +166,15 @@ where
             let mask = zero.less(active);
             let increments = self.sweep(like, group, work, mask, &mut evaluation, iteration);
             count += active;
-            let mut may_be_over = judge.extraordinary(increments, active).any_positive();
+            let is_first = iteration == 0;
+            let extraordinary = judge.extraordinary(increments, active, is_first);
+            let mut may_be_over = extraordinary.any_positive();
             if may_be_over {
                 let (done, going) = judge.judge(increments, active);
                 arrived += done;
                 active = going;
             } else {
-                judge.go_on(increments);
+                judge.go_on(increments, is_first);
             }
             // Lanes that have converged before keep their last rate.
             rates = V::select(mask, judge.rates(), rates);
