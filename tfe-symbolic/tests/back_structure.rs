@@ -81,6 +81,8 @@ fn ignorable_coordinates_are_in_no_equation() {
     assert_eq!(ignorable(", force(x) = -dot(x)"), [1]);
     assert_eq!(ignorable(", force(x) = -dot(x)*dot(y)"), [1]);
     assert_eq!(ignorable(", force(y) = -1"), []);
+    assert_eq!(ignorable(", input(u), force(y) = u"), []);
+    assert_eq!(ignorable(", input(u), force(x) = u"), [1]);
     assert_eq!(ignorable(", force(x) = -y*dot(x)"), []);
     assert_eq!(ignorable(", force(x) = -select(y > 1, dot(x), 0)"), []);
     assert_eq!(ignorable(" + x*sign(y)"), []);
