@@ -1,6 +1,6 @@
 //! Equations of first order: velocities are the unknowns, or the rates of phase space.
 
-use super::group::{Group, Work};
+use super::group::{Group, Work, Written};
 use super::judge::{Increments, larger};
 use super::products::sum;
 use super::second_order::largest;
@@ -22,9 +22,9 @@ where
         like: V,
         group: &mut Group<N>,
         work: &mut Work<N>,
-        mask: V::Mask,
+        written: Written<V>,
     ) {
-        let (at, rows) = self.rows::<V>(group, work, mask);
+        let (at, rows) = self.rows::<V>(group, work, written);
         rows.set_low::<_, _, M>(like, &at);
     }
 
@@ -35,11 +35,11 @@ where
         like: V,
         group: &mut Group<N>,
         work: &mut Work<N>,
-        mask: V::Mask,
+        written: Written<V>,
         evaluation: &mut Evaluation<V, N>,
         refresh: bool,
     ) -> Increments<V> {
-        let (at, rows) = self.rows::<V>(group, work, mask);
+        let (at, rows) = self.rows::<V>(group, work, written);
         let (changed, size) = rows.sweep_velocity(like, self.model, &at, evaluation, refresh);
         let (changed, size) = (changed.by_lane(), size.by_lane());
         let start = largest(like, &load(like, &group.start.q));
@@ -58,11 +58,11 @@ where
         like: V,
         group: &mut Group<N>,
         work: &mut Work<N>,
-        mask: V::Mask,
+        written: Written<V>,
         evaluation: &mut Evaluation<V, N>,
         which: (bool, bool),
     ) -> Increments<V> {
-        let (at, rows) = self.rows::<V>(group, work, mask);
+        let (at, rows) = self.rows::<V>(group, work, written);
         let [of_rates, of_forces] = rows.sweep_phase(like, self.model, &at, evaluation, which);
         let (changed, size) = (of_rates.0.by_lane(), of_rates.1.by_lane());
         let start = largest(like, &load(like, &group.start.q));

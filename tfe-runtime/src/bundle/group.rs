@@ -106,11 +106,33 @@ impl<const N: usize> Work<N> {
     }
 }
 
-/// `new` in the lanes of the mask.
-#[inline(always)]
-pub(super) fn replace<V: Eight>(mask: V::Mask, old: &mut [f64; LANES], new: V) {
-    let kept = new.with(*old);
-    *old = V::select(mask, new, kept).lanes();
+/// The lanes that are written.
+#[derive(Clone, Copy)]
+pub(super) struct Written<V: Eight> {
+    pub(super) mask: V::Mask,
+    all: bool,
+}
+
+impl<V: Eight> Written<V> {
+    /// Those whose flag is one; others are zero.
+    #[inline(always)]
+    pub(super) fn of(flags: V) -> Self {
+        Self {
+            mask: flags.like(0.0).less(flags),
+            all: !(flags.like(1.0) - flags).any_positive(),
+        }
+    }
+
+    /// Writes `new` in these lanes. Mostly it is all of them: stores under a mask, which the compiler makes of a choice, take many times as long on some processors.
+    #[inline(always)]
+    pub(super) fn put(self, old: &mut [f64; LANES], new: V) {
+        if self.all {
+            *old = new.lanes();
+        } else {
+            let kept = new.with(*old);
+            *old = V::select(self.mask, new, kept).lanes();
+        }
+    }
 }
 
 /// One where a lane is chosen, else zero.

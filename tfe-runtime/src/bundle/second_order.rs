@@ -1,6 +1,6 @@
 //! M q̈ = f(q, q̇): forces are the only unknowns.
 
-use super::group::{Group, Row, Work};
+use super::group::{Group, Row, Work, Written};
 use super::judge::Increments;
 use super::products::{apply, sum};
 use super::step::Step;
@@ -55,21 +55,21 @@ where
         like: V,
         group: &mut Group<N>,
         work: &mut Work<N>,
-        mask: V::Mask,
+        written: Written<V>,
         evaluation: &mut Evaluation<V, N>,
         iteration: u32,
     ) -> Increments<V> {
         let (table, acting) = (&self.tables.twice, &const { acting::<M, N>() });
         apply(like, table, acting, &group.forces, &mut work.products);
         if iteration == 0 {
-            let (at, forces) = self.accelerated(group, work, mask);
+            let (at, forces) = self.accelerated(group, work, written);
             if self.control.is_rough() {
                 forces.set_drift::<_, _, M>(like, &at);
             } else {
                 forces.set_exact_drift::<_, _, M>(like, &at);
             }
         }
-        let (at, forces) = self.accelerated::<V>(group, work, mask);
+        let (at, forces) = self.accelerated::<V>(group, work, written);
         let (changed, size) = forces.sweep(like, self.model, &at, evaluation);
         let (changed, size) = (changed.by_lane(), size.by_lane());
         let speed = largest(like, &load(like, &work.velocity));

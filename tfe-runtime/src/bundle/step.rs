@@ -1,6 +1,6 @@
 //! A step of eight trajectories: start of the iteration, the iteration, the end.
 
-use super::group::{Group, Row, Work, flags, replace};
+use super::group::{Group, Row, Work, Written, flags};
 use super::judge::{Increments, Judge, larger};
 use super::products::apply;
 use super::together::Together;
@@ -47,7 +47,7 @@ where
         if const { is_second_order::<M, N>() } {
             self.begin_second_order(like, group, work);
         } else if !self.control.is_rough() {
-            self.begin(like, group, work, like.like(0.0).less(wanted));
+            self.begin(like, group, work, Written::of(wanted));
         }
         let mut arrived = self.iterate(like, group, work, wanted, statistics);
 
@@ -65,13 +65,13 @@ where
             let nothing = zero * (ends[a].0).0 + zero * (ends[a].1).0;
             arrived = V::select(nothing.less_or_equal(zero), arrived, zero);
         }
-        let mask = zero.less(arrived);
+        let written = Written::of(arrived);
         for a in 0..N {
             let ((q, q_low), (p, p_low)) = ends[a];
-            replace::<V>(mask, &mut group.start.q[a], q);
-            replace::<V>(mask, &mut group.start.p[a], p);
-            replace::<V>(mask, &mut group.low.q[a], q_low);
-            replace::<V>(mask, &mut group.low.p[a], p_low);
+            written.put(&mut group.start.q[a], q);
+            written.put(&mut group.start.p[a], p);
+            written.put(&mut group.low.q[a], q_low);
+            written.put(&mut group.low.p[a], p_low);
         }
         let arrived = arrived.lanes();
         for lane in 0..LANES {
@@ -133,10 +133,10 @@ where
             core::mem::swap(unknowns, products);
             return;
         }
-        let mask = like.like(0.0).less(like.with(flags(warm)));
+        let written = Written::of(like.with(flags(warm)));
         for (old, new) in unknowns.iter_mut().zip(products) {
             for a in 0..N {
-                replace::<V>(mask, &mut old[a], like.with(new[a]));
+                written.put(&mut old[a], like.with(new[a]));
             }
         }
     }
@@ -163,8 +163,8 @@ where
         let (mut active, mut arrived, mut count, mut rates) = (wanted, zero, zero, zero);
         let (mut evaluation, mut iteration) = (Evaluation::zero(like), 0);
         while iteration < most {
-            let mask = zero.less(active);
-            let increments = self.sweep(like, group, work, mask, &mut evaluation, iteration);
+            let written = Written::of(active);
+            let increments = self.sweep(like, group, work, written, &mut evaluation, iteration);
             count += active;
             let is_first = iteration == 0;
             let extraordinary = judge.extraordinary(increments, active, is_first);
@@ -177,7 +177,7 @@ where
                 judge.go_on(increments, is_first);
             }
             // Lanes that have converged before keep their last rate.
-            rates = V::select(mask, judge.rates(), rates);
+            rates = V::select(written.mask, judge.rates(), rates);
             let rest = most - iteration;
             if yielding && iteration >= 2 && (rest < 8 || judge.doubtful(active).any_positive()) {
                 active = judge.hopeful(active, rest);
@@ -209,26 +209,26 @@ where
         arrived
     }
 
-    /// One iteration of the lanes of the mask.
+    /// One iteration of the lanes that are written.
     #[inline(always)]
     fn sweep<V: Eight>(
         &self,
         like: V,
         group: &mut Group<N>,
         work: &mut Work<N>,
-        mask: V::Mask,
+        written: Written<V>,
         at: &mut Evaluation<V, N>,
         iteration: u32,
     ) -> Increments<V> {
         // Constant conditions, so that of the three iterations one is compiled.
         if const { is_second_order::<M, N>() } {
-            return self.sweep_second_order(like, group, work, mask, at, iteration);
+            return self.sweep_second_order(like, group, work, written, at, iteration);
         }
         let refresh = const { !M::FACTS.constant_mass } && REFRESHED.contains(&iteration);
         if const { is_phase::<M, N>() } {
-            self.sweep_phase(like, group, work, mask, at, (iteration == 0, refresh))
+            self.sweep_phase(like, group, work, written, at, (iteration == 0, refresh))
         } else {
-            self.sweep_velocity(like, group, work, mask, at, refresh)
+            self.sweep_velocity(like, group, work, written, at, refresh)
         }
     }
 

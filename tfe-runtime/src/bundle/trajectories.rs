@@ -1,6 +1,6 @@
 //! How trajectories lie side by side.
 
-use super::group::{Ends, Group, Row, Work, replace};
+use super::group::{Ends, Group, Row, Work, Written};
 use super::products::apply;
 use super::step::Step;
 use crate::model::{First, Model};
@@ -12,12 +12,12 @@ use crate::points::sweep::Largest;
 use crate::registers::pair::{Eight, LANES};
 use crate::registers::storage::{Fixed, Heap, Matrix};
 
-/// Eight trajectories, of which those of the mask are wanted.
+/// Eight trajectories, of which some are written.
 pub(super) struct Trajectories<'a, M, V: Eight, const N: usize> {
     step: &'a Step<'a, M, N>,
     start: &'a Ends<N>,
     low: &'a Ends<N>,
-    mask: V::Mask,
+    written: Written<V>,
 }
 
 impl<M, V: Eight, const N: usize> Arrangement<V, LANES, N> for Trajectories<'_, M, V, N> {
@@ -85,7 +85,7 @@ impl<M, V: Eight, const N: usize> Arrangement<V, LANES, N> for Trajectories<'_, 
 
     #[inline(always)]
     fn set(&self, place: &mut [f64; LANES], value: V) {
-        replace(self.mask, place, value);
+        self.written.put(place, value);
     }
 
     #[inline(always)]
@@ -108,13 +108,13 @@ impl<M, const N: usize> Step<'_, M, N> {
     fn lying<'a, V: Eight>(
         &'a self,
         (start, low): (&'a Ends<N>, &'a Ends<N>),
-        mask: V::Mask,
+        written: Written<V>,
     ) -> Trajectories<'a, M, V, N> {
         Trajectories {
             step: self,
             start,
             low,
-            mask,
+            written,
         }
     }
 
@@ -124,9 +124,9 @@ impl<M, const N: usize> Step<'_, M, N> {
         &'a self,
         group: &'a mut Group<N>,
         work: &'a mut Work<N>,
-        mask: V::Mask,
+        written: Written<V>,
     ) -> (Trajectories<'a, M, V, N>, Rows<'a, LANES, N>) {
-        let at = self.lying((&group.start, &group.low), mask);
+        let at = self.lying((&group.start, &group.low), written);
         let rows = Rows {
             rates: &mut group.rates,
             forces: &mut group.forces,
@@ -147,12 +147,12 @@ impl<M, const N: usize> Step<'_, M, N> {
         &'a self,
         group: &'a mut Group<N>,
         work: &'a mut Work<N>,
-        mask: V::Mask,
+        written: Written<V>,
     ) -> (
         Trajectories<'a, M, V, N>,
         Forces<'a, [f64; LANES], LANES, N>,
     ) {
-        let at = self.lying((&group.start, &group.low), mask);
+        let at = self.lying((&group.start, &group.low), written);
         let forces = Forces {
             forces: &mut group.forces,
             products: &mut work.products,
