@@ -191,7 +191,7 @@ pub trait Model<const N: usize> {
     const FACTS: Facts;
 
     /// The ignorable coordinates: nothing that [`first`](Self::first) and [`first_and_mass`](Self::first_and_mass) give depends on them, and no force acts on them, so that their
-    /// momenta are constant. Steppers leave them out of the iteration of an element. It is no error to name none.
+    /// momenta are constant. Steppers leave them out of the iteration of an element (T-162 of `docs/theory.md`). It is no error to name none.
     const IGNORABLE: [bool; N] = [false; N];
 
     /// L(q, v, t), or H(q, p, t).

@@ -46,24 +46,24 @@ impl<const N: usize, S: Storage> Work<N, S> {
     ) {
         let (tables, h) = (leg.tables, like.like(leg.h));
         if const { matches!(N, 1 | 2) } {
+            // Σ (bᵀA) f beside Σ b f; what comes of the latter on the way to velocities is left behind.
             let force = (&tables.weights, &*self.forces);
-            let mut sums = (tables.lever).sums_beside::<_, N, EXACT>(like, &self.forces, force);
-            let force = sums;
+            let sums = (tables.lever).sums_beside::<_, N, EXACT>(like, &self.forces, force);
+            let mut lever = sums;
             if !leg.inertia.is_diagonal() {
                 let (State { q, .. }, State { q: q_low, .. }) = apart(sums);
                 let (high, low) = leg.inertia.of_both(&q, &q_low);
-                sums = (block(like, &high, 0), block(like, &low, 0));
+                lever = (block(like, &high, 0), block(like, &low, 0));
             }
-            // What is made of the forces here is left behind.
-            let acceleration = self.accelerations::<_, EXACT>(like, leg, sums, 0);
+            let acceleration = self.accelerations::<_, EXACT>(like, leg, lever, 0);
             let v = (
                 block(like, &self.velocity, 0),
                 block(like, &self.velocity_low, 0),
             );
             let velocity = moved::<_, EXACT>(h, acceleration, v);
             let rates = (
-                first_of::<_, N>(velocity.0, force.0),
-                first_of::<_, N>(velocity.1, force.1),
+                first_of::<_, N>(velocity.0, sums.0),
+                first_of::<_, N>(velocity.1, sums.1),
             );
             (*end, *end_low) = apart(moved::<_, EXACT>(h, rates, leg.both(like)));
             return;
