@@ -207,18 +207,23 @@ fn cyclic(dof: &Affine, entries: &[Entry]) -> Vec<usize> {
     else {
         return Vec::new();
     };
-    let mut rows = SortedSet::new();
-    for entry in entries
+    let rows = entries
         .iter()
         .filter(|entry| matches!(entry.place.array, Array::ByQ | Array::Row(_)))
-    {
-        match entry.place.row.as_constant() {
-            Some(row) => rows.insert(row),
-            None => return Vec::new(),
-        };
-    }
-    (0..count)
-        .filter(|index| i64::try_from(*index).is_ok_and(|index| !rows.contains(&index)))
+        .map(|entry| entry.place.row.as_constant());
+    without(0..count, rows)
+}
+
+/// The coordinates that are not among these indices; none where one of them is not literal.
+fn without(
+    coordinates: impl Iterator<Item = usize>,
+    indices: impl Iterator<Item = Option<i64>>,
+) -> Vec<usize> {
+    let Some(indices) = indices.collect::<Option<SortedSet<i64>>>() else {
+        return Vec::new();
+    };
+    coordinates
+        .filter(|index| i64::try_from(*index).is_ok_and(|index| !indices.contains(&index)))
         .collect()
 }
 
@@ -227,14 +232,8 @@ fn conserved(cyclic: &[usize], entries: &[Entry]) -> Vec<usize> {
     let forces = entries
         .iter()
         .filter(|entry| entry.place.array == Array::Force);
-    let pushed: Option<SortedSet<i64>> =
-        forces.map(|entry| entry.place.row.as_constant()).collect();
-    let Some(pushed) = pushed else {
-        return Vec::new();
-    };
-    let is_free =
-        |index: &&usize| i64::try_from(**index).is_ok_and(|index| !pushed.contains(&index));
-    cyclic.iter().filter(is_free).copied().collect()
+    let pushed = forces.map(|entry| entry.place.row.as_constant());
+    without(cyclic.iter().copied(), pushed)
 }
 
 /// The conserved coordinates that no first derivative, force or entry of the mass matrix holds, not even in a condition; none where one holds a coordinate whose index is not literal.
@@ -249,16 +248,11 @@ fn ignorable(graph: &Graph, conserved: &[usize], entries: &[Entry]) -> Vec<usize
         })
         .map(|entry| entry.value)
         .collect();
-    let indices = (graph.reachable(&roots).into_iter()).filter_map(|id| match graph.node(id) {
+    let held = (graph.reachable(&roots).into_iter()).filter_map(|id| match graph.node(id) {
         Node::Input(Input::Coordinate(index)) => Some(index.as_constant()),
         _ => None,
     });
-    let held: Option<SortedSet<i64>> = indices.collect();
-    let Some(held) = held else {
-        return Vec::new();
-    };
-    let is_free = |index: &&usize| i64::try_from(**index).is_ok_and(|index| !held.contains(&index));
-    conserved.iter().filter(is_free).copied().collect()
+    without(conserved.iter().copied(), held)
 }
 
 impl Pattern {
