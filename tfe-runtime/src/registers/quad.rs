@@ -440,18 +440,28 @@ impl Quad {
         upper: _mm256_permute2f128_pd 0x31;
     }
 
-    /// Whether all lanes are within limits.
+    /// The lanes within limits.
     #[inline(always)]
-    fn is_within(self, (low, high): (f64, f64)) -> bool {
+    fn within(self, (low, high): (f64, f64)) -> m64x4 {
         let (isa, high_value) = (self.isa, self.like(high).value);
         // Constants: one comparison does where limits are opposite.
-        let within = if low == -high {
-            isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), high_value)
-        } else {
-            let above = isa.less_than_or_equal_f64s(self.like(low).value, self.value);
-            isa.and_m64x4(above, isa.less_than_or_equal_f64s(self.value, high_value))
-        };
-        isa.first_true_m64s(isa.not_m64x4(within)) == 4
+        if low == -high {
+            return isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), high_value);
+        }
+        let above = isa.less_than_or_equal_f64s(self.like(low).value, self.value);
+        isa.and_m64x4(above, isa.less_than_or_equal_f64s(self.value, high_value))
+    }
+
+    /// Whether a mask has all lanes.
+    #[inline(always)]
+    fn has_all(self, mask: m64x4) -> bool {
+        self.isa.first_true_m64s(self.isa.not_m64x4(mask)) == 4
+    }
+
+    /// Whether all lanes are within limits.
+    #[inline(always)]
+    fn is_within(self, limits: (f64, f64)) -> bool {
+        self.has_all(self.within(limits))
     }
 
     /// Rows from columns, in eight instructions: of lanes written down one by one the compiler makes nineteen.
@@ -479,10 +489,11 @@ impl Quad {
     /// Whether all lanes of both have sines of these modules.
     #[inline(always)]
     fn are_turns(self, other: Self) -> bool {
-        let (isa, limit) = (self.isa, self.like(LIMIT).value);
-        let one = isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), limit);
-        let two = isa.less_than_or_equal_f64s(isa.abs_f64s(other.value), limit);
-        isa.first_true_m64s(isa.not_m64x4(isa.and_m64x4(one, two))) == 4
+        let limits = (-LIMIT, LIMIT);
+        self.has_all(
+            self.isa
+                .and_m64x4(self.within(limits), other.within(limits)),
+        )
     }
 
     /// sin of both: the chains of operations overlap, and constants are loaded once.
