@@ -3,6 +3,7 @@
 use crate::evidence::Evidence;
 use crate::newton::{IDLE, MAX_IDLE, ROUGH_ROUND_OFF, ROUND_OFF, Solve, of_fixed_point};
 use crate::real::Real;
+use crate::registers::pair::Eight;
 
 /// Judges the increments of several trajectories as [`Monitor`](crate::newton::Monitor) judges those of one. Truth values are one and zero.
 #[derive(Clone, Copy)]
@@ -10,6 +11,7 @@ pub(super) struct Judge<V> {
     tolerance: V,
     /// How much the rate before counts.
     memory: V,
+    is_first: bool,
     last: V,
     rate: V,
     risen: V,
@@ -60,12 +62,13 @@ impl<V: Real> Increments<V> {
     }
 }
 
-impl<V: Real> Judge<V> {
+impl<V: Eight> Judge<V> {
     #[inline(always)]
     pub(super) fn new(like: V, tolerance: f64, solve: Solve) -> Self {
         let (tolerance, memory) = of_fixed_point(tolerance);
         Self {
             memory: like.like(memory),
+            is_first: true,
             worst: like.like(0.0),
             proven: like.like(match solve {
                 Solve::Trusting => f64::INFINITY,
@@ -87,13 +90,31 @@ impl<V: Real> Judge<V> {
         self.rate
     }
 
-    /// Zero where a lane is not active, or where its increment is not the last one and falls as most do, or is the first one; then [`go_on`](Self::go_on) says what
-    /// [`judge`](Self::judge) says, and says it in a tenth of the operations.
+    /// Which of the `active` lanes have converged, and which go on; those in neither have lost their numbers.
     #[inline(always)]
-    pub(super) fn extraordinary(&self, increments: Increments<V>, active: V, is_first: bool) -> V {
+    pub(super) fn judge(&mut self, increments: Increments<V>, active: V) -> (V, V) {
+        let is_ordinary = !self.extraordinary(increments, active).any_positive();
+        let is_first = core::mem::take(&mut self.is_first);
+        if !is_ordinary {
+            return self.judge_all(increments, active);
+        }
+        let (size, zero) = (increments.relative, active.like(0.0));
+        if !is_first {
+            self.rate = size / self.last;
+            self.see_rate(size, self.rate);
+            (self.idle, self.risen) = (zero, zero);
+        }
+        (self.last, self.best) = (size, size);
+        (zero, active)
+    }
+
+    /// Zero where a lane is not active, or where its increment is not the last one and falls as most do, or is the first one: nothing but rates is to be found there, in a
+    /// tenth of the operations.
+    #[inline(always)]
+    fn extraordinary(&self, increments: Increments<V>, active: V) -> V {
         let (size, zero) = (increments.relative, active.like(0.0));
         // Comparisons with a NaN are false.
-        if is_first {
+        if self.is_first {
             let far = V::select(self.tolerance.less(size), zero, active);
             return V::select(size.less(size.like(f64::INFINITY)), far, active);
         }
@@ -101,32 +122,16 @@ impl<V: Real> Judge<V> {
         V::select(size.less(size.like(0.5) * self.best), far, active)
     }
 
-    /// Remembers increments of which none is extraordinary.
+    /// Remembers the largest rates that tell something of the root.
     #[inline(always)]
-    pub(super) fn go_on(&mut self, increments: Increments<V>, is_first: bool) {
-        let (size, zero) = (increments.relative, increments.relative.like(0.0));
-        if is_first {
-            // It tells no rate.
-            (self.last, self.best) = (size, size);
-            return;
-        }
-        self.rate = size / self.last;
-        let seen = V::select(size.like(Evidence::FAR).less(size), self.rate, zero);
+    fn see_rate(&mut self, size: V, rate: V) {
+        let seen = V::select(size.like(Evidence::FAR).less(size), rate, size.like(0.0));
         self.worst = V::select(self.worst.less(seen), seen, self.worst);
-        (self.last, self.best, self.idle, self.risen) = (size, size, zero, zero);
     }
 
-    /// Zero where a lane is not active, or where its rate and its last increment are so small that it is surely hopeful if eight iterations are left.
+    /// The same for increments of any kind.
     #[inline(always)]
-    pub(super) fn doubtful(&self, active: V) -> V {
-        let (rate, zero) = (self.rate, active.like(0.0));
-        let slow = V::select(rate.less(rate.like(0.05)), zero, active);
-        V::select(self.last.less_or_equal(rate.like(1e-4)), slow, active)
-    }
-
-    /// Which of the `active` lanes have converged, and which go on; those in neither have lost their numbers.
-    #[inline(always)]
-    pub(super) fn judge(&mut self, increments: Increments<V>, active: V) -> (V, V) {
+    fn judge_all(&mut self, increments: Increments<V>, active: V) -> (V, V) {
         let size = increments.relative;
         let (zero, one, infinity) = (size.like(0.0), size.like(1.0), size.like(f64::INFINITY));
         let is_first = infinity.less_or_equal(self.last);
@@ -138,8 +143,7 @@ impl<V: Real> Judge<V> {
         let beyond = larger(by_rate, by_memory);
         let beyond = V::select(self.last.less_or_equal(size), size - self.tolerance, beyond);
         let beyond = V::select(is_first, size - self.tolerance, beyond);
-        let seen = V::select(size.like(Evidence::FAR).less(size), rate, zero);
-        self.worst = V::select(self.worst.less(seen), seen, self.worst);
+        self.see_rate(size, rate);
         self.risen = V::select(self.last.less_or_equal(size), self.risen + one, zero);
         let is_better = size.less(size.like(0.5) * self.best);
         self.best = V::select(is_better, size, self.best);
@@ -172,11 +176,19 @@ impl<V: Real> Judge<V> {
     /// Which of the `active` lanes so many more iterations might serve, at their present rates.
     #[inline(always)]
     pub(super) fn hopeful(&self, active: V, remaining: u32) -> V {
+        let (rate, zero) = (self.rate, active.like(0.0));
+        if remaining >= 8 {
+            // Most steps: the eighth power is less than half of the smallest target.
+            let slow = V::select(rate.less(rate.like(0.05)), zero, active);
+            let far = V::select(self.last.less_or_equal(rate.like(1e-4)), slow, active);
+            if !far.any_positive() {
+                return active;
+            }
+        }
         let target = larger(self.tolerance, active.like(64.0 * f64::EPSILON));
         let exponent = i32::try_from(remaining).unwrap_or(i32::MAX);
         // It falls all the way, or it never does. A loop with an exit would cost more: where it ends, nobody can foresee.
-        let projected = self.last * self.rate.powi(exponent);
-        let zero = active.like(0.0);
+        let projected = self.last * rate.powi(exponent);
         let hopeful = V::select(projected.less_or_equal(target), active, zero);
         V::select(self.last.less_or_equal(target), active, hopeful)
     }
@@ -194,6 +206,7 @@ mod tests {
     use crate::Lanes;
     use crate::equations::Increment;
     use crate::newton::{Monitor, Verdict};
+    use crate::registers::pair::Pair;
 
     /// Increments that fall, rise, stay, and stop being numbers.
     fn sequence(seed: u64) -> [(f64, f64); 24] {
@@ -220,32 +233,24 @@ mod tests {
         let (mut converged, mut failed, mut hopeless, mut short) = (0, 0, 0, 0);
         for seed in 0..4000 {
             let lanes = [0, 1, 2, 3].map(|lane| sequence(4 * seed + lane));
-            let like = Lanes([0.0; 4]);
+            // Both halves are the same.
+            let twice = |four| Pair(Lanes(four), Lanes(four));
+            let like = twice([0.0; 4]);
             let tolerance = if seed % 2 == 0 { 1e-17 } else { 1e-9 };
             let mut judge = Judge::new(like, tolerance, Solve::Auto);
             let mut monitors = [(); 4].map(|()| Monitor::of_fixed_point(tolerance));
             let mut active = [true; 4];
             for step in 0..24 {
                 let increments = Increments::new(
-                    Lanes([0, 1, 2, 3].map(|lane| lanes[lane][step].0)),
-                    Lanes([0, 1, 2, 3].map(|lane| lanes[lane][step].1)),
+                    twice([0, 1, 2, 3].map(|lane| lanes[lane][step].0)),
+                    twice([0, 1, 2, 3].map(|lane| lanes[lane][step].1)),
                 );
-                let flags = Lanes(active.map(|lane| f64::from(u8::from(lane))));
+                let flags = twice(active.map(|lane| f64::from(u8::from(lane))));
                 let rest = 24 - step as u32;
-                // The short ways, where no lane needs the long ones.
-                let ordinary = judge.extraordinary(increments, flags, step == 0).0 == [0.0; 4];
-                let (done, going) = if ordinary {
-                    judge.go_on(increments, step == 0);
-                    (Lanes([0.0; 4]), flags)
-                } else {
-                    judge.judge(increments, flags)
-                };
-                let hopeful = if rest >= 8 && judge.doubtful(going).0 == [0.0; 4] {
-                    going
-                } else {
-                    judge.hopeful(going, rest)
-                };
-                short += u32::from(ordinary);
+                short += u32::from(!judge.extraordinary(increments, flags).any_positive());
+                let (done, going) = judge.judge(increments, flags);
+                let hopeful = judge.hopeful(going, rest).0;
+                let (done, going) = (done.0, going.0);
                 for lane in 0..4 {
                     if !active[lane] {
                         assert_eq!((done.0[lane], going.0[lane]), (0.0, 0.0));
@@ -265,7 +270,7 @@ mod tests {
                     failed += u32::from(expected == (0.0, 0.0));
                     active[lane] = expected.1 > 0.0;
                     if active[lane] {
-                        assert_eq!(judge.rates().0[lane], monitor.rate());
+                        assert_eq!(judge.rates().0.0[lane], monitor.rate());
                         let lost = monitor.is_hopeless(rest);
                         assert_eq!(hopeful.0[lane] == 0.0, lost);
                         hopeless += u32::from(lost);

@@ -166,25 +166,16 @@ where
             let written = Written::of(active);
             let increments = self.sweep(like, group, work, written, &mut evaluation, iteration);
             count += active;
-            let is_first = iteration == 0;
-            let extraordinary = judge.extraordinary(increments, active, is_first);
-            let mut may_be_over = extraordinary.any_positive();
-            if may_be_over {
-                let (done, going) = judge.judge(increments, active);
-                arrived += done;
-                active = going;
-            } else {
-                judge.go_on(increments, is_first);
-            }
+            let (done, going) = judge.judge(increments, active);
             // Lanes that have converged before keep their last rate.
             rates = V::select(written.mask, judge.rates(), rates);
-            let rest = most - iteration;
-            if yielding && iteration >= 2 && (rest < 8 || judge.doubtful(active).any_positive()) {
-                active = judge.hopeful(active, rest);
-                may_be_over = true;
+            arrived += done;
+            active = going;
+            if yielding && iteration >= 2 {
+                active = judge.hopeful(active, most - iteration);
             }
             iteration += 1;
-            if may_be_over && !active.any_positive() {
+            if !active.any_positive() {
                 break;
             }
         }
