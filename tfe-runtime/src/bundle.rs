@@ -24,7 +24,7 @@ use crate::error::StepError;
 use crate::legendre::largest;
 use crate::model::{Model, State};
 use crate::newton::{Control, Preference, Solve};
-use crate::points::has_form;
+use crate::points::forms::has_form;
 use crate::registers::pair::LANES;
 use crate::registers::storage::MAX_GROUPS;
 use crate::scheme::{SchemeTable, Tables};

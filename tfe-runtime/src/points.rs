@@ -26,6 +26,8 @@ mod computed;
 pub(crate) mod end;
 pub(crate) mod evaluation;
 pub(crate) mod first_order;
+pub(crate) mod forms;
+pub(crate) mod inertia;
 #[cfg(feature = "alloc")]
 pub(crate) mod reach;
 pub(crate) mod second_order;
@@ -33,20 +35,19 @@ mod step;
 pub(crate) mod sweep;
 pub(crate) mod tables;
 
-use crate::double_double::DoubleDouble;
-use crate::element::Element;
 use crate::equations::weighted;
 use crate::error::StepError;
 use crate::lanes::Lanes;
-use crate::lu::Block;
 use crate::method::{cold_rate, cold_rates, may_be_phase};
-use crate::model::{First, Form, Model, State};
+use crate::model::{First, Model, State};
 use crate::registers::four::{Apart, Four};
-use crate::registers::storage::{Fixed, Keep, List, MAX_GROUPS, Row, Storage};
+use crate::registers::storage::{Fixed, Keep, List, Row, Storage};
 use crate::scheme::{SchemeRef, Tables};
 use crate::workspace::width;
 use core::marker::PhantomData;
 use evaluation::Places;
+use forms::{is_phase, is_second_order};
+use inertia::Inertia;
 
 /// What steps with all points at once carry from one to the next: rows for groups of four points.
 #[derive(Clone, Debug)]
@@ -89,25 +90,6 @@ struct Work<const N: usize, S: Storage> {
     /// The largest coordinate at the start, and the largest velocity or momentum.
     distance: f64,
     speed: f64,
-}
-
-/// A constant mass matrix.
-#[derive(Clone, Debug)]
-pub(crate) struct Inertia<const N: usize, S: Storage> {
-    /// Whether it has nothing beside its diagonal.
-    has_diagonal_alone: bool,
-    /// That diagonal; of no meaning where there is more.
-    pub(crate) masses: [f64; N],
-    /// The diagonal of the inverse; ones where that is not constant.
-    pub(crate) inverse_diagonal: [f64; N],
-    /// What rounding took from the inverse of the diagonal.
-    pub(crate) inverse_low: [f64; N],
-    /// M⁻¹ (or H_pp), row by row; of no meaning where it is not constant, or diagonal.
-    pub(crate) inverse: S::Square<N>,
-    /// The length of the step for which these are: h²/m where there is nothing beside the diagonal, and what rounding took from it.
-    step: f64,
-    reach: [f64; N],
-    reach_low: [f64; N],
 }
 
 /// Where and from where, and by what.
@@ -378,15 +360,6 @@ impl Needed {
     }
 }
 
-/// Whether there are points of that kind: for a nonlinear model without constraints, and an element of no more than 16 points that has the form.
-pub(crate) const fn are_possible<M, const N: usize>(element: &Element) -> bool
-where
-    M: Model<N>,
-{
-    let is_small = element.points() <= 4 * MAX_GROUPS;
-    N > 0 && is_small && !M::FACTS.linear && M::CONSTRAINTS.is_empty() && has_form::<M, N>(element)
-}
-
 /// Rates of momenta and coordinates at the start, for a first iteration that continues nothing; those of momenta are zero where they are no unknowns.
 pub(crate) fn constant_rates<M, const N: usize>(
     model: &M,
@@ -408,144 +381,6 @@ where
         }
     }
     (force, rate)
-}
-
-impl<const N: usize, S: Storage> Inertia<N, S> {
-    /// M⁻¹ of a model, empty unless its mass matrix is constant; nothing if that is singular, or if momenta are no multiples of velocities
-    /// where they have to be.
-    pub(crate) fn of<M>(model: &M) -> Option<Self>
-    where
-        M: Model<N>,
-    {
-        if !M::FACTS.constant_mass {
-            return Some(Self {
-                has_diagonal_alone: false,
-                masses: [1.0; N],
-                inverse_diagonal: [1.0; N],
-                inverse_low: [0.0; N],
-                inverse: List::filled([0.0; N], 0),
-                step: 0.0,
-                reach: [0.0; N],
-                reach_low: [0.0; N],
-            });
-        }
-        let (mut first, mut mass) = (First::ZERO, [[0.0; N]; N]);
-        model.first_and_mass(0.0, &[0.0; N], &[0.0; N], &mut first, &mut mass);
-        if is_second_order::<M, N>() && first.z != [0.0; N] {
-            return None;
-        }
-        if let Some(diagonal) = diagonal_of(&mass) {
-            return Self::of_diagonal(diagonal, M::FORM);
-        }
-        let inverse = Block::of(&mass).ok()?.inverse();
-        let inverse = match M::FORM {
-            Form::Lagrangian => inverse,
-            Form::Hamiltonian => mass,
-        };
-        let (mut inverse_diagonal, mut rows) = ([0.0; N], S::Square::filled([0.0; N], N));
-        for a in 0..N {
-            (inverse_diagonal[a], rows[a]) = (inverse[a][a], inverse[a]);
-        }
-        Some(Self {
-            has_diagonal_alone: false,
-            masses: [1.0; N],
-            inverse_diagonal,
-            inverse_low: [0.0; N],
-            inverse: rows,
-            step: 0.0,
-            reach: [0.0; N],
-            reach_low: [0.0; N],
-        })
-    }
-
-    /// From the diagonal of L_vv or H_pp; nothing if a mass is zero, infinite or no number.
-    fn of_diagonal(given: [f64; N], form: Form) -> Option<Self> {
-        let (mut masses, mut inverse, mut inverse_low) = ([0.0; N], [0.0; N], [0.0; N]);
-        for a in 0..N {
-            let reciprocal = 1.0 / given[a];
-            if !(given[a].is_finite() && reciprocal.is_finite()) {
-                return None;
-            }
-            (masses[a], inverse[a]) = match form {
-                Form::Lagrangian => (given[a], reciprocal),
-                Form::Hamiltonian => (reciprocal, given[a]),
-            };
-            let exact = DoubleDouble::ONE.over(DoubleDouble::new(masses[a]));
-            inverse_low[a] = exact.minus(DoubleDouble::new(inverse[a])).high;
-        }
-        Some(Self {
-            has_diagonal_alone: true,
-            masses,
-            inverse_diagonal: inverse,
-            inverse_low,
-            inverse: List::filled([0.0; N], 0),
-            step: 0.0,
-            reach: [0.0; N],
-            reach_low: [0.0; N],
-        })
-    }
-}
-
-/// The diagonal of a matrix that has nothing else.
-fn diagonal_of<const N: usize>(matrix: &[[f64; N]; N]) -> Option<[f64; N]> {
-    let mut diagonal = [0.0; N];
-    for a in 0..N {
-        diagonal[a] = matrix[a][a];
-        for b in 0..N {
-            if a != b && matrix[a][b] != 0.0 {
-                return None;
-            }
-        }
-    }
-    Some(diagonal)
-}
-
-/// The coordinates that are iterated for: all that are not ignorable.
-pub(crate) const fn acting<M, const N: usize>() -> [bool; N]
-where
-    M: Model<N>,
-{
-    let (mut acting, mut a) = ([true; N], 0);
-    while a < N {
-        acting[a] = !M::IGNORABLE[a];
-        a += 1;
-    }
-    acting
-}
-
-/// Whether the equations are M q̈ = f.
-pub(crate) const fn is_second_order<M, const N: usize>() -> bool
-where
-    M: Model<N>,
-{
-    M::FACTS.constant_mass && M::FACTS.separable && !M::FACTS.time_dependent
-}
-
-/// Whether rates of momenta are unknowns as well.
-pub(crate) const fn is_phase<M, const N: usize>() -> bool
-where
-    M: Model<N>,
-{
-    matches!(M::FORM, Form::Hamiltonian)
-}
-
-/// Whether the element has one of the three forms for the model as it was declared: all have but those that ask a Hamiltonian for velocities.
-pub(crate) const fn has_form<M, const N: usize>(element: &Element) -> bool
-where
-    M: Model<N>,
-{
-    match M::FORM {
-        Form::Lagrangian => true,
-        Form::Hamiltonian => element.has_phase_form() || is_second_order::<M, N>(),
-    }
-}
-
-/// Whether rates at more points than it has unknown ones are those of the element.
-pub(crate) const fn is_projected<M, const N: usize>(element: &Element) -> bool
-where
-    M: Model<N>,
-{
-    !element.is_collocated() && !is_second_order::<M, N>()
 }
 
 /// The largest magnitude.
@@ -570,10 +405,11 @@ fn is_finite<const N: usize>(state: &State<N>) -> bool {
 
 #[cfg(all(test, feature = "simd", target_arch = "x86_64"))]
 pub(crate) mod tests {
+    use super::forms::has_form;
     use super::*;
     use crate::bundle::Pendulums;
     use crate::method::Memory;
-    use crate::model::{CoordinateName, Facts, Second};
+    use crate::model::{CoordinateName, Facts, Form, Second};
     use crate::newton::Control;
     use crate::real::Real;
     use crate::registers::storage::Heap;

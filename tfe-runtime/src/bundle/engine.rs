@@ -6,7 +6,7 @@ use super::together::Together;
 use crate::lanes::Lanes;
 use crate::model::Model;
 use crate::newton::Control;
-use crate::points::Inertia;
+use crate::points::inertia::Inertia;
 use crate::points::tables::Tables;
 use crate::registers::pair::{Eight, LANES, Pair};
 use crate::registers::storage::Heap;

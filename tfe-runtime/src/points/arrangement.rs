@@ -1,6 +1,6 @@
 //! What lies side by side in registers while an iteration computes.
 
-use super::Inertia;
+use super::inertia::Inertia;
 use crate::model::{First, Model};
 use crate::registers::side::Side;
 use crate::registers::storage::{Fixed, Matrix, Storage};

@@ -1,8 +1,8 @@
 //! Equations of first order, velocities or the rates of phase space as unknowns: one text for four points of a trajectory side by side and for eight trajectories.
 
-use super::acting;
 use super::arrangement::{Arrangement, Row, Size};
 use super::evaluation::Evaluation;
+use super::forms::acting;
 use crate::model::Model;
 use crate::registers::side::{Side, factor, solve, store};
 

@@ -2,7 +2,8 @@
 
 use crate::basis::{MAX_RATES, MOST_OF_INTEGRALS};
 use crate::model::{Form, Model, State};
-use crate::points::{Points, is_second_order};
+use crate::points::Points;
+use crate::points::forms::is_second_order;
 use crate::registers::storage::Heap;
 use crate::scheme::SchemeRef;
 use alloc::vec::Vec;

@@ -1,8 +1,8 @@
 //! M q̈ = f(q, q̇), forces as the only unknowns: one text for four points of a trajectory side by side and for eight trajectories.
 
-use super::acting;
 use super::arrangement::{Arrangement, Row, Size};
 use super::evaluation::Evaluation;
+use super::forms::acting;
 use crate::model::{Form, Model};
 use crate::precise::Precise;
 use crate::registers::side::Side;

@@ -1,8 +1,9 @@
 //! A step of one trajectory: start of the iteration, the iteration, the end.
 
 use super::evaluation::{Evaluation, FEW, Placed};
+use super::forms::{acting, is_phase, is_second_order};
 use super::{Leg, Outcome, Points, Together, Work};
-use super::{acting, is_finite, is_phase, is_second_order, largest};
+use super::{is_finite, largest};
 use crate::error::StepError;
 use crate::method::{Last, Memory};
 use crate::model::{Model, State};

@@ -3,14 +3,15 @@
 use super::arrangement::{Arrangement, Size};
 use super::evaluation::Evaluation;
 use super::first_order::Rows;
+use super::forms::acting;
+use super::inertia::Inertia;
 use super::second_order::{Forces, velocity_of};
-use super::{Inertia, Leg, Row, Work, acting};
-use crate::double_double::DoubleDouble;
+use super::{Leg, Row, Work};
 use crate::equations::Increment;
 use crate::model::{First, Model};
+#[cfg(feature = "alloc")]
 use crate::precise::Precise;
 use crate::registers::four::{Four, block, put};
-use crate::registers::side::Side;
 use crate::registers::storage::{Fixed, Matrix, Storage};
 
 /// The largest magnitude so far in each lane. NaN is left out: the end of a step is not finite where one of its forces is not, and that is looked at once a step.
@@ -339,85 +340,5 @@ impl<const N: usize, S: Storage> Work<N, S> {
             position.max(momentum)
         };
         Increment { relative, position }
-    }
-}
-
-impl<const N: usize, S: Storage> Inertia<N, S> {
-    /// Whether a constant mass matrix has nothing beside its diagonal: one number always has not.
-    #[inline(always)]
-    pub(crate) fn is_diagonal(&self) -> bool {
-        N == 1 || self.has_diagonal_alone
-    }
-
-    /// The constant M⁻¹ (or H_pp) times a vector for each of several points.
-    #[inline(always)]
-    pub(crate) fn times<V: Precise>(&self, like: V, vector: &[V; N]) -> [V; N] {
-        let mut product = [like.like(0.0); N];
-        if self.is_diagonal() {
-            for a in 0..N {
-                product[a] = like.like(self.inverse_diagonal[a]) * vector[a];
-            }
-            return product;
-        }
-        for (a, row) in self.inverse.iter().enumerate() {
-            for b in 0..N {
-                product[a] = like.like(row[b]).times_plus(vector[b], product[a]);
-            }
-        }
-        product
-    }
-
-    /// Sets how far accelerations reach in a step of length h.
-    #[inline(always)]
-    pub(crate) fn set_step<V: Four>(&mut self, like: V, h: f64) {
-        if !self.is_diagonal() || self.step == h {
-            return;
-        }
-        self.step = h;
-        let (square, square_low) = like.like(h).product(like.like(h));
-        for at in (0..N).step_by(4) {
-            let inverse = block(like, &self.inverse_diagonal, at);
-            let inverse_low = block(like, &self.inverse_low, at);
-            let (product, rest) = square.product(inverse);
-            let rest = rest + (square * inverse_low + square_low * inverse);
-            let (high, low) = product.exact_sum(rest);
-            put(high, &mut self.reach, at);
-            put(low, &mut self.reach_low, at);
-        }
-    }
-
-    /// One line of it times the numbers of a row.
-    #[inline(always)]
-    pub(crate) fn row<V: Side<L>, const L: usize>(
-        &self,
-        like: V,
-        row: &[[f64; L]; N],
-        a: usize,
-    ) -> V {
-        if self.is_diagonal() {
-            return like.like(self.inverse_diagonal[a]) * like.with(row[a]);
-        }
-        let mut sum = like.like(0.0);
-        for b in 0..N {
-            sum = like
-                .like(self.inverse[a][b])
-                .times_plus(like.with(row[b]), sum);
-        }
-        sum
-    }
-
-    /// The same of a number and what rounding took from it.
-    #[inline(always)]
-    pub(super) fn of_both(&self, high: &[f64; N], low: &[f64; N]) -> ([f64; N], [f64; N]) {
-        let (mut of_high, mut of_low) = ([0.0; N], [0.0; N]);
-        for (a, row) in self.inverse.iter().enumerate() {
-            let mut sum = DoubleDouble::ZERO;
-            for b in 0..N {
-                let product = DoubleDouble::product(row[b], high[b]);
-                sum = sum.plus(product).plus(DoubleDouble::new(row[b] * low[b]));
-            }
-            (of_high[a], of_low[a]) = (sum.high, sum.low);
-        }
-        (of_high, of_low)
     }
 }
