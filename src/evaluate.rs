@@ -53,6 +53,20 @@ pub(crate) fn names(count: usize, name: &dyn Fn(usize) -> CoordinateName) -> Vec
     (0..count).map(name).collect()
 }
 
+/// The largest residuals, beside how many constraints are independent.
+fn largest(residuals: &[constrained::Residual], independent: &[bool]) -> ConstraintResidual {
+    let (mut position, mut rate) = (0.0, 0.0);
+    for one in residuals {
+        position = larger(position, one.position.abs());
+        rate = larger(rate, one.velocity.abs());
+    }
+    ConstraintResidual {
+        position,
+        velocity: rate,
+        rank: independent.iter().filter(|one| **one).count(),
+    }
+}
+
 fn declared_names(constraints: &[Constraint]) -> Vec<&'static str> {
     constraints.iter().map(|one| one.name).collect()
 }
@@ -96,17 +110,8 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
     }
 
     fn residual(&self, t: f64, q: &[f64; N], velocity: &[f64; N]) -> ConstraintResidual {
-        let (mut position, mut rate) = (0.0, 0.0);
-        for one in constrained::residuals(self, t, q, velocity, 1.0) {
-            position = larger(position, one.position.abs());
-            rate = larger(rate, one.velocity.abs());
-        }
-        let independent = constrained::independent(self, t, q);
-        ConstraintResidual {
-            position,
-            velocity: rate,
-            rank: independent.into_iter().filter(|one| *one).count(),
-        }
+        let residuals = constrained::residuals(self, t, q, velocity, 1.0);
+        largest(&residuals, &constrained::independent(self, t, q))
     }
 
     fn reactions(&self, t: f64, (q, p): (&[f64; N], &[f64; N]), velocity: &[f64; N]) -> Vec<f64> {

@@ -64,8 +64,13 @@ impl<const N: usize> Length<N> for FixedLength {
         (&state.q, &state.p)
     }
 
-    fn from_fn(_: &[f64; N], number: impl FnMut(usize) -> f64) -> [f64; N] {
-        std::array::from_fn(number)
+    #[inline]
+    fn from_fn(_: &[f64; N], mut number: impl FnMut(usize) -> f64) -> [f64; N] {
+        let mut numbers = [0.0; N];
+        for (a, place) in numbers.iter_mut().enumerate() {
+            *place = number(a);
+        }
+        numbers
     }
 }
 

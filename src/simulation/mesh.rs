@@ -149,9 +149,14 @@ fn in_order<const N: usize>(
             return Err(RunErrorKind::Impulse { time: impulse.time });
         }
     }
-    let times: Vec<f64> = impulses.iter().map(|impulse| impulse.time).collect();
-    let places = order(&times, direction).into_iter();
-    Ok(places.map(|place| impulses[place]).collect())
+    let (mut times, mut ordered) = (Vec::new(), Vec::with_capacity(impulses.len()));
+    for impulse in impulses {
+        times.push(impulse.time);
+    }
+    for place in order(&times, direction) {
+        ordered.push(impulses[place]);
+    }
+    Ok(ordered)
 }
 
 /// The impulses between two times.

@@ -192,10 +192,7 @@ where
     ) -> Option<L::State> {
         let Examined { t, h, after, .. } = *examined;
         let end = self.end_of_parts((t, h), parts, start);
-        let off = match &end {
-            Some(end) => paired::<N, L>(end, after, |end, after| end - after),
-            None => paired::<N, L>(after, after, |_, _| f64::INFINITY),
-        };
+        let off = off::<N, L>(end.as_ref(), after);
         self.compared.push(Compared { t, h, off });
         end
     }
@@ -267,6 +264,14 @@ fn paired<const N: usize, L: Length<N>>(
         L::from_fn(one, |a| of(ones[a], others[a]))
     };
     L::state(vector(q, other_q), vector(p, other_p))
+}
+
+/// By how much the end of parts is away from that of an element.
+fn off<const N: usize, L: Length<N>>(end: Option<&L::State>, after: &L::State) -> L::State {
+    match end {
+        Some(end) => paired::<N, L>(end, after, |end, after| end - after),
+        None => paired::<N, L>(after, after, |_, _| f64::INFINITY),
+    }
 }
 
 fn extended<const N: usize, L: Length<N>>(

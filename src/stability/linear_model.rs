@@ -89,13 +89,17 @@ impl<const N: usize> LinearModel<N> {
         }
         let view = legendre::hamiltonian_view(model, t, &state.q, &state.p)
             .map_err(|_| LinearModelError::NoVelocity)?;
+        Self::of(view.second)
+    }
+
+    fn of(second: Second<f64, N>) -> Result<Self, LinearModelError> {
         let Second {
             zz,
             zq,
             qq,
             force_z,
             force_q,
-        } = &view.second;
+        } = &second;
         let mut entries = [zz, zq, qq, force_z, force_q]
             .into_iter()
             .flatten()
@@ -103,9 +107,7 @@ impl<const N: usize> LinearModel<N> {
         if !entries.all(|entry| entry.is_finite()) {
             return Err(LinearModelError::NotFinite);
         }
-        Ok(Self {
-            second: view.second,
-        })
+        Ok(Self { second })
     }
 
     /// How fast it moves: the eigenvalues of its equations.

@@ -18,7 +18,7 @@ pub(crate) mod rows;
 mod states;
 mod tangent;
 #[cfg(feature = "alloc")]
-mod trail;
+pub(crate) mod trail;
 
 pub use crate::control::START_TOLERANCE;
 #[cfg(feature = "alloc")]

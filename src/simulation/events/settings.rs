@@ -5,6 +5,7 @@ use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::motion::Event;
 use crate::simulation::kind::Simulated;
+use tfe_runtime::CoordinateName;
 
 /// New values of parameters, for [`Act::Set`](crate::Act::Set). They hold until they are set again, or the run ends; the model of the caller stays as it is.
 ///
@@ -86,7 +87,16 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
         model: &M,
         remodel: Option<Remodel<'m, M>>,
     ) -> Result<Changed<'m, M>, RunErrorKind> {
-        let names = model.parameter_names();
+        let values = self.numbered(&model.parameter_names())?;
+        let made = remodel.and_then(|remodel| remodel(model, &values));
+        match made {
+            Some(model) => Ok((model, values)),
+            None => Err(RunErrorKind::ParametersFixed),
+        }
+    }
+
+    /// The values with the numbers of their parameters.
+    fn numbered(&self, names: &[CoordinateName]) -> Result<Vec<(usize, f64)>, RunErrorKind> {
         let number = |(name, value): &(String, f64)| {
             let index = names.iter().position(|own| own.is(name));
             let index = index.ok_or_else(|| RunErrorKind::NoParameter {
@@ -102,12 +112,7 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
                 })
             }
         };
-        let values: Vec<_> = self.values.iter().map(number).collect::<Result<_, _>>()?;
-        let made = remodel.and_then(|remodel| remodel(model, &values));
-        match made {
-            Some(model) => Ok((model, values)),
-            None => Err(RunErrorKind::ParametersFixed),
-        }
+        self.values.iter().map(number).collect()
     }
 
     /// The state from where the run goes on, of the model with the new values.

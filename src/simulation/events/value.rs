@@ -48,11 +48,10 @@ impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
         L: Length<N, Vector = V>,
     {
         let Event { t, q, v, .. } = event;
-        let unit = |a: usize| L::from_fn(q, |b| if a == b { 1.0 } else { 0.0 });
-        let still = L::zero(q);
-        let coordinates = q.as_ref().len();
         match self {
             Self::Column(column) => {
+                let unit = |a: usize| L::from_fn(q, |b| if a == b { 1.0 } else { 0.0 });
+                let (still, coordinates) = (L::zero(q), q.as_ref().len());
                 let z = if M::NEEDS_VELOCITY { v } else { &event.p };
                 let mut values = vec![Dual::ZERO; model.output_count()];
                 let mut slope = |dt: f64, dq: &V, dz: &V| {
@@ -63,25 +62,29 @@ impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
                 let normal = L::from_fn(q, |a| slope(0.0, &unit(a), &still));
                 (!of_velocity).then(|| (normal, slope(1.0, &still, &still)))
             }
-            Self::Function(function) => {
-                let size = |one: f64| if one > 0.0 { one } else { 1.0 };
-                let moved = |from: &V, a: usize, s: f64| {
-                    let part = |b: usize| from.as_ref()[b] + if a == b { s } else { 0.0 };
-                    L::from_fn(from, part)
-                };
-                let at_q = DISTANCE * size(largest(q.as_ref()));
-                let at_v = DISTANCE * size(largest(v.as_ref()));
-                let here = function(*t, q, v);
-                let of_velocity =
-                    (0..coordinates).any(|a| function(*t, q, &moved(v, a, at_v)) != here);
-                let normal = L::from_fn(q, |a| {
-                    derivative(at_q, |s| function(*t, &moved(q, a, s), v))
-                });
-                let drift = derivative(DISTANCE, |s| function(t + s, q, v));
-                (!of_velocity).then_some((normal, drift))
-            }
+            Self::Function(function) => normal_of::<L, N>(function, *t, (q, v)),
         }
     }
+}
+
+/// The same of a function, by differences.
+fn normal_of<L: Length<N>, const N: usize>(
+    function: &Function<'_, L::Vector>,
+    t: f64,
+    (q, v): (&L::Vector, &L::Vector),
+) -> Option<(L::Vector, f64)> {
+    let size = |one: f64| if one > 0.0 { one } else { 1.0 };
+    let moved = |from: &L::Vector, a: usize, s: f64| {
+        let part = |b: usize| from.as_ref()[b] + if a == b { s } else { 0.0 };
+        L::from_fn(from, part)
+    };
+    let at_q = DISTANCE * size(largest(q.as_ref()));
+    let at_v = DISTANCE * size(largest(v.as_ref()));
+    let here = function(t, q, v);
+    let of_velocity = (0..q.as_ref().len()).any(|a| function(t, q, &moved(v, a, at_v)) != here);
+    let normal = L::from_fn(q, |a| derivative(at_q, |s| function(t, &moved(q, a, s), v)));
+    let drift = derivative(DISTANCE, |s| function(t + s, q, v));
+    (!of_velocity).then_some((normal, drift))
 }
 
 impl<const N: usize> Value<'_, [f64; N]> {

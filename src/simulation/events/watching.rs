@@ -125,6 +125,11 @@ fn watched<'m, const N: usize, L: Length<N>>(
     on.iter().map(watched).collect()
 }
 
+/// What is seen of them before a run.
+fn unseen<const N: usize, L: Length<N>>(watched: &[Watched<'_, N, L>]) -> Seen {
+    Seen::nothing(watched.iter().map(|one| one.on.name.clone()).collect())
+}
+
 /// A model whose events may set parameters: it may go to other threads.
 pub trait Settable<'m, const N: usize, L: Length<N>>: Simulated<N, L> + Send + Sync + 'm {}
 
@@ -155,7 +160,7 @@ where
             remodel: watching.remodel,
             look: watching.look,
             keep_off: watching.keep_off,
-            seen: Seen::nothing(watched.iter().map(|one| one.on.name.clone()).collect()),
+            seen: unseen(&watched),
             watched,
             chosen,
             clear: Clear::default(),

@@ -19,6 +19,29 @@ pub struct Trail {
     degree: usize,
 }
 
+/// What there is of a model.
+#[derive(Clone, Copy)]
+pub(crate) struct Of<'a> {
+    coordinates: usize,
+    constraints: &'a [Constraint],
+}
+
+impl Of<'static> {
+    pub(crate) const fn model<M: Model<N>, const N: usize>() -> Self {
+        Self {
+            coordinates: N,
+            constraints: M::CONSTRAINTS,
+        }
+    }
+}
+
+impl Of<'_> {
+    /// Of the unknowns of its elements.
+    fn layout(self, scheme: &SchemeRef<'_>) -> Layout {
+        Layout::new(&scheme.element, self.coordinates, self.constraints.len())
+    }
+}
+
 /// Where the iteration of a coming step may start.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Foreseen {
@@ -29,34 +52,30 @@ pub(crate) struct Foreseen {
 
 impl Foreseen {
     /// Looks up a step; without one nothing is foreseen.
-    pub(crate) fn look<M, const N: usize>(
+    pub(crate) fn look(
         &mut self,
         trail: &Trail,
         scheme: &SchemeRef<'_>,
+        of: Of<'_>,
         step: (f64, f64),
-    ) where
-        M: Model<N>,
-    {
-        let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
-        self.unknowns.resize(layout.size(), 0.0);
-        let is_known = trail.foresee::<M, N>(scheme, step, &mut self.unknowns);
+    ) {
+        self.unknowns.resize(of.layout(scheme).size(), 0.0);
+        let is_known = trail.foresee(scheme, of, step, &mut self.unknowns);
         self.step = is_known.then_some(step);
     }
 
     /// Writes what was foreseen for a step, all but the velocity at its end; false where that is nothing.
-    pub(crate) fn take<M, const N: usize>(
+    pub(crate) fn take(
         &mut self,
         scheme: &SchemeRef<'_>,
+        of: Of<'_>,
         step: (f64, f64),
         unknowns: &mut [f64],
-    ) -> bool
-    where
-        M: Model<N>,
-    {
+    ) -> bool {
         if self.step.take() != Some(step) {
             return false;
         }
-        let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
+        let layout = of.layout(scheme);
         let (end, node) = (layout.end(0), layout.node(0));
         unknowns[..end].copy_from_slice(&self.unknowns[..end]);
         unknowns[node..layout.size()].copy_from_slice(&self.unknowns[node..]);
@@ -92,15 +111,14 @@ impl Trail {
     }
 
     /// Adds an element of Gauss points; one of another degree than those before replaces them.
-    pub(crate) fn push<M, const N: usize>(
+    pub(crate) fn push(
         &mut self,
         scheme: &SchemeRef<'_>,
+        of: Of<'_>,
         span: (f64, f64),
         unknowns: &[f64],
-    ) where
-        M: Model<N>,
-    {
-        let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
+    ) {
+        let (layout, n) = (of.layout(scheme), of.coordinates);
         let degree = layout.degree();
         if self.degree != degree {
             self.clear();
@@ -112,12 +130,12 @@ impl Trail {
         };
         let rows = scheme.rate.chunks_exact(scheme.unknowns());
         for weights in rows.clone() {
-            for a in 0..N {
-                self.numbers.push(sum(weights, &|l| l * N + a));
+            for a in 0..n {
+                self.numbers.push(sum(weights, &|l| l * n + a));
             }
         }
         for (j, weights) in rows.enumerate() {
-            for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+            for (c, constraint) in of.constraints.iter().enumerate() {
                 let number = if constraint.kind.is_holonomic() {
                     unknowns[layout.inside(j, c)]
                 } else {
@@ -126,7 +144,7 @@ impl Trail {
                 self.numbers.push(number);
             }
         }
-        for c in 0..M::CONSTRAINTS.len() {
+        for c in 0..of.constraints.len() {
             self.numbers.push(unknowns[layout.node(c)]);
         }
         self.spans.push(span);
@@ -145,17 +163,16 @@ impl Trail {
     }
 
     /// Writes the unknowns of an element of Gauss points from t to t + h, all but the velocity at its end; false, with nothing written, where the trail does not reach that far.
-    pub(crate) fn foresee<M, const N: usize>(
+    fn foresee(
         &self,
         scheme: &SchemeRef<'_>,
+        of: Of<'_>,
         (t, h): (f64, f64),
         unknowns: &mut [f64],
-    ) -> bool
-    where
-        M: Model<N>,
-    {
+    ) -> bool {
         /// So much of an element may lie beyond the last one.
         const BEYOND: f64 = 0.1;
+        let n = of.coordinates;
         let reaches = |(start, length): &(f64, f64)| {
             ((t + h) - (start + length)) * length.signum() <= BEYOND * h.abs()
         };
@@ -164,23 +181,23 @@ impl Trail {
         };
         let ends = [self.at(t), self.at(t + h)].into_iter().flatten();
         if !(self.spans.last().is_some_and(reaches)
-            && ends.chain([middle]).all(|one| one.is_resolved::<N>()))
+            && ends.chain([middle]).all(|one| one.is_resolved(n)))
         {
             return false;
         }
         for (i, node) in scheme.unknown_nodes.iter().enumerate() {
             let t = t + h * node;
             let found = self.at(t).unwrap_or(middle);
-            for a in 0..N {
-                unknowns[i * N + a] = found.legendre_sum(t, |j| j * N + a);
+            for a in 0..n {
+                unknowns[i * n + a] = found.legendre_sum(t, |j| j * n + a);
             }
         }
-        let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
-        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+        let layout = of.layout(scheme);
+        for (c, constraint) in of.constraints.iter().enumerate() {
             let place = Multipliers {
                 of: c,
-                first: middle.degree * N,
-                count: M::CONSTRAINTS.len(),
+                first: middle.degree * n,
+                count: of.constraints.len(),
             };
             middle.multipliers(constraint, place, (t, h), scheme, |j, number| {
                 let at = match j {
@@ -217,12 +234,12 @@ impl Found<'_> {
 
     /// Whether the last Legendre coefficient of the rates is small beside the others. Another element that started from a wrong root of a step that is too long might find one beside
     /// it, and the two would agree.
-    fn is_resolved<const N: usize>(&self) -> bool {
+    fn is_resolved(&self, coordinates: usize) -> bool {
         /// Beside the largest.
         const SMALL: f64 = 0.01;
-        let rates = &self.numbers[..self.degree * N];
+        let rates = &self.numbers[..self.degree * coordinates];
         let size = |rates: &[f64]| rates.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        size(&rates[(self.degree - 1) * N..]) <= SMALL * size(rates)
+        size(&rates[(self.degree - 1) * coordinates..]) <= SMALL * size(rates)
     }
 
     /// A sum of Legendre polynomials at a time.

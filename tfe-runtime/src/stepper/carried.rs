@@ -1,6 +1,7 @@
 //! What a stepper carries from step to step.
 
 use super::piece::{Ahead, Piece};
+use crate::dense::DenseElement;
 use crate::method::{Impulse, Memory};
 use crate::points::Points;
 use crate::propagator::Propagator;
@@ -49,5 +50,11 @@ impl<const N: usize> Carried<N> {
             ahead: None,
             passes_node: false,
         }
+    }
+
+    /// The polynomials of a last step that was cut.
+    pub(super) fn dense_of_pieces(&self, start: f64, end: f64) -> Option<DenseElement<N>> {
+        let pieces = self.pieces.iter().map(|piece| piece.dense.clone());
+        DenseElement::of_pieces((start, end), pieces.collect())
     }
 }

@@ -74,9 +74,10 @@ where
         start: f64,
         end: f64,
     ) -> DenseElement<N> {
-        let pieces = self.carried.pieces.iter().map(|piece| piece.dense.clone());
-        DenseElement::of_pieces((start, end), pieces.collect())
-            .unwrap_or_else(|| self.dense_of_last(spare, start, end))
+        match self.carried.dense_of_pieces(start, end) {
+            Some(dense) => dense,
+            None => self.dense_of_last(spare, start, end),
+        }
     }
 
     pub(super) fn dense_of_last(

@@ -3,6 +3,7 @@
 use super::piece::{Ahead, Piece};
 use super::setup::Stepper;
 use crate::constrained::rows::Independence;
+use crate::constrained::trail::Of;
 use crate::cut::Halving;
 use crate::error::{ConstraintError, StepError};
 use crate::method::Impulse;
@@ -67,8 +68,12 @@ where
             return self.go_on(ahead, (t, h), state);
         }
         let (foreseen, scheme) = (&mut self.foreseen, self.table.view());
-        self.carried.memory.is_foreseen =
-            foreseen.take::<M, N>(&scheme, (t, h), &mut self.carried.numbers);
+        self.carried.memory.is_foreseen = foreseen.take(
+            &scheme,
+            Of::model::<M, N>(),
+            (t, h),
+            &mut self.carried.numbers,
+        );
         let (start, cuts) = (*state, self.carried.memory.statistics.cuts);
         let outcome = self.advance_plainly(t, h, state, impulses);
         if !(impulses.is_empty() && matches!(self.control.solve, Solve::Auto | Solve::Newton)) {

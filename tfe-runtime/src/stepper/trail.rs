@@ -2,6 +2,7 @@
 
 use super::setup::Stepper;
 use crate::constrained::Trail;
+use crate::constrained::trail::Of;
 use crate::element::Element;
 use crate::model::Model;
 use crate::scheme::Tables;
@@ -19,7 +20,8 @@ where
         if let Some(last) = &self.carried.memory.last
             && self.may_foresee()
         {
-            trail.push::<M, N>(&scheme, (last.t, last.h), &self.carried.numbers);
+            let of = Of::model::<M, N>();
+            trail.push(&scheme, of, (last.t, last.h), &self.carried.numbers);
         }
     }
 
@@ -27,7 +29,8 @@ where
     pub fn foresee(&mut self, trail: &Trail, (t, h): (f64, f64)) {
         if Self::HAS_CONSTRAINTS && self.may_foresee() {
             let scheme = self.table.view();
-            self.foreseen.look::<M, N>(trail, &scheme, (t, h));
+            self.foreseen
+                .look(trail, &scheme, Of::model::<M, N>(), (t, h));
         }
     }
 
