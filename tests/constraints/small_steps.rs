@@ -214,11 +214,11 @@ fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
             let simulation: Simulation<'_, M, N> = Simulation::new(model);
             let is_fast = name == "Andrews";
             let (count, known, short) = if is_fast {
-                (1, 0.4, 5e-5)
+                (1, 0.4, 1e-4)
             } else {
                 (COUNT, f64::from(COUNT), span / 300.0)
             };
-            let fine = simulation.clone().element(Mixed::<7>).step(short);
+            let fine = simulation.clone().element(Mixed::<5>).step(short);
             let exact = fine.run(start, 0.0..known).expect("a run");
             // How far it turns within a time, at most, as far as the motion is known.
             let turns = |within: f64, step: f64| {
