@@ -199,6 +199,12 @@ fn slides(kind: &RunErrorKind) -> bool {
     matches!(kind, RunErrorKind::Solve { source: found, .. } if *found == source)
 }
 
+/// Whether a function given for an input has failed once more: then it does with steps of any length. Once may be a single point, which other steps do not meet.
+pub(super) fn fails_again(before: Option<&RunErrorKind>, kind: &RunErrorKind) -> bool {
+    let of_input = |kind: &RunErrorKind| matches!(kind, RunErrorKind::Input(_));
+    of_input(kind) && before.is_some_and(of_input)
+}
+
 /// The largest of all.
 pub(super) fn largest(errors: &[Vec<f64>]) -> f64 {
     errors.iter().flatten().copied().fold(0.0, larger)
