@@ -10,6 +10,23 @@ pub(crate) fn raise(so_far: &mut f64, value: f64) {
     *so_far = larger(*so_far, value);
 }
 
+/// The largest magnitude.
+#[cfg(feature = "fit")]
+pub(crate) fn largest(numbers: &[f64]) -> f64 {
+    numbers.iter().fold(0.0, |most, x| larger(most, x.abs()))
+}
+
+/// The root of the sum of squares, of numbers of any size.
+#[cfg(feature = "fit")]
+pub(crate) fn norm(numbers: &[f64]) -> f64 {
+    let largest = largest(numbers);
+    if largest == 0.0 {
+        return 0.0;
+    }
+    let sum: f64 = numbers.iter().map(|x| (x / largest).powi(2)).sum();
+    largest * sum.sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::larger;

@@ -80,6 +80,57 @@ fn exact_measurements_give_exact_parameters() {
 }
 
 /// As short as it can be: the start is found, too.
+/// Units make no difference: of masses, of what is measured, of its deviation.
+#[test]
+fn sizes_do_not_matter() {
+    let fitted = |mass: f64, length: f64, deviation: f64| {
+        let guess = Ball {
+            m: mass,
+            g: 9.81 * length,
+            c: 0.1 * mass,
+        };
+        let start = guess.state([length], [4.0 * length]);
+        let measured: Vec<f64> = heights()
+            .into_iter()
+            .enumerate()
+            .map(|(k, y)| (y + if k % 2 == 0 { 1e-3 } else { -1e-3 }) * length)
+            .collect();
+        let fit = Fit::new(&guess).start(start, 0.0).step(0.05);
+        fit.parameters(["g", "c"])
+            .output_within("height", times(), &measured, deviation)
+            .solve()
+            .expect("a fit")
+    };
+    let plain = fitted(1.0, 1.0, 1.0);
+    let sizes = [1e-150, 1e-9, 1.0, 1e9, 1e150];
+    let kinds = sizes.into_iter().flat_map(|size| {
+        let deviations = [1e-100, 1.0, 1e100].map(|deviation| (1.0, size, deviation));
+        deviations.into_iter().chain([(size, 1.0, 1.0)])
+    });
+    for (mass, length, deviation) in kinds {
+        let fit = fitted(mass, length, deviation);
+        for (name, unit) in [("g", length), ("c", mass)] {
+            let numbers = [&fit, &plain].map(|fit| (fit.value(name), fit.deviation(name)));
+            let [
+                (Some(value), Some(off)),
+                (Some(expected), Some(expected_off)),
+            ] = numbers
+            else {
+                panic!("{name} is looked for");
+            };
+            // A minimum is known to the root of a rounding; what it is off by is some 1e-3.
+            assert!(
+                (value / unit - expected).abs() < 1e-6 * expected_off,
+                "{name} {mass:e} {length:e} {deviation:e}: {value:e}"
+            );
+            assert!(
+                (off / unit / expected_off - 1.0).abs() < 1e-6,
+                "{name} {mass:e} {length:e} {deviation:e}: {off:e} {expected_off:e}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_start_that_is_not_told_is_found() {
     let guess = Ball {

@@ -308,6 +308,37 @@ fn multipliers_are_what_states_are_worth() {
     }
 }
 
+/// Units make no difference, of masses, lengths or times: the cost has those of a force squared, times a time.
+#[test]
+fn sizes_do_not_matter() {
+    let plain = swing_up().elements(20).solve().expect("an optimum");
+    for size in [1e-30, 1e-9, 1e-4, 1e4, 1e9, 1e30] {
+        for (mass, length, time) in [(size, 1.0, 1.0), (1.0, size, 1.0), (1.0, 1.0, size)] {
+            let cart = CartPole {
+                cart: mass * CART.cart,
+                m: mass * CART.m,
+                l: length * CART.l,
+                g: CART.g * length / (time * time),
+            };
+            let start = cart.state([0.0, 0.0], [0.0, 0.0]);
+            let end = cart.state([length, PI], [0.0, 0.0]);
+            let best = OptimalControl::of(&cart)
+                .elements(20)
+                .from_to(start, end, 0.0..2.0 * time)
+                .running_cost("effort")
+                .solve();
+            let best = best.unwrap_or_else(|error| panic!("{mass:e} {length:e} {time:e}: {error}"));
+            let force = mass * length / (time * time);
+            let cost = best.cost() / force / force / time;
+            assert!(
+                (cost / plain.cost() - 1.0).abs() < 1e-9,
+                "{mass:e} {length:e} {time:e}: {cost} {}",
+                plain.cost()
+            );
+        }
+    }
+}
+
 /// A mass that is pushed.
 #[dynamics(
     coordinates(x),

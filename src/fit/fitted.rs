@@ -1,6 +1,7 @@
 //! What a fit has found.
 
 use crate::motion::Motion;
+use crate::numbers::norm;
 use nalgebra::DMatrix;
 use std::fmt;
 use tfe_runtime::State;
@@ -14,6 +15,7 @@ pub struct Fitted<M, const N: usize> {
     pub(super) values: Vec<f64>,
     pub(super) first: Vec<f64>,
     pub(super) covariance: DMatrix<f64>,
+    pub(super) deviations: Vec<f64>,
     pub(super) residuals: Vec<f64>,
     pub(super) trials: Vec<Trial>,
 }
@@ -60,8 +62,7 @@ impl<M, const N: usize> Fitted<M, N> {
 
     /// The standard deviation of one, the root of its [covariance](Self::covariance) with itself.
     pub fn deviation(&self, name: &str) -> Option<f64> {
-        let place = self.place(name)?;
-        Some(self.covariance[(place, place)].sqrt())
+        Some(self.deviations[self.place(name)?])
     }
 
     /// The covariance of the values,
@@ -95,15 +96,14 @@ impl<M, const N: usize> fmt::Display for Fitted<M, N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let widest = self.names.iter().map(String::len).max().unwrap_or(0);
         for (place, name) in self.names.iter().enumerate() {
-            let deviation = self.covariance[(place, place)].sqrt();
+            let deviation = self.deviations[place];
             writeln!(
                 f,
                 "{name:<widest$}  {:>12.6} -> {:>14.8} ± {deviation:.2e}",
                 self.first[place], self.values[place]
             )?;
         }
-        let sum: f64 = self.residuals.iter().map(|one| one * one).sum();
-        let mean = (sum / self.residuals.len().max(1) as f64).sqrt();
+        let mean = norm(&self.residuals) / (self.residuals.len().max(1) as f64).sqrt();
         write!(
             f,
             "{} values, deviation {mean:.3e}, {} runs",

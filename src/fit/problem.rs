@@ -4,6 +4,7 @@ use super::data::{Column, Observed};
 use super::error::FitError;
 use super::fitted::{Fitted, Trial};
 use super::setup::Fit;
+use crate::numbers::{largest, norm};
 use crate::sensitivity::Sensitive;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::DMatrix;
@@ -218,7 +219,9 @@ pub(super) struct Least<'f, M, const N: usize> {
     numbers: nalgebra::DVector<f64>,
     here: RefCell<Option<Evaluated<N>>>,
     trials: RefCell<Vec<Trial>>,
-    /// The sum of squares at the beginning.
+    /// A power of two near the largest residual at the beginning: the library that solves the problem forms squares, of units in which they neither vanish nor overflow.
+    unit: f64,
+    /// The sum of squares at the beginning, in this unit.
     first: f64,
 }
 
@@ -252,10 +255,13 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
             numbers,
             here: RefCell::new(None),
             trials: RefCell::new(Vec::new()),
+            unit: 1.0,
             first: 0.0,
         };
         let start = least.evaluate()?;
-        least.first = start.residuals.iter().map(|one| one * one).sum();
+        least.unit = unit_of(&start);
+        let residuals = start.residuals.iter().map(|one| one / least.unit);
+        least.first = residuals.map(|one| one * one).sum();
         least.note(Some(&start));
         *least.here.borrow_mut() = Some(start);
         Ok(least)
@@ -293,7 +299,7 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
                 why: format!("{reason:?}"),
             });
         };
-        let covariance = done.covariance(&evaluated)?;
+        let (covariance, deviations) = done.covariance(&evaluated)?;
         Ok(Fitted {
             model: done.unknowns.model(done.fit.model, &values)?,
             motion: evaluated.sensitive.motion().clone(),
@@ -301,6 +307,7 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
             values,
             first: done.unknowns.first,
             covariance,
+            deviations,
             residuals: evaluated.residuals,
             trials,
         })
@@ -350,8 +357,7 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
     fn note(&self, evaluated: Option<&Evaluated<N>>) {
         let (values, _) = self.unknowns.values(self.numbers.as_slice());
         let deviation = evaluated.map_or(f64::INFINITY, |one| {
-            let sum: f64 = one.residuals.iter().map(|r| r * r).sum();
-            (sum / one.residuals.len() as f64).sqrt()
+            norm(&one.residuals) / (one.residuals.len() as f64).sqrt()
         });
         let mut trials = self.trials.borrow_mut();
         if self.fit.progress {
@@ -366,18 +372,20 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
         trials.push(Trial { values, deviation });
     }
 
-    /// s² (JᵀJ)⁻¹ (T-126).
-    fn covariance(&self, evaluated: &Evaluated<N>) -> Result<DMatrix<f64>, FitError> {
+    /// s² (JᵀJ)⁻¹ (T-126), and the roots of its diagonal, whose squares may be less than any number.
+    fn covariance(&self, evaluated: &Evaluated<N>) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
         /// Singular values below this part of the largest, of columns of length one, are roundings of the motion.
         const TOLD: f64 = 1e-11;
 
         let mut slopes = evaluated.slopes.clone();
-        let lengths: Vec<f64> = slopes.column_iter().map(|column| column.norm()).collect();
         let (rows, columns) = slopes.shape();
-        for (mut column, length) in slopes.column_iter_mut().zip(&lengths) {
-            if *length > 0.0 {
-                column /= *length;
+        let mut lengths = Vec::with_capacity(columns);
+        for mut column in slopes.column_iter_mut() {
+            let length = norm(column.as_slice());
+            if length > 0.0 {
+                column.apply(|slope| *slope /= length);
             }
+            lengths.push(length);
         }
         let svd = slopes.svd(false, true);
         let (largest, least) = (svd.singular_values.max(), svd.singular_values.imin());
@@ -390,17 +398,31 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
         if svd.singular_values[least] < TOLD * largest {
             return Err(undetermined(right.row(least).iamax_full().1));
         }
-        let sum: f64 = evaluated.residuals.iter().map(|one| one * one).sum();
-        let square = match rows - columns {
+        // s
+        let deviation = match rows - columns {
             0 => 1.0,
-            free => sum / free as f64,
+            free => norm(&evaluated.residuals) / (free as f64).sqrt(),
         };
         let inverse = DMatrix::from_diagonal(&svd.singular_values.map(|one| 1.0 / (one * one)));
         let scaled = right.transpose() * inverse * right;
-        Ok(DMatrix::from_fn(columns, columns, |a, b| {
-            square * scaled[(a, b)] / (lengths[a] * lengths[b])
-        }))
+        let covariance = DMatrix::from_fn(columns, columns, |a, b| {
+            scaled[(a, b)] * (deviation / lengths[a]) * (deviation / lengths[b])
+        });
+        if !covariance.iter().all(|entry| entry.is_finite()) {
+            return Err(FitError::NotFinite);
+        }
+        let deviation_of = |a: usize| scaled[(a, a)].sqrt() * (deviation / lengths[a]);
+        Ok((covariance, (0..columns).map(deviation_of).collect()))
     }
+}
+
+/// A power of two near the largest residual; near the largest slope where all residuals are zero.
+fn unit_of<const N: usize>(start: &Evaluated<N>) -> f64 {
+    let sizes = [&start.residuals[..], start.slopes.as_slice()].map(largest);
+    let size = sizes.into_iter().find(|size| *size > 0.0);
+    // Neither it nor what is divided by it is beyond what a number can be.
+    let exponent = size.unwrap_or(1.0).log2().round().clamp(-1000.0, 1000.0);
+    exponent.exp2()
 }
 
 impl<M: Model<N>, const N: usize> LeastSquaresProblem<f64, nalgebra::Dyn, nalgebra::Dyn>
@@ -428,7 +450,7 @@ impl<M: Model<N>, const N: usize> LeastSquaresProblem<f64, nalgebra::Dyn, nalgeb
     fn residuals(&self) -> Option<nalgebra::DVector<f64>> {
         let count = self.columns.iter().map(|one| one.times.len()).sum();
         Some(match &*self.here.borrow() {
-            Some(here) => nalgebra::DVector::from_column_slice(&here.residuals),
+            Some(here) => nalgebra::DVector::from_column_slice(&here.residuals) / self.unit,
             None => nalgebra::DVector::from_element(count, 1e6 * (1.0 + self.first)),
         })
     }
@@ -439,7 +461,7 @@ impl<M: Model<N>, const N: usize> LeastSquaresProblem<f64, nalgebra::Dyn, nalgeb
         let (_, rates) = self.unknowns.values(self.numbers.as_slice());
         let (rows, columns) = here.slopes.shape();
         Some(nalgebra::DMatrix::from_fn(rows, columns, |row, column| {
-            here.slopes[(row, column)] * rates[column]
+            here.slopes[(row, column)] / self.unit * rates[column]
         }))
     }
 }

@@ -349,18 +349,26 @@ impl<M> Problem<'_, M> {
         let mut links = Vec::with_capacity(elements);
         for element in 0..elements {
             let quadratic = condensed[element].quadratic(&hessians[element]);
-            let link = self.link(&condensed[element], &quadratic, &iterate.nodes[element + 1])?;
+            links.push(self.link(&condensed[element], &quadratic, &iterate.nodes[element + 1])?);
+        }
+        let units = units(&links, n);
+        let (state, costate) = (&units, &units.map(f64::recip));
+        for (element, link) in links.iter().enumerate() {
             let backward = link.a.transpose().lu().try_inverse()?;
             let carried = &link.g * &backward;
             let mut matrix = DMatrix::zeros(2 * n, 2 * n);
-            matrix
-                .view_mut((0, 0), (n, n))
-                .copy_from(&(&link.a + &carried * &link.q));
-            matrix.view_mut((0, n), (n, n)).copy_from(&-&carried);
-            matrix
-                .view_mut((n, 0), (n, n))
-                .copy_from(&-(&backward * &link.q));
-            matrix.view_mut((n, n), (n, n)).copy_from(&backward);
+            let blocks = [
+                (0, 0, &link.a + &carried * &link.q),
+                (0, n, -&carried),
+                (n, 0, -(&backward * &link.q)),
+                (n, n, backward.clone()),
+            ];
+            for (row, column, block) in blocks {
+                let of_rows = if row == 0 { costate } else { state };
+                let of_columns = if column == 0 { state } else { costate };
+                let scaled = block.map_with_location(|i, j, x| of_rows[i] * x * of_columns[j]);
+                matrix.view_mut((row, column), (n, n)).copy_from(&scaled);
+            }
             // The storage of nalgebra goes by columns.
             let rows = matrix.transpose();
             (chain.link_mut(element).matrix).copy_from_slice(rows.as_slice());
@@ -369,18 +377,25 @@ impl<M> Problem<'_, M> {
             for side in 0..SIDES {
                 let right = &mut chain.right_side_mut(side).links;
                 let right = &mut right[element * 2 * n..(element + 1) * 2 * n];
-                right[..n].copy_from_slice(upper.column(side).as_slice());
-                right[n..].copy_from_slice(lower.column(side).as_slice());
+                let upper = upper.column(side).component_mul(costate);
+                let lower = lower.column(side).component_mul(state);
+                right[..n].copy_from_slice(upper.as_slice());
+                right[n..].copy_from_slice(lower.as_slice());
             }
-            links.push(link);
         }
-        self.close(chain, condensed, &hessians);
+        self.close(chain, condensed, &hessians, &units);
         chain.solve().ok()?;
-        self.solution(chain, condensed, &hessians, &links, iterate)
+        self.solution((chain, &units), condensed, &hessians, &links, iterate)
     }
 
     /// The conditions at both ends: a component is given, or its costate is that of the cost of the end.
-    fn close(&self, chain: &mut Chain, condensed: &[Condensed], hessians: &[DMatrix<f64>]) {
+    fn close(
+        &self,
+        chain: &mut Chain,
+        condensed: &[Condensed],
+        hessians: &[DMatrix<f64>],
+        units: &DVector<f64>,
+    ) {
         let n = 2 * self.sizes.dof;
         let closure = chain.closure_mut();
         closure.first.fill(0.0);
@@ -397,8 +412,8 @@ impl<M> Problem<'_, M> {
             }
             last[n + at] = 1.0;
             if let Some(end) = &end {
-                for (entry, second) in last.iter_mut().zip(end.matrix.row(at).iter()) {
-                    *entry = -second;
+                for (j, entry) in last[..n].iter_mut().enumerate() {
+                    *entry = -units[at] * end.matrix[(at, j)] * units[j];
                 }
             }
         }
@@ -407,7 +422,7 @@ impl<M> Problem<'_, M> {
             right.fill(0.0);
             for at in (0..n).filter(|at| !self.ends.last[*at]) {
                 if let Some(end) = &end {
-                    right[n + at] = end.gradients[(at, side)];
+                    right[n + at] = units[at] * end.gradients[(at, side)];
                 }
             }
         }
@@ -416,7 +431,7 @@ impl<M> Problem<'_, M> {
     /// All unknowns from the nodes of the chain.
     fn solution(
         &self,
-        chain: &Chain,
+        (chain, units): (&Chain, &DVector<f64>),
         condensed: &[Condensed],
         hessians: &[DMatrix<f64>],
         links: &[Link],
@@ -425,8 +440,13 @@ impl<M> Problem<'_, M> {
         let n = 2 * self.sizes.dof;
         let elements = self.blocks.len();
         let solved = |side: usize, e: usize| chain.node_of(side, e).split_at(n);
-        let node = |e: usize| DVector::from_column_slice(solved(WHOLE, e).0);
-        let costate = |e: usize| DVector::from_column_slice(solved(WHOLE, e).1);
+        let state_of = |side: usize, e: usize| {
+            DVector::from_column_slice(solved(side, e).0).component_mul(units)
+        };
+        let costate_of = |side: usize, e: usize| {
+            DVector::from_column_slice(solved(side, e).1).component_div(units)
+        };
+        let (node, costate) = (|e| state_of(WHOLE, e), |e| costate_of(WHOLE, e));
         let mut step = Step {
             change: Iterate {
                 nodes: (0..=elements).map(node).collect(),
@@ -444,13 +464,13 @@ impl<M> Problem<'_, M> {
         };
         for (at, one) in condensed.iter().enumerate() {
             let change = &step.change.nodes[at];
-            let along = DVector::from_column_slice(solved(ALONG, at).0);
+            let along = state_of(ALONG, at);
             let (outer, along, end) = if let Some(link) = links.get(at) {
                 let end = costate(at + 1);
                 let inputs = link.by_inputs.inputs(WHOLE, change, &end);
                 let outer = DVector::from_vec([change.as_slice(), inputs.as_slice()].concat());
                 step.change.steering.push(inputs);
-                let other = DVector::from_column_slice(solved(ALONG, at + 1).1);
+                let other = costate_of(ALONG, at + 1);
                 let inputs = link.by_inputs.inputs(ALONG, &along, &other);
                 let along = DVector::from_vec([along.as_slice(), inputs.as_slice()].concat());
                 (outer, along, end)
@@ -629,6 +649,20 @@ impl<M> Problem<'_, M> {
         }
         history.push(note);
     }
+}
+
+/// Units of the state in which the inputs reach about one; those of the costate are their reciprocals, times one of the cost. Powers of two, so that nothing is rounded. Without them a problem
+/// of heavy bodies, or of weak inputs, would look like one whose inputs move nothing.
+fn units(links: &[Link], n: usize) -> DVector<f64> {
+    DVector::from_fn(n, |at, _| {
+        let reached: f64 = links.iter().map(|link| link.g[(at, at)].abs()).sum();
+        let exponent = 0.5 * reached.log2();
+        if exponent.is_finite() {
+            exponent.round().exp2()
+        } else {
+            1.0
+        }
+    })
 }
 
 /// How many times as large as their multipliers the weights of violated equations must be for the merit to fall along a step; none where they would have to be too large.
