@@ -4,6 +4,7 @@ use crate::constraints::write_residuals;
 use crate::driven::InputError;
 use crate::length::{FixedLength, Length};
 use crate::motion::Motion;
+use crate::numbers::Short;
 use std::error::Error;
 use std::fmt;
 use tfe_runtime::constrained::Residual;
@@ -265,9 +266,11 @@ impl fmt::Display for RunErrorKind {
             Self::Element(error) => error.fmt(f),
             Self::Family(error) => error.fmt(f),
             Self::Step { step } => {
+                let step = Short(*step);
                 write!(f, "the step is {step}, but it must be finite and not zero")
             }
             Self::Accuracy { asked } => {
+                let asked = Short(*asked);
                 write!(
                     f,
                     "the accuracy is {asked}, but it must lie between 0 and 1"
@@ -288,12 +291,15 @@ impl fmt::Display for RunErrorKind {
                 }
             }
             Self::Span { start, end } => {
+                let (start, end) = (Short(*start), Short(*end));
                 write!(f, "the span {start}..{end} has an end that is not finite")
             }
             Self::TooManySteps { span, step } => {
+                let (span, step) = (Short(*span), Short(*step));
                 write!(f, "a span of {span} holds too many steps of {step}")
             }
             Self::StepUnresolved { time, step, least } => {
+                let (step, time) = (Short(*step), Short(*time));
                 write!(
                     f,
                     "a step of {step} is not resolved at t = {time}, where the least is {least:.1e}: count time from an origin near the motion"
@@ -381,6 +387,7 @@ impl fmt::Display for RunErrorKind {
                 write!(f, "there are no nodes in the span {start}..{end}")
             }
             Self::Start { coordinate, q, p } => {
+                let (q, p) = (Short(*q), Short(*p));
                 write!(
                     f,
                     "the start is not finite: coordinate {coordinate} is {q}, its momentum {p}"
@@ -407,6 +414,7 @@ impl fmt::Display for RunErrorKind {
                 step,
                 source,
             } => {
+                let (time, step) = (Short(*time), Short(*step));
                 write!(f, "element {element} (t = {time}, h = {step}): {source}")
             }
             Self::Transition {
@@ -414,10 +422,13 @@ impl fmt::Display for RunErrorKind {
                 time,
                 step,
                 source,
-            } => write!(
-                f,
-                "element {element} (t = {time}, h = {step}) has no transition matrix: {source}"
-            ),
+            } => {
+                let (time, step) = (Short(*time), Short(*step));
+                write!(
+                    f,
+                    "element {element} (t = {time}, h = {step}) has no transition matrix: {source}"
+                )
+            }
         }
     }
 }

@@ -1,4 +1,21 @@
-//! Comparisons of numbers in which no NaN is lost.
+//! Comparisons of numbers in which no NaN is lost, and numbers of any size in messages.
+
+use std::fmt;
+
+/// A number in a message: with an exponent where it would have rows of zeros.
+pub(crate) struct Short(pub(crate) f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(number) = self;
+        let size = number.abs();
+        if size == 0.0 || (1e-5..1e16).contains(&size) || !size.is_finite() {
+            number.fmt(f)
+        } else {
+            write!(f, "{number:e}")
+        }
+    }
+}
 
 /// The larger one; NaN if one is, which `f64::max` would drop: `errors.fold(0.0, larger)`.
 pub(crate) fn larger(a: f64, b: f64) -> f64 {
@@ -29,7 +46,18 @@ pub(crate) fn norm(numbers: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::larger;
+    use super::{Short, larger};
+
+    #[test]
+    fn numbers_have_no_rows_of_zeros() {
+        let shown = |number: f64| Short(number).to_string();
+        assert_eq!(
+            [0.1, 0.0, -3.0, 1e15].map(shown),
+            ["0.1", "0", "-3", "1000000000000000"]
+        );
+        assert_eq!([1e-6, -2.5e300].map(shown), ["1e-6", "-2.5e300"]);
+        assert_eq!([f64::NAN, f64::INFINITY].map(shown), ["NaN", "inf"]);
+    }
 
     #[test]
     fn a_nan_stays_whatever_follows() {
