@@ -24,6 +24,8 @@ pub(crate) struct Periodic<'m, M, const N: usize> {
     pub(crate) start: f64,
     pub(crate) period: f64,
     pub(crate) unfolding: f64,
+    /// Of the guess: Σ p·v / Σ v·v, by which a force γ v is measured.
+    pub(crate) inertia: f64,
     pub(crate) globals: Vec<Global>,
     /// How much the coordinates grow over a period.
     pub(crate) advance: [f64; N],
@@ -46,7 +48,7 @@ impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
             return Err(OrbitError::Period { period });
         }
         // Damping that takes a percent of the motion over a period is no discretization error.
-        if !(unfolding.abs() * period < 1e-2) {
+        if !(unfolding.abs() * period < 1e-2 * self.inertia) {
             return Err(OrbitError::NoFamily { unfolding });
         }
         Ok(())
@@ -56,6 +58,29 @@ impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
     pub(crate) fn trivial(&self) -> usize {
         let unfolded = self.globals.contains(&Global::Unfolding);
         usize::from(self.phase.is_some()) * (1 + usize::from(unfolded))
+    }
+}
+
+/// Σ p·v / Σ v·v over places of a guess; one where it does not move.
+pub(crate) fn inertia_of<'a>(places: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> f64 {
+    let (mut action, mut square, mut fastest) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for (p, v) in places {
+        let speed = v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        // In units of the largest speed so far, whose square is a number.
+        if speed > fastest {
+            let ratio = fastest / speed;
+            (action, square, fastest) = (action * ratio, square * ratio * ratio, speed);
+        }
+        if fastest > 0.0 {
+            action += p.iter().zip(v).map(|(p, v)| p * (v / fastest)).sum::<f64>();
+            square += v.iter().map(|v| (v / fastest).powi(2)).sum::<f64>();
+        }
+    }
+    let inertia = (action / (fastest * square)).abs();
+    if inertia > 0.0 && inertia.is_finite() {
+        inertia
+    } else {
+        1.0
     }
 }
 
@@ -189,7 +214,7 @@ impl<M: Model<N>, const N: usize> Problem<N> for Periodic<'_, M, N> {
         match self.globals[global] {
             Global::Period => self.period,
             // A force that acts within a period.
-            Global::Unfolding => 1.0 / self.period,
+            Global::Unfolding => self.inertia / self.period,
         }
     }
 

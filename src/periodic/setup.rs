@@ -4,7 +4,7 @@ use super::error::OrbitError;
 use super::kind::Closed;
 use super::orbit::Orbit;
 use super::phase::{Period, Phase};
-use super::problem::{Global, Periodic};
+use super::problem::{Global, Periodic, inertia_of};
 use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh};
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Motion;
@@ -228,6 +228,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             start: self.start,
             period,
             unfolding: 0.0,
+            inertia: 1.0,
             globals: Vec::new(),
             advance: self.advances(),
             phase: None,
@@ -247,6 +248,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             problem.phase = Some(self.checked_phase(N)?);
             if conservative || problem.globals.is_empty() {
                 problem.globals.push(Global::Unfolding);
+                problem.inertia = self.inertia_along(&curve, period)?;
             }
             if problem.globals.len() == 2 {
                 problem.energy = Some(self.energy_of(&curve)?);
@@ -310,6 +312,19 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             let (q, v) = curve(self.start + period * f64::from(k) / 16.0);
             q == first && v == [0.0; N]
         }) && self.advances() == [0.0; N]
+    }
+
+    fn inertia_along(&self, curve: &Curve<'_, N>, period: f64) -> Result<f64, OrbitError> {
+        const PLACES: u32 = 16;
+        let mut places = Vec::new();
+        for k in 0..PLACES {
+            let t = self.start + period * f64::from(k) / f64::from(PLACES);
+            let (q, v) = curve(t);
+            let state = legendre::state(self.model, t, &q, &v);
+            places.push((state.map_err(AssemblyError::Legendre)?.p, v));
+        }
+        let places = places.iter().map(|(p, v)| (&p[..], &v[..]));
+        Ok(inertia_of(places))
     }
 
     fn energy_of(&self, curve: &Curve<'_, N>) -> Result<f64, OrbitError> {

@@ -273,10 +273,24 @@ fn keep_from_overflow(factor: &mut DMatrix<f64>) -> i64 {
 /// The coordinates of a mechanical system and their momenta have units that may make one a billion times the other;
 /// balancing (Parlett and Reinsch) takes the difference out of the factors and with it out of the round-off.
 fn balance(factors: &mut [DMatrix<f64>], n: usize) {
-    // The largest modulus at each place, each factor relative to its largest entry.
+    let is_lost = |factor: &DMatrix<f64>| {
+        let size = largest(factor.iter());
+        let mut entries = factor.iter();
+        entries.any(|x| *x != 0.0 && x.abs() / size < f64::MIN_POSITIVE)
+    };
+    if factors.iter().any(is_lost) {
+        // First as they are, so that none is taken for zero.
+        balance_by(factors, n, |_| 1.0);
+    }
+    // Then each factor relative to its largest entry.
+    balance_by(factors, n, |factor| largest(factor.iter()));
+}
+
+/// The same by the largest modulus at each place, relative to the sizes of the factors.
+fn balance_by(factors: &mut [DMatrix<f64>], n: usize, size_of: impl Fn(&DMatrix<f64>) -> f64) {
     let mut most = DMatrix::<f64>::zeros(n, n);
     for factor in factors.iter() {
-        let size = largest(factor.iter());
+        let size = size_of(factor);
         if size > 0.0 {
             most.zip_apply(factor, |most, x| *most = most.max(x.abs() / size));
         }

@@ -12,3 +12,4 @@ mod errors;
 mod models;
 mod orbits;
 mod sensitive;
+mod sizes;

@@ -3,7 +3,7 @@
 use super::super::error::OrbitError;
 use super::super::orbit::sort;
 use super::super::phase::Phase;
-use super::super::problem::Global;
+use super::super::problem::{Global, inertia_of};
 use crate::assembly::{AssemblyError, Chain, Control, Convergence, Mesh};
 use crate::constraints::allowed::{self, basis_of};
 use crate::periodic_schur::{self, Multiplier};
@@ -20,6 +20,8 @@ pub struct Shooting<'m, M> {
     pub(super) start: f64,
     pub(super) period: f64,
     pub(super) unfolding: f64,
+    /// As that of orbits of fixed size.
+    inertia: f64,
     pub(super) globals: Vec<Global>,
     pub(super) phase: Option<Phase>,
     pub(super) energy: Option<f64>,
@@ -44,6 +46,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             start,
             period,
             unfolding: 0.0,
+            inertia: 1.0,
             globals: Vec::new(),
             phase: None,
             energy: None,
@@ -106,6 +109,18 @@ impl<'m, M: family::Model> Shooting<'m, M> {
     /// Iterates to a solution, by steps that are halved where they lead away.
     pub(super) fn solve(&mut self, control: Control) -> Result<(), OrbitError> {
         let n = self.model.len();
+        if self.globals.contains(&Global::Unfolding) {
+            let velocity = |node| family::velocity(self.model, self.start, node);
+            let velocities = self
+                .nodes
+                .iter()
+                .map(velocity)
+                .collect::<Result<Vec<_>, _>>();
+            // Where there is none the first step says so.
+            let velocities = velocities.unwrap_or_default();
+            let places = self.nodes.iter().zip(&velocities);
+            self.inertia = inertia_of(places.map(|(node, v)| (&node.p[..], &v[..])));
+        }
         let dense = usize::from(self.phase == Some(Phase::Orthogonal));
         let mut chain = Chain::new(2 * n, self.globals.len(), self.mesh.elements(), dense);
         self.linearise(&mut chain)?;
@@ -139,7 +154,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             return Err(OrbitError::Period { period });
         }
         // Damping that takes a percent of the motion over a period is no discretization error.
-        if !(unfolding.abs() * period < 1e-2) {
+        if !(unfolding.abs() * period < 1e-2 * self.inertia) {
             return Err(OrbitError::NoFamily { unfolding });
         }
         Ok(())
@@ -295,7 +310,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         let globals = globals.map(|(global, correction)| match global {
             Global::Period => correction / self.period,
             // A force that acts within a period.
-            Global::Unfolding => correction * self.period,
+            Global::Unfolding => correction * self.period / self.inertia,
         });
         crate::assembly::size(nodes, chain.matrices(), globals)
     }

@@ -1,0 +1,135 @@
+//! Units of masses, lengths and times make no difference.
+
+use std::f64::consts::TAU;
+use tfe::periodic::OrbitError;
+use tfe::prelude::*;
+
+/// A particle in a plane, between springs that stiffen.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - k/2*(x^2 + 2*y^2) - b*k/l^2*x^2*y^2,
+)]
+struct Plane {
+    m: f64,
+    k: f64,
+    b: f64,
+    l: f64,
+}
+
+/// A pendulum in a viscous fluid that is pushed to and fro.
+#[dynamics(
+    coordinates(theta),
+    lagrangian = m*l^2/2*dot(theta)^2 + m*g*l*cos(theta),
+    force(theta) = m*g*l*f*cos(w*t) - c*m*l^2*dot(theta),
+)]
+struct Pushed {
+    m: f64,
+    l: f64,
+    g: f64,
+    f: f64,
+    w: f64,
+    c: f64,
+}
+
+/// Van der Pol's oscillator of any mass.
+#[dynamics(
+    coordinates(x),
+    lagrangian = m*(dot(x)^2 - x^2)/2,
+    force(x) = m*(1 - x^2)*dot(x),
+)]
+struct VanDerPol {
+    m: f64,
+}
+
+/// Masses, lengths and times, one of them in other units.
+fn units() -> impl Iterator<Item = [f64; 3]> {
+    let sizes = [1e-100, 1e-30, 1e-9, 1e-4, 1.0, 1e4, 1e9, 1e30, 1e100];
+    sizes
+        .into_iter()
+        .flat_map(|size| [[size, 1.0, 1.0], [1.0, size, 1.0], [1.0, 1.0, size]])
+}
+
+#[test]
+fn conservative_orbits_have_the_same_period() {
+    for [m, l, t] in units() {
+        let k = m / t / t;
+        let plane = Plane { m, k, b: 0.3, l };
+        let orbit = PeriodicOrbit::of(&plane)
+            .elements(12)
+            .guess(|at| {
+                let phase = 2.0_f64.sqrt() * at / t;
+                let (q, v) = (
+                    0.4 * l * phase.cos(),
+                    -0.4 * l * 2.0_f64.sqrt() / t * phase.sin(),
+                );
+                ([0.0, q], [0.0, v])
+            })
+            .unknown_period(4.5 * t)
+            .solve();
+        let orbit = orbit.unwrap_or_else(|error| panic!("{m:e} {l:e} {t:e}: {error}"));
+        // Along the axis the spring is linear; twelve elements are off by 9e-7.
+        let period = orbit.period() / t;
+        assert!(
+            (period - TAU / 2.0_f64.sqrt()).abs() < 1e-6,
+            "{m:e} {l:e} {t:e}: {period}"
+        );
+        assert!(
+            orbit.is_stable(),
+            "{m:e} {l:e} {t:e} {:?} {:?}",
+            orbit.verdict(),
+            orbit.multipliers()
+        );
+    }
+}
+
+#[test]
+fn forced_orbits_have_the_same_multipliers() {
+    let found = |[m, l, t]: [f64; 3]| {
+        let pushed = Pushed {
+            m,
+            l,
+            g: l / t / t,
+            f: 0.2,
+            w: 0.7 / t,
+            c: 0.1 / t,
+        };
+        let orbit = PeriodicOrbit::of(&pushed)
+            .period(TAU / 0.7 * t)
+            .elements(20)
+            .solve();
+        let orbit = orbit.unwrap_or_else(|error| panic!("{m:e} {l:e} {t:e}: {error}"));
+        let moduli: Vec<f64> = orbit.multipliers().iter().map(|one| one.norm()).collect();
+        (orbit.start().q[0], moduli)
+    };
+    let (angle, moduli) = found([1.0; 3]);
+    // Abel, Jacobi, Liouville: a damping of 0.1 over the period takes as much of every area.
+    let product = (-0.1 * TAU / 0.7_f64).exp();
+    let off = moduli.iter().product::<f64>() - product;
+    assert!(off.abs() < 1e-5, "{off:e}");
+    for of in units() {
+        let (other, others) = found(of);
+        assert!((other - angle).abs() < 1e-11, "{of:?}: {other} {angle}");
+        for (one, other) in moduli.iter().zip(&others) {
+            assert!((one - other).abs() < 1e-11, "{of:?}: {moduli:?} {others:?}");
+        }
+    }
+}
+
+/// A limit cycle has one period only: a light one must not be forced to another, nor a heavy one be refused its own.
+#[test]
+fn a_force_that_closes_an_orbit_is_measured_by_the_mass() {
+    for m in [1e-12, 1e-6, 1.0, 1e6, 1e12] {
+        let oscillator = VanDerPol { m };
+        let guess = |t: f64| ([2.0 * t.cos()], [-2.0 * t.sin()]);
+        let of = || PeriodicOrbit::of(&oscillator).elements(40).guess(guess);
+        let orbit = of().unknown_period(6.6).solve().expect("a limit cycle");
+        // As in `tests/reference/periodic.json`.
+        assert!(
+            (orbit.period() - 6.663_286_859_3).abs() < 1e-6,
+            "{m:e}: {}",
+            orbit.period()
+        );
+        let forced = of().period(7.5).solve();
+        assert!(matches!(forced, Err(OrbitError::NoFamily { .. })), "{m:e}");
+    }
+}
