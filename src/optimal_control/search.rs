@@ -352,6 +352,7 @@ impl<M> Problem<'_, M> {
             links.push(self.link(&condensed[element], &quadratic, &iterate.nodes[element + 1])?);
         }
         let units = units(&links, n);
+        // The numbers of the chain are y over its unit and λ times it: rows are scaled by the reciprocals of what columns are.
         let (state, costate) = (&units, &units.map(f64::recip));
         for (element, link) in links.iter().enumerate() {
             let backward = link.a.transpose().lu().try_inverse()?;
