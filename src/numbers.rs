@@ -28,13 +28,11 @@ pub(crate) fn raise(so_far: &mut f64, value: f64) {
 }
 
 /// The largest magnitude.
-#[cfg(feature = "fit")]
 pub(crate) fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().fold(0.0, |most, x| larger(most, x.abs()))
 }
 
 /// The root of the sum of squares, of numbers of any size.
-#[cfg(feature = "fit")]
 pub(crate) fn norm(numbers: &[f64]) -> f64 {
     let largest = largest(numbers);
     if largest == 0.0 {

@@ -14,7 +14,7 @@ use ladder::{Ladder, Verdict};
 use probe::probe;
 use runs::{
     AIM, COARSER, Climbed, FIRST, ITERATION, LEAST_FACTOR, LEFT, LONGER, MOST_FACTOR, MOST_RUNS,
-    MOST_STEPS, ROUGH, TIGHTEST, fails_again, largest,
+    MOST_STEPS, ROUGH, TIGHTEST, largest,
 };
 pub(crate) use runs::{
     Asked, Beside, Failed, Found, Graded, Judge, Pilot, Ran, RanBeside, Runner, Way, next,
@@ -251,9 +251,7 @@ fn climb(
                 }
                 Verdict::Floor => break,
             },
-            Err(failed) if failed.is_final || fails_again(failure.as_ref(), &failed.kind) => {
-                return Err(failed.kind);
-            }
+            Err(failed) if failed.is_final_after(failure.as_ref()) => return Err(failed.kind),
             Err(failed) => {
                 ladder.fail(taken);
                 failure = Some(failed.kind);

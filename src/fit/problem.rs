@@ -260,8 +260,7 @@ impl<'f, M: Model<N>, const N: usize> Least<'f, M, N> {
         };
         let start = least.evaluate()?;
         least.unit = unit_of(&start);
-        let residuals = start.residuals.iter().map(|one| one / least.unit);
-        least.first = residuals.map(|one| one * one).sum();
+        least.first = (norm(&start.residuals) / least.unit).powi(2);
         least.note(Some(&start));
         *least.here.borrow_mut() = Some(start);
         Ok(least)

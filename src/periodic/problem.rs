@@ -3,6 +3,7 @@
 use super::error::OrbitError;
 use super::phase::Phase;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem};
+use crate::numbers::norm;
 use tfe_runtime::condenser::Direction;
 use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::{First, Form, LegendreError, Model, State, StepError, constrained, legendre};
@@ -14,6 +15,17 @@ pub(crate) enum Global {
     Period,
     /// The force γ v that unfolds the families of a conservative model; zero in the solution, up to discretization.
     Unfolding,
+}
+
+impl Global {
+    /// What a correction of it is measured by.
+    pub(crate) fn scale(self, period: f64, inertia: f64) -> f64 {
+        match self {
+            Self::Period => period,
+            // A force that acts within a period.
+            Self::Unfolding => inertia / period,
+        }
+    }
 }
 
 /// The chain of elements over one period, closed by periodicity.
@@ -43,15 +55,7 @@ impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
 
     /// Whether a solution is an orbit.
     pub(crate) fn check(&self) -> Result<(), OrbitError> {
-        let (period, unfolding) = (self.period, self.unfolding);
-        if !(period > 0.0) {
-            return Err(OrbitError::Period { period });
-        }
-        // Damping that takes a percent of the motion over a period is no discretization error.
-        if !(unfolding.abs() * period < 1e-2 * self.inertia) {
-            return Err(OrbitError::NoFamily { unfolding });
-        }
-        Ok(())
+        check(self.period, self.unfolding, self.inertia)
     }
 
     /// How many multipliers are one: none of a forced orbit, one of an autonomous, two of a conservative one.
@@ -61,27 +65,28 @@ impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
     }
 }
 
-/// Σ p·v / Σ v·v over places of a guess; one where it does not move.
-pub(crate) fn inertia_of<'a>(places: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> f64 {
-    let (mut action, mut square, mut fastest) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for (p, v) in places {
-        let speed = v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-        // In units of the largest speed so far, whose square is a number.
-        if speed > fastest {
-            let ratio = fastest / speed;
-            (action, square, fastest) = (action * ratio, square * ratio * ratio, speed);
-        }
-        if fastest > 0.0 {
-            action += p.iter().zip(v).map(|(p, v)| p * (v / fastest)).sum::<f64>();
-            square += v.iter().map(|v| (v / fastest).powi(2)).sum::<f64>();
-        }
-    }
-    let inertia = (action / (fastest * square)).abs();
+/// Σ p·v / Σ v·v over places of a guess, their momenta and velocities one after the other; one where it does not move.
+pub(crate) fn inertia_of(p: &[f64], v: &[f64]) -> f64 {
+    let speed = norm(v);
+    let action: f64 = p.iter().zip(v).map(|(p, v)| p * (v / speed)).sum();
+    let inertia = (action / speed).abs();
     if inertia > 0.0 && inertia.is_finite() {
         inertia
     } else {
         1.0
     }
+}
+
+/// Whether a solution is an orbit.
+pub(crate) fn check(period: f64, unfolding: f64, inertia: f64) -> Result<(), OrbitError> {
+    if !(period > 0.0) {
+        return Err(OrbitError::Period { period });
+    }
+    // Damping that takes a percent of the motion over a period is no discretization error.
+    if !(unfolding.abs() * period < 1e-2 * inertia) {
+        return Err(OrbitError::NoFamily { unfolding });
+    }
+    Ok(())
 }
 
 /// The rows of periodicity: y_E − y_0 = (0, advance).
@@ -211,11 +216,7 @@ impl<M: Model<N>, const N: usize> Problem<N> for Periodic<'_, M, N> {
     }
 
     fn scale(&self, global: usize) -> f64 {
-        match self.globals[global] {
-            Global::Period => self.period,
-            // A force that acts within a period.
-            Global::Unfolding => self.inertia / self.period,
-        }
+        self.globals[global].scale(self.period, self.inertia)
     }
 
     fn set_globals(&mut self, globals: &[f64]) {

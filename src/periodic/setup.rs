@@ -316,15 +316,15 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
 
     fn inertia_along(&self, curve: &Curve<'_, N>, period: f64) -> Result<f64, OrbitError> {
         const PLACES: u32 = 16;
-        let mut places = Vec::new();
+        let (mut momenta, mut velocities) = (Vec::new(), Vec::new());
         for k in 0..PLACES {
             let t = self.start + period * f64::from(k) / f64::from(PLACES);
             let (q, v) = curve(t);
             let state = legendre::state(self.model, t, &q, &v);
-            places.push((state.map_err(AssemblyError::Legendre)?.p, v));
+            momenta.extend(state.map_err(AssemblyError::Legendre)?.p);
+            velocities.extend(v);
         }
-        let places = places.iter().map(|(p, v)| (&p[..], &v[..]));
-        Ok(inertia_of(places))
+        Ok(inertia_of(&momenta, &velocities))
     }
 
     fn energy_of(&self, curve: &Curve<'_, N>) -> Result<f64, OrbitError> {

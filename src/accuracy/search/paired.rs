@@ -9,7 +9,7 @@ use super::super::pilot::corners;
 use super::super::trace::difference;
 use super::runs::{
     AIM, Asked, Beside, Climbed, FIRST, Found, ITERATION, MOST_RUNS, RESOLVED, ROUGH, ROUNDINGS,
-    Runner, TIGHTEST, Way, fails_again, largest, next,
+    Runner, TIGHTEST, Way, largest, next,
 };
 use crate::error::RunErrorKind;
 use crate::numbers::larger;
@@ -225,9 +225,7 @@ pub(super) fn climb(
             error_estimate: None,
         };
         let ran = match ran {
-            Err(failed) if failed.is_final || fails_again(failure.as_ref(), &failed.kind) => {
-                return Err(failed.kind);
-            }
+            Err(failed) if failed.is_final_after(failure.as_ref()) => return Err(failed.kind),
             Err(failed) => {
                 attempts.push(told);
                 failure = Some(failed.kind);

@@ -109,6 +109,15 @@ pub(crate) struct Failed {
     pub(crate) is_final: bool,
 }
 
+impl Failed {
+    /// Whether steps of any length stop there, as far as this failure and the last one before it tell: a function given for an input that has failed twice does so whatever the steps. Once may
+    /// be a single point, which other steps do not meet.
+    pub(crate) fn is_final_after(&self, before: Option<&RunErrorKind>) -> bool {
+        let of_input = |kind: &RunErrorKind| matches!(kind, RunErrorKind::Input(_));
+        self.is_final || of_input(&self.kind) && before.is_some_and(of_input)
+    }
+}
+
 impl From<RunErrorKind> for Failed {
     fn from(kind: RunErrorKind) -> Self {
         let is_final = slides(&kind);
@@ -197,12 +206,6 @@ pub(crate) fn next(element: Element) -> Option<Element> {
 fn slides(kind: &RunErrorKind) -> bool {
     let source = StepError::Slides;
     matches!(kind, RunErrorKind::Solve { source: found, .. } if *found == source)
-}
-
-/// Whether a function given for an input has failed once more: then it does with steps of any length. Once may be a single point, which other steps do not meet.
-pub(super) fn fails_again(before: Option<&RunErrorKind>, kind: &RunErrorKind) -> bool {
-    let of_input = |kind: &RunErrorKind| matches!(kind, RunErrorKind::Input(_));
-    of_input(kind) && before.is_some_and(of_input)
 }
 
 /// The largest of all.

@@ -3,7 +3,7 @@
 use super::super::error::OrbitError;
 use super::super::orbit::sort;
 use super::super::phase::Phase;
-use super::super::problem::{Global, inertia_of};
+use super::super::problem::{Global, check, inertia_of};
 use crate::assembly::{AssemblyError, Chain, Control, Convergence, Mesh};
 use crate::constraints::allowed::{self, basis_of};
 use crate::periodic_schur::{self, Multiplier};
@@ -110,16 +110,15 @@ impl<'m, M: family::Model> Shooting<'m, M> {
     pub(super) fn solve(&mut self, control: Control) -> Result<(), OrbitError> {
         let n = self.model.len();
         if self.globals.contains(&Global::Unfolding) {
-            let velocity = |node| family::velocity(self.model, self.start, node);
-            let velocities = self
-                .nodes
-                .iter()
-                .map(velocity)
-                .collect::<Result<Vec<_>, _>>();
-            // Where there is none the first step says so.
-            let velocities = velocities.unwrap_or_default();
-            let places = self.nodes.iter().zip(&velocities);
-            self.inertia = inertia_of(places.map(|(node, v)| (&node.p[..], &v[..])));
+            let (mut momenta, mut velocities) = (Vec::new(), Vec::new());
+            for node in &self.nodes {
+                // Where there is none the first step says so.
+                if let Ok(v) = family::velocity(self.model, self.start, node) {
+                    momenta.extend_from_slice(&node.p);
+                    velocities.extend(v);
+                }
+            }
+            self.inertia = inertia_of(&momenta, &velocities);
         }
         let dense = usize::from(self.phase == Some(Phase::Orthogonal));
         let mut chain = Chain::new(2 * n, self.globals.len(), self.mesh.elements(), dense);
@@ -149,15 +148,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
 
     /// Whether a solution is an orbit.
     fn check(&self) -> Result<(), OrbitError> {
-        let (period, unfolding) = (self.period, self.unfolding);
-        if !(period > 0.0) {
-            return Err(OrbitError::Period { period });
-        }
-        // Damping that takes a percent of the motion over a period is no discretization error.
-        if !(unfolding.abs() * period < 1e-2 * self.inertia) {
-            return Err(OrbitError::NoFamily { unfolding });
-        }
-        Ok(())
+        check(self.period, self.unfolding, self.inertia)
     }
 
     /// Steps all elements from their nodes and solves for the correction, which is then in the chain.
@@ -307,11 +298,8 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         let nodes = self.nodes.iter().enumerate();
         let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)));
         let globals = self.globals.iter().zip(chain.globals());
-        let globals = globals.map(|(global, correction)| match global {
-            Global::Period => correction / self.period,
-            // A force that acts within a period.
-            Global::Unfolding => correction * self.period / self.inertia,
-        });
+        let globals = globals
+            .map(|(global, correction)| correction / global.scale(self.period, self.inertia));
         crate::assembly::size(nodes, chain.matrices(), globals)
     }
 

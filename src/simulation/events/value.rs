@@ -3,6 +3,7 @@
 use crate::differences::SIXTH;
 use crate::length::Length;
 use crate::motion::Event;
+use crate::numbers::largest;
 use crate::sensitivity::slopes::{Along, Change};
 use crate::simulation::kind::Simulated;
 use std::sync::Arc;
@@ -27,10 +28,6 @@ fn derivative(distance: f64, f: impl Fn(f64) -> f64) -> f64 {
         weight * (f(s) - f(-s))
     });
     differences.sum::<f64>() / distance
-}
-
-fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
 }
 
 /// A distance for differences, relative to what is changed: their error is below roundings, and these are some 1e-13.
