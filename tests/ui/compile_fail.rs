@@ -1,9 +1,27 @@
 //! Mistakes in a declaration: the whole message of each, under the guilty token. `TRYBUILD=overwrite cargo test` rewrites the expectations.
 
+use std::process::Command;
+
+/// What cargo takes its flags from before all else.
+const FLAGS: &str = "CARGO_ENCODED_RUSTFLAGS";
+
+/// `trybuild` compiles the crates that cases depend on with one set of flags, and once more with another for the cases. With flags from the environment, these, they are compiled once.
+const OF_CASES: &str = "--cfg\x1ftrybuild\x1f-A\x1fdead_code\x1f--diagnostic-width=140";
+
 #[test]
 fn messages() {
-    let cases = trybuild::TestCases::new();
-    cases.compile_fail("*/*.rs");
+    if std::env::var(FLAGS).is_ok_and(|flags| flags == OF_CASES) {
+        let cases = trybuild::TestCases::new();
+        cases.compile_fail("*/*.rs");
+        return;
+    }
+    let itself = std::env::current_exe().expect("a path of this test");
+    let status = Command::new(itself)
+        .args(["--exact", "messages", "--nocapture"])
+        .env(FLAGS, OF_CASES)
+        .status()
+        .expect("this test once more");
+    assert!(status.success(), "messages differ, see above");
 }
 
 /// The engine's own corpus has a case for every kind of diagnostic; here are those that a user meets, with the place that rustc underlines.
