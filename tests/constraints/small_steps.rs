@@ -228,8 +228,8 @@ fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
                 within * speeds.fold(0.0, larger)
             };
             let steps = [1.0, 0.7, 0.5, 0.3, 0.2, 0.1].into_iter();
-            // Those of the squeezer are cut into a thousand pieces each: three, with two elements.
-            for step in steps.filter(|step| !is_fast || [1.0, 0.5, 0.1].contains(step)) {
+            // Those of the squeezer are cut into a thousand pieces each: two, with two elements.
+            for step in steps.filter(|step| !is_fast || [1.0, 0.1].contains(step)) {
                 let nodes = self.nodes.clone();
                 for nodes in nodes.step_by(if is_fast { 2 } else { 1 }) {
                     let count_one = |cell: &Cell<u32>| cell.set(cell.get() + 1);
