@@ -2,8 +2,10 @@
 
 mod block;
 mod condensed;
+mod correction;
 mod error;
 mod optimum;
+mod problem;
 mod search;
 mod transcription;
 
@@ -12,8 +14,10 @@ use crate::boundary::{
     BoundaryError, Component, Condition, check_conditions, check_span, straight,
 };
 use crate::driven::place;
+use block::Said;
 use nalgebra::DVector;
-use search::{Control, Ends, Failure, Iterate, Problem};
+use problem::{Ends, Iterate, Problem};
+use search::{Control, Failure};
 use std::ops::Range;
 use std::sync::Arc;
 use tfe_runtime::basis::{MAX_NODES, legendre};
@@ -261,7 +265,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         let places: Vec<_> = places.collect();
         let block = |place| transcription::element(M::FORM, &scheme, &sizes, place, &running);
         let problem = Problem {
-            model: self.model,
+            model: &Said::<M, N>(self.model),
             sizes,
             blocks: places.iter().map(|place| block(*place)).collect(),
             end: (!end.is_empty()).then(|| transcription::end(M::FORM, N, self.span.end, &end)),
@@ -372,7 +376,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
     fn first(
         &self,
         table: &SchemeTable,
-        problem: &Problem<'_, M>,
+        problem: &Problem<'_>,
         places: &[(f64, f64)],
     ) -> Result<Iterate, OptimalControlErrorKind> {
         let line = Box::new(straight(&self.conditions, &self.span)) as Curve<'_, N>;
@@ -441,7 +445,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
 
     fn optimum(
         &self,
-        problem: &Problem<'_, M>,
+        problem: &Problem<'_>,
         table: &SchemeTable,
         mesh: Mesh,
         iterate: &Iterate,

@@ -63,13 +63,35 @@ pub(super) struct Linear {
     pub(super) of_rows: DMatrix<f64>,
 }
 
-/// What a model says at one point, in any numbers: g, then ℓ.
+/// What a model says at a point: g, then the sum ℓ of the outputs in the columns `costs`.
+///
+/// A search knows no more of its model, so that it is compiled once for all models.
+pub(super) trait PointFunctions {
+    /// In numbers.
+    fn numbers(&self, t: f64, arguments: &[f64], costs: &[usize], answer: &mut Vec<f64>);
+
+    /// With derivatives in two directions.
+    fn derivatives(&self, t: f64, arguments: &[Twice], costs: &[usize], answer: &mut Vec<Twice>);
+}
+
+/// What a model with N coordinates says.
+pub(super) struct Said<'m, M, const N: usize>(pub(super) &'m M);
+
+impl<M: Controlled<N>, const N: usize> PointFunctions for Said<'_, M, N> {
+    fn numbers(&self, t: f64, arguments: &[f64], costs: &[usize], answer: &mut Vec<f64>) {
+        said(self.0, t, arguments, costs, answer);
+    }
+
+    fn derivatives(&self, t: f64, arguments: &[Twice], costs: &[usize], answer: &mut Vec<Twice>) {
+        said(self.0, t, arguments, costs, answer);
+    }
+}
+
 fn said<M: Controlled<N>, R: Real, const N: usize>(
     model: &M,
     t: f64,
     arguments: &[R],
     costs: &[usize],
-    columns: &mut Vec<R>,
     answer: &mut Vec<R>,
 ) {
     let zero = R::from_f64(0.0);
@@ -91,9 +113,8 @@ fn said<M: Controlled<N>, R: Real, const N: usize>(
     }
     let mut cost = zero;
     if !costs.is_empty() {
-        columns.clear();
-        columns.resize(model.columns(), zero);
-        model.observables_with(&inputs, t, &q, &z, columns);
+        let mut columns = vec![zero; model.columns()];
+        model.observables_with(&inputs, t, &q, &z, &mut columns);
         for column in costs {
             cost += columns[*column];
         }
@@ -103,39 +124,29 @@ fn said<M: Controlled<N>, R: Real, const N: usize>(
 
 impl Block {
     /// c and f at s.
-    pub(super) fn values<M: Controlled<N>, const N: usize>(
-        &self,
-        model: &M,
-        s: &DVector<f64>,
-    ) -> Values {
+    pub(super) fn values(&self, model: &dyn PointFunctions, s: &DVector<f64>) -> Values {
         let mut values = Values {
             rows: &self.linear * s,
             cost: 0.0,
             said: Vec::with_capacity(self.points.len()),
         };
-        let (mut columns, mut answer) = (Vec::new(), Vec::new());
+        let mut answer = Vec::new();
         for point in &self.points {
             let arguments = &point.map * s;
-            said(
-                model,
-                point.t,
-                arguments.as_slice(),
-                &self.costs,
-                &mut columns,
-                &mut answer,
-            );
-            let g = DVector::from_column_slice(&answer[..2 * N]);
+            model.numbers(point.t, arguments.as_slice(), &self.costs, &mut answer);
+            let cost = answer.pop().unwrap_or(0.0);
+            let g = DVector::from_column_slice(&answer);
             values.rows += &point.into * &g;
-            values.cost += point.weight * answer[2 * N];
+            values.cost += point.weight * cost;
             values.said.push(g);
         }
         values
     }
 
     /// Everything at s, with the second derivatives of the rows summed with `multipliers`.
-    pub(super) fn linearise<M: Controlled<N>, const N: usize>(
+    pub(super) fn linearise(
         &self,
-        model: &M,
+        model: &dyn PointFunctions,
         s: &DVector<f64>,
         multipliers: &DVector<f64>,
     ) -> Linear {
@@ -151,13 +162,14 @@ impl Block {
             of_cost: DMatrix::zeros(variables, variables),
             of_rows: DMatrix::zeros(variables, variables),
         };
-        let (mut columns, mut answer) = (Vec::new(), Vec::new());
+        let mut answer = Vec::new();
         for point in &self.points {
             let arguments = &point.map * s;
             let n = arguments.len();
             let weights = point.into.tr_mul(multipliers);
-            let mut g = DVector::zeros(2 * N);
-            let mut g_by = DMatrix::zeros(2 * N, n);
+            let said = point.into.ncols();
+            let mut g = DVector::zeros(said);
+            let mut g_by = DMatrix::zeros(said, n);
             let mut cost_by = DVector::zeros(n);
             let mut cost_second = DMatrix::zeros(n, n);
             let mut rows_second = DMatrix::zeros(n, n);
@@ -170,21 +182,14 @@ impl Block {
                             Twice::new(Dual::new(*value, unit(k, i)), Dual::new(unit(k, j), 0.0))
                         })
                         .collect();
-                    said(
-                        model,
-                        point.t,
-                        &twice,
-                        &self.costs,
-                        &mut columns,
-                        &mut answer,
-                    );
+                    model.derivatives(point.t, &twice, &self.costs, &mut answer);
                     let mut second = 0.0;
-                    for (component, number) in answer[..2 * N].iter().enumerate() {
+                    for (component, number) in answer[..said].iter().enumerate() {
                         g[component] = number.value.value;
                         g_by[(component, i)] = number.value.slope;
                         second += weights[component] * number.slope.slope;
                     }
-                    let number = answer[2 * N];
+                    let number = answer[said];
                     cost = number.value.value;
                     cost_by[i] = number.value.slope;
                     for (row, column) in [(i, j), (j, i)] {

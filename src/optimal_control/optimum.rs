@@ -1,6 +1,7 @@
 //! What a search has found.
 
-use super::search::{Iterate, Iteration, Problem};
+use super::problem::{Iterate, Problem};
+use super::search::Iteration;
 use crate::assembly::{Iterate as ChainIterate, Mesh, Solution};
 use crate::driven::{Driven, InputError};
 use crate::motion::Motion;
@@ -173,7 +174,7 @@ impl<M> Found<'_, M> {
     /// The motion through the elements as they are.
     pub(super) fn motion<const N: usize>(
         &self,
-        problem: &Problem<'_, M>,
+        problem: &Problem<'_>,
         scheme: &SchemeRef<'_>,
         iterate: &Iterate,
     ) -> Motion<N>
@@ -214,7 +215,7 @@ impl<M> Found<'_, M> {
     fn interiors<const N: usize>(
         &self,
         driven: &Driven<'_, M>,
-        problem: &Problem<'_, M>,
+        problem: &Problem<'_>,
         scheme: &SchemeRef<'_>,
         iterate: &Iterate,
     ) -> Vec<f64>
@@ -230,7 +231,7 @@ impl<M> Found<'_, M> {
         for (element, block) in problem.blocks.iter().enumerate() {
             let own = &iterate.interiors[element].as_slice()[..rates];
             if in_phase_space && M::FORM == Form::Hamiltonian {
-                let values = block.values(self.model, &problem.variables(iterate, element));
+                let values = block.values(problem.model, &problem.variables(iterate, element));
                 for said in &values.said {
                     all.extend_from_slice(&said.as_slice()[N..]);
                 }
