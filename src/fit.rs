@@ -4,8 +4,10 @@ mod data;
 mod error;
 mod fitted;
 mod problem;
+mod runs;
 mod setup;
 mod solve;
+mod unknowns;
 
 pub use error::FitError;
 pub use fitted::{Fitted, Trial};

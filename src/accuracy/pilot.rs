@@ -58,7 +58,7 @@ struct Kept {
 /// The grading with which a step is off by [`Course::local`]; `None` where equal steps are as good, or where no steps were found.
 ///
 /// An error e of a step h asks for the step h (local/e)^{1/(p+1)} (T-103).
-pub(crate) fn explore(course: &Course, pair: &mut impl Pair) -> Option<Grading> {
+pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
     let Range { start, end } = course.span;
     let direction = (end - start).signum();
     let mut nodes = vec![start];

@@ -2,8 +2,10 @@
 
 use super::error::FitError;
 use super::fitted::Fitted;
-use super::problem::{Least, Unknowns};
+use super::problem::{Least, Solved};
+use super::runs::Runs;
 use super::setup::Fit;
+use super::unknowns::Unknowns;
 use tfe_runtime::Model;
 
 impl<M: Model<N>, const N: usize> Fit<'_, M, N> {
@@ -17,7 +19,7 @@ impl<M: Model<N>, const N: usize> Fit<'_, M, N> {
         let unknowns = Unknowns::new(
             self.model,
             (&self.parameters, &self.bounds),
-            (guess, start_is_known),
+            (&guess, start_is_known),
         )?;
         let count: usize = columns.iter().map(|one| one.times.len()).sum();
         if count < unknowns.len() {
@@ -26,6 +28,28 @@ impl<M: Model<N>, const N: usize> Fit<'_, M, N> {
                 unknowns: unknowns.len(),
             });
         }
-        Least::new(self, columns, unknowns, t0)?.solve()
+        let start = start_is_known.then_some(guess);
+        let mut runs = Runs::new(self, columns, &unknowns, (t0, start));
+        let solved = Least::new(&mut runs, &unknowns, self.progress)?.solve()?;
+        let Solved {
+            values,
+            covariance,
+            deviations,
+            residuals,
+            trials,
+        } = solved;
+        // The last run is that of the values found.
+        let motion = runs.motion.take().ok_or(FitError::NotFinite)?;
+        Ok(Fitted {
+            model: runs.model(&values)?,
+            motion,
+            names: unknowns.names,
+            values,
+            first: unknowns.first,
+            covariance,
+            deviations,
+            residuals,
+            trials,
+        })
     }
 }

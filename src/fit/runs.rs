@@ -1,0 +1,113 @@
+//! Runs with values of the unknowns, beside what was measured.
+
+use super::data::{Column, Observed};
+use super::error::FitError;
+use super::problem::{Compare, Compared};
+use super::setup::Fit;
+use super::unknowns::Unknowns;
+use crate::motion::Motion;
+use nalgebra::DMatrix;
+use std::ops::Range;
+use tfe_runtime::{Model, State};
+
+/// The runs of a fit.
+pub(super) struct Runs<'f, M, const N: usize> {
+    fit: &'f Fit<'f, M, N>,
+    columns: Vec<Column<'f>>,
+    /// The parameters among the unknowns, by their index among all of the model.
+    parameters: Vec<usize>,
+    /// Where it is not looked for.
+    start: Option<State<N>>,
+    span: Range<f64>,
+    times: Vec<f64>,
+    /// Of the last values.
+    pub(super) motion: Option<Motion<N>>,
+}
+
+impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
+    pub(super) fn new(
+        fit: &'f Fit<'f, M, N>,
+        columns: Vec<Column<'f>>,
+        unknowns: &Unknowns,
+        (t0, start): (f64, Option<State<N>>),
+    ) -> Self {
+        let mut times: Vec<f64> = columns.iter().flat_map(|one| one.times).copied().collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let last = times.last().copied().unwrap_or(t0);
+        Self {
+            fit,
+            columns,
+            parameters: unknowns.parameters.clone(),
+            start,
+            span: t0..last,
+            times,
+            motion: None,
+        }
+    }
+
+    /// The model with these values.
+    pub(super) fn model(&self, values: &[f64]) -> Result<M, FitError> {
+        let model = self.fit.model;
+        let mut made = None;
+        for (index, value) in self.parameters.iter().zip(values) {
+            let from = made.as_ref().unwrap_or(model);
+            made = Some(
+                from.with_parameter(*index, *value)
+                    .ok_or(FitError::NotCopied)?,
+            );
+        }
+        match made {
+            Some(made) => Ok(made),
+            // Only the start is looked for: a copy, by way of any parameter.
+            None => model
+                .with_parameter(0, model.parameter(0))
+                .ok_or(FitError::NotCopied),
+        }
+    }
+
+    /// The start of a run with these values.
+    fn start(&self, values: &[f64]) -> State<N> {
+        let own = &values[self.parameters.len()..];
+        self.start.unwrap_or_else(|| State {
+            p: std::array::from_fn(|a| own[a]),
+            q: std::array::from_fn(|a| own[N + a]),
+        })
+    }
+}
+
+impl<M: Model<N>, const N: usize> Compare for Runs<'_, M, N> {
+    fn count(&self) -> usize {
+        self.columns.iter().map(|one| one.times.len()).sum()
+    }
+
+    fn compare(&mut self, values: &[f64]) -> Result<Compared, FitError> {
+        let model = self.model(values)?;
+        let run = self.fit.simulation(&model, &self.times);
+        let (start, span) = (self.start(values), self.span.clone());
+        let sensitive = run.run_sensitive_by(start, span, &self.parameters);
+        let sensitive = sensitive.map_err(|error| FitError::Run(error.kind().clone()))?;
+        let count = self.count();
+        let mut residuals = Vec::with_capacity(count);
+        let mut slopes = DMatrix::zeros(count, values.len());
+        let motion = sensitive.motion();
+        for column in &self.columns {
+            for (t, measured) in column.times.iter().zip(column.values) {
+                // Elements end there.
+                let node = motion.nearest(*t);
+                let (value, by_parameters, by_start) = match column.place {
+                    Observed::Output(place) => sensitive.output_at(node, place),
+                    Observed::Coordinate(a) => sensitive.coordinate_at(node, a),
+                };
+                let row = residuals.len();
+                residuals.push((value - measured) / column.deviation);
+                let all = by_parameters.iter().chain(&by_start);
+                for (place, slope) in (0..values.len()).zip(all) {
+                    slopes[(row, place)] = slope / column.deviation;
+                }
+            }
+        }
+        self.motion = Some(motion.clone());
+        Ok(Compared { residuals, slopes })
+    }
+}
