@@ -322,6 +322,16 @@ fn what_cannot_be_fitted_is_told() {
             .to_string()
             .contains("not looked for")
     );
+    // A first value that is no number has no bounds: the first run tells.
+    let unknown = Ball {
+        g: f64::NAN,
+        ..TRUE
+    };
+    let unknown = Fit::new(&unknown)
+        .start(start, 0.0)
+        .step(0.05)
+        .parameters(["g"]);
+    assert!(matches!(with(unknown), Err(FitError::Run(_))));
     // A motion that does not depend on the mass for itself, only on c/m: both cannot be told.
     let rest = TRUE.state([1.0], [0.0]);
     let both = Fit::new(&TRUE)

@@ -107,7 +107,9 @@ impl Unknowns {
             }
             let own = bounds.iter().rev().find(|(own, ..)| own == name);
             let (low, high) = own.map_or((f64::NEG_INFINITY, f64::INFINITY), |one| (one.1, one.2));
-            if !(low < high && (low..=high).contains(&value)) {
+            // Of a value that is NaN the first run tells.
+            let is_within = value.is_nan() || (low..=high).contains(&value);
+            if !(low < high && is_within) {
                 return Err(FitError::Bounds {
                     name: name.clone(),
                     low,
