@@ -9,10 +9,7 @@ use nalgebra::{DMatrix, DVector, Dyn, U1, VecStorage};
 
 /// Residuals and their derivatives as functions of the unknowns.
 pub(super) trait Compare {
-    /// The number of residuals.
-    fn count(&self) -> usize;
-
-    /// Those of some values.
+    /// Those of some values; always as many.
     ///
     /// # Errors
     /// Why there are none.
@@ -20,14 +17,58 @@ pub(super) trait Compare {
 }
 
 /// What was measured beside a motion.
-#[derive(Clone)]
 pub(super) struct Compared {
     pub(super) residuals: Vec<f64>,
     /// By the values, a row for each residual.
     pub(super) slopes: DMatrix<f64>,
 }
 
-/// The sum of squares of the residuals, and its least value so far.
+impl Compared {
+    /// s² (JᵀJ)⁻¹ (T-126), and the roots of its diagonal, whose squares may be less than any number.
+    fn covariance(&self, names: &[String]) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
+        /// Singular values below this part of the largest, of columns of length one, are roundings of the motion.
+        const TOLD: f64 = 1e-11;
+
+        let mut slopes = self.slopes.clone();
+        let (rows, columns) = slopes.shape();
+        let mut lengths = Vec::with_capacity(columns);
+        for mut column in slopes.column_iter_mut() {
+            let length = norm(column.as_slice());
+            if length > 0.0 {
+                column.apply(|slope| *slope /= length);
+            }
+            lengths.push(length);
+        }
+        let svd = slopes.svd(false, true);
+        let (largest, least) = (svd.singular_values.max(), svd.singular_values.imin());
+        let undetermined = |place: usize| FitError::Undetermined {
+            name: names[place].clone(),
+        };
+        let Some(right) = svd.v_t.filter(|_| largest > 0.0) else {
+            return Err(undetermined(0));
+        };
+        if svd.singular_values[least] < TOLD * largest {
+            return Err(undetermined(right.row(least).iamax_full().1));
+        }
+        // s
+        let deviation = match rows - columns {
+            0 => 1.0,
+            free => norm(&self.residuals) / (free as f64).sqrt(),
+        };
+        let inverse = DMatrix::from_diagonal(&svd.singular_values.map(|one| 1.0 / (one * one)));
+        let scaled = right.transpose() * inverse * right;
+        let covariance = DMatrix::from_fn(columns, columns, |a, b| {
+            scaled[(a, b)] * (deviation / lengths[a]) * (deviation / lengths[b])
+        });
+        if !covariance.iter().all(|entry| entry.is_finite()) {
+            return Err(FitError::NotFinite);
+        }
+        let deviation_of = |a: usize| scaled[(a, a)].sqrt() * (deviation / lengths[a]);
+        Ok((covariance, (0..columns).map(deviation_of).collect()))
+    }
+}
+
+/// Residuals as functions of numbers without bounds, at the last ones that were tried.
 pub(super) struct Least<'r> {
     runs: &'r mut dyn Compare,
     unknowns: &'r Unknowns,
@@ -35,6 +76,8 @@ pub(super) struct Least<'r> {
     numbers: DVector<f64>,
     /// None where the run failed.
     here: Option<Compared>,
+    /// Of residuals.
+    count: usize,
     trials: Vec<Trial>,
     /// A power of two near the largest residual at the beginning: the library that solves the problem forms squares, of units in which they neither vanish nor overflow.
     unit: f64,
@@ -63,11 +106,13 @@ impl<'r> Least<'r> {
             shows,
             numbers: DVector::from_vec(unknowns.numbers()),
             here: None,
+            count: 0,
             trials: Vec::new(),
             unit: 1.0,
             first: 0.0,
         };
         let start = least.compare()?;
+        least.count = start.residuals.len();
         least.unit = unit_of(&start);
         least.first = (norm(&start.residuals) / least.unit).powi(2);
         least.here = Some(start);
@@ -87,32 +132,38 @@ impl<'r> Least<'r> {
             .with_stepbound(1.0);
         let (done, report) = method.minimize(self);
         use TerminationReason::{Converged, NoImprovementPossible, Orthogonal, ResidualsZero};
-        let values = done.unknowns.values(done.numbers.as_slice()).0;
+        let Self {
+            unknowns,
+            numbers,
+            here,
+            trials,
+            ..
+        } = done;
+        let values = unknowns.values(numbers.as_slice()).0;
         let reason = report.termination;
         let converged = matches!(
             reason,
             ResidualsZero | Orthogonal | Converged { .. } | NoImprovementPossible(_)
         );
-        let (Some(compared), true) = (&done.here, converged) else {
-            let trials = done.trials.iter();
-            let least = trials.fold(None, |least: Option<&Trial>, one| {
+        let Some(compared) = here.filter(|_| converged) else {
+            let least = trials.iter().fold(None, |least: Option<&Trial>, one| {
                 let is_less = least.is_none_or(|least| one.deviation < least.deviation);
                 if is_less { Some(one) } else { least }
             });
             return Err(FitError::NotConverged {
                 best: least.map_or(values, |one| one.values.clone()),
                 deviation: least.map_or(f64::INFINITY, |one| one.deviation),
-                runs: done.trials.len(),
+                runs: trials.len(),
                 why: format!("{reason:?}"),
             });
         };
-        let (covariance, deviations) = done.covariance(compared)?;
+        let (covariance, deviations) = compared.covariance(&unknowns.names)?;
         Ok(Solved {
             values,
             covariance,
             deviations,
-            residuals: compared.residuals.clone(),
-            trials: done.trials,
+            residuals: compared.residuals,
+            trials,
         })
     }
 
@@ -144,49 +195,6 @@ impl<'r> Least<'r> {
             );
         }
         self.trials.push(Trial { values, deviation });
-    }
-
-    /// s² (JᵀJ)⁻¹ (T-126), and the roots of its diagonal, whose squares may be less than any number.
-    fn covariance(&self, compared: &Compared) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
-        /// Singular values below this part of the largest, of columns of length one, are roundings of the motion.
-        const TOLD: f64 = 1e-11;
-
-        let mut slopes = compared.slopes.clone();
-        let (rows, columns) = slopes.shape();
-        let mut lengths = Vec::with_capacity(columns);
-        for mut column in slopes.column_iter_mut() {
-            let length = norm(column.as_slice());
-            if length > 0.0 {
-                column.apply(|slope| *slope /= length);
-            }
-            lengths.push(length);
-        }
-        let svd = slopes.svd(false, true);
-        let (largest, least) = (svd.singular_values.max(), svd.singular_values.imin());
-        let undetermined = |place: usize| FitError::Undetermined {
-            name: self.unknowns.names[place].clone(),
-        };
-        let Some(right) = svd.v_t.filter(|_| largest > 0.0) else {
-            return Err(undetermined(0));
-        };
-        if svd.singular_values[least] < TOLD * largest {
-            return Err(undetermined(right.row(least).iamax_full().1));
-        }
-        // s
-        let deviation = match rows - columns {
-            0 => 1.0,
-            free => norm(&compared.residuals) / (free as f64).sqrt(),
-        };
-        let inverse = DMatrix::from_diagonal(&svd.singular_values.map(|one| 1.0 / (one * one)));
-        let scaled = right.transpose() * inverse * right;
-        let covariance = DMatrix::from_fn(columns, columns, |a, b| {
-            scaled[(a, b)] * (deviation / lengths[a]) * (deviation / lengths[b])
-        });
-        if !covariance.iter().all(|entry| entry.is_finite()) {
-            return Err(FitError::NotFinite);
-        }
-        let deviation_of = |a: usize| scaled[(a, a)].sqrt() * (deviation / lengths[a]);
-        Ok((covariance, (0..columns).map(deviation_of).collect()))
     }
 }
 
@@ -221,7 +229,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Least<'_> {
     fn residuals(&self) -> Option<DVector<f64>> {
         Some(match &self.here {
             Some(here) => DVector::from_column_slice(&here.residuals) / self.unit,
-            None => DVector::from_element(self.runs.count(), 1e6 * (1.0 + self.first)),
+            None => DVector::from_element(self.count, 1e6 * (1.0 + self.first)),
         })
     }
 

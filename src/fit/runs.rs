@@ -6,6 +6,7 @@ use super::problem::{Compare, Compared};
 use super::setup::Fit;
 use super::unknowns::Unknowns;
 use crate::motion::Motion;
+use crate::sensitivity::Sensitive;
 use nalgebra::DMatrix;
 use std::ops::Range;
 use tfe_runtime::{Model, State};
@@ -14,21 +15,20 @@ use tfe_runtime::{Model, State};
 pub(super) struct Runs<'f, M, const N: usize> {
     fit: &'f Fit<'f, M, N>,
     columns: Vec<Column<'f>>,
-    /// The parameters among the unknowns, by their index among all of the model.
-    parameters: Vec<usize>,
+    unknowns: &'f Unknowns,
     /// Where it is not looked for.
     start: Option<State<N>>,
     span: Range<f64>,
     times: Vec<f64>,
-    /// Of the last values.
-    pub(super) motion: Option<Motion<N>>,
+    /// That of the last values.
+    last: Option<Sensitive<N>>,
 }
 
 impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
     pub(super) fn new(
         fit: &'f Fit<'f, M, N>,
         columns: Vec<Column<'f>>,
-        unknowns: &Unknowns,
+        unknowns: &'f Unknowns,
         (t0, start): (f64, Option<State<N>>),
     ) -> Self {
         let mut times: Vec<f64> = columns.iter().flat_map(|one| one.times).copied().collect();
@@ -38,11 +38,11 @@ impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
         Self {
             fit,
             columns,
-            parameters: unknowns.parameters.clone(),
+            unknowns,
             start,
             span: t0..last,
             times,
-            motion: None,
+            last: None,
         }
     }
 
@@ -50,7 +50,7 @@ impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
     pub(super) fn model(&self, values: &[f64]) -> Result<M, FitError> {
         let model = self.fit.model;
         let mut made = None;
-        for (index, value) in self.parameters.iter().zip(values) {
+        for (index, value) in self.unknowns.parameters.iter().zip(values) {
             let from = made.as_ref().unwrap_or(model);
             made = Some(
                 from.with_parameter(*index, *value)
@@ -66,9 +66,14 @@ impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
         }
     }
 
+    /// The last run, if there is one.
+    pub(super) fn motion(&self) -> Option<&Motion<N>> {
+        self.last.as_ref().map(Sensitive::motion)
+    }
+
     /// The start of a run with these values.
     fn start(&self, values: &[f64]) -> State<N> {
-        let own = &values[self.parameters.len()..];
+        let own = &values[self.unknowns.parameters.len()..];
         self.start.unwrap_or_else(|| State {
             p: std::array::from_fn(|a| own[a]),
             q: std::array::from_fn(|a| own[N + a]),
@@ -77,19 +82,13 @@ impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
 }
 
 impl<M: Model<N>, const N: usize> Compare for Runs<'_, M, N> {
-    fn count(&self) -> usize {
-        self.columns.iter().map(|one| one.times.len()).sum()
-    }
-
     fn compare(&mut self, values: &[f64]) -> Result<Compared, FitError> {
         let model = self.model(values)?;
         let run = self.fit.simulation(&model, &self.times);
         let (start, span) = (self.start(values), self.span.clone());
-        let sensitive = run.run_sensitive_by(start, span, &self.parameters);
+        let sensitive = run.run_sensitive_by(start, span, &self.unknowns.parameters);
         let sensitive = sensitive.map_err(|error| FitError::Run(error.kind().clone()))?;
-        let count = self.count();
-        let mut residuals = Vec::with_capacity(count);
-        let mut slopes = DMatrix::zeros(count, values.len());
+        let (mut residuals, mut slopes) = (Vec::new(), Vec::new());
         let motion = sensitive.motion();
         for column in &self.columns {
             for (t, measured) in column.times.iter().zip(column.values) {
@@ -99,15 +98,13 @@ impl<M: Model<N>, const N: usize> Compare for Runs<'_, M, N> {
                     Observed::Output(place) => sensitive.output_at(node, place),
                     Observed::Coordinate(a) => sensitive.coordinate_at(node, a),
                 };
-                let row = residuals.len();
                 residuals.push((value - measured) / column.deviation);
-                let all = by_parameters.iter().chain(&by_start);
-                for (place, slope) in (0..values.len()).zip(all) {
-                    slopes[(row, place)] = slope / column.deviation;
-                }
+                let all = by_parameters.iter().chain(&by_start).take(values.len());
+                slopes.extend(all.map(|slope| slope / column.deviation));
             }
         }
-        self.motion = Some(motion.clone());
+        let slopes = DMatrix::from_row_iterator(residuals.len(), values.len(), slopes);
+        self.last = Some(sensitive);
         Ok(Compared { residuals, slopes })
     }
 }

@@ -39,9 +39,10 @@ impl<M: Model<N>, const N: usize> Fit<'_, M, N> {
             trials,
         } = solved;
         // The last run is that of the values found.
-        let motion = runs.motion.take().ok_or(FitError::NotFinite)?;
+        let motion = runs.motion().cloned().ok_or(FitError::NotFinite)?;
+        let model = runs.model(&values)?;
         Ok(Fitted {
-            model: runs.model(&values)?,
+            model,
             motion,
             names: unknowns.names,
             values,
