@@ -87,6 +87,7 @@ impl<M: Controlled<N>, const N: usize> PointFunctions for Said<'_, M, N> {
     }
 }
 
+/// The same in any numbers. Room for the outputs is that of the answer.
 fn said<M: Controlled<N>, R: Real, const N: usize>(
     model: &M,
     t: f64,
@@ -101,6 +102,15 @@ fn said<M: Controlled<N>, R: Real, const N: usize>(
     let (q, z): ([R; N], [R; N]) = (std::array::from_fn(|a| q[a]), std::array::from_fn(|a| z[a]));
     let mut inputs = [zero; MAX_INPUTS];
     inputs[..u.len()].copy_from_slice(u);
+    let mut cost = zero;
+    if !costs.is_empty() {
+        answer.clear();
+        answer.resize(model.columns(), zero);
+        model.observables_with(&inputs, t, &q, &z, answer);
+        for column in costs {
+            cost += answer[*column];
+        }
+    }
     let mut first = First::zero();
     model.first_with(&inputs, t, &q, &z, &mut first);
     answer.clear();
@@ -110,14 +120,6 @@ fn said<M: Controlled<N>, R: Real, const N: usize>(
             Form::Lagrangian => first.q[a] + first.force[a],
             Form::Hamiltonian => first.force[a] - first.q[a],
         });
-    }
-    let mut cost = zero;
-    if !costs.is_empty() {
-        let mut columns = vec![zero; model.columns()];
-        model.observables_with(&inputs, t, &q, &z, &mut columns);
-        for column in costs {
-            cost += columns[*column];
-        }
     }
     answer.push(cost);
 }

@@ -79,6 +79,7 @@ impl Evaluation {
         self.cost + self.violation(weights)
     }
 
+    /// What violated equations count alone.
     pub(super) fn violation(&self, weights: &[DVector<f64>]) -> f64 {
         let blocks = self.rows.iter().zip(weights);
         blocks.map(|(rows, weights)| rows.abs().dot(weights)).sum()
