@@ -118,6 +118,18 @@ pub fn dominant_of(
     mut apply: impl FnMut(&[f64], &mut [f64]),
     control: Iteration,
 ) -> Result<Dominant, DominantError> {
+    iterate(size, &mut apply, control)
+}
+
+/// A product of the operator.
+type Apply<'a> = dyn FnMut(&[f64], &mut [f64]) + 'a;
+
+/// The same of no type of its own, so that it is compiled once, here.
+fn iterate(
+    size: usize,
+    apply: &mut Apply<'_>,
+    control: Iteration,
+) -> Result<Dominant, DominantError> {
     if size == 0 {
         return Err(DominantError::Empty);
     }
@@ -125,7 +137,7 @@ pub fn dominant_of(
     let mut krylov = Krylov::new(size, vectors);
     let mut products = 0;
     loop {
-        let invariant = krylov.expand(&mut apply, &mut products)?;
+        let invariant = krylov.expand(apply, &mut products)?;
         let mut ordered =
             Ordered::new(krylov.projection()).map_err(|_| DominantError::Projected)?;
         ordered.lead(krylov.count.div_ceil(2));
@@ -187,7 +199,7 @@ impl Krylov {
     /// Fills the basis; says whether it spans an invariant space before.
     fn expand(
         &mut self,
-        apply: &mut impl FnMut(&[f64], &mut [f64]),
+        apply: &mut Apply<'_>,
         products: &mut usize,
     ) -> Result<bool, DominantError> {
         let size = self.basis.nrows();
