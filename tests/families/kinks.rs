@@ -140,21 +140,21 @@ fn kinks_are_those_of_models_of_fixed_size() {
     );
 }
 
-/// A hundred beads fall onto the floor: with cuts the energy is kept to roundings, across kinks not.
+/// Forty beads fall onto the floor: with cuts the energy is kept to roundings, across kinks not.
 #[test]
 fn elements_keep_their_order_at_every_site() {
     let beads = Beads {
-        n: 100,
+        n: 40,
         k: 400.0,
         g: 9.81,
     };
-    let heights: Vec<f64> = (0..100).map(|i| 0.3 + 0.1 * f64::from(i).sin()).collect();
-    let start = || beads.state(heights.clone(), vec![0.0; 100]);
+    let heights: Vec<f64> = (0..40).map(|i| 0.3 + 0.1 * f64::from(i).sin()).collect();
+    let start = || beads.state(heights.clone(), vec![0.0; 40]);
     let run = Simulation::new(&beads).element(Mixed::<7>).step(0.02);
     let cut = run.clone().at_kinks(true).run(start(), 0.0..1.0);
     let cut = cut.expect("a run");
     let across = run.run(start(), 0.0..1.0).expect("a run");
-    assert!(cut.statistics().kinks >= 200, "{}", cut.statistics().kinks);
+    assert!(cut.statistics().kinks >= 80, "{}", cut.statistics().kinks);
     assert_eq!(cut.states().len(), across.states().len());
     let (with, without) = (cut.energy_error(), across.energy_error());
     assert!(with < 1e-13 && without > 1e-9, "{with:e} {without:e}");

@@ -1,6 +1,6 @@
 //! The table of `docs/calls.md`: every call of the surface on models of both kinds of length, free and with constraints. What works is run, what does not has to be a typed error.
 //!
-//! `UPDATE_TABLE=1 cargo test --features sparse --test families the_table` writes it anew.
+//! `UPDATE_TABLE=1 cargo test --test families the_table` writes it anew.
 
 use std::error::Error;
 use std::fmt::Write as _;
