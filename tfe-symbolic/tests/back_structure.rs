@@ -197,3 +197,49 @@ fn programs_do_not_change_from_run_to_run() {
         .collect();
     assert!(programs.windows(2).all(|pair| pair[0] == pair[1]));
 }
+
+/// Second derivatives of what a sign decides are zero, and say nothing.
+#[test]
+fn choices_are_not_linear() {
+    for (text, [linear, quadratic, constant, separable]) in [
+        ("force(x) = -mu*sign(dot(x))", [false, true, true, true]),
+        ("force(x) = select(x > 0, 1, -1)", [false, true, true, true]),
+        ("dissipation = abs(dot(x))", [false, true, true, true]),
+        ("force(x) = select(t < 1, 1, 0)", [true; 4]),
+        ("output(side) = sign(x)", [true; 4]),
+    ] {
+        let text = format!(
+            "coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, {}",
+            text.replace("mu", "3")
+        );
+        let derivation = derivation(&text);
+        let found = derivation.structure();
+        let found = [
+            found.linear,
+            found.quadratic_in_z,
+            found.constant_mass,
+            found.separable,
+        ];
+        assert_eq!(found, [linear, quadratic, constant, separable], "{text}");
+    }
+    for (energy, [linear, quadratic, constant, separable]) in [
+        ("abs(x)", [false, true, true, true]),
+        ("max(x, 0)", [false, true, true, true]),
+        ("abs(dot(x))", [false, false, false, true]),
+        (
+            "select(x > 0, dot(x), 2*dot(x))",
+            [false, true, true, false],
+        ),
+    ] {
+        let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+        let derivation = derivation(&text);
+        let found = derivation.structure();
+        let found = [
+            found.linear,
+            found.quadratic_in_z,
+            found.constant_mass,
+            found.separable,
+        ];
+        assert_eq!(found, [linear, quadratic, constant, separable], "{text}");
+    }
+}

@@ -91,6 +91,25 @@ impl Dependence {
         }
         found
     }
+
+    /// The same of what decides the choices in these expressions: conditions, and arguments of functions with a kink.
+    fn of_choices(graph: &Graph, values: impl Iterator<Item = ExprId>) -> Self {
+        let roots: Vec<ExprId> = values.collect();
+        let nodes = graph.reachable(&roots).into_iter();
+        Self::of(graph, nodes.flat_map(|id| deciding(graph.node(id))))
+    }
+}
+
+/// The expressions whose sign, or whose difference, chooses the value of a node.
+fn deciding(node: &Node) -> Vec<ExprId> {
+    match node {
+        Node::Select { left, right, .. } => vec![*left, *right],
+        Node::Call {
+            function: Function::Abs | Function::Sign | Function::Min | Function::Max,
+            arguments,
+        } => arguments.clone(),
+        _ => Vec::new(),
+    }
 }
 
 impl Structure {
@@ -109,6 +128,17 @@ impl Structure {
             Dependence::of(graph, values)
         };
         let (constraints, constraints_vary) = constraints(graph, entries);
+        // What a sign decides is in the first derivatives alone: those of a step are zero.
+        let chosen = |arrays: &[Array]| {
+            let values = entries
+                .iter()
+                .filter(|entry| arrays.contains(&entry.place.array))
+                .map(|entry| entry.value);
+            Dependence::of_choices(graph, values)
+        };
+        let chosen_momenta = chosen(&[Array::ByZ]);
+        let chosen_forces = chosen(&[Array::Force]);
+        let chosen_rates = chosen(&[Array::ByZ, Array::ByQ, Array::Force]);
         let mass = depends(&[Array::ZZ]);
         let tangent = depends(&[
             Array::ZZ,
@@ -130,12 +160,14 @@ impl Structure {
             dof: dof.clone(),
             time_dependent: depends(&[Array::Value, Array::Force]).time || constraints_vary,
             forced: of(Array::Force).next().is_some(),
-            quadratic_in_z: !mass.z,
-            constant_mass: !(mass.z || mass.q || mass.time),
-            linear: !(tangent.z || tangent.q || constraints),
-            separable: of(Array::ZQ).next().is_none(),
+            quadratic_in_z: !(mass.z || chosen_momenta.z),
+            constant_mass: !(mass.z || mass.q || mass.time || chosen_momenta.z),
+            linear: !(tangent.z || tangent.q || chosen_rates.z || chosen_rates.q || constraints),
+            separable: of(Array::ZQ).next().is_none() && !chosen_momenta.q,
             smooth: is_smooth(graph, entries),
-            symmetric_forces: of(Array::ForceZ).next().is_none() && is_symmetric(entries),
+            symmetric_forces: of(Array::ForceZ).next().is_none()
+                && !(chosen_forces.z || chosen_forces.q)
+                && is_symmetric(entries),
             cyclic,
             conserved,
             ignorable,
@@ -152,14 +184,7 @@ impl Structure {
 /// Whether no value is chosen by a sign.
 fn is_smooth(graph: &Graph, entries: &[Entry]) -> bool {
     let values: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
-    !(graph.reachable(&values).into_iter()).any(|id| match graph.node(id) {
-        Node::Select { .. } => true,
-        Node::Call { function, .. } => matches!(
-            function,
-            Function::Abs | Function::Sign | Function::Min | Function::Max
-        ),
-        _ => false,
-    })
+    (graph.reachable(&values).into_iter()).all(|id| deciding(graph.node(id)).is_empty())
 }
 
 /// Whether there are constraints, and whether they depend on the time.
