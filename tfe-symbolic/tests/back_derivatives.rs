@@ -353,3 +353,66 @@ fn exponents_beyond_32_bits_are_differentiated() {
     assert!((results.value - value).abs() < digits * value.abs());
     assert!((results.q[0] - slope).abs() < digits * slope.abs());
 }
+
+/// First derivatives of a potential by the coordinates, at rest.
+fn slopes(text: &str, q: &[f64]) -> Vec<f64> {
+    let declared = declare(text, &Context::default()).expect("a model");
+    let program = Derivation::of(&declared).program(ALL);
+    let environment = Environment {
+        q: q.to_vec(),
+        z: vec![0.0; q.len()],
+        ..Environment::default()
+    };
+    let results = interpret(&program, &environment).expect("a complete environment");
+    let second = results.qq.iter().flatten();
+    assert!(
+        second.clone().all(|x| x.is_finite()),
+        "{text}: {:?}",
+        results.qq
+    );
+    results.q
+}
+
+/// A term that stands in several of the sums within a denominator.
+#[test]
+fn terms_in_several_sums_of_a_denominator() {
+    let (x, y, z) = (0.3, 0.7, 0.2);
+    let u = x + 2.0 * y + z;
+    for (energy, expected) in [
+        ("y/sqrt((x + y) + (y + z))", (x + y + z) / (u * u.sqrt())),
+        ("y/((x + y) + (y + z))", (x + z) / (u * u)),
+        (
+            "y^2/sqrt((x + y) + (y + z))",
+            2.0 * y / u.sqrt() - y * y / (u * u.sqrt()),
+        ),
+        ("y/sqrt((x + 2*y) + z)", (x + y + z) / (u * u.sqrt())),
+    ] {
+        let text = format!(
+            "coordinates(x, y, z), lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - {energy}"
+        );
+        let found = -slopes(&text, &[x, y, z])[1];
+        assert!(
+            (found - expected).abs() < 1e-14,
+            "{energy}: {found}, {expected}"
+        );
+    }
+}
+
+/// Half-integer powers have the derivatives zero where their base is.
+#[test]
+fn half_integer_powers_at_zero() {
+    for (energy, x, expected) in [
+        ("2/5*max(-x, 0)^2.5", 1.0, 0.0),
+        ("2/5*max(-x, 0)^2.5", -4.0, -8.0),
+        ("2/5*abs(x)^2.5", -4.0, -8.0),
+        ("2/7*abs(x)^3.5", 4.0, 32.0),
+        ("2/5*(x^2)^1.25*sqrt(abs(x))^0", 4.0, 8.0),
+    ] {
+        let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+        let found = -slopes(&text, &[x])[0];
+        assert!(
+            (found - expected).abs() < 1e-13,
+            "{energy} at {x}: {found}, {expected}"
+        );
+    }
+}

@@ -263,12 +263,13 @@ impl Graph {
         self.scale(coefficient, product)
     }
 
-    /// √x^(2n) → xⁿ and abs(x)^(2n) → x^(2n).
+    /// √x^(2n) → xⁿ, xⁿ/√x → xⁿ⁻¹ √x and abs(x)^(2n) → x^(2n).
     fn fold_even_powers(
         &self,
         collected: &mut SortedMap<ExprId, i64>,
         waiting: &mut Vec<(ExprId, i64)>,
     ) {
+        self.lift_roots(collected);
         for (x, n) in collected.iter_mut() {
             let Node::Call {
                 function,
@@ -290,6 +291,40 @@ impl Graph {
                     *n = 0;
                 }
                 _ => {}
+            }
+        }
+    }
+}
+
+impl Graph {
+    /// xⁿ/√x → xⁿ⁻¹ √x for n > 0, and x²/√abs(x) → abs(x) √abs(x): the same numbers, and zero instead of 0/0 where x = 0.
+    fn lift_roots(&self, collected: &mut SortedMap<ExprId, i64>) {
+        let below = |(x, n): &(ExprId, i64)| match self.node(*x) {
+            Node::Call {
+                function: Function::Sqrt,
+                arguments,
+            } if *n == -1 => Some((*x, *arguments.first()?)),
+            _ => None,
+        };
+        let roots: Vec<(ExprId, ExprId)> = collected.iter().filter_map(below).collect();
+        for (root, argument) in roots {
+            if let Some(n) = collected.get_mut(&argument).filter(|n| **n >= 1) {
+                *n -= 1;
+                *collected.get_or_default(root) = 1;
+                continue;
+            }
+            let Node::Call {
+                function: Function::Abs,
+                arguments,
+            } = self.node(argument)
+            else {
+                continue;
+            };
+            let squared = arguments.first().and_then(|x| collected.get_mut(x));
+            if let Some(n) = squared.filter(|n| **n >= 2) {
+                *n -= 2;
+                *collected.get_or_default(argument) += 1;
+                *collected.get_or_default(root) = 1;
             }
         }
     }

@@ -218,6 +218,10 @@ fn parts_of_denominators(graph: &Graph, x: ExprId) -> Vec<PartOfDenominator> {
     let mut found = Vec::new();
     for (sum, n) in factors.iter().filter(|(_, n)| *n < 0) {
         for (coefficient, term) in terms_if_positive(graph, *sum) {
+            // In several of the sums within its coefficients add up.
+            if occurrences(graph, *sum, term) > 1 {
+                continue;
+            }
             let Some(rest) = quotient(graph, factors, term) else {
                 continue;
             };
@@ -264,6 +268,15 @@ fn terms_if_positive(graph: &Graph, sum: ExprId) -> Vec<(Constant, ExprId)> {
         }
     }
     found
+}
+
+/// How often an expression is a term of a sum and of the sums in it.
+fn occurrences(graph: &Graph, sum: ExprId, term: ExprId) -> usize {
+    let Some((_, terms)) = graph.as_sum(sum) else {
+        return 0;
+    };
+    let of = |x: ExprId| usize::from(x == term) + occurrences(graph, x, term);
+    terms.iter().map(|(_, x)| of(*x)).sum()
 }
 
 /// A sum without one of its terms, which may stand in a sum within.
