@@ -659,7 +659,8 @@ impl<'a> Emitter<'a> {
         };
         let name = coordinate.map(|name| format!("{function}_{}", name.replace(['[', ']'], "")));
         match name {
-            Some(name) if self.taken.insert(name.clone()) => {
+            // Parameters are renamed by an underscore at their end.
+            Some(name) if !name.ends_with('_') && self.taken.insert(name.clone()) => {
                 let name = format_ident!("{name}");
                 self.names.insert(temporary, name.clone());
                 name

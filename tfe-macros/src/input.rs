@@ -30,12 +30,19 @@ fn name_span(item: TokenStream) -> Option<Span> {
 /// Checks that the struct can hold parameters.
 ///
 /// # Errors
-/// Fields without names; generic parameters other than const parameters.
+/// Fields without names or under a `cfg`; generic parameters other than const parameters.
 pub(crate) fn check(item: &ItemStruct) -> syn::Result<()> {
     if let Fields::Unnamed(fields) = &item.fields {
         return Err(syn::Error::new_spanned(
             fields,
             "a model's parameters need names\nhelp: write `struct Name { m: f64, g: f64 }`",
+        ));
+    }
+    let mut attributes = item.fields.iter().flat_map(|field| &field.attrs);
+    if let Some(attribute) = attributes.find(|one| one.path().is_ident("cfg")) {
+        return Err(syn::Error::new_spanned(
+            attribute,
+            "a parameter cannot depend on the configuration: its model is derived with it in any case\nhelp: put the `cfg` on the whole struct, and declare it once for each configuration",
         ));
     }
     for parameter in &item.generics.params {
