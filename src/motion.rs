@@ -5,6 +5,7 @@ mod at_error;
 mod checkpoint;
 mod event;
 pub(crate) mod points;
+mod time;
 mod warning;
 
 pub use at_error::AtError;
@@ -13,6 +14,7 @@ pub use event::Event;
 pub use warning::Warning;
 
 pub(crate) use checkpoint::{LastCut, Reached, Seen};
+pub(crate) use time::is_same_time;
 
 pub use arcs::{MotionArc, Setting};
 

@@ -611,3 +611,26 @@ fn families_know_their_errors_too() {
         "{error}"
     );
 }
+
+/// A longest step that is none is refused.
+#[test]
+fn the_longest_step_is_checked() {
+    for step in [0.0, f64::NAN] {
+        let run = Simulation::new(&Pendulum).step(step).accuracy(1e-6);
+        let run = run.run(Pendulum.state([2.0], [0.0]), 0.0..1.0);
+        let error = run.expect_err("no step");
+        assert!(matches!(error.kind(), RunErrorKind::Step { .. }), "{error}");
+    }
+}
+
+/// Breaks that are one but for a rounding, or at the end but for one, leave no element between them.
+#[test]
+fn breaks_a_rounding_apart_are_one() {
+    let start = Pendulum.state([2.0], [0.0]);
+    let late = 0.1 + 0.2;
+    let run = Simulation::new(&Pendulum).break_at(0.3);
+    let twice = run.clone().break_at(late).accuracy(1e-6);
+    twice.run(start, 0.0..1.0).expect("a break");
+    let at_end = run.accuracy(1e-6);
+    at_end.run(start, 0.0..late).expect("a break");
+}

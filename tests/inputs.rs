@@ -1,7 +1,7 @@
 //! Inputs: functions of the time, tables, loops of control.
 
 use tfe::prelude::*;
-use tfe::{Driven, InputError, RunErrorKind};
+use tfe::{Driven, HeldNode, InputError, RunErrorKind};
 
 /// A pendulum whose pivot is moved and whose axis is turned: inputs in the energy, in forces, in outputs.
 #[dynamics(
@@ -593,4 +593,87 @@ fn parameters_of_driven_models_are_set() {
             .abs()
             < 1e-12
     );
+}
+
+/// A function that panics at the very start of a run that is to meet an accuracy, that is estimated, or that goes on, is told as in any other.
+#[test]
+fn functions_that_panic_at_once_are_told() {
+    #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u, output(force) = u)]
+    struct Oscillator;
+
+    let start = Oscillator.state([1.0], [0.0]);
+    let simulation = Simulation::new(&Oscillator).step(0.1);
+    let panics = |_: f64| -> f64 { panic!("at once") };
+    let broken = simulation.clone().input("u", panics);
+    let check = |kind: &RunErrorKind| {
+        let told = RunErrorKind::Input(InputError::Panicked { time: 1.0 });
+        assert_eq!(kind, &told);
+    };
+    let accurate = broken.clone().accuracy(1e-6).run(start, 1.0..5.0);
+    check(accurate.expect_err("a panic").kind());
+    let estimated = broken.run_estimated(start, 1.0..5.0);
+    check(estimated.expect_err("a panic").kind());
+    let good = simulation.input("u", |_| 0.0).run(start, 0.0..1.0);
+    let good = good.expect("a run");
+    let resumed = broken.resume(good.checkpoint().expect("complete"), 5.0);
+    check(resumed.expect_err("a panic").kind());
+}
+
+/// An input that jumps at the last node pushes up to there as before.
+#[test]
+fn given_nodes_may_end_at_a_jump() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u)]
+    struct Mass;
+
+    let motion = Simulation::new(&Mass)
+        .element(Radau::<3>)
+        .nodes([0.0, 0.5, 1.0])
+        .table("u", [0.0, 1.0], [1.0, -1.0], Interpolation::Hold)
+        .run(Mass.state([0.0], [0.0]), 0.0..1.0)
+        .expect("a run");
+    let speed = motion.last().v[0];
+    assert!((speed - 1.0).abs() < 1e-12, "{speed}");
+}
+
+/// The outputs of a node at which an event stops the loop are those of this node.
+#[test]
+fn outputs_of_a_loop_that_is_stopped_are_those_of_its_end() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u, event(wall) = 0.75 - x, output(place) = x)]
+    struct Mass;
+
+    let mut held = Simulation::new(&Mass)
+        .step(0.3)
+        .on("wall", Crossing::Falling, |_| Act::Stop)
+        .hold(Mass.state([0.0], [1.0]), 0.0)
+        .expect("a loop");
+    for _ in 0..3 {
+        held.advance().expect("a step");
+    }
+    let node = held.node();
+    assert!((node.t - 0.75).abs() < 1e-12, "{node:?}");
+    assert_eq!(node.output("place"), Some(node.q[0]));
+    assert!(held.advance().is_err());
+}
+
+/// Late times have roundings that are much of a short period.
+#[test]
+fn feedback_is_sampled_at_late_times() {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u)]
+    struct Mass;
+
+    let asked = AtomicU32::new(0);
+    let start = Mass.state([1.0], [0.0]);
+    let held = Simulation::new(&Mass).step(1e-3).hold(start, 1e5);
+    let mut held = held.expect("a loop");
+    let law = |node: &HeldNode<1>| {
+        asked.fetch_add(1, Ordering::Relaxed);
+        -node.q[0]
+    };
+    held.sample("u", 1e-3, law).expect("an input");
+    for _ in 0..20 {
+        held.advance().expect("a step");
+    }
+    assert_eq!(asked.load(Ordering::Relaxed), 20);
 }

@@ -634,3 +634,30 @@ fn steps_that_are_cut_are_looked_at() {
         "{told:?}"
     );
 }
+
+/// A run that goes on looks for unstable steps as one that begins.
+#[test]
+fn runs_that_go_on_are_watched() {
+    let simulation = Simulation::new(&Oscillator).element(Primal::<3>).step(3.3);
+    let first = simulation.run(Oscillator.state([1.0], [0.0]), 0.0..33.0);
+    let first = first.expect("ten steps");
+    let checkpoint = first.checkpoint().expect("complete");
+    let second = simulation.resume(checkpoint, 330.0).expect("a run");
+    let told = second.warnings();
+    let is_unstable = |warning: &Warning| matches!(warning, Warning::UnstableStep { .. });
+    assert!(told.iter().any(is_unstable), "{told:?}");
+}
+
+/// Endless steps that are roundings of the time are refused before the first.
+#[test]
+fn endless_steps_below_the_resolution_of_the_time_are_refused() {
+    let simulation = Simulation::new(&Oscillator).step(1.0);
+    let mut steps = simulation.steps(Oscillator.state([1.0], [0.0]), 1e17);
+    let first = steps.next().expect("an error");
+    let kind = first.expect_err("nodes share times");
+    assert!(
+        matches!(kind, RunErrorKind::StepUnresolved { .. }),
+        "{kind}"
+    );
+    assert!(steps.next().is_none());
+}

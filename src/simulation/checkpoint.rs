@@ -90,7 +90,8 @@ where
         end: f64,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
         let (time, state) = (checkpoint.time(), &checkpoint.state);
-        let prepared = self.check_start(state).and_then(|()| {
+        let prepare = || -> Result<_, RunErrorKind> {
+            self.check_start(state)?;
             let mut run = self.clone();
             run.step = run.step.or(checkpoint.reached.step);
             M::leave_behind(&mut run.impulses, time);
@@ -108,19 +109,16 @@ where
                     run.impulses.retain(|one| !is_behind(M::time_of(one)));
                     run.mesh(span)
                 })?;
-            Ok((place, stepper))
-        });
-        match prepared {
-            Ok(((mesh, done, origin), stepper)) => {
-                let node = Node::of(time, state, checkpoint.velocity.clone());
-                let motion = Motion::starting(&*self.model, node);
+            let node = Node::of(time, state, checkpoint.velocity.clone());
+            Ok((place, stepper, Motion::starting(&*self.model, node)))
+        };
+        let prepared = self.model.guarded(prepare);
+        match prepared.unwrap_or_else(|| Err(RunErrorKind::panicked(time))) {
+            Ok(((mesh, done, origin), stepper, motion)) => {
                 let place = (&mesh, done, origin, Some(&checkpoint.seen));
                 self.drive_on(motion, state, place, stepper, None)
             }
-            Err(kind) => {
-                let motion = self.model.first_node((time, state), None);
-                Err(RunError::new(kind, motion))
-            }
+            Err(kind) => Err(self.refused(kind, (time, state))),
         }
     }
 }

@@ -93,7 +93,7 @@ where
                 _ => Err(RunErrorKind::Step { step: f64::NAN }),
             };
         };
-        let names = steps.model().map_or_else(Vec::new, Evaluate::output_names);
+        let names = steps.model().output_names();
         let node = HeldNode {
             node,
             outputs: vec![0.0; names.len()],
@@ -174,16 +174,20 @@ where
 
     /// Asks the feedback that is due.
     fn ask_samplers(&mut self) -> Result<(), InputError> {
-        /// In periods.
+        /// In periods, besides those of the times themselves.
         const ROUNDING: f64 = 1e-9;
         for sampler in &mut self.samplers {
+            let Sampler { start, period, .. } = *sampler;
             #[allow(clippy::cast_precision_loss, reason = "a count of samples")]
-            let late = (self.node.t - sampler.start).abs() / sampler.period - sampler.count as f64;
-            if late < -ROUNDING {
+            let count = sampler.count as f64;
+            let late = (self.node.t - start).abs() / period - count;
+            let times = self.node.t.abs().max(start.abs()) / period;
+            let rounding = ROUNDING + 4.0 * f64::EPSILON * (times + count);
+            if late < -rounding {
                 continue;
             }
             let name = || M::INPUTS[sampler.place].to_owned();
-            if late > ROUNDING {
+            if late > rounding {
                 return Err(InputError::Sampling {
                     name: name(),
                     time: self.node.t,
@@ -233,12 +237,13 @@ where
 
     fn observe(&mut self) {
         let HeldNode { node, outputs, .. } = &mut self.node;
-        if let Some(model) = self.steps.model().filter(|_| !outputs.is_empty()) {
-            let at = (&node.q, &node.p);
-            let seen = model.guarded(|| model.outputs(node.t, at, &node.v, outputs));
-            if seen.is_none() {
-                outputs.fill(f64::NAN);
-            }
+        if outputs.is_empty() {
+            return;
+        }
+        let (model, at) = (self.steps.model(), (&node.q, &node.p));
+        let seen = model.guarded(|| model.outputs(node.t, at, &node.v, outputs));
+        if seen.is_none() {
+            outputs.fill(f64::NAN);
         }
     }
 }

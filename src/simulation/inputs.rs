@@ -18,8 +18,8 @@ where
     /// Gives an input of the model as a function of the time, as [`Driven::input`]; one that was given before is given anew. Inputs that are not given are zero.
     ///
     /// A name that the model does not declare stops the run before it begins. A function that gives a number that is not finite where it is needed, or panics, ends the run with an error,
-    /// [`InputError::Value`] with the time, or [`InputError::Panicked`]. Panics are caught once for all that a step asks (a panic that aborts the program is not), by `run`, `steps`, `hold`,
-    /// [`section`](Self::section), `run_linearised` and runs with an `accuracy`. Where the function jumps or has a kink, elements should [end](Self::break_at).
+    /// [`InputError::Value`] with the time, or [`InputError::Panicked`]. Panics are caught once for all that a step asks (a panic that aborts the program is not), by `run`, `resume`, `steps`, `hold`,
+    /// [`section`](Self::section), `run_linearised`, `run_estimated` and runs with an `accuracy`. Where the function jumps or has a kink, elements should [end](Self::break_at).
     ///
     /// ```
     /// use tfe::prelude::*;

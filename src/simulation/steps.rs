@@ -172,11 +172,12 @@ where
         warnings
     }
 
-    /// The model as events have left it, unless the steps have ended.
-    pub(super) fn model(&self) -> Option<&M> {
-        self.way.course.stepper()?;
-        let changed = self.way.pieces.as_ref().map(|pieces| &*pieces.model);
-        Some(changed.unwrap_or(&*self.way.model))
+    /// The model as events have left it.
+    pub(super) fn model(&self) -> &M {
+        match &self.way.pieces {
+            Some(pieces) => &pieces.model,
+            None => &self.way.model,
+        }
     }
 
     /// The node from which the next step goes, unless the steps have ended.

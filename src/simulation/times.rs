@@ -1,6 +1,7 @@
 //! When elements begin and end: equal steps between breaks, or between given nodes.
 
 use crate::error::RunErrorKind;
+use crate::motion::is_same_time;
 use std::ops::Range;
 
 /// Times between two breaks, cut into equal steps; the last one may be shorter.
@@ -51,10 +52,11 @@ impl Times {
         let within = |time: f64| {
             direction * start <= direction * time && direction * time <= direction * end
         };
-        let is_inside = |&time: &f64| within(time) && !is_same(time, start) && !is_same(time, end);
+        let is_inside =
+            |&time: &f64| within(time) && !is_same_time(time, start) && !is_same_time(time, end);
         let mut cuts: Vec<f64> = breaks.iter().copied().filter(is_inside).collect();
         sort(&mut cuts, direction);
-        cuts.dedup_by(|a, b| is_same(*a, *b));
+        cuts.dedup_by(|a, b| is_same_time(*a, *b));
         let mut segments = Vec::new();
         let mut from = start;
         for to in cuts.into_iter().chain([end]) {
@@ -65,7 +67,7 @@ impl Times {
             }
             from = to;
         }
-        let is_at = |time: f64| breaks.iter().any(|one| is_same(*one, time));
+        let is_at = |time: f64| breaks.iter().any(|one| is_same_time(*one, time));
         if let Some(first) = segments.first_mut() {
             first.at_break.0 = is_at(start);
         }
@@ -116,12 +118,12 @@ impl Times {
         Self::new(span, end - start, &[])?;
         check_nodes(span, nodes, direction)?;
         let mut nodes = nodes.to_vec();
-        let ahead =
-            |time: &f64| direction * start < direction * time && direction * time < direction * end;
-        let mut breaks: Vec<f64> = breaks.iter().copied().filter(ahead).collect();
+        let mut breaks = breaks.to_vec();
         sort(&mut breaks, direction);
-        breaks.dedup_by(|a, b| is_same(*a, *b));
-        let is_new = |time: &&f64| !is_among(&nodes, **time, direction);
+        breaks.dedup_by(|a, b| is_same_time(*a, *b));
+        let is_inside =
+            |time: f64| direction * start < direction * time && direction * time < direction * end;
+        let is_new = |time: &&f64| is_inside(**time) && !is_among(&nodes, **time, direction);
         let new: Vec<f64> = breaks.iter().filter(is_new).copied().collect();
         nodes.extend(new);
         sort(&mut nodes, direction);
@@ -226,7 +228,7 @@ impl Endless {
         }
         let direction = step.signum();
         let is_ahead = |time: &f64| {
-            time.is_finite() && direction * start < direction * time && !is_same(*time, start)
+            time.is_finite() && direction * start < direction * time && !is_same_time(*time, start)
         };
         let mut ahead: Vec<f64> = breaks.iter().copied().filter(is_ahead).collect();
         sort(&mut ahead, direction);
@@ -234,13 +236,14 @@ impl Endless {
         let span = start..last;
         check_span(&span, step)?;
         let mut segments = Times::new(&span, step, breaks)?.segments;
+        check_resolution(last, step)?;
         segments.push(Segment {
             start: last,
             end: direction * f64::INFINITY,
             step,
             steps: usize::MAX,
             whole: true,
-            at_break: (breaks.iter().any(|one| is_same(*one, last)), false),
+            at_break: (breaks.iter().any(|one| is_same_time(*one, last)), false),
         });
         Ok(Self {
             segments,
@@ -282,16 +285,11 @@ pub(crate) fn up_to_break(start: f64, end: f64) -> f64 {
     (end - start) - rounding(end, end - start)
 }
 
-/// Whether two times are one but for rounding.
-pub(super) fn is_same(a: f64, b: f64) -> bool {
-    (a - b).abs() <= 8.0 * f64::EPSILON * a.abs().max(b.abs())
-}
-
 /// Whether a time is one of some in the order of a run, but for rounding.
 fn is_among(times: &[f64], time: f64, direction: f64) -> bool {
     let after = times.partition_point(|one| direction * one < direction * time);
     let near = &times[after.saturating_sub(1)..times.len().min(after + 1)];
-    near.iter().any(|one| is_same(*one, time))
+    near.iter().any(|one| is_same_time(*one, time))
 }
 
 /// Some roundings of the time, in the direction of the run.
@@ -319,6 +317,18 @@ fn check_nodes(span: &Range<f64>, nodes: &[f64], direction: f64) -> Result<(), R
             end,
         })
     }
+}
+
+/// Refuses steps that are roundings of the time: nodes would share times, and points of an element, too.
+fn check_resolution(time: f64, step: f64) -> Result<(), RunErrorKind> {
+    /// A step of fewer roundings of the time has points that share times.
+    const LEAST_ROUNDINGS: f64 = 64.0;
+
+    let least = LEAST_ROUNDINGS * f64::EPSILON * time.abs();
+    if step.abs() < least {
+        return Err(RunErrorKind::StepUnresolved { time, step, least });
+    }
+    Ok(())
 }
 
 /// A segment for each element. Where lengths in a row differ by roundings alone they are made equal to the bit, without changing their sum.
@@ -349,9 +359,6 @@ fn single_steps(nodes: &[f64]) -> Vec<Segment> {
 impl Segment {
     /// A count of steps beyond this is a mistake in units rather than a run: it would take years.
     const MOST_STEPS: f64 = 1e15;
-
-    /// A step of fewer roundings of the time has points that share times.
-    const LEAST_ROUNDINGS: f64 = 64.0;
 
     fn new(start: f64, end: f64, step: f64) -> Result<Self, RunErrorKind> {
         let ratio = (end - start) / step;
@@ -385,18 +392,8 @@ impl Segment {
         Ok(segment)
     }
 
-    /// Refuses steps that are roundings of the time: nodes would share times, and points of an element, too.
     fn check_resolution(&self) -> Result<(), RunErrorKind> {
-        let time = self.start.abs().max(self.end.abs());
-        let least = Self::LEAST_ROUNDINGS * f64::EPSILON * time;
-        if self.step.abs() < least {
-            return Err(RunErrorKind::StepUnresolved {
-                time,
-                step: self.step,
-                least,
-            });
-        }
-        Ok(())
+        check_resolution(self.start.abs().max(self.end.abs()), self.step)
     }
 
     /// The length of the k-th element.

@@ -3,9 +3,9 @@
 use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::setup::Simulation;
-use super::times::is_same as is_same_time;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::{Length, RunTimeLength};
+use crate::motion::is_same_time;
 use crate::motion::{Motion, Node};
 use std::convert::identity;
 use std::ops::Range;

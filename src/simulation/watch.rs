@@ -34,7 +34,7 @@ impl Watch {
         }
     }
 
-    /// Examines the element that begins at `t` in `state` if its number is 0, 1, 2, 4, 8, …
+    /// Examines the element that begins at `t` in `state` if its number is 0, 1, 2, 4, 8, …; of a run that goes on, the first one, and those of twice its number and so forth.
     pub(super) fn look<M: Model<N>, const N: usize>(
         &mut self,
         model: &M,
@@ -42,7 +42,7 @@ impl Watch {
         (t, h): (f64, f64),
         state: &State<N>,
     ) {
-        if number == self.next {
+        if number >= self.next {
             self.next = (2 * number).max(1);
             self.examine(model, number, (t, h), state);
         }

@@ -4,6 +4,7 @@ use super::error::WorkPrecisionError;
 use super::grid::Grid;
 use super::subject::{PhasePoint, Subject};
 use crate::error::RunErrorKind;
+use crate::motion::is_same_time;
 use crate::numbers::larger;
 use std::fmt;
 use tfe_runtime::step::Control;
@@ -125,9 +126,6 @@ fn norm(values: &[f64]) -> f64 {
     largest * squares.sum::<f64>().sqrt()
 }
 
-/// Times closer than this, relative to their size, are one: a step between them would be rounding.
-const SAME: f64 = 8.0 * f64::EPSILON;
-
 impl<S: PhasePoint> Known<S> {
     /// The relative error at the end that even the exact motion would seem to have.
     pub(super) fn uncertainty(&self) -> f64 {
@@ -155,8 +153,7 @@ impl<S: PhasePoint> Known<S> {
             .iter()
             .min_by(|a, b| distance(&a.0).total_cmp(&distance(&b.0)))?;
         let (known, reference) = nearest;
-        (distance(known) <= SAME * time.abs().max(known.abs()))
-            .then(|| self.scale.distances(state, reference))
+        is_same_time(time, *known).then(|| self.scale.distances(state, reference))
     }
 }
 
@@ -218,7 +215,7 @@ fn check<S: PhasePoint>(time: f64, state: &S, expected: usize) -> Result<(), Wor
 fn times(grids: &[Grid]) -> Vec<f64> {
     let mut times: Vec<f64> = grids.iter().flat_map(Grid::compared).collect();
     times.sort_by(f64::total_cmp);
-    times.dedup_by(|a, b| (*a - *b).abs() <= SAME * a.abs().max(b.abs()));
+    times.dedup_by(|a, b| is_same_time(*a, *b));
     if let Some(grid) = grids.first() {
         let end = grid.node(grid.steps());
         if end < grid.node(0) {

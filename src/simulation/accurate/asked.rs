@@ -5,6 +5,7 @@ use super::super::follow::Follow;
 use super::super::kind::{Chosen, Simulated};
 use super::super::mesh::{Grid, Mesh};
 use super::super::setup::Simulation;
+use super::super::times::check_span;
 use super::graded::Steps;
 use super::repeatable::{Broken, Passing, Repeatable, trusting};
 use super::{Accurate, accurate, check_accuracy, estimated};
@@ -94,14 +95,26 @@ where
         start: L::State,
         span: Range<f64>,
     ) -> Result<Estimated<Motion<N, L>>, RunError<N, L>> {
-        let mesh = self.prepare(&start, &span).map(|(mesh, _)| mesh);
-        let mesh = mesh.map_err(|kind| self.refused(kind, (span.start, &start)))?;
-        estimated(self, (span.start, &start), &mesh)
-            .map_err(|broken| RunError::new(broken.0, broken.1))
+        let at_start = (span.start, &start);
+        let found = self.model.guarded(|| {
+            let mesh = self.prepare(&start, &span).map(|(mesh, _)| mesh);
+            let mesh = mesh.map_err(|kind| self.refused(kind, at_start))?;
+            estimated(self, at_start, &mesh).map_err(|broken| RunError::new(broken.0, broken.1))
+        });
+        found.unwrap_or_else(|| Err(self.refused(RunErrorKind::panicked(span.start), at_start)))
     }
 
-    fn refused(&self, kind: RunErrorKind, start: (f64, &L::State)) -> RunError<N, L> {
-        RunError::new(kind, self.model.first_node(start, None))
+    /// An error of a run that has not begun.
+    pub(in crate::simulation) fn refused(
+        &self,
+        kind: RunErrorKind,
+        (t, start): (f64, &L::State),
+    ) -> RunError<N, L> {
+        let motion = self
+            .model
+            .guarded(|| self.model.first_node((t, start), None));
+        let motion = motion.unwrap_or_else(|| Motion::unknown(&*self.model, t, start));
+        RunError::new(kind, motion)
     }
 }
 
@@ -134,8 +147,21 @@ where
                 None,
             ));
         }
-        let checked = self.check(run, &start, &span);
-        checked.map_err(|kind| run.refused(kind, (span.start, &start)))?;
+        let at_start = (span.start, &start);
+        let found = run.model.guarded(|| self.find(run, at_start, &span));
+        found.unwrap_or_else(|| Err(run.refused(RunErrorKind::panicked(span.start), at_start)))
+    }
+
+    /// The same of a span that takes a time.
+    fn find(
+        &self,
+        run: &Simulation<'_, M, N, L>,
+        at_start: (f64, &L::State),
+        span: &Range<f64>,
+    ) -> Result<Estimated<Motion<N, L>>, RunError<N, L>> {
+        let (_, start) = at_start;
+        let checked = self.check(run, start, span);
+        checked.map_err(|kind| run.refused(kind, at_start))?;
         let asked = Asked {
             accuracy: self.accuracy,
             span: span.clone(),
@@ -150,10 +176,10 @@ where
         };
         let mut facts = M::FACTS;
         // Equations of first order, written as p·f(q), conserve nothing that short and long steps could spoil.
-        facts.forced |= !facts.linear && run.model.is_of_first_order(span.start, &start);
+        facts.forced |= !facts.linear && run.model.is_of_first_order(span.start, start);
         let are_equal = self.equal_steps || run.has_events();
         let steps = Steps::of(&facts, are_equal, M::IS_CONSTRAINED);
-        accurate(run, &start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
+        accurate(run, start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
     }
 
     fn check(
@@ -166,6 +192,9 @@ where
         run.check_start(start)?;
         if run.nodes.is_some() {
             run.mesh(span)?;
+        }
+        if let Some(longest) = run.step {
+            check_span(span, longest)?;
         }
         // Of span, breaks and impulses.
         let h = (span.end - span.start) / 1000.0;
@@ -332,15 +361,18 @@ where
     }
 
     fn part(&self, (t0, start): (f64, &L::State), (t, end): (f64, &L::State)) -> Motion<N, L> {
-        let stepper = M::stepper(self.model.clone(), self.chosen());
-        let Ok(mut stepper) = stepper else {
-            return self.model.first_node((t0, start), None);
-        };
-        let mut motion = self.model.first_node((t0, start), Some(&mut stepper));
-        if t != t0 {
-            M::record(&mut motion, &mut stepper, &self.model, (t, end));
-        }
-        motion
+        let part = self.model.guarded(|| {
+            let stepper = M::stepper(self.model.clone(), self.chosen());
+            let Ok(mut stepper) = stepper else {
+                return self.model.first_node((t0, start), None);
+            };
+            let mut motion = self.model.first_node((t0, start), Some(&mut stepper));
+            if t != t0 {
+                M::record(&mut motion, &mut stepper, &self.model, (t, end));
+            }
+            motion
+        });
+        part.unwrap_or_else(|| Motion::unknown(&*self.model, t0, start))
     }
 
     fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind> {

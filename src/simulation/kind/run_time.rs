@@ -2,13 +2,12 @@
 
 use super::super::checks::{check_finite, conserves_energies};
 use super::super::mesh::{Grid, Mesh};
-use super::super::times::is_same;
 use super::super::watch::Watch;
 use super::{Chosen, Simulated, second};
 use crate::error::RunErrorKind;
 use crate::evaluate::names;
 use crate::length::RunTimeLength;
-use crate::motion::{Motion, Node, Warning};
+use crate::motion::{Motion, Node, Warning, is_same_time};
 use std::ops::Range;
 use tfe_runtime::constrained::Trail;
 use tfe_runtime::dual::Dual;
@@ -228,7 +227,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
 
     fn kick(&self, impulses: &[(f64, Vec<f64>)], t: f64, state: &mut FamilyState) -> bool {
         let mut is_kicked = false;
-        for (_, impulse) in impulses.iter().filter(|(time, _)| is_same(*time, t)) {
+        for (_, impulse) in impulses.iter().filter(|(time, _)| is_same_time(*time, t)) {
             for (p, change) in state.p.iter_mut().zip(impulse) {
                 *p += change;
             }
