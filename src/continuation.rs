@@ -154,7 +154,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         self
     }
 
-    /// The number of elements, equally long unless [`graded`](Self::graded).
+    /// The number of elements, all equally long: of this and [`graded`](Self::graded) the last call counts.
     #[must_use]
     pub fn elements(mut self, elements: usize) -> Self {
         self.orbit = self.orbit.elements(elements);

@@ -29,6 +29,7 @@ pub use tfe_runtime::family::{OperatorError, TransitionOperator};
 pub use tfe_runtime::transition::TransitionError;
 pub use time_scales::TimeScales;
 
+use crate::numbers::largest;
 use eigenvalues::largest_modulus;
 use nalgebra::DMatrix;
 use std::ops::Range;
@@ -198,7 +199,7 @@ pub fn spectral_radius(matrix: &DMatrix<f64>) -> f64 {
 
 /// How far a transition matrix is from symplectic: the largest entry of |AᵀJA − J|, J = [[0, −1], [1, 0]] in the order (p, q).
 ///
-/// Zero to round-off for symplectic elements and models without forces. NaN for a matrix of odd size.
+/// Zero to round-off for symplectic elements and models without forces. NaN for a matrix of odd size, or with an entry that is NaN.
 pub fn symplecticity_defect(matrix: &DMatrix<f64>) -> f64 {
     let size = matrix.nrows();
     if !matrix.is_square() || !size.is_multiple_of(2) {
@@ -214,7 +215,8 @@ pub fn symplecticity_defect(matrix: &DMatrix<f64>) -> f64 {
             0.0
         }
     });
-    (matrix.transpose() * &j * matrix - j).amax()
+    let difference = matrix.transpose() * &j * matrix - j;
+    largest(difference.as_slice())
 }
 
 #[cfg(test)]
@@ -232,5 +234,6 @@ mod tests {
         assert_eq!(symplecticity_defect(&stretch), 7.0);
         let broken = DMatrix::from_row_slice(2, 2, &[f64::NAN, 0.0, 0.0, 1.0]);
         assert!(spectral_radius(&broken).is_nan());
+        assert!(symplecticity_defect(&broken).is_nan());
     }
 }

@@ -75,6 +75,8 @@ impl Mesh {
 
     /// The lengths of so many elements, each with the same arc length in scaled time and phase space, between nodes of which momenta and coordinates are given.
     pub(crate) fn equidistributed(&self, nodes: &[[&[f64]; 2]], elements: usize) -> Vec<f64> {
+        /// A range below this, of the largest value, is that of roundings.
+        const CONSERVED: f64 = 1e-9;
         let components = nodes.first().map_or(0, |[p, q]| p.len() + q.len());
         let component = |[p, q]: &[&[f64]; 2], k: usize| match k.checked_sub(p.len()) {
             None => p[k],
@@ -87,7 +89,8 @@ impl Mesh {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
                     (low.min(value), high.max(value))
                 });
-            if high > low {
+            // What differs by roundings is conserved.
+            if high - low > CONSERVED * high.abs().max(low.abs()) {
                 *inverse = 1.0 / (high - low);
             }
         }
@@ -162,6 +165,17 @@ mod tests {
         assert_eq!(graded.elements(), 3);
         assert_eq!(graded.times(0.0, 3.7).last(), Some(3.7));
         assert!((graded.place(1, 0.0, 3.7).1 - 2.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn roundings_of_what_is_conserved_are_no_motion() {
+        let p = [1.0, 1.0 + f64::EPSILON, 1.0 + f64::EPSILON];
+        let q = [0.0, 1.0, 2.0];
+        let nodes: Vec<[&[f64]; 2]> = (0..3).map(|k| [&p[k..=k], &q[k..=k]]).collect();
+        let mesh = Mesh::new(2, &[]).expect("a mesh");
+        for weight in mesh.equidistributed(&nodes, 2) {
+            assert!((weight - 0.5).abs() < 1e-15);
+        }
     }
 
     #[test]

@@ -235,7 +235,9 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
         let mut header = vec![self.parameter.to_owned(), "period".to_owned()];
         let names: Vec<CoordinateName> = (0..N).map(M::coordinate_name).collect();
         header.extend(names.iter().map(|name| format!("amplitude_{name}")));
-        for k in 1..=2 * N {
+        // Constraints leave fewer.
+        let multipliers = self.points.first().map(|point| point.multipliers.len());
+        for k in 1..=multipliers.unwrap_or(2 * N) {
             header.extend([format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
         }
         header.push("stable".to_owned());

@@ -8,7 +8,7 @@ use super::problem::Continued;
 use crate::assembly::{Assembly, AssemblyError, Control, Iterate, Problem};
 use crate::periodic::OrbitError;
 use crate::periodic::orbit::{multipliers_of, trivial_of};
-use crate::periodic::problem::Global;
+use crate::periodic::problem::{Global, Periodic};
 use crate::periodic_schur::Multiplier;
 use crate::stability::chebyshev::bracketed_root;
 use std::ops::Range;
@@ -461,8 +461,13 @@ fn solved<M: Model<N> + Clone, const N: usize>(
     iterations: u32,
 ) -> Result<Solved<M, N>, OrbitError> {
     let transitions = assembly.transitions().to_vec();
-    let floquet = multipliers_of(&problem.orbit, &iterate.nodes, &transitions)?;
-    let trivial = trivial_of(&floquet, problem.orbit.trivial());
+    // What the constraints allow, they do at this parameter.
+    let orbit = Periodic {
+        model: &problem.model,
+        ..problem.orbit.clone()
+    };
+    let floquet = multipliers_of(&orbit, &iterate.nodes, &transitions)?;
+    let trivial = trivial_of(&floquet, orbit.trivial());
     let slope = tangent.globals.last().copied().unwrap_or(f64::NAN);
     // With the parameter given instead of the arc length the determinant is dλ/ds times as large.
     let sign = match problem.row {

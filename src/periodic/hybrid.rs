@@ -6,6 +6,7 @@ use super::phase::Period;
 use super::setup::PeriodicOrbit;
 use crate::linearised::Linearised;
 use crate::motion::Motion;
+use crate::numbers::{larger, largest};
 use crate::periodic_schur::Multiplier;
 use crate::simulation::Simulation;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -70,7 +71,8 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
 /// ```
 ///
 /// with A of [`run_linearised`](Simulation::run_linearised), across events; of corrections that do the same, as of orbits that come in families, the shortest is taken, and corrections that make
-/// r larger are halved. The guess should meet the events of the orbit, and begin away from them.
+/// r larger are halved. The guess should meet the events of the orbit, and begin away from them. Where no correction is left but r is larger than roundings, as of a model that has no orbit of this period, or of a
+/// conservative one on elements that are too coarse, there is no orbit.
 #[derive(Debug)]
 pub struct HybridOrbits<'m, M, const N: usize> {
     pub(super) simulation: Simulation<'m, M, N>,
@@ -177,13 +179,18 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
                 scales: &scales,
                 period,
             };
-            let (change, stretch) = closing.shortest(&residual)?;
-            let size = change.amax().max(stretch.abs() / period);
+            let Correction {
+                start: change,
+                stretch,
+                gain,
+            } = closing.shortest(&residual)?;
+            let size = larger(largest(change.as_slice()), stretch.abs() / period);
             let is_done = size <= self.tolerance || (size < ROUNDED && size > 0.5 * last);
             last = size;
             let mut part = 1.0;
+            let apart = largest(residual.as_slice());
             let mut tried = Err(OrbitError::Stalled {
-                residual: residual.amax(),
+                residual: apart,
                 iterations,
             });
             for _ in 0..=MAX_HALVINGS {
@@ -193,7 +200,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
                 };
                 let time = period + part * stretch;
                 if let Ok(run) = self.run(&moved, time)
-                    && (is_done || self.residual(&run, &scales).amax() < residual.amax())
+                    && (is_done || largest(self.residual(&run, &scales).as_slice()) < apart)
                 {
                     tried = Ok((moved, time, run));
                     break;
@@ -201,15 +208,24 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
                 part *= 0.5;
             }
             // Nothing is better than roundings.
-            if tried.is_err() && size < ROUNDED {
-                return self.found(run, state, period, iterations);
+            let is_best = tried.is_err() && size < ROUNDED;
+            if !is_best {
+                (state, period, run) = tried?;
             }
-            (state, period, run) = tried?;
-            if is_done {
-                return self.found(run, state, period, iterations);
+            if is_done || is_best {
+                // What no correction changes may be left: then the motion does not close.
+                let residual = largest(self.residual(&run, &scales).as_slice());
+                if residual <= self.tolerance.max(ROUNDED) * gain.max(1.0) {
+                    return self.found(run, state, period, iterations);
+                }
+                return Err(OrbitError::Stalled {
+                    residual,
+                    iterations,
+                });
             }
         }
-        let residual = self.residual(&run, &scales(run.motion())).amax();
+        let residual = self.residual(&run, &scales(run.motion()));
+        let residual = largest(residual.as_slice());
         Err(OrbitError::Stalled {
             residual,
             iterations,
@@ -260,19 +276,41 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     ) -> Result<HybridOrbit<N>, OrbitError> {
         let mut floquet = run.multipliers().map_err(OrbitError::Multipliers)?;
         sort(&mut floquet);
-        let autonomous = !M::FACTS.time_dependent;
         let (motion, transitions) = run.into_parts();
+        let trivial = self.trivial(&floquet, &motion);
         Ok(HybridOrbit {
             start,
             period,
             multipliers: floquet.iter().map(Multiplier::to_complex).collect(),
             floquet,
-            trivial: usize::from(autonomous),
+            trivial: usize::from(trivial),
             motion,
             transitions,
             iterations,
         })
     }
+
+    /// Whether a multiplier is one because the model does not depend on time. Where the period is known it need not be: acts may depend on time, and a state of rest has none.
+    fn trivial(&self, floquet: &[Multiplier], motion: &Motion<N>) -> bool {
+        /// How near to one it is at least.
+        const NEAR: f64 = 1e-4;
+        if matches!(self.period, Period::Guess(_)) {
+            return true;
+        }
+        let moves = motion.states().iter().any(|node| node.v != [0.0; N]);
+        let is_one = |one: &Multiplier| one.log_modulus.hypot(one.argument) < NEAR;
+        !M::FACTS.time_dependent && moves && floquet.iter().any(is_one)
+    }
+}
+
+/// A correction of an orbit.
+pub(super) struct Correction {
+    /// Of the start, ordered (p, q), in parts of the scales.
+    pub(super) start: DVector<f64>,
+    /// Of the period.
+    pub(super) stretch: f64,
+    /// By how much a correction is multiplied over a period, at most.
+    pub(super) gain: f64,
 }
 
 /// The linear equations of an orbit that closes.
@@ -286,11 +324,8 @@ pub(super) struct Closing<'a> {
 }
 
 impl Closing<'_> {
-    /// The shortest correction, of the start in parts of the scales, and of the period.
-    pub(super) fn shortest(
-        &self,
-        residual: &DVector<f64>,
-    ) -> Result<(DVector<f64>, f64), OrbitError> {
+    /// The shortest correction.
+    pub(super) fn shortest(&self, residual: &DVector<f64>) -> Result<Correction, OrbitError> {
         /// Singular values below this, of the largest, are zeros: of families of orbits.
         const ZERO: f64 = 1e-9;
         let size = residual.len();
@@ -303,20 +338,29 @@ impl Closing<'_> {
                 self.product[(row, column)] * scale(column) / scale(row) - unit
             }
         });
+        let stalled = OrbitError::Stalled {
+            residual: largest(residual.as_slice()),
+            iterations: 0,
+        };
+        // Of other numbers the decomposition would never end.
+        let mut entries = matrix.iter().chain(residual.iter());
+        if !entries.all(|entry| entry.is_finite()) {
+            return Err(stalled);
+        }
         let svd = matrix.svd(true, true);
-        let largest = svd.singular_values.amax();
-        let change = svd.solve(&-residual, ZERO * largest);
-        let Ok(change) = change else {
-            return Err(OrbitError::Stalled {
-                residual: residual.amax(),
-                iterations: 0,
-            });
+        let gain = svd.singular_values.amax();
+        let Ok(change) = svd.solve(&-residual, ZERO * gain) else {
+            return Err(stalled);
         };
         let stretch = self
             .rate
             .as_ref()
             .map_or(0.0, |_| change[size] * self.period);
-        Ok((change.rows(0, size).into_owned(), stretch))
+        Ok(Correction {
+            start: change.rows(0, size).into_owned(),
+            stretch,
+            gain,
+        })
     }
 }
 
@@ -415,7 +459,7 @@ impl<const N: usize> HybridOrbit<N> {
         &self.floquet
     }
 
-    /// The places of the multiplier that is one because the model does not depend on time; empty for a forced one.
+    /// The place of the multiplier that is one because the model does not depend on time; empty for a forced one, for a state of rest, and where the period is known and none is within 10⁻⁴ of one.
     pub fn trivial(&self) -> Vec<usize> {
         trivial_of(&self.floquet, self.trivial)
     }

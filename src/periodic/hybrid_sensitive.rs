@@ -1,7 +1,7 @@
 //! Orbits with events, with their derivatives by parameters.
 
 use super::error::OrbitError;
-use super::hybrid::{Closing, HybridOrbit, HybridOrbits, scales};
+use super::hybrid::{Closing, Correction, HybridOrbit, HybridOrbits, scales};
 use super::moving;
 use super::orbit::sort;
 use super::phase::Period;
@@ -38,8 +38,8 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
         };
         let slopes = |by_end: DVector<f64>, parameter: Option<usize>| {
             let residual = DVector::from_fn(2 * N, |row, _| by_end[row] / scales.of(row, 2 * N));
-            let (change, stretch) = closing.shortest(&residual)?;
-            let change = |row: usize| change[row] * scales.of(row, 2 * N);
+            let Correction { start, stretch, .. } = closing.shortest(&residual)?;
+            let change = |row: usize| start[row] * scales.of(row, 2 * N);
             let moved = State {
                 q: std::array::from_fn(|a| change(N + a)),
                 p: std::array::from_fn(change),

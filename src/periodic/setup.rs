@@ -110,10 +110,11 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         self
     }
 
-    /// The number of elements, equally long unless [`graded`](Self::graded).
+    /// The number of elements, all equally long: of this and [`graded`](Self::graded) the last call counts.
     #[must_use]
     pub fn elements(mut self, elements: usize) -> Self {
         self.elements = elements;
+        self.weights.clear();
         self
     }
 

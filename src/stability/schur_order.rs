@@ -84,7 +84,7 @@ impl Ordered {
         let Some(x) = sylvester
             .lu()
             .solve(&right)
-            .filter(|x| x.amax().is_finite())
+            .filter(|x| x.iter().all(|entry| entry.is_finite()))
         else {
             return;
         };

@@ -12,8 +12,8 @@ pub struct TimeScales {
 }
 
 impl TimeScales {
-    /// Rates that are smaller, relative to the largest, are those of free coordinates and rounding.
-    const FREE: f64 = 1e-6;
+    /// Rates that are smaller, relative to the largest, are those of free coordinates and rounding, which moves double zeros by its square root.
+    const FREE: f64 = 1e-7;
     /// Beyond such a ratio of rates a model is called stiff.
     const STIFF: f64 = 100.0;
 
@@ -27,7 +27,7 @@ impl TimeScales {
         self.rates.iter().map(|rate| rate.norm()).fold(0.0, larger)
     }
 
-    /// The smallest |λ| that is not zero; zero if all are.
+    /// The smallest |λ| that is not zero; zero if all are. Rates below 10⁻⁷ of the largest count as zero: by rounding, those of free coordinates are some 10⁻⁸.
     pub fn slowest(&self) -> f64 {
         let least = Self::FREE * self.fastest();
         let sizes = self.rates.iter().map(|rate| rate.norm());
@@ -102,5 +102,17 @@ mod tests {
         let scales = model.time_scales().expect("eigenvalues");
         assert!((scales.stiffness() / 2e3 - 1.0).abs() < 1e-9);
         assert!(scales.to_string().contains("ratio 2.000e3: stiff"));
+    }
+
+    #[test]
+    fn rates_far_apart_are_stiff() {
+        let mut model = LinearModel::<2> {
+            second: Second::ZERO,
+        };
+        model.second.zz = [[1.0, 0.0], [0.0, 1.0]];
+        model.second.qq = [[9.0, 0.0], [0.0, 1e14]];
+        let scales = model.time_scales().expect("eigenvalues");
+        assert!((scales.slowest() / 3.0 - 1.0).abs() < 1e-6, "{scales}");
+        assert!((scales.stiffness() * 3e-7 - 1.0).abs() < 1e-6, "{scales}");
     }
 }

@@ -197,3 +197,21 @@ fn every_mode_has_its_bubbles() {
         assert_interval(interval, start, end, "two modes");
     }
 }
+
+/// At zero there is no element, and what vanishes there is not looked for.
+#[test]
+fn steps_of_both_signs() {
+    let oscillator = Oscillator {
+        m: 1.0,
+        c: 0.0,
+        k: 1.0,
+    };
+    let rest = oscillator.state([0.0], [0.0]);
+    let found = unstable_intervals(&oscillator, Primal::<2>, &rest, -4.0..4.0).expect("intervals");
+    let [before, after] = &found[..] else {
+        panic!("{found:#?}");
+    };
+    let limit = 12.0_f64.sqrt();
+    assert_eq!((before.start, after.end), (-4.0, 4.0));
+    assert!((before.end + limit).abs() < 1e-11 && (after.start - limit).abs() < 1e-11);
+}

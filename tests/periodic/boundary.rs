@@ -182,3 +182,30 @@ fn an_assembled_initial_value_problem_is_stepping() {
         }
     }
 }
+
+/// Of weights and a number of elements the last call counts.
+#[test]
+fn a_number_of_elements_takes_the_place_of_weights() {
+    let (projectile, pendulum) = (Projectile { g: 9.81 }, Pendulum {});
+    for (weights, elements) in [([1.0, 2.0, 0.7], 10), ([1.0, 1.0, 1.0], 2)] {
+        let arc = BoundaryValue::of(&projectile)
+            .graded(weights)
+            .elements(elements)
+            .from_to([0.0, 0.0], [10.0, 0.0], 0.0..2.0)
+            .solve()
+            .expect("an arc");
+        let nodes = arc.nodes();
+        assert_eq!(nodes.len(), elements + 1);
+        for pair in nodes.windows(2) {
+            let length = pair[1].t - pair[0].t;
+            assert!((length - 2.0 / elements as f64).abs() < 1e-14);
+        }
+        let rest = PeriodicOrbit::of(&pendulum)
+            .graded(weights)
+            .elements(elements)
+            .period(1.0)
+            .solve()
+            .expect("rest");
+        assert_eq!(rest.transitions().len(), elements);
+    }
+}

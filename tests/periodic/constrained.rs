@@ -1,6 +1,7 @@
 //! Orbits of constrained models against those of their twins in minimal coordinates.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
+use tfe::continuation::Branch;
 use tfe::prelude::*;
 
 const OMEGA: f64 = 2.3;
@@ -186,5 +187,75 @@ fn a_swing_of_a_unit_quaternion() {
     for name in ["i1", "mgd"] {
         let (ours, theirs) = (ours.by(name).period(), theirs.by(name).period());
         assert!((ours - theirs).abs() < 1e-6, "{name}: {ours} {theirs}");
+    }
+}
+
+/// A driven pendulum whose mass is another one upwards: which momenta the rod allows depends on m.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + m*dot(y)^2)/2 - y,
+    let torque = f*cos(2*t) - c*(x*dot(y) - y*dot(x)),
+    force(x) = -y*torque,
+    force(y) = x*torque,
+    constraint(rod) = x^2 + y^2 - 1,
+    sensitivity(m),
+)]
+#[derive(Clone)]
+struct Sway {
+    m: f64,
+    f: f64,
+    c: f64,
+}
+
+fn sways() -> Branch<Sway, 2> {
+    let sway = Sway {
+        m: 2.0,
+        f: 0.9,
+        c: 0.2,
+    };
+    Continuation::of(&sway)
+        .parameter(|sway| &mut sway.m)
+        .range(2.0..4.0)
+        .largest_step(0.5)
+        .elements(20)
+        .period(|_| PI)
+        .guess(|t| {
+            let (sin, cos) = (-0.3 * (2.0 * t).cos()).sin_cos();
+            let rate = 0.6 * (2.0 * t).sin();
+            ([sin, -cos], [cos * rate, sin * rate])
+        })
+        .run()
+        .expect("a branch")
+}
+
+#[test]
+fn a_branch_has_the_multipliers_of_its_orbits() {
+    let branch = sways();
+    let end = branch.points().len() - 1;
+    let (point, model) = (&branch.points()[end], branch.model(end).expect("a model"));
+    assert_eq!(point.parameter, 4.0);
+    let alone = PeriodicOrbit::of(model)
+        .elements(20)
+        .period(PI)
+        .guess_from(point.start)
+        .solve()
+        .expect("an orbit");
+    assert_eq!(point.multipliers.len(), 2);
+    for (found, expected) in point.multipliers.iter().zip(alone.multipliers()) {
+        assert!((found - expected).norm() < 1e-9, "{found} {expected}");
+    }
+}
+
+#[test]
+fn a_table_of_a_branch_has_a_column_for_each_multiplier() {
+    let branch = sways();
+    let name = format!("tfe-constrained-branch-{}.csv", std::process::id());
+    let path = std::env::temp_dir().join(name);
+    branch.write_csv(&path).expect("written");
+    let text = std::fs::read_to_string(&path).expect("read");
+    std::fs::remove_file(&path).expect("removed");
+    // The parameter, the period, two amplitudes, two multipliers, and whether it is stable.
+    for line in text.lines() {
+        assert_eq!(line.split(',').count(), 9, "{line}");
     }
 }

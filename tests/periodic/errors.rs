@@ -197,3 +197,22 @@ fn boundary_values_that_are_ill_posed() {
         .expect("an arc");
     assert!((solved.start().q[1] + 2.0 + 0.5 * 9.81).abs() < 1e-13);
 }
+
+/// What falls gains momentum: no correction changes that, and only the coordinate can be closed.
+#[test]
+fn motions_that_do_not_close_are_no_orbits() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + g*x)]
+    struct Fall {
+        g: f64,
+    }
+    let fall = Fall { g: 0.01 };
+    let error = PeriodicOrbit::of_simulation(&Simulation::new(&fall))
+        .period(1.0)
+        .guess_from(fall.state([0.0], [0.3]))
+        .solve();
+    assert!(
+        matches!(error, Err(OrbitError::Stalled { .. })),
+        "{:?}",
+        error.map(|_| ())
+    );
+}

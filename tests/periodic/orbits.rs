@@ -523,3 +523,18 @@ fn the_motion_of_an_orbit_is_the_stepped_one() {
         }
     }
 }
+
+/// A state of rest has no multiplier that is one, though the model does not depend on time.
+#[test]
+fn a_saddle_of_a_simulation_is_unstable() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + x^2/2, force(x) = -3*dot(x))]
+    struct Saddle {}
+    let saddle = Saddle {};
+    let orbit = PeriodicOrbit::of_simulation(&Simulation::new(&saddle))
+        .period(1.0)
+        .solve()
+        .expect("rest");
+    let rate = (13.0_f64.sqrt() - 3.0) / 2.0;
+    assert!((orbit.multipliers()[0].re - rate.exp()).abs() < 1e-3);
+    assert!(!orbit.is_stable() && orbit.trivial().is_empty());
+}

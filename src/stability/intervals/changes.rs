@@ -159,7 +159,15 @@ impl Search<'_> {
             .collect();
         for function in 0..count {
             for (start, end) in self.brackets(function) {
-                candidates.push(self.polish(function, start, end)?);
+                candidates.push(if start.0 < 0.0 && end.0 > 0.0 {
+                    // Not looked at more closely: at zero the matrix may not exist.
+                    Candidate {
+                        at: 0.0,
+                        is_root: true,
+                    }
+                } else {
+                    self.polish(function, start, end)?
+                });
             }
         }
         candidates.sort_by(|a, b| a.at.total_cmp(&b.at));
