@@ -90,7 +90,7 @@ pub enum OptimalControlErrorKind {
         /// Iterations done.
         iterations: usize,
     },
-    /// No quadratic model of the problem has one minimum: an input costs nothing and moves nothing, or the ends cannot be met.
+    /// No quadratic model of the problem has one minimum: an input costs nothing and moves nothing, or small changes of the inputs do not bring the motion to its ends.
     Singular {
         /// Iterations done.
         iterations: usize,
@@ -192,10 +192,17 @@ impl fmt::Display for OptimalControlErrorKind {
                 f,
                 "element {element}, at t = {time}, is singular or not finite after {iterations} iterations: another guess may help"
             ),
-            Self::Singular { iterations } => write!(
-                f,
-                "the problem has no single minimum nearby after {iterations} iterations: an input costs nothing and moves nothing, or the ends cannot be met"
-            ),
+            Self::Singular { iterations } => {
+                f.write_str("the problem has no single minimum near ")?;
+                match iterations {
+                    0 => f.write_str("the guess")?,
+                    _ => write!(f, "what {iterations} iterations have found")?,
+                }
+                f.write_str(
+                    ": an input costs nothing and moves nothing, or small changes of the inputs do not bring the motion to its ends; \
+                     another guess or another span may help",
+                )
+            }
             Self::Stalled {
                 iterations,
                 correction,
