@@ -166,6 +166,13 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         &self.nodes[node].state
     }
 
+    /// The derivatives of the time of the last node, where an event has stopped the run.
+    pub(crate) fn end_times(&self) -> Option<&[f64]> {
+        // Such a run leaves no checkpoint.
+        let (_, times) = self.events.last()?;
+        self.motion.checkpoint().is_none().then_some(&times[..])
+    }
+
     /// The derivatives of (p, q) and of velocities at a time of the motion, those before it at an event.
     fn between(&self, time: f64) -> Result<Between, AtError> {
         self.motion.at(time)?;

@@ -515,6 +515,47 @@ fn what_cannot_be_cut_at_kinks_is_refused() {
     smooth.run_linearised(start, 0.0..1.0).expect("a run");
 }
 
+/// A cut moves with the start; where the force jumps, a derivative that does not know it would be wrong.
+#[test]
+fn derivatives_of_steps_cut_at_kinks_are_refused() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - g*abs(x), output(place) = x)]
+    struct Valley {
+        g: f64,
+    }
+    let valley = Valley { g: 1.0 };
+    let start = valley.state([0.6], [0.0]);
+    let run = Simulation::new(&valley).step(0.1).at_kinks(true);
+    let check = |kind: &RunErrorKind| {
+        assert!(
+            matches!(kind, RunErrorKind::KinksUnsupported { .. }),
+            "{kind}"
+        );
+    };
+    check(
+        run.run_sensitive(start, 0.0..2.0)
+            .expect_err("kinks")
+            .kind(),
+    );
+    let loss = tfe::sensitivity::Loss::output_at_end("place");
+    check(
+        run.gradient(start, 0.0..2.0, &loss)
+            .expect_err("kinks")
+            .kind(),
+    );
+    check(
+        run.hessian(start, 0.0..2.0, &loss, ["g"])
+            .expect_err("kinks")
+            .kind(),
+    );
+    let section = || run.section("place", Crossing::Either, start, 0.0);
+    let mut linearised = section().linearised();
+    check(&linearised.next().expect("an error").expect_err("kinks"));
+    assert!(linearised.next().is_none());
+    // Without derivatives there is nothing to refuse.
+    let point = section().next().expect("a point").expect("a crossing");
+    assert!((point.t - 1.2_f64.sqrt()).abs() < 1e-12);
+}
+
 /// A structure at rest, whose sites begin to move one after the other: signs of what moves by powers of a small time are no kinks where gaps are open.
 #[test]
 fn what_decides_nothing_cuts_nothing() {

@@ -4,7 +4,7 @@ use crate::differences::SIXTH;
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
-use crate::motion::{Motion, Node};
+use crate::motion::{Motion, Node, is_same_time};
 use crate::sensitivity::names::place_of;
 use std::fmt;
 use std::sync::Arc;
@@ -228,7 +228,8 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
             match term {
                 Term::End(function) => {
                     value += factor * function(&nodes[last]);
-                    let by = partial(&nodes[last], *factor, &**function);
+                    let duration = (nodes[last].t - nodes[0].t).abs();
+                    let by = partial(&nodes[last], (*factor, duration), &**function);
                     looks.push(Look { node: last, by });
                 }
                 Term::Output(name) => {
@@ -248,6 +249,12 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
                     let Some(column) = column(name) else { continue };
                     for (t, measured) in times.iter().zip(values) {
                         let node = motion.nearest(*t);
+                        if !is_same_time(nodes[node].t, *t) {
+                            return Err(RunErrorKind::Loss {
+                                name: name.clone(),
+                                why: "an event has stopped the run before all of its times",
+                            });
+                        }
                         let off = output(node, column).unwrap_or(f64::NAN) - measured;
                         value += factor * 0.5 * off * off;
                         let by = By::Output(column, factor * off);
@@ -257,7 +264,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
             }
             let is_finite = |look: &Look| match &look.by {
                 By::Output(_, factor) => factor.is_finite(),
-                By::Node { q, p, v } => {
+                By::Node { q, p, v, .. } => {
                     let mut all = q.iter().chain(p).chain(v);
                     all.all(|one| one.is_finite())
                 }
@@ -308,42 +315,59 @@ pub(crate) struct Look {
 pub(crate) enum By {
     /// By an output, times a factor.
     Output(usize, f64),
-    /// By coordinates, momenta and velocities.
+    /// By the time, coordinates, momenta and velocities.
     Node {
+        t: f64,
         q: Vec<f64>,
         p: Vec<f64>,
         v: Vec<f64>,
     },
 }
 
-/// The derivative of a function of a node, by differences of sixth order.
+/// The derivative of a function of the last node of a run that takes a time, by differences of sixth order.
 fn partial<const N: usize, L: Length<N>>(
     node: &Node<N, L>,
-    factor: f64,
+    (factor, duration): (f64, f64),
     function: &dyn Fn(&Node<N, L>) -> f64,
 ) -> By {
     const DISTANCE: f64 = 2e-3;
+    /// Of the duration, in which a function of the time may go up and down many times.
+    const DISTANCE_IN_TIME: f64 = 2e-5;
 
     type Part<const N: usize, L> = fn(&mut Node<N, L>) -> &mut <L as Length<N>>::Vector;
+    let slope = |distance: f64, at: &mut dyn FnMut(f64) -> f64| {
+        let differences = (1..).zip(SIXTH).map(|(k, weight)| {
+            let step = f64::from(k) * distance;
+            weight * (at(step) - at(-step)) / distance
+        });
+        factor * differences.sum::<f64>()
+    };
     let by = |part: Part<N, L>| -> Vec<f64> {
         let mut moved = node.clone();
         let still = part(&mut moved).clone();
-        let slope = |(a, value): (usize, &f64)| {
-            let distance = DISTANCE * value.abs().max(1.0);
-            let mut at = |step: f64| {
+        let by_number = |(a, value): (usize, &f64)| {
+            slope(DISTANCE * value.abs().max(1.0), &mut |step| {
                 let with = |b: usize| still.as_ref()[b] + if a == b { step } else { 0.0 };
                 *part(&mut moved) = L::from_fn(&still, with);
                 function(&moved)
-            };
-            let differences = (1..).zip(SIXTH).map(|(k, weight)| {
-                let step = f64::from(k) * distance;
-                weight * (at(step) - at(-step)) / distance
-            });
-            factor * differences.sum::<f64>()
+            })
         };
-        still.as_ref().iter().enumerate().map(slope).collect()
+        still.as_ref().iter().enumerate().map(by_number).collect()
+    };
+    let by_time = |duration: f64| {
+        let mut moved = node.clone();
+        slope(DISTANCE_IN_TIME * duration, &mut |step| {
+            moved.t = node.t + step;
+            function(&moved)
+        })
     };
     By::Node {
+        // A run without elements does not end elsewhere.
+        t: if duration > 0.0 {
+            by_time(duration)
+        } else {
+            0.0
+        },
         q: by(|node| &mut node.q),
         p: by(|node| &mut node.p),
         v: by(|node| &mut node.v),

@@ -55,3 +55,14 @@ pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
         Err(RunErrorKind::Inconsistent { time, residuals })
     }
 }
+
+/// Refuses derivatives of steps that are cut at kinks: they do not know that the times of the cuts move, which counts where a force jumps.
+pub(super) fn check_kinks<M: Model<N>, const N: usize>(
+    at_kinks: Option<bool>,
+    call: &'static str,
+) -> Result<(), RunErrorKind> {
+    if at_kinks == Some(true) && const { !M::FACTS.smooth } {
+        return Err(RunErrorKind::KinksUnsupported { call });
+    }
+    Ok(())
+}

@@ -3,6 +3,7 @@
 mod family;
 mod view;
 
+use super::checks::check_kinks;
 use super::mesh::Mesh;
 use super::setup::Simulation;
 use super::trail::is_same;
@@ -58,7 +59,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::NoOutput`] and [`RunErrorKind::Loss`] for a loss that does not belong to the model and the span,
-    /// [`RunErrorKind::Transition`] where an element has no derivative.
+    /// [`RunErrorKind::Transition`] where an element has no derivative, [`RunErrorKind::KinksUnsupported`] where steps were to be cut at [kinks](Self::at_kinks), whose times move.
     pub fn gradient(
         &self,
         start: State<N>,
@@ -67,7 +68,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ) -> Result<(f64, LossGradient<N>), RunError<N>> {
         let outputs = (0..self.model.columns()).map(|at| self.model.column_name(at));
         let outputs: Vec<_> = outputs.collect();
-        if let Err(kind) = loss.check(&outputs, (span.start, span.end)) {
+        let checked = check_kinks::<M, N>(self.at_kinks, "gradient");
+        let checked = checked.and_then(|()| loss.check(&outputs, (span.start, span.end)));
+        if let Err(kind) = checked {
             let motion = Motion::from_start(&*self.model, span.start, &start);
             return Err(RunError::new(kind, motion));
         }
@@ -166,6 +169,12 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
                     let through = (0..2 * N).map(|row| lambda[row] * slopes[(row, column)]);
                     *sum += through.sum::<f64>();
                 }
+            }
+        }
+        if let Some(times) = sensitive.end_times() {
+            let by_time = view.by_time(motion.states().len() - 1, motion.last());
+            for (sum, moved) in all.iter_mut().zip(times) {
+                *sum += by_time * moved;
             }
         }
         view.add_along(&mut pull, sensitive, &mut all)?;

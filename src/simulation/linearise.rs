@@ -2,6 +2,7 @@
 
 pub(in crate::simulation) mod family;
 
+use super::checks::check_kinks;
 use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::sensitive::Tangents;
@@ -27,15 +28,14 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// nearby, whose differences of sixth order are their derivatives. Where an event falls on a node, both elements have one matrix.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element has no transition matrix.
+    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element has no transition matrix, [`RunErrorKind::KinksUnsupported`] where steps were to be cut at
+    /// [kinks](Self::at_kinks), whose times move.
     pub fn run_linearised(
         &self,
         start: State<N>,
         span: Range<f64>,
     ) -> Result<Linearised<N>, RunError<N>> {
-        if self.at_kinks == Some(true) && const { !M::FACTS.smooth } {
-            let call = "run_linearised";
-            let kind = RunErrorKind::KinksUnsupported { call };
+        if let Err(kind) = check_kinks::<M, N>(self.at_kinks, "run_linearised") {
             let motion = Motion::from_start(&*self.model, span.start, &start);
             return Err(RunError::new(kind, motion));
         }

@@ -1,9 +1,11 @@
 //! Sections of Poincaré: where a motion without an end crosses a surface.
 
+use super::checks::check_kinks;
+use super::course::Course;
 use super::events::Severed;
 use super::events::act::{Act, Crossing, Event, On};
 use super::follow::{Follow, Passed};
-use super::kind::Simulated;
+use super::kind::{Chosen, Simulated};
 use super::pieces::{Left, Observe, Side};
 use super::sensitive::Tangents;
 use super::setup::Simulation;
@@ -62,8 +64,7 @@ where
         t0: f64,
     ) -> Section<'m, M, N, L> {
         let mut run = self.clone();
-        let which = run.events.len();
-        run.events.watch(On {
+        run.events.watch_first(On {
             name: name.into(),
             function: None,
             crossing,
@@ -72,11 +73,10 @@ where
         let beginning = (run.model.guarded(|| run.endless(&start, t0)))
             .unwrap_or_else(|| Err(RunErrorKind::panicked(t0)));
         Section {
-            chosen: (run.chosen_element(), run.control),
+            chosen: run.chosen(),
             model: run.model.clone(),
             way: Way::new(run.model.clone(), beginning, start, run.impulses),
             crossings: Crossings {
-                which,
                 tangents: None,
                 points: VecDeque::new(),
             },
@@ -121,7 +121,7 @@ where
     M: Sectioned<N, L> + 'm,
     L: Length<N>,
 {
-    chosen: (tfe_runtime::Element, tfe_runtime::step::Control),
+    chosen: Chosen,
     model: Share<'m, M>,
     way: Way<'m, M, N, L>,
     crossings: Crossings<'m, M, N, L>,
@@ -195,10 +195,20 @@ impl<'m, M: family::Model + 'm> Carry<'m, M, 0, RunTimeLength> for Infallible {
 }
 
 impl<M: Model<N>, const N: usize> Section<'_, M, N> {
-    /// Points with their [transition matrices](SectionPoint::transition) from now on: a factorisation and 2N solutions a step, and as much again at each point.
+    /// Points with their [transition matrices](SectionPoint::transition) from now on: a factorisation and 2N solutions a step, and as much again at each point. Where steps are to be cut at
+    /// [kinks](Simulation::at_kinks), whose times move, the next point is [`RunErrorKind::KinksUnsupported`].
     #[must_use]
     pub fn linearised(mut self) -> Self {
-        self.crossings.tangents = Some(Tangents::new(self.model.clone(), self.chosen, &[]));
+        let Chosen {
+            element,
+            control,
+            at_kinks,
+        } = self.chosen;
+        if let Err(kind) = check_kinks::<M, N>(Some(at_kinks), "linearised") {
+            self.way.course = Course::new(Err(kind));
+        }
+        let tangents = Tangents::new(self.model.clone(), (element, control), &[]);
+        self.crossings.tangents = Some(tangents);
         self
     }
 }
@@ -225,10 +235,11 @@ where
     }
 }
 
+/// The section, among all events: what another one does on its surface comes after the point.
+const SECTION: usize = 0;
+
 /// Lines up the points of an element.
 struct Crossings<'m, M: Sectioned<N, L> + 'm, const N: usize, L: Length<N>> {
-    /// The section, among all events.
-    which: usize,
     /// Since the last point.
     tangents: Option<M::Tangents<'m>>,
     points: VecDeque<Result<SectionPoint<N, L>, RunErrorKind>>,
@@ -251,7 +262,7 @@ where
     }
 
     fn met(&mut self, severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
-        if severed.which != self.which {
+        if severed.which != SECTION {
             return Ok(());
         }
         let matrix = self.tangents.as_mut().map(|one| one.crossed(severed));

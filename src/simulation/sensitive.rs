@@ -2,7 +2,7 @@
 
 mod family;
 
-use super::checks::check_start;
+use super::checks::{check_kinks, check_start};
 use super::events::Severed;
 use super::events::act::{Near, state_after};
 use super::follow::{Follow, Passed};
@@ -27,13 +27,14 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node by all parameters of the model and by the start.
     ///
     /// Those of `sensitivity(…)` have kernels of their own, others are differentiated by dual numbers in the same kernels; both are exact. A step costs a factorisation of its
-    /// tangent besides, a solution for each number of the start and each parameter, and as many products of matrices. Steps are not cut at
-    /// [kinks](Self::at_kinks). Acts of [events](Self::on) are called several times with states nearby, whose differences of sixth order are their derivatives.
+    /// tangent besides, a solution for each number of the start and each parameter, and as many products of matrices. Acts of
+    /// [events](Self::on) are called several times with states nearby, whose differences of sixth order are their derivatives.
     ///
     /// The example is at [`Sensitive`].
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element or an event has no derivative.
+    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element or an event has no derivative, [`RunErrorKind::KinksUnsupported`] where steps were to be
+    /// cut at [kinks](Self::at_kinks), whose times move.
     pub fn run_sensitive(
         &self,
         start: State<N>,
@@ -79,6 +80,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
         mut tangents: Tangents<'m, M, N>,
     ) -> Result<Sensitive<N>, RunError<N>> {
+        if let Err(kind) = check_kinks::<M, N>(self.at_kinks, "run_sensitive") {
+            let motion = Motion::from_start(&*self.model, span.start, &start);
+            return Err(RunError::new(kind, motion));
+        }
         let motion = self.drive(start, &span, identity, Some(&mut tangents))?;
         Ok(tangents.into_sensitive(motion))
     }

@@ -208,7 +208,8 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
     /// [`Statistics::kinks`](crate::Statistics::kinks) counts the crossings. A motion that would slide along a jump is an error, [`StepError::Slides`](crate::runtime::StepError::Slides).
     ///
     /// [`run`](Self::run), [`steps`](Self::steps) and [`run_estimated`](Self::run_estimated) do so only if asked, runs with an [`accuracy`](Self::accuracy) unless forbidden;
-    /// [`run_linearised`](Self::run_linearised) refuses to, as [`RunErrorKind::KinksUnsupported`], and derivatives of models of run-time length have none across a kink, [`RunErrorKind::Unsupported`].
+    /// `run_linearised`, `run_sensitive`, `gradient`, `hessian` and linearised [sections](Self::section) refuse to, as [`RunErrorKind::KinksUnsupported`]: derivatives do not know that the times of
+    /// the cuts move. Those of models of run-time length have none across a kink, [`RunErrorKind::Unsupported`].
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -293,3 +293,24 @@ fn tangent_events() {
         }
     }
 }
+
+/// A ball that bounces on the surface of a section: its points are before the bounces.
+#[test]
+fn sections_see_what_acts_on_their_surface() {
+    let simulation = Simulation::new(&BALL)
+        .step(0.1)
+        .on("height", Crossing::Falling, |event| {
+            Act::Restart(event.state_with_velocity([-event.v[0]]))
+        });
+    let start = BALL.state([1.0], [0.0]);
+    let points = simulation.section("height", Crossing::Falling, start, 0.0);
+    let fall = (2.0 / BALL.g).sqrt();
+    let mut count = 0;
+    for (point, falls) in points.zip([1.0, 3.0, 5.0]) {
+        let point = point.expect("a point");
+        assert!((point.t - falls * fall).abs() < 1e-12, "{point:?}");
+        assert!(point.v[0] < 0.0, "{point:?}");
+        count += 1;
+    }
+    assert_eq!(count, 3);
+}

@@ -161,3 +161,43 @@ fn derivatives_go_through_impacts() {
     let s = check::<_, 2, 4>(&model, start, 2.5, 1e-10, simulation, true);
     assert_eq!(s.motion().events().len(), 2);
 }
+
+/// Where an event stops a run its end moves, and with it what a loss has of the time: y = 1 + v t − g t²/2 from rest.
+#[test]
+fn losses_of_the_time_of_an_event_move_with_it() {
+    #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y, event(hit) = y, output(height) = y, output(clock) = t)]
+    struct Fall {
+        g: f64,
+    }
+    let fall = Fall { g: 10.0 };
+    let start = fall.state([1.0], [0.0]);
+    let run = Simulation::new(&fall)
+        .step(0.1)
+        .on("hit", Crossing::Falling, |_| Act::Stop);
+    let end = 0.2_f64.sqrt();
+    let of_time: [Loss<'_, 1>; 2] = [
+        Loss::output_at_end("clock"),
+        Loss::at_end(|node: &tfe::Node<1>| node.t),
+    ];
+    for loss in of_time {
+        let found = run.gradient(start, 0.0..2.0, &loss);
+        let (value, gradient) = found.expect("a gradient");
+        assert!((value - end).abs() < 1e-13);
+        let by_start = gradient.by_start();
+        assert!((by_start.q[0] - 0.1 / end).abs() < 1e-9, "{by_start:?}");
+        assert!((by_start.p[0] - 0.1).abs() < 1e-9, "{by_start:?}");
+        assert!((gradient.by("g") + end / 20.0).abs() < 1e-9);
+    }
+    // t v = −2 y₀ at the end.
+    let loss = Loss::at_end(|node: &tfe::Node<1>| node.t * node.v[0]);
+    let found = run.gradient(start, 0.0..2.0, &loss);
+    let (_, gradient) = found.expect("a gradient");
+    assert!((gradient.by_start().q[0] + 2.0).abs() < 1e-9);
+    assert!(gradient.by("g").abs() < 1e-9);
+    // What lies behind the end is not seen.
+    let squares = |t: f64| run.gradient(start, 0.0..2.0, &Loss::squares("height", [t], [0.5]));
+    squares(0.3).expect("before the end");
+    let error = squares(1.9).expect_err("behind the end");
+    let kind = error.kind();
+    assert!(matches!(kind, RunErrorKind::Loss { .. }), "{kind}");
+}

@@ -52,10 +52,6 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
         self.on.is_empty()
     }
 
-    pub(in crate::simulation) fn len(&self) -> usize {
-        self.on.len()
-    }
-
     /// One event more, that sets no parameters.
     pub(in crate::simulation) fn watch(&mut self, on: On<'m, N, L>)
     where
@@ -63,6 +59,15 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
     {
         self.on.push(on);
         (self.look, self.keep_off) = (Events::look, Events::keep_off);
+    }
+
+    /// The same before all others, also where they come at one time.
+    pub(in crate::simulation) fn watch_first(&mut self, on: On<'m, N, L>)
+    where
+        M: Simulated<N, L>,
+    {
+        self.watch(on);
+        self.on.rotate_right(1);
     }
 
     /// One event more: of an output, or of a function.

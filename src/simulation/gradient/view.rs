@@ -3,8 +3,8 @@
 use crate::error::RunErrorKind;
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length, Polynomial};
-use crate::motion::AtError;
 use crate::motion::points::{Point, Points};
+use crate::motion::{AtError, Node};
 use crate::sensitivity::Sensitive;
 use crate::sensitivity::inside::Moved;
 use crate::sensitivity::loss::{By, Seen};
@@ -89,7 +89,7 @@ impl<'a, M: Evaluate<N, L>, const N: usize, L: Length<N>> View<'a, M, N, L> {
         for look in looks {
             match &look.by {
                 By::Output(column, factor) => partials.outputs[*column] += factor,
-                By::Node { q, p, v } => {
+                By::Node { q, p, v, .. } => {
                     for (sums, own) in [
                         (&mut partials.q, q),
                         (&mut partials.p, p),
@@ -157,6 +157,35 @@ impl<'a, M: Evaluate<N, L>, const N: usize, L: Length<N>> View<'a, M, N, L> {
 }
 
 impl<M: Model<N>, const N: usize> View<'_, M, N> {
+    /// The derivative of what the loss has directly of a node by its time, where the state stays as it is.
+    pub(super) fn by_time(&self, number: usize, node: &Node<N>) -> f64 {
+        let Some(partials) = self.of_node(number) else {
+            return 0.0;
+        };
+        let state = node.state();
+        let place = Place {
+            t: node.t,
+            state: &state,
+            v: &node.v,
+        };
+        let along = Along::new(self.model, place);
+        let change = Change {
+            t: 1.0,
+            ..Change::ZERO
+        };
+        let velocity = along.velocity(&change);
+        let outputs = along.outputs(&change, &velocity);
+        let explicit = self.seen.of_node(number).iter().map(|look| match &look.by {
+            By::Output(..) => 0.0,
+            By::Node { t, .. } => *t,
+        });
+        let by_velocity = partials.v.iter().zip(&velocity);
+        let by_outputs = partials.outputs.iter().zip(&outputs);
+        let products = by_velocity.chain(by_outputs);
+        let products = products.filter(|(factor, _)| **factor != 0.0);
+        explicit.sum::<f64>() + products.map(|(factor, slope)| factor * slope).sum::<f64>()
+    }
+
     /// Adds what the integrals have of all elements, times the derivatives along these, by the start, ordered (p, q), and by parameters; explicit derivatives by parameters are left to the sums.
     pub(super) fn add_along(
         &mut self,
