@@ -1,7 +1,10 @@
 //! Inputs: functions of the time, tables, loops of control.
 
+mod failures;
+mod loops;
+
 use tfe::prelude::*;
-use tfe::{Driven, HeldNode, InputError, RunErrorKind};
+use tfe::Driven;
 
 /// A pendulum whose pivot is moved and whose axis is turned: inputs in the energy, in forces, in outputs.
 #[dynamics(
@@ -313,103 +316,6 @@ fn elements_end_at_the_times_of_a_table() {
     assert!((q - exact).abs() < 1e-13);
 }
 
-/// A loop of control gives what a table of the same values gives.
-#[test]
-fn a_loop_holds_what_was_set() {
-    let start = DRIVING.state([0.3], [0.0]);
-    let mut run = Simulation::new(&DRIVING)
-        .step(0.02)
-        .input("w", w)
-        .hold(start, 0.0)
-        .unwrap();
-    let (mut times, mut values) = (Vec::new(), Vec::new());
-    for _ in 0..200 {
-        let node = run.node();
-        let torque = -2.0 * node.q[0] - 0.5 * node.v[0];
-        times.push(node.t);
-        values.push(torque);
-        run.set("u", torque);
-        run.advance().unwrap();
-        let node = run.node();
-        assert_eq!(node.output("torque"), Some(torque - DRIVING.c * node.v[0]));
-    }
-    assert_eq!(run.statistics().steps, 200);
-    let table = Simulation::new(&DRIVING).step(0.02).input("w", w).table(
-        "u",
-        &times,
-        &values,
-        Interpolation::Hold,
-    );
-    let motion = table.run(start, 0.0..run.node().t).unwrap();
-    assert!((motion.last().q[0] - run.node().q[0]).abs() < 1e-12);
-}
-
-#[test]
-fn misuse_is_told() {
-    let start = DRIVING.state([1.0], [0.0]);
-    let unknown = Simulation::new(&DRIVING)
-        .input("torque", |_| 1.0)
-        .run(start, 0.0..1.0)
-        .unwrap_err();
-    let InputError::Unknown { name, known } = (match unknown.kind() {
-        RunErrorKind::Input(error) => error.clone(),
-        other => panic!("{other}"),
-    }) else {
-        panic!("{unknown}");
-    };
-    assert_eq!((name.as_str(), &known[..]), ("torque", &["w", "u"][..]));
-    assert_eq!(
-        unknown.to_string(),
-        "the model has no input `torque`, only `w`, `u`"
-    );
-    let table = |times: &[f64], values: &[f64]| {
-        let run = Simulation::new(&DRIVING).table("u", times, values, Interpolation::Spline);
-        run.steps(start, 0.0)
-            .next()
-            .unwrap()
-            .unwrap_err()
-            .to_string()
-    };
-    assert_eq!(
-        table(&[0.0, 1.0], &[1.0]),
-        "the table of input `u`: there must be as many values as times, and at least one"
-    );
-    assert_eq!(
-        table(&[0.0, 0.0], &[1.0, 2.0]),
-        "the table of input `u`: the times must increase"
-    );
-    // Without a number there is no state, and an error says where and which input it was.
-    let nan = Simulation::new(&DRIVING)
-        .step(0.1)
-        .input("u", |t| if t < 0.5 { 0.0 } else { f64::NAN });
-    let error = nan.run(start, 0.0..1.0).unwrap_err();
-    let RunErrorKind::Input(InputError::Value { name, time, value }) = error.kind() else {
-        panic!("{error}");
-    };
-    assert!(name == "u" && (0.5..0.6).contains(time) && value.is_nan());
-    assert!(error.partial().last().q[0].is_finite());
-    let mut run = Simulation::new(&DRIVING)
-        .step(0.1)
-        .hold(start, 0.0)
-        .unwrap();
-    run.set("u", f64::NAN);
-    assert_eq!(
-        run.advance().unwrap_err().to_string(),
-        "input `u` was set to NaN"
-    );
-    run.set("v", 1.0);
-    assert!(matches!(
-        run.advance(),
-        Err(RunErrorKind::Input(InputError::Unknown { .. }))
-    ));
-    run.advance().unwrap();
-    assert_eq!(run.node().t, 0.1);
-    assert!(matches!(
-        Simulation::new(&DRIVING).hold(start, 0.0),
-        Err(RunErrorKind::Step { .. })
-    ));
-}
-
 /// Events see inputs.
 #[test]
 fn events_of_inputs_are_met() {
@@ -427,131 +333,6 @@ fn events_of_inputs_are_met() {
     // 1 − 5t² = 0.1 t
     let exact = (-0.1 + (0.01_f64 + 20.0).sqrt()) / 10.0;
     assert!((motion.events()[0].t - exact).abs() < 1e-14);
-}
-
-/// A function that panics, or gives what is no number, ends a run with an error that says when; what was recorded before is kept.
-#[test]
-fn functions_that_fail_are_told() {
-    #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u, output(force) = u, event(middle) = x)]
-    struct Oscillator;
-
-    let start = Oscillator.state([1.0], [0.0]);
-    let simulation = Simulation::new(&Oscillator).step(0.1);
-    let nan = |t: f64| if t > 2.0 { f64::NAN } else { 0.1 };
-    let panics = |t: f64| {
-        assert!(t < 2.0, "no wind beyond two seconds");
-        0.1
-    };
-    let is_value = |kind: &RunErrorKind| match kind {
-        RunErrorKind::Input(InputError::Value { name, time, value }) => {
-            name == "u" && (2.0..2.1).contains(time) && value.is_nan()
-        }
-        _ => false,
-    };
-    let is_panic = |kind: &RunErrorKind| match kind {
-        RunErrorKind::Input(InputError::Panicked { time }) => (1.89..2.01).contains(time),
-        _ => false,
-    };
-    let error = simulation
-        .clone()
-        .input("u", nan)
-        .run(start, 0.0..5.0)
-        .expect_err("NaN");
-    assert!(is_value(error.kind()), "{error}");
-    assert!((error.partial().last().t - 2.0).abs() < 1e-12);
-    let error = simulation
-        .clone()
-        .input("u", panics)
-        .run(start, 0.0..5.0)
-        .expect_err("a panic");
-    assert!(is_panic(error.kind()), "{error}");
-    assert!(error.partial().states().len() >= 19);
-    // At the very start.
-    let at_once = |_: f64| -> f64 { panic!("at once") };
-    let error = simulation
-        .clone()
-        .input("u", at_once)
-        .run(start, 1.0..5.0)
-        .expect_err("a panic");
-    assert_eq!(
-        error.kind(),
-        &RunErrorKind::Input(InputError::Panicked { time: 1.0 })
-    );
-    let mut steps = simulation.clone().input("u", at_once).steps(start, 1.0);
-    assert!(steps.next().is_some_and(|step| step.is_err()) && steps.next().is_none());
-    // Step by step, with an accuracy, and where events are looked for.
-    let mut steps = simulation.clone().input("u", panics).steps(start, 0.0);
-    let error = steps.find_map(Result::err).expect("it ends");
-    assert!(is_panic(&error) && steps.next().is_none());
-    let mut steps = simulation.clone().input("u", nan).steps(start, 0.0);
-    assert!(is_value(&steps.find_map(Result::err).expect("it ends")));
-    let accurate = simulation
-        .clone()
-        .input("u", nan)
-        .accuracy(1e-6)
-        .run(start, 0.0..5.0);
-    let error = accurate.expect_err("NaN");
-    assert!(
-        matches!(error.kind(), RunErrorKind::Input(InputError::Value { .. })),
-        "{error}"
-    );
-    let watched = simulation
-        .clone()
-        .input("u", panics)
-        .on("middle", Crossing::Either, |_| Act::Record)
-        .run(start, 0.0..5.0)
-        .expect_err("a panic");
-    assert!(is_panic(watched.kind()) && watched.partial().events().len() == 1);
-    // What failed once does not spoil another run.
-    let good = simulation.clone().input("u", nan).run(start, 0.0..1.9);
-    assert_eq!(good.expect("before it fails").states().len(), 20);
-}
-
-/// Feedback with rates of their own: the same as setting the inputs by hand at these times.
-#[test]
-fn feedback_is_sampled_with_its_own_rate() {
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u, w), force(x) = u + w)]
-    struct Mass;
-
-    let start = Mass.state([1.0], [0.3]);
-    let hold = || {
-        Simulation::new(&Mass)
-            .step(0.02)
-            .hold(start, 0.5)
-            .expect("a loop")
-    };
-    let (mut sampled, mut by_hand) = (hold(), hold());
-    sampled
-        .sample("u", 0.1, |node| -node.q[0])
-        .expect("an input");
-    sampled
-        .sample("w", 0.06, |node| -0.5 * node.v[0])
-        .expect("an input");
-    for step in 0..600 {
-        let node = by_hand.node().clone();
-        if step % 5 == 0 {
-            by_hand.set("u", -node.q[0]);
-        }
-        if step % 3 == 0 {
-            by_hand.set("w", -0.5 * node.v[0]);
-        }
-        by_hand.advance().expect("a step");
-        sampled.advance().expect("a step");
-        assert_eq!(sampled.node(), by_hand.node(), "step {step}");
-    }
-    let told = |result: Result<(), RunErrorKind>| match result {
-        Err(RunErrorKind::Input(InputError::Sampling { .. })) => true,
-        other => panic!("{other:?}"),
-    };
-    assert!(told(hold().sample("u", 0.0, |_| 0.0)));
-    assert!(hold().sample("v", 0.1, |_| 0.0).is_err());
-    let mut between = hold();
-    between
-        .sample("u", 0.05, |_| 0.0)
-        .expect("a positive period");
-    let mut results = (0..3).map(|_| between.advance());
-    assert!(results.next().is_some_and(|first| first.is_ok()));
-    assert!(results.any(|one| one.is_err()) || told(between.advance()));
 }
 
 /// Parameters of a driven model are set as those of any other, and its inputs stay.
@@ -595,30 +376,6 @@ fn parameters_of_driven_models_are_set() {
     );
 }
 
-/// A function that panics at the very start of a run that is to meet an accuracy, that is estimated, or that goes on, is told as in any other.
-#[test]
-fn functions_that_panic_at_once_are_told() {
-    #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u, output(force) = u)]
-    struct Oscillator;
-
-    let start = Oscillator.state([1.0], [0.0]);
-    let simulation = Simulation::new(&Oscillator).step(0.1);
-    let panics = |_: f64| -> f64 { panic!("at once") };
-    let broken = simulation.clone().input("u", panics);
-    let check = |kind: &RunErrorKind| {
-        let told = RunErrorKind::Input(InputError::Panicked { time: 1.0 });
-        assert_eq!(kind, &told);
-    };
-    let accurate = broken.clone().accuracy(1e-6).run(start, 1.0..5.0);
-    check(accurate.expect_err("a panic").kind());
-    let estimated = broken.run_estimated(start, 1.0..5.0);
-    check(estimated.expect_err("a panic").kind());
-    let good = simulation.input("u", |_| 0.0).run(start, 0.0..1.0);
-    let good = good.expect("a run");
-    let resumed = broken.resume(good.checkpoint().expect("complete"), 5.0);
-    check(resumed.expect_err("a panic").kind());
-}
-
 /// An input that jumps at the last node pushes up to there as before.
 #[test]
 fn given_nodes_may_end_at_a_jump() {
@@ -633,47 +390,4 @@ fn given_nodes_may_end_at_a_jump() {
         .expect("a run");
     let speed = motion.last().v[0];
     assert!((speed - 1.0).abs() < 1e-12, "{speed}");
-}
-
-/// The outputs of a node at which an event stops the loop are those of this node.
-#[test]
-fn outputs_of_a_loop_that_is_stopped_are_those_of_its_end() {
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u, event(wall) = 0.75 - x, output(place) = x)]
-    struct Mass;
-
-    let mut held = Simulation::new(&Mass)
-        .step(0.3)
-        .on("wall", Crossing::Falling, |_| Act::Stop)
-        .hold(Mass.state([0.0], [1.0]), 0.0)
-        .expect("a loop");
-    for _ in 0..3 {
-        held.advance().expect("a step");
-    }
-    let node = held.node();
-    assert!((node.t - 0.75).abs() < 1e-12, "{node:?}");
-    assert_eq!(node.output("place"), Some(node.q[0]));
-    assert!(held.advance().is_err());
-}
-
-/// Late times have roundings that are much of a short period.
-#[test]
-fn feedback_is_sampled_at_late_times() {
-    use std::sync::atomic::{AtomicU32, Ordering};
-
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u)]
-    struct Mass;
-
-    let asked = AtomicU32::new(0);
-    let start = Mass.state([1.0], [0.0]);
-    let held = Simulation::new(&Mass).step(1e-3).hold(start, 1e5);
-    let mut held = held.expect("a loop");
-    let law = |node: &HeldNode<1>| {
-        asked.fetch_add(1, Ordering::Relaxed);
-        -node.q[0]
-    };
-    held.sample("u", 1e-3, law).expect("an input");
-    for _ in 0..20 {
-        held.advance().expect("a step");
-    }
-    assert_eq!(asked.load(Ordering::Relaxed), 20);
 }

@@ -1,0 +1,126 @@
+//! Loops of control.
+
+use crate::{DRIVING, w};
+use tfe::prelude::*;
+use tfe::{HeldNode, InputError, RunErrorKind};
+
+/// A loop of control gives what a table of the same values gives.
+#[test]
+fn a_loop_holds_what_was_set() {
+    let start = DRIVING.state([0.3], [0.0]);
+    let mut run = Simulation::new(&DRIVING)
+        .step(0.02)
+        .input("w", w)
+        .hold(start, 0.0)
+        .unwrap();
+    let (mut times, mut values) = (Vec::new(), Vec::new());
+    for _ in 0..200 {
+        let node = run.node();
+        let torque = -2.0 * node.q[0] - 0.5 * node.v[0];
+        times.push(node.t);
+        values.push(torque);
+        run.set("u", torque);
+        run.advance().unwrap();
+        let node = run.node();
+        assert_eq!(node.output("torque"), Some(torque - DRIVING.c * node.v[0]));
+    }
+    assert_eq!(run.statistics().steps, 200);
+    let table = Simulation::new(&DRIVING).step(0.02).input("w", w).table(
+        "u",
+        &times,
+        &values,
+        Interpolation::Hold,
+    );
+    let motion = table.run(start, 0.0..run.node().t).unwrap();
+    assert!((motion.last().q[0] - run.node().q[0]).abs() < 1e-12);
+}
+
+/// Feedback with rates of their own: the same as setting the inputs by hand at these times.
+#[test]
+fn feedback_is_sampled_with_its_own_rate() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u, w), force(x) = u + w)]
+    struct Mass;
+
+    let start = Mass.state([1.0], [0.3]);
+    let hold = || {
+        Simulation::new(&Mass)
+            .step(0.02)
+            .hold(start, 0.5)
+            .expect("a loop")
+    };
+    let (mut sampled, mut by_hand) = (hold(), hold());
+    sampled
+        .sample("u", 0.1, |node| -node.q[0])
+        .expect("an input");
+    sampled
+        .sample("w", 0.06, |node| -0.5 * node.v[0])
+        .expect("an input");
+    for step in 0..600 {
+        let node = by_hand.node().clone();
+        if step % 5 == 0 {
+            by_hand.set("u", -node.q[0]);
+        }
+        if step % 3 == 0 {
+            by_hand.set("w", -0.5 * node.v[0]);
+        }
+        by_hand.advance().expect("a step");
+        sampled.advance().expect("a step");
+        assert_eq!(sampled.node(), by_hand.node(), "step {step}");
+    }
+    let told = |result: Result<(), RunErrorKind>| match result {
+        Err(RunErrorKind::Input(InputError::Sampling { .. })) => true,
+        other => panic!("{other:?}"),
+    };
+    assert!(told(hold().sample("u", 0.0, |_| 0.0)));
+    assert!(hold().sample("v", 0.1, |_| 0.0).is_err());
+    let mut between = hold();
+    between
+        .sample("u", 0.05, |_| 0.0)
+        .expect("a positive period");
+    let mut results = (0..3).map(|_| between.advance());
+    assert!(results.next().is_some_and(|first| first.is_ok()));
+    assert!(results.any(|one| one.is_err()) || told(between.advance()));
+}
+
+/// The outputs of a node at which an event stops the loop are those of this node.
+#[test]
+fn outputs_of_a_loop_that_is_stopped_are_those_of_its_end() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u, event(wall) = 0.75 - x, output(place) = x)]
+    struct Mass;
+
+    let mut held = Simulation::new(&Mass)
+        .step(0.3)
+        .on("wall", Crossing::Falling, |_| Act::Stop)
+        .hold(Mass.state([0.0], [1.0]), 0.0)
+        .expect("a loop");
+    for _ in 0..3 {
+        held.advance().expect("a step");
+    }
+    let node = held.node();
+    assert!((node.t - 0.75).abs() < 1e-12, "{node:?}");
+    assert_eq!(node.output("place"), Some(node.q[0]));
+    assert!(held.advance().is_err());
+}
+
+/// Late times have roundings that are much of a short period.
+#[test]
+fn feedback_is_sampled_at_late_times() {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u)]
+    struct Mass;
+
+    let asked = AtomicU32::new(0);
+    let start = Mass.state([1.0], [0.0]);
+    let held = Simulation::new(&Mass).step(1e-3).hold(start, 1e5);
+    let mut held = held.expect("a loop");
+    let law = |node: &HeldNode<1>| {
+        asked.fetch_add(1, Ordering::Relaxed);
+        -node.q[0]
+    };
+    held.sample("u", 1e-3, law).expect("an input");
+    for _ in 0..20 {
+        held.advance().expect("a step");
+    }
+    assert_eq!(asked.load(Ordering::Relaxed), 20);
+}
