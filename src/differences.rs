@@ -15,6 +15,15 @@ pub(crate) const WELL_KNOWN: f64 = 1e-9;
 /// The distances that are tried, in parts of the first.
 pub(crate) const NEARER: [f64; 3] = [1.0, 0.25, 0.0625];
 
+/// A derivative at zero by differences of sixth order over a distance.
+pub(crate) fn derivative(distance: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
+    let differences = (1..).zip(SIXTH).map(|(k, weight)| {
+        let s = f64::from(k) * distance;
+        weight * (f(s) - f(-s))
+    });
+    differences.sum::<f64>() / distance
+}
+
 /// Where a function is evaluated, and what the value there counts in the derivative of eighth order and in that of sixth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {

@@ -14,7 +14,7 @@ pub use event::Event;
 pub use warning::Warning;
 
 pub(crate) use checkpoint::{LastCut, Reached, Seen};
-pub(crate) use time::is_same_time;
+pub(crate) use time::{breaks_within, direction_of, is_same_time, sort_times};
 
 pub use arcs::{MotionArc, Setting};
 
@@ -123,6 +123,8 @@ pub struct Motion<const N: usize, L: Length<N> = FixedLength> {
     warnings: Vec<Warning>,
     names: Vec<CoordinateName>,
     checkpoint: Option<Box<Checkpoint<N, L>>>,
+    /// Whether an event has ended it.
+    is_stopped: bool,
     events: Vec<Event<N, L>>,
     arcs: Arcs,
 }
@@ -213,6 +215,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
             warnings: Vec::new(),
             names,
             checkpoint: None,
+            is_stopped: false,
             events: Vec::new(),
             arcs: Arcs::default(),
         }
@@ -278,6 +281,15 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
 
     pub(crate) fn set_checkpoint(&mut self, checkpoint: Checkpoint<N, L>) {
         self.checkpoint = Some(Box::new(checkpoint));
+    }
+
+    /// Says that an event has ended the run.
+    pub(crate) fn set_stopped(&mut self) {
+        self.is_stopped = true;
+    }
+
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.is_stopped
     }
 
     /// Where the run ended, with all that [`Simulation::resume`](crate::Simulation::resume) needs to go on as if it had never stopped; `None` where the run failed, an event has ended it or set

@@ -168,9 +168,8 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
 
     /// The derivatives of the time of the last node, where an event has stopped the run.
     pub(crate) fn end_times(&self) -> Option<&[f64]> {
-        // Such a run leaves no checkpoint.
         let (_, times) = self.events.last()?;
-        self.motion.checkpoint().is_none().then_some(&times[..])
+        self.motion.is_stopped().then_some(times)
     }
 
     /// The derivatives of (p, q) and of velocities at a time of the motion, those before it at an event.

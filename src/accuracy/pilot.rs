@@ -1,7 +1,7 @@
 //! A run with steps that follow the error of each, to learn where they have to be short.
 
 use super::grading::Grading;
-use crate::motion::is_same_time;
+use crate::motion::breaks_within;
 use std::ops::Range;
 
 /// Two elements of different order over the same step.
@@ -135,16 +135,8 @@ fn varies(course: &Course, kept: &[Kept], steps: &[f64]) -> bool {
 
 /// Breaks inside a span in the order of the run, and its end.
 pub(crate) fn corners(span: &Range<f64>, breaks: &[f64]) -> Vec<f64> {
-    let Range { start, end } = *span;
-    let direction = (end - start).signum();
-    let mut corners = breaks.to_vec();
-    corners.retain(|&t| {
-        let is_inside = direction * start < direction * t && direction * t < direction * end;
-        is_inside && !is_same_time(t, start) && !is_same_time(t, end)
-    });
-    corners.sort_by(|a, b| (direction * a).total_cmp(&(direction * b)));
-    corners.dedup_by(|a, b| is_same_time(*a, *b));
-    corners.push(end);
+    let mut corners = breaks_within(span, breaks);
+    corners.push(span.end);
     corners
 }
 

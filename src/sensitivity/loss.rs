@@ -1,6 +1,6 @@
 //! Losses: numbers of a motion that are to be small, and their gradients.
 
-use crate::differences::SIXTH;
+use crate::differences::derivative;
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
@@ -228,8 +228,10 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
             match term {
                 Term::End(function) => {
                     value += factor * function(&nodes[last]);
-                    let duration = (nodes[last].t - nodes[0].t).abs();
-                    let by = partial(&nodes[last], (*factor, duration), &**function);
+                    // The time of the end moves where an event decides it.
+                    let span = (nodes[last].t - nodes[0].t).abs();
+                    let span = (motion.is_stopped() && span > 0.0).then_some(span);
+                    let by = partial(&nodes[last], (*factor, span), &**function);
                     looks.push(Look { node: last, by });
                 }
                 Term::Output(name) => {
@@ -324,50 +326,40 @@ pub(crate) enum By {
     },
 }
 
-/// The derivative of a function of the last node of a run that takes a time, by differences of sixth order.
+/// The derivative of a function of a node, by differences of sixth order; that by its time over a `span` of times, and zero if there is none.
 fn partial<const N: usize, L: Length<N>>(
     node: &Node<N, L>,
-    (factor, duration): (f64, f64),
+    (factor, span): (f64, Option<f64>),
     function: &dyn Fn(&Node<N, L>) -> f64,
 ) -> By {
     const DISTANCE: f64 = 2e-3;
-    /// Of the duration, in which a function of the time may go up and down many times.
+    /// Of the span, in which a function of the time may go up and down many times.
     const DISTANCE_IN_TIME: f64 = 2e-5;
 
     type Part<const N: usize, L> = fn(&mut Node<N, L>) -> &mut <L as Length<N>>::Vector;
-    let slope = |distance: f64, at: &mut dyn FnMut(f64) -> f64| {
-        let differences = (1..).zip(SIXTH).map(|(k, weight)| {
-            let step = f64::from(k) * distance;
-            weight * (at(step) - at(-step)) / distance
-        });
-        factor * differences.sum::<f64>()
-    };
     let by = |part: Part<N, L>| -> Vec<f64> {
         let mut moved = node.clone();
         let still = part(&mut moved).clone();
-        let by_number = |(a, value): (usize, &f64)| {
-            slope(DISTANCE * value.abs().max(1.0), &mut |step| {
+        let slope = |(a, value): (usize, &f64)| {
+            let at = |step: f64| {
                 let with = |b: usize| still.as_ref()[b] + if a == b { step } else { 0.0 };
                 *part(&mut moved) = L::from_fn(&still, with);
                 function(&moved)
-            })
+            };
+            factor * derivative(DISTANCE * value.abs().max(1.0), at)
         };
-        still.as_ref().iter().enumerate().map(by_number).collect()
+        still.as_ref().iter().enumerate().map(slope).collect()
     };
-    let by_time = |duration: f64| {
+    let by_time = |span: f64| {
         let mut moved = node.clone();
-        slope(DISTANCE_IN_TIME * duration, &mut |step| {
+        let at = |step: f64| {
             moved.t = node.t + step;
             function(&moved)
-        })
+        };
+        factor * derivative(DISTANCE_IN_TIME * span, at)
     };
     By::Node {
-        // A run without elements does not end elsewhere.
-        t: if duration > 0.0 {
-            by_time(duration)
-        } else {
-            0.0
-        },
+        t: span.map_or(0.0, by_time),
         q: by(|node| &mut node.q),
         p: by(|node| &mut node.p),
         v: by(|node| &mut node.v),

@@ -1,7 +1,8 @@
 //! The elements of a run, and the impulses that act in them.
 
-use super::times::{Elements, Times, check_span, direction_of, ends};
+use super::times::{Elements, Times, check_span, ends};
 use crate::error::RunErrorKind;
+use crate::motion::direction_of;
 use std::ops::Range;
 use tfe_runtime::step::Impulse;
 

@@ -92,11 +92,14 @@ where
         let mut seen = seen.cloned().unwrap_or_default();
         let place = (mesh, done, &mut seen);
         let mut motion = self.drive_from(motion, start, place, &mut stepper, follower)?;
-        let last = motion.last();
+        if seen.has_stopped {
+            motion.set_stopped();
+        }
         // A run that was stopped has no grid to go on with, and one whose parameters were set no model.
-        if seen.has_stopped || !motion.settings().is_empty() {
+        if motion.is_stopped() || !motion.settings().is_empty() {
             return Ok(motion);
         }
+        let last = motion.last();
         let checkpoint = Checkpoint {
             reached: Reached::new(origin, self.step, mesh, last.t),
             state: last.state(),

@@ -1,7 +1,7 @@
 //! When elements begin and end: equal steps between breaks, or between given nodes.
 
 use crate::error::RunErrorKind;
-use crate::motion::is_same_time;
+use crate::motion::{breaks_within, direction_of, is_same_time, sort_times};
 use std::ops::Range;
 
 /// Times between two breaks, cut into equal steps; the last one may be shorter.
@@ -30,11 +30,6 @@ pub(super) fn check_span(span: &Range<f64>, step: f64) -> Result<(), RunErrorKin
     Ok(())
 }
 
-/// One, or minus one where a run goes back in time.
-pub(super) fn direction_of(span: &Range<f64>) -> f64 {
-    if span.end < span.start { -1.0 } else { 1.0 }
-}
-
 /// When the elements of a span begin and end, whatever they are of.
 #[derive(Clone, Debug)]
 pub(super) struct Times {
@@ -49,17 +44,9 @@ impl Times {
     pub(super) fn new(span: &Range<f64>, step: f64, breaks: &[f64]) -> Result<Self, RunErrorKind> {
         let Range { start, end } = *span;
         let direction = direction_of(span);
-        let within = |time: f64| {
-            direction * start <= direction * time && direction * time <= direction * end
-        };
-        let is_inside =
-            |&time: &f64| within(time) && !is_same_time(time, start) && !is_same_time(time, end);
-        let mut cuts: Vec<f64> = breaks.iter().copied().filter(is_inside).collect();
-        sort(&mut cuts, direction);
-        cuts.dedup_by(|a, b| is_same_time(*a, *b));
         let mut segments = Vec::new();
         let mut from = start;
-        for to in cuts.into_iter().chain([end]) {
+        for to in breaks_within(span, breaks).into_iter().chain([end]) {
             if to != from {
                 let mut segment = Segment::new(from, to, direction * step.abs())?;
                 segment.at_break = (from != start, to != end);
@@ -86,7 +73,7 @@ impl Times {
         let (start, end) = ends(cuts);
         let direction = direction_of(&(start..end));
         let mut breaks = breaks.to_vec();
-        sort(&mut breaks, direction);
+        sort_times(&mut breaks, direction);
         // Elsewhere nothing may be lost: a rounding at each of many cuts would add up.
         let is_break = |time: f64| is_among(&breaks, time, direction);
         let segment = |pair: &[f64]| {
@@ -119,14 +106,11 @@ impl Times {
         check_nodes(span, nodes, direction)?;
         let mut nodes = nodes.to_vec();
         let mut breaks = breaks.to_vec();
-        sort(&mut breaks, direction);
-        breaks.dedup_by(|a, b| is_same_time(*a, *b));
-        let is_inside =
-            |time: f64| direction * start < direction * time && direction * time < direction * end;
-        let is_new = |time: &&f64| is_inside(**time) && !is_among(&nodes, **time, direction);
-        let new: Vec<f64> = breaks.iter().filter(is_new).copied().collect();
+        sort_times(&mut breaks, direction);
+        let mut new = breaks_within(span, &breaks);
+        new.retain(|time| !is_among(&nodes, *time, direction));
         nodes.extend(new);
-        sort(&mut nodes, direction);
+        sort_times(&mut nodes, direction);
         nodes.dedup();
         let mut segments = single_steps(&nodes);
         for segment in &mut segments {
@@ -231,7 +215,7 @@ impl Endless {
             time.is_finite() && direction * start < direction * time && !is_same_time(*time, start)
         };
         let mut ahead: Vec<f64> = breaks.iter().copied().filter(is_ahead).collect();
-        sort(&mut ahead, direction);
+        sort_times(&mut ahead, direction);
         let last = ahead.last().copied().unwrap_or(start);
         let span = start..last;
         check_span(&span, step)?;
@@ -420,9 +404,4 @@ impl Segment {
             self.start + k as f64 * self.step
         }
     }
-}
-
-/// Puts times in the order in which a run meets them. Not generic, so that it is compiled once.
-fn sort(times: &mut [f64], direction: f64) {
-    times.sort_by(|a, b| (direction * a).total_cmp(&(direction * b)));
 }

@@ -194,6 +194,14 @@ fn losses_of_the_time_of_an_event_move_with_it() {
     let (_, gradient) = found.expect("a gradient");
     assert!((gradient.by_start().q[0] + 2.0).abs() < 1e-9);
     assert!(gradient.by("g").abs() < 1e-9);
+    // An end that does not move is not asked for elsewhere.
+    let loss = Loss::at_end(|node: &tfe::Node<1>| {
+        assert_eq!(node.t, 0.4);
+        node.q[0]
+    });
+    let found = run.gradient(start, 0.0..0.4, &loss);
+    let (_, gradient) = found.expect("a gradient");
+    assert!((gradient.by_start().q[0] - 1.0).abs() < 1e-9);
     // What lies behind the end is not seen.
     let squares = |t: f64| run.gradient(start, 0.0..2.0, &Loss::squares("height", [t], [0.5]));
     squares(0.3).expect("before the end");

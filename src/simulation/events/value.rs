@@ -1,6 +1,6 @@
 //! What changes its sign at an event.
 
-use crate::differences::SIXTH;
+use crate::differences::derivative;
 use crate::length::Length;
 use crate::motion::Event;
 use crate::numbers::largest;
@@ -19,15 +19,6 @@ pub(in crate::simulation) enum Value<'m, V> {
     /// The output's place among all.
     Column(usize),
     Function(Function<'m, V>),
-}
-
-/// A derivative at zero by differences over a distance.
-fn derivative(distance: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let differences = (1..).zip(SIXTH).map(|(k, weight)| {
-        let s = f64::from(k) * distance;
-        weight * (f(s) - f(-s))
-    });
-    differences.sum::<f64>() / distance
 }
 
 /// A distance for differences, relative to what is changed: their error is below roundings, and these are some 1e-13.
