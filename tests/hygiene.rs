@@ -182,6 +182,13 @@ pub struct Greek {
     pub μ: f64,
 }
 
+/// A field like the cosine of a coordinate whose name ends in an underscore, as fields of such names are renamed.
+#[dynamics(coordinates(phi_), lagrangian = dot(phi_)^2/2 - cos_phi*sin(phi_))]
+pub struct Underscored {
+    /// Not the cosine.
+    pub cos_phi: f64,
+}
+
 #[test]
 fn they_all_move() {
     let first = shadowed::First { m: 1.0, k: 1.0 };
@@ -236,6 +243,11 @@ fn they_all_move() {
     assert_eq!(constants::G, 0);
     let three = Three { m: [1.0, 2.0, 3.0] };
     assert_eq!(three.state([0.0; 3], [1.0; 3]).p, [1.0, 2.0, 3.0]);
+
+    let underscored = Underscored { cos_phi: 3.0 };
+    let mut derivatives = tfe::runtime::First::<f64, 1>::ZERO;
+    Model::first(&underscored, 0.0, &[1.0], &[0.0], &mut derivatives);
+    assert_eq!(derivatives.q, [-3.0 * 1.0_f64.cos()]);
 
     // The substituted expression binds as a whole: L_q = −2 (2x + 4x³) = −12 at x = 1.
     let soft = Soft {};

@@ -659,8 +659,7 @@ impl<'a> Emitter<'a> {
         };
         let name = coordinate.map(|name| format!("{function}_{}", name.replace(['[', ']'], "")));
         match name {
-            // Parameters are renamed by an underscore at their end.
-            Some(name) if !name.ends_with('_') && self.taken.insert(name.clone()) => {
+            Some(name) if !self.is_parameter(&name) && self.taken.insert(name.clone()) => {
                 let name = format_ident!("{name}");
                 self.names.insert(temporary, name.clone());
                 name
@@ -702,11 +701,16 @@ impl<'a> Emitter<'a> {
             } else {
                 identifier(field)
             };
-        // Beside `q` there may be a field `q_`.
-        while self.parameters.values().any(|other| *other == local) {
+        // Beside `q` there may be a field `q_`, and beside a field `sin_x` a coordinate `x_` with its sine.
+        while self.is_parameter(&local.to_string()) || self.taken.contains(&local.to_string()) {
             local = format_ident!("{local}_");
         }
         local
+    }
+
+    /// Whether the local variable of a parameter has this name.
+    fn is_parameter(&self, name: &str) -> bool {
+        self.parameters.values().any(|local| local == name)
     }
 }
 

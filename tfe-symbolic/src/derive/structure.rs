@@ -72,10 +72,9 @@ struct Dependence {
 }
 
 impl Dependence {
-    fn of(graph: &Graph, values: impl Iterator<Item = ExprId>) -> Self {
-        let roots: Vec<ExprId> = values.collect();
+    fn of(graph: &Graph, values: &[ExprId]) -> Self {
         let mut found = Self::default();
-        for id in graph.reachable(&roots) {
+        for id in graph.reachable(values) {
             if let Node::Input(input) = graph.node(id) {
                 match input {
                     Input::Time | Input::Control(_) => found.time = true,
@@ -93,10 +92,10 @@ impl Dependence {
     }
 
     /// The same of what decides the choices in these expressions: conditions, and arguments of functions with a kink.
-    fn of_choices(graph: &Graph, values: impl Iterator<Item = ExprId>) -> Self {
-        let roots: Vec<ExprId> = values.collect();
-        let nodes = graph.reachable(&roots).into_iter();
-        Self::of(graph, nodes.flat_map(|id| deciding(graph.node(id))))
+    fn of_choices(graph: &Graph, values: &[ExprId]) -> Self {
+        let nodes = graph.reachable(values).into_iter();
+        let deciding: Vec<ExprId> = nodes.flat_map(|id| deciding(graph.node(id))).collect();
+        Self::of(graph, &deciding)
     }
 }
 
@@ -120,22 +119,16 @@ impl Structure {
                 .iter()
                 .filter(move |entry| entry.place.array == array)
         };
-        let depends = |arrays: &[Array]| {
-            let values = entries
+        let values = |arrays: &[Array]| -> Vec<ExprId> {
+            let wanted = entries
                 .iter()
-                .filter(|entry| arrays.contains(&entry.place.array))
-                .map(|entry| entry.value);
-            Dependence::of(graph, values)
+                .filter(|entry| arrays.contains(&entry.place.array));
+            wanted.map(|entry| entry.value).collect()
         };
-        let (constraints, constraints_vary) = constraints(graph, entries);
+        let depends = |arrays: &[Array]| Dependence::of(graph, &values(arrays));
         // What a sign decides is in the first derivatives alone: those of a step are zero.
-        let chosen = |arrays: &[Array]| {
-            let values = entries
-                .iter()
-                .filter(|entry| arrays.contains(&entry.place.array))
-                .map(|entry| entry.value);
-            Dependence::of_choices(graph, values)
-        };
+        let chosen = |arrays: &[Array]| Dependence::of_choices(graph, &values(arrays));
+        let (constraints, constraints_vary) = constraints(graph, entries);
         let chosen_momenta = chosen(&[Array::ByZ]);
         let chosen_forces = chosen(&[Array::Force]);
         let chosen_rates = chosen(&[Array::ByZ, Array::ByQ, Array::Force]);
@@ -201,7 +194,7 @@ fn constraints(graph: &Graph, entries: &[Entry]) -> (bool, bool) {
         )
     });
     let values: Vec<ExprId> = rows.map(|entry| entry.value).collect();
-    let time = Dependence::of(graph, values.iter().copied()).time;
+    let time = Dependence::of(graph, &values).time;
     (!values.is_empty(), time)
 }
 

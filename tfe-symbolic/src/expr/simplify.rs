@@ -294,9 +294,7 @@ impl Graph {
             }
         }
     }
-}
 
-impl Graph {
     /// xⁿ/√x → xⁿ⁻¹ √x for n > 0, and x²/√abs(x) → abs(x) √abs(x): the same numbers, and zero instead of 0/0 where x = 0.
     fn lift_roots(&self, collected: &mut SortedMap<ExprId, i64>) {
         let below = |(x, n): &(ExprId, i64)| match self.node(*x) {

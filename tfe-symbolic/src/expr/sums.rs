@@ -219,7 +219,7 @@ fn parts_of_denominators(graph: &Graph, x: ExprId) -> Vec<PartOfDenominator> {
     for (sum, n) in factors.iter().filter(|(_, n)| *n < 0) {
         for (coefficient, term) in terms_if_positive(graph, *sum) {
             // In several of the sums within its coefficients add up.
-            if occurrences(graph, *sum, term) > 1 {
+            if occurrences(graph, *sum, term, &mut SortedMap::new()) > 1 {
                 continue;
             }
             let Some(rest) = quotient(graph, factors, term) else {
@@ -270,13 +270,23 @@ fn terms_if_positive(graph: &Graph, sum: ExprId) -> Vec<(Constant, ExprId)> {
     found
 }
 
-/// How often an expression is a term of a sum and of the sums in it.
-fn occurrences(graph: &Graph, sum: ExprId, term: ExprId) -> usize {
-    let Some((_, terms)) = graph.as_sum(sum) else {
-        return 0;
-    };
-    let of = |x: ExprId| usize::from(x == term) + occurrences(graph, x, term);
-    terms.iter().map(|(_, x)| of(*x)).sum()
+/// How often an expression is a term of a sum and of the sums in it. Sums that stand in several others are counted in each, but looked into once.
+fn occurrences(
+    graph: &Graph,
+    sum: ExprId,
+    term: ExprId,
+    counted: &mut SortedMap<ExprId, usize>,
+) -> usize {
+    if let Some(count) = counted.get(&sum) {
+        return *count;
+    }
+    let mut count = 0_usize;
+    for (_, x) in graph.as_sum(sum).map_or(&[][..], |(_, terms)| terms) {
+        let within = occurrences(graph, *x, term, counted);
+        count = count.saturating_add(within + usize::from(*x == term));
+    }
+    *counted.get_or_default(sum) = count;
+    count
 }
 
 /// A sum without one of its terms, which may stand in a sum within.
