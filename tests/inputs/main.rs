@@ -3,8 +3,8 @@
 mod failures;
 mod loops;
 
-use tfe::prelude::*;
 use tfe::Driven;
+use tfe::prelude::*;
 
 /// A pendulum whose pivot is moved and whose axis is turned: inputs in the energy, in forces, in outputs.
 #[dynamics(
