@@ -11,7 +11,7 @@ use tfe_symbolic::expr::input::{Affine, Input};
 use tfe_symbolic::model::declared::{Force, Form, Observable, Parameter};
 use tfe_symbolic::program::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{By, Request};
-use tfe_symbolic::syntax::context::Context;
+use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 const ALL: Request = Request {
     value: true,
@@ -407,11 +407,122 @@ fn half_integer_powers_at_zero() {
         ("2/5*abs(x)^2.5", -4.0, -8.0),
         ("2/7*abs(x)^3.5", 4.0, 32.0),
         ("2/5*(x^2)^1.25*sqrt(abs(x))^0", 4.0, 8.0),
+        ("2/5*(max(-x, 0)/4)^2.5", 1.0, 0.0),
+        ("2/5*(max(-x, 0)/4)^2.5", -16.0, -2.0),
+        ("2/5*(4*max(-x, 0))^2.5", 1.0, 0.0),
+        ("2/5*(4*max(-x, 0))^2.5", -1.0, -32.0),
+        ("2/3*(4*max(-x, 0))^1.5", -1.0, -8.0),
+        ("2/3*(x^2/4)^0.75", 4.0, 0.5_f64.sqrt()),
+        ("2/5*(abs(x)/4)^2.5", -16.0, -2.0),
+        ("sqrt(4*x^2)", 0.0, 0.0),
+        ("sqrt(4*x^2)", -3.0, -2.0),
+        ("norm([x/5])", 2.0, 0.2),
     ] {
         let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
         let found = -slopes(&text, &[x])[0];
         assert!(
             (found - expected).abs() < 1e-13,
+            "{energy} at {x}: {found}, {expected}"
+        );
+    }
+}
+
+/// Reciprocals that several products share, where the powers in some of them would merge with those of a root.
+#[test]
+fn reciprocals_are_shared_by_products_that_have_them() {
+    const VALUES: [(&str, f64); 6] = [
+        ("a", 3.0),
+        ("b", 7.0),
+        ("c", 0.5),
+        ("d", 5.0),
+        ("h", 1.3),
+        ("m", 2.0),
+    ];
+    let (x, y) = (0.7_f64, 0.4);
+    let s = x * x + 1.3 * 1.3;
+    for (parts, fields) in [
+        ("force(x) = b/(s*m), force(y) = -c*dot(y)/(s*m)", "abchm"),
+        ("force(x) = b/(s*d), force(y) = -c*dot(y)/(s*d)", "abcdhm"),
+        (
+            "output(u) = b/s^(3/2), output(v) = x/(s*m), output(w) = y/(s*m)",
+            "abhm",
+        ),
+        (
+            "output(u) = b/s^(3/2), output(v) = x/(s*d), output(w) = y/(s*d)",
+            "abdhm",
+        ),
+    ] {
+        let text = format!(
+            "coordinates(x, y), let s = x^2 + h^2, lagrangian = m/2*(dot(x)^2 + dot(y)^2) + a/sqrt(s), {parts}"
+        );
+        let field = |name: char| Field {
+            name: name.to_string(),
+            kind: FieldKind::Scalar,
+        };
+        let context = Context {
+            struct_name: "Model".to_owned(),
+            fields: fields.chars().map(field).collect(),
+            const_parameters: Vec::new(),
+        };
+        let declared = declare(&text, &context).expect("a model");
+        let environment = Environment {
+            q: vec![x, y],
+            z: vec![0.3, -0.9],
+            parameters: VALUES.map(|(name, value)| (name.to_owned(), value)).into(),
+            ..Environment::default()
+        };
+        let requests = [
+            Request {
+                second: false,
+                mass: false,
+                ..ALL
+            },
+            ALL,
+            Request {
+                observables: true,
+                ..ALL
+            },
+        ];
+        for request in requests {
+            let program = Derivation::of(&declared).program(request);
+            let found = interpret(&program, &environment).expect("a complete environment");
+            let divisor = if parts.contains("s*m") { 2.0 } else { 5.0 };
+            let mut numbers = vec![(found.q[0], -3.0 * x / (s * s.sqrt()))];
+            if parts.contains("force") {
+                numbers.push((found.force[0], 7.0 / (s * divisor)));
+                numbers.push((found.force[1], 0.5 * 0.9 / (s * divisor)));
+            }
+            if request.observables && parts.contains("output") {
+                let expected = [7.0 / (s * s.sqrt()), x / (s * divisor), y / (s * divisor)];
+                numbers.extend(found.observables.iter().copied().zip(expected));
+            }
+            for (found, expected) in numbers {
+                assert!(
+                    (found - expected).abs() < 1e-14,
+                    "{parts}: {found} {expected}\n{program}"
+                );
+            }
+        }
+    }
+}
+
+/// Slopes near the ends of the ranges of functions, to the last digits.
+#[test]
+fn slopes_at_the_ends_of_ranges_keep_their_digits() {
+    let near = 1.0 - 2.0_f64.powi(-30);
+    let beyond = 1.0 + 2.0_f64.powi(-30);
+    let gap = |x: f64| ((1.0 - x) * (1.0 + x)).abs();
+    for (energy, x, expected) in [
+        ("tanh(x)", 800.0, 0.0),
+        ("asin(x)", near, 1.0 / gap(near).sqrt()),
+        ("acos(x)", near, -1.0 / gap(near).sqrt()),
+        ("atanh(x)", near, 1.0 / gap(near)),
+        ("acosh(x)", beyond, 1.0 / gap(beyond).sqrt()),
+    ] {
+        let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+        let found = -slopes(&text, &[x])[0];
+        assert!(
+            (found - expected).abs() <= 4e-15 * expected.abs(),
             "{energy} at {x}: {found}, {expected}"
         );
     }

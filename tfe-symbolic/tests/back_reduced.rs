@@ -16,8 +16,8 @@ const PARAMETERS: [(&str, f64); 6] = [
     ("omega", 1.7),
 ];
 
-/// A declaration with the fields of [`PARAMETERS`] that it uses.
-fn declared(text: &str, fields: &str) -> Declared {
+/// A struct with some of [`PARAMETERS`].
+fn context(fields: &str) -> Context {
     let field = |name: &str| match name {
         "n" => Field {
             name: name.to_owned(),
@@ -32,12 +32,16 @@ fn declared(text: &str, fields: &str) -> Declared {
             kind: FieldKind::Scalar,
         },
     };
-    let context = Context {
+    Context {
         struct_name: "Model".to_owned(),
         fields: fields.split_whitespace().map(field).collect(),
         const_parameters: Vec::new(),
-    };
-    declare(text, &context).unwrap_or_else(|problems| panic!("{text}\n{problems:?}"))
+    }
+}
+
+/// A declaration with the fields of [`PARAMETERS`] that it uses.
+fn declared(text: &str, fields: &str) -> Declared {
+    declare(text, &context(fields)).unwrap_or_else(|problems| panic!("{text}\n{problems:?}"))
 }
 
 fn variant(text: &str, fields: &str) -> Variant {
@@ -225,6 +229,51 @@ fn a_hamiltonian_about_a_point() {
     let cosine = x0.cos() - x0.sin() * d - x0.cos() * d * d / 2.0 + x0.sin() * d.powi(3) / 6.0;
     let value = run(&near, &[x], &[p]).value;
     assert!((value - (kinetic - cosine)).abs() < 1e-14 * value.abs().max(1.0));
+}
+
+#[test]
+fn no_polynomial_where_two_sides_meet() {
+    let truncation = |parts: &str, given: &str| {
+        let text = format!(
+            "coordinates(x), lagrangian = dot(x)^2/2 - k*x^2/2 - c*x^4 {parts}, model(Near, truncated(2{given}))"
+        );
+        declare(&text, &context("k c"))
+    };
+    for parts in [
+        "- abs(x)",
+        "- max(x, 0)^2",
+        "- select(x > 0, x, 2*x)",
+        "- max(x, c)^2 + max(c, x)",
+        ", force(x) = -c*sign(dot(x))",
+        ", force(x) = c*max(x, 0) + c*max(-x, 0)",
+        ", dissipation = c*abs(dot(x))",
+        ", force(x) = -c*norm([dot(x), 2*dot(x)])",
+        "- norm([c*x, x])",
+    ] {
+        let about = if parts.contains("x, c") {
+            ", x = c"
+        } else {
+            ""
+        };
+        assert!(truncation(parts, about).is_err(), "{parts}");
+        truncation(parts, ", x = 0.3, dot(x) = 0.2").expect("away from it");
+    }
+    // Both sides have the polynomial that is asked for.
+    for parts in [
+        "- abs(x)^3",
+        "- max(-x, 0)^3",
+        "- select(x > 0, x^3, x^4)",
+        ", force(x) = -c*dot(x)*abs(dot(x))",
+    ] {
+        let near = variant(
+            &format!(
+                "coordinates(x), lagrangian = dot(x)^2/2 - k*x^2/2 - c*x^4 {parts}, model(Near, truncated(2))"
+            ),
+            "k c",
+        );
+        let linear = declared("coordinates(x), lagrangian = dot(x)^2/2 - k*x^2/2", "k");
+        same(&near.model, &linear, &[0.7], &[-0.8]);
+    }
 }
 
 #[test]

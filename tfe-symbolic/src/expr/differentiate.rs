@@ -2,6 +2,7 @@
 //!
 //! Both walk with an explicit stack or a forward loop and remember what they have met, so a shared node is differentiated once.
 
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
@@ -113,7 +114,7 @@ impl Forward {
     fn chosen(
         &self,
         graph: &mut Graph,
-        (comparison, left, right): (crate::expr::comparison::Comparison, ExprId, ExprId),
+        (comparison, left, right): (Comparison, ExprId, ExprId),
         then: Option<ExprId>,
         otherwise: Option<ExprId>,
     ) -> Option<ExprId> {
@@ -252,8 +253,12 @@ fn partial(graph: &mut Graph, id: ExprId, node: &Node, at: usize) -> (Constant, 
             graph.multiply(*exponent, power)
         }
         Node::Power { base, .. } => {
+            // Where the power vanishes its logarithm is infinite, and the slope zero: a contact `max(-x, 0)^e` that is open.
             let logarithm = graph.call(Function::Ln, &[*base]);
-            graph.multiply(logarithm, id)
+            let slope = graph.multiply(logarithm, id);
+            let zero = graph.constant(Constant::ZERO);
+            let size = graph.call(Function::Abs, &[id]);
+            graph.select(Comparison::LessOrEqual, size, zero, zero, slope)
         }
         Node::Call {
             function,
@@ -281,7 +286,6 @@ fn partial(graph: &mut Graph, id: ExprId, node: &Node, at: usize) -> (Constant, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::expr::comparison::Comparison;
     use crate::expr::graph::SumRange;
     use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
 

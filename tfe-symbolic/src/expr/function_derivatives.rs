@@ -21,6 +21,7 @@ impl Function {
                 let sine = graph.call(Self::Sin, &[x]);
                 graph.negate(sine)
             }
+            // Of tanh to the digits of one: 1/cosh² has all, and derivatives that are infinite times zero from |x| = 355 on.
             Self::Tan | Self::Tanh => {
                 let value = graph.call(self, &[x]);
                 let square = graph.multiply(value, value);
@@ -31,8 +32,7 @@ impl Function {
                 }
             }
             Self::Asin | Self::Acos => {
-                let square = graph.multiply(x, x);
-                let rest = graph.subtract(one, square);
+                let rest = below_one(graph, x);
                 let root = graph.call(Self::Sqrt, &[rest]);
                 let slope = graph.divide(one, root);
                 if self == Self::Asin {
@@ -41,13 +41,13 @@ impl Function {
                     graph.negate(slope)
                 }
             }
-            Self::Atan | Self::Atanh => {
+            Self::Atan => {
                 let square = graph.multiply(x, x);
-                let below = if self == Self::Atan {
-                    graph.add(one, square)
-                } else {
-                    graph.subtract(one, square)
-                };
+                let below = graph.add(one, square);
+                graph.divide(one, below)
+            }
+            Self::Atanh => {
+                let below = below_one(graph, x);
                 graph.divide(one, below)
             }
             Self::Atan2 => {
@@ -64,11 +64,12 @@ impl Function {
             Self::Sinh => graph.call(Self::Cosh, &[x]),
             Self::Cosh => graph.call(Self::Sinh, &[x]),
             Self::Asinh | Self::Acosh => {
-                let square = graph.multiply(x, x);
                 let below = if self == Self::Asinh {
+                    let square = graph.multiply(x, x);
                     graph.add(square, one)
                 } else {
-                    graph.subtract(square, one)
+                    let below = below_one(graph, x);
+                    graph.negate(below)
                 };
                 let root = graph.call(Self::Sqrt, &[below]);
                 graph.divide(one, root)
@@ -93,4 +94,11 @@ impl Function {
             }
         }
     }
+}
+
+/// (1 − x)(1 + x), which has all digits near ±1.
+fn below_one(graph: &mut Graph, x: ExprId) -> ExprId {
+    let one = graph.constant(Constant::ONE);
+    let (less, more) = (graph.subtract(one, x), graph.add(one, x));
+    graph.multiply(less, more)
 }

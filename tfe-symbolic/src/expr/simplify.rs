@@ -132,9 +132,9 @@ impl Graph {
 
     fn call_positive(&mut self, function: Function, x: ExprId) -> ExprId {
         match (function, self.node(x)) {
-            (Function::Sqrt, Node::Product(factors)) => {
-                if let [(base, 2)] = factors[..] {
-                    return self.call(Function::Abs, &[base]);
+            (Function::Sqrt, Node::Product(_) | Node::Sum { .. }) => {
+                if let Some(half) = self.root_of_square(x) {
+                    return self.call(Function::Abs, &[half]);
                 }
             }
             (
@@ -150,6 +150,19 @@ impl Graph {
             function,
             arguments: vec![x],
         })
+    }
+
+    /// y of x = y², where that is a number times even powers.
+    fn root_of_square(&mut self, x: ExprId) -> Option<ExprId> {
+        let (coefficient, inner) = self.as_multiple(x);
+        let Node::Product(factors) = self.node(inner) else {
+            return None;
+        };
+        if factors.iter().any(|(_, n)| n % 2 != 0) {
+            return None;
+        }
+        let halves: Vec<(ExprId, i32)> = factors.iter().map(|(x, n)| (*x, n / 2)).collect();
+        Some(self.product(coefficient.exact_sqrt()?, &halves))
     }
 
     /// `then` where `left comparison right` holds, `otherwise` elsewhere.
@@ -235,7 +248,7 @@ impl Graph {
                 }
             }
             if waiting.is_empty() {
-                self.fold_even_powers(&mut collected, &mut waiting);
+                coefficient = coefficient * self.fold_even_powers(&mut collected, &mut waiting);
             }
         }
         collected.retain(|_, n| *n != 0);
@@ -263,13 +276,13 @@ impl Graph {
         self.scale(coefficient, product)
     }
 
-    /// √x^(2n) → xⁿ, xⁿ/√x → xⁿ⁻¹ √x and abs(x)^(2n) → x^(2n).
+    /// √x^(2n) → xⁿ, xⁿ/√x → xⁿ⁻¹ √x and abs(x)^(2n) → x^(2n); the number by which all is to be multiplied then.
     fn fold_even_powers(
         &self,
         collected: &mut SortedMap<ExprId, i64>,
         waiting: &mut Vec<(ExprId, i64)>,
-    ) {
-        self.lift_roots(collected);
+    ) -> Constant {
+        let coefficient = self.lift_roots(collected);
         for (x, n) in collected.iter_mut() {
             let Node::Call {
                 function,
@@ -293,10 +306,13 @@ impl Graph {
                 _ => {}
             }
         }
+        coefficient
     }
 
-    /// xⁿ/√x → xⁿ⁻¹ √x for n > 0, and x²/√abs(x) → abs(x) √abs(x): the same numbers, and zero instead of 0/0 where x = 0.
-    fn lift_roots(&self, collected: &mut SortedMap<ExprId, i64>) {
+    /// xⁿ/√x → xⁿ⁻¹ √x for n > 0, x²/√abs(x) → abs(x) √abs(x) and x²/√(c x y) → x √(c x y)/(c y): the same numbers, and zero instead of 0/0 where x = 0. The number by which
+    /// all is to be multiplied then.
+    fn lift_roots(&self, collected: &mut SortedMap<ExprId, i64>) -> Constant {
+        let mut coefficient = Constant::ONE;
         let below = |(x, n): &(ExprId, i64)| match self.node(*x) {
             Node::Call {
                 function: Function::Sqrt,
@@ -316,6 +332,13 @@ impl Graph {
                 arguments,
             } = self.node(argument)
             else {
+                if let Some((multiple, factors)) = self.above_its_root(argument, collected) {
+                    for (x, n) in factors {
+                        *collected.get_or_default(x) -= i64::from(n);
+                    }
+                    *collected.get_or_default(root) = 1;
+                    coefficient = coefficient * multiple;
+                }
                 continue;
             };
             let squared = arguments.first().and_then(|x| collected.get_mut(x));
@@ -325,6 +348,30 @@ impl Graph {
                 *collected.get_or_default(root) = 1;
             }
         }
+        coefficient
+    }
+
+    /// 1/c and the factors of an argument c Π xᵢ^mᵢ of a root, if all that stand above in it are among other factors as often, and one may vanish.
+    fn above_its_root(
+        &self,
+        argument: ExprId,
+        collected: &SortedMap<ExprId, i64>,
+    ) -> Option<(Constant, Vec<(ExprId, i32)>)> {
+        let (multiple, inner) = self.as_multiple(argument);
+        let factors = match self.node(inner) {
+            Node::Product(factors) => factors.clone(),
+            _ => vec![(inner, 1)],
+        };
+        let mut above = factors.iter().filter(|(_, n)| *n > 0);
+        let stands_above = |(x, n): &(ExprId, i32)| {
+            let here = collected.get(x).copied().unwrap_or_default();
+            here >= i64::from(*n)
+        };
+        let may_vanish = |(x, _): &(ExprId, i32)| !matches!(self.node(*x), Node::Input(_));
+        if !above.clone().all(stands_above) || !above.any(may_vanish) {
+            return None;
+        }
+        Some((multiple.reciprocal()?, factors))
     }
 }
 

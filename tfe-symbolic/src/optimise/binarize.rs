@@ -363,11 +363,15 @@ impl<'a> Arranger<'a> {
         } else {
             factors
         };
-        for (x, n) in factors {
+        for &(x, n) in &factors {
             let (loops, size) = (self.graph.loops_of(x), n.unsigned_abs());
+            // Groups are those of merged factors: others may lack one, or have another power of it.
+            let stand_here =
+                |group: &&Vec<ExprId>| group.iter().all(|y| factors.contains(&(*y, n)));
             let together = shared
                 .get(&x)
-                .filter(|_| n < 0 && size <= LARGEST_PRODUCT_POWER);
+                .filter(|_| n < 0 && size <= LARGEST_PRODUCT_POWER)
+                .filter(stand_here);
             if together.is_some_and(|together| together[0] != x) {
                 continue; // the reciprocal of the first covers it
             }

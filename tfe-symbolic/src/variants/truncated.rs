@@ -13,9 +13,11 @@ use super::{Assignment, Mistake, Reduction};
 use crate::diagnostic::Kind;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::directional;
+use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
-use crate::expr::ordered::SortedMap;
+use crate::expr::ordered::{SortedMap, SortedSet};
+use crate::expr::rewrite::Mapping;
 use crate::model::declared::Form;
 
 /// The parts of a state. While derivatives are taken, placeholders of these numbers stand for q − q₀, v − v₀ and p − p₀.
@@ -142,8 +144,12 @@ impl Reduction {
             }
         }
         let sum = series(graph, of, degree, point)?;
-        let polynomial = graph.with_leaves(sum, &mut |graph, input| at_point(graph, input, point));
-        if is_singular(graph, polynomial) {
+        let mapping = about(graph, sum, point, None);
+        let polynomial = mapping.of(sum);
+        if is_singular(graph, polynomial)
+            || divides_by_zero(graph, sum, &mapping)
+            || has_kink(graph, sum, point, &mapping)
+        {
             return Err(Kind::NoTaylorPolynomial);
         }
         let is_long = || graph.reachable(&[polynomial]).len() > MAX_OF_HIGH_DEGREE;
@@ -183,6 +189,102 @@ fn series(graph: &mut Graph, of: ExprId, degree: u32, point: &Point) -> Result<E
         terms.push((factor.unwrap_or(Constant::ZERO), derivative));
     }
     Ok(graph.linear(Constant::ZERO, &terms))
+}
+
+/// What each part of a series is about the point; one choice may be made otherwise.
+fn about(
+    graph: &mut Graph,
+    series: ExprId,
+    point: &Point,
+    otherwise: Option<(ExprId, Side)>,
+) -> Mapping {
+    let mut mapping = Mapping::default();
+    for old in graph.reachable(&[series]) {
+        let node = graph.node(old).clone();
+        let side = otherwise.filter(|(choice, _)| *choice == old);
+        let new = match (&node, side) {
+            (Node::Input(input), _) => at_point(graph, input, point).unwrap_or(old),
+            (_, Some((_, Side::Of(branch)))) => mapping.of(branch),
+            (_, Some((_, Side::Sign(sign)))) => graph.integer(sign),
+            (node, None) if mapping.keeps(node) => old,
+            (node, None) => graph.remake(node, &mapping),
+        };
+        mapping.set(old, new);
+    }
+    mapping
+}
+
+/// Whether something is divided by zero about the point, be it multiplied by zero: `norm([x, y])` at the origin.
+fn divides_by_zero(graph: &Graph, series: ExprId, mapping: &Mapping) -> bool {
+    let (mut waiting, mut seen) = (vec![series], SortedSet::new());
+    while let Some(id) = waiting.pop() {
+        if !seen.insert(id) {
+            continue;
+        }
+        match graph.node(id) {
+            // What is not chosen does not count.
+            Node::Select { then, .. } if mapping.of(id) == mapping.of(*then) => {
+                waiting.push(*then);
+            }
+            Node::Select { otherwise, .. } if mapping.of(id) == mapping.of(*otherwise) => {
+                waiting.push(*otherwise);
+            }
+            Node::Product(factors) => {
+                if (factors.iter()).any(|(x, n)| *n < 0 && is_zero(graph, mapping.of(*x))) {
+                    return true;
+                }
+                waiting.extend(factors.iter().map(|(x, _)| *x));
+            }
+            node => waiting.extend(node.children()),
+        }
+    }
+    false
+}
+
+/// What a choice may be where both sides meet.
+#[derive(Clone, Copy)]
+enum Side {
+    Of(ExprId),
+    Sign(i64),
+}
+
+/// Whether the point lies where two sides of a choice meet and the polynomials of both are not the same: that of `abs(x)*x` to degree one about 0 is 0, and
+/// `abs(x)` has none.
+fn has_kink(graph: &mut Graph, series: ExprId, point: &Point, mapping: &Mapping) -> bool {
+    let mut between = Vec::new();
+    for id in graph.reachable(&[series]) {
+        match graph.node(id) {
+            Node::Select {
+                left,
+                right,
+                then,
+                otherwise,
+                ..
+            } if is_tie(graph, mapping.of(*left), mapping.of(*right)) => {
+                between.extend([(id, Side::Of(*then)), (id, Side::Of(*otherwise))]);
+            }
+            Node::Call {
+                function: Function::Sign,
+                arguments,
+            } if arguments.iter().all(|x| is_zero(graph, mapping.of(*x))) => {
+                between.extend([(id, Side::Sign(1)), (id, Side::Sign(-1))]);
+            }
+            _ => {}
+        }
+    }
+    between
+        .into_iter()
+        .any(|choice| about(graph, series, point, Some(choice)).of(series) != mapping.of(series))
+}
+
+fn is_tie(graph: &Graph, left: ExprId, right: ExprId) -> bool {
+    left == right || (is_zero(graph, left) && is_zero(graph, right))
+}
+
+fn is_zero(graph: &Graph, id: ExprId) -> bool {
+    graph
+        .as_constant(id)
+        .is_some_and(|value| value.to_f64() == 0.0)
 }
 
 /// q₀ for q, and q − q₀ for its placeholder.
