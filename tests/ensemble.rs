@@ -375,6 +375,35 @@ fn parameter_sets() {
     assert_eq!(none.expect("nothing to do").len(), 0);
 }
 
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k*x^4/4, input(u), force(x) = u)]
+struct Pushed {
+    k: f64,
+}
+
+/// Each model is driven by its own function, whoever runs beside it.
+#[test]
+fn inputs_are_those_of_each_model() {
+    let plain: Vec<_> = fractions(11).map(|k| Pushed { k }).collect();
+    let numbered = || plain.iter().zip(0..);
+    let own: Vec<_> = numbered()
+        .map(|(model, i)| {
+            let phase = f64::from(i);
+            let driven = tfe::Driven::new(model).input("u", move |t| (t + phase).cos());
+            driven.expect("an input")
+        })
+        .collect();
+    let table: Vec<_> = numbered()
+        .map(|(model, i)| {
+            let driven = tfe::Driven::new(model);
+            let values = [f64::from(i), 1.0, 0.0];
+            (driven.table("u", &[0.0, 1.0, 5.0], &values, tfe::Interpolation::Linear)).expect("one")
+        })
+        .collect();
+    let start = plain[0].state([1.0], [0.0]);
+    models_agree(&own, Mixed::<6>, start);
+    models_agree(&table, Mixed::<4>, start);
+}
+
 /// Of models in lanes each that does not contract goes its own way, with its own parameters; one that fails stops no other.
 #[test]
 fn some_parameter_sets_go_their_own_way() {

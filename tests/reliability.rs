@@ -661,3 +661,60 @@ fn endless_steps_below_the_resolution_of_the_time_are_refused() {
     );
     assert!(steps.next().is_none());
 }
+
+/// A checkpoint of a model with other parameters: nothing that belongs to these is carried on.
+#[test]
+fn other_parameters_go_on_from_a_checkpoint() {
+    #[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - k*x^2/2 - y^2/2)]
+    struct Spring {
+        m: f64,
+        k: f64,
+    }
+    let (soft, stiff) = (Spring { m: 1.0, k: 1.0 }, Spring { m: 2.0, k: 4.0 });
+    let run = |model| {
+        let run = Simulation::new(model).element(Element::mixed(6)).step(0.1);
+        run.record_every(10)
+    };
+    let first = run(&soft).run(soft.state([1.0, 0.5], [0.0, 0.2]), 0.0..5.0);
+    let first = first.expect("a run");
+    let checkpoint = first.checkpoint().expect("complete");
+    let second = run(&stiff).resume(checkpoint, 10.0).expect("a run");
+    let anew = run(&stiff).run(*checkpoint.state(), 5.0..10.0);
+    let (one, other) = (second.last(), anew.expect("a run").last().state());
+    for a in 0..2 {
+        assert!((one.q[a] - other.q[a]).abs() < 1e-13);
+        assert!((one.p[a] - other.p[a]).abs() < 1e-13);
+    }
+    // A span that is empty does not begin a grid.
+    let run = Simulation::new(&soft).step(0.1).element(Element::mixed(4));
+    let start = soft.state([1.0, 0.5], [0.0, 0.2]);
+    let whole = run.run(start, 0.0..2.0).expect("a run");
+    let first = run.run(start, 0.0..1.0).expect("a run");
+    let same = run.resume(first.checkpoint().expect("complete"), 1.0);
+    let same = same.expect("nothing to do");
+    let second = run.resume(same.checkpoint().expect("complete"), 2.0);
+    assert_eq!(second.expect("a run").states(), &whole.states()[10..]);
+}
+
+/// Linear models of every mass, on which gravity acts: steps by one matrix are those that are solved.
+#[test]
+fn heavy_linear_models_keep_their_motion() {
+    #[dynamics(coordinates(y), lagrangian = m/2*dot(y)^2 - m*g*y, force(y) = -m*c*dot(y))]
+    struct Falling {
+        m: f64,
+        g: f64,
+        c: f64,
+    }
+    for m in [1e-30, 1.0, 6e24, 1e30, 1e60] {
+        let body = Falling { m, g: 9.81, c: 0.5 };
+        let run = Simulation::new(&body).element(Element::mixed(6)).step(0.01);
+        let motion = run
+            .record_every(100)
+            .run(body.state([0.0], [3.0]), 0.0..4.0);
+        let motion = motion.expect("a run");
+        let (v_end, decay) = (-9.81 / 0.5, (-0.5 * 4.0_f64).exp());
+        let y = v_end * 4.0 + (3.0 - v_end) * (1.0 - decay) / 0.5;
+        let found = motion.last().q[0];
+        assert!((found - y).abs() < 1e-11 * y.abs(), "{m}: {found} {y}");
+    }
+}

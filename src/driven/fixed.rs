@@ -76,6 +76,10 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         self.model.second_with(&inputs, t, q, z, first, second);
     }
 
+    fn shares_inputs(&self, other: &Self) -> bool {
+        self.sources.are_those_of(&other.sources)
+    }
+
     const SENSITIVITIES: &'static [&'static str] = M::SENSITIVITIES;
 
     fn sensitivity_parameter(&self, index: usize) -> f64 {
@@ -89,7 +93,7 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         if by != By::Time || self.sources.is_constant() {
             return self.model.first_by_with(by, &inputs, t, q, z, first);
         }
-        let distance = t.map(&mut |t| DISTANCE * t.abs().max(1.0));
+        let distance = t.map(&mut |t| DISTANCE * t.abs().max(1.0).cbrt());
         let (early, late) = (t - distance, t + distance);
         let (mut before, mut after) = (First::zero(), First::zero());
         self.first(early, q, z, &mut before);

@@ -122,9 +122,12 @@ impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for OneModel<'m, 
 impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for ManyModels<'m, M> {
     type Lanes = Varied<'m, M>;
 
-    /// Kernels written by hand that do not number their parameters read them from one model, which no two lanes share.
+    /// Kernels written by hand that do not number their parameters read them from one model, which no two lanes share; the functions that inputs come from are those of one model, too.
     fn share_kernels(&self) -> bool {
-        self.0.first().is_some_and(|model| model.parameters() > 0)
+        self.0.first().is_some_and(|first| {
+            let share = |model| first.shares_inputs(model);
+            first.parameters() > 0 && self.0.iter().all(share)
+        })
     }
 
     fn bundle(

@@ -44,8 +44,11 @@ impl Reached {
             return Ok((mesh(&(time..end), Some(nodes))?, 0, time));
         }
         let on_grid = mesh(&(origin..end), None).ok().filter(|mesh| {
-            let next = mesh.elements().nth(elements);
-            next.is_some_and(|(start, ..)| start == time)
+            match mesh.elements().nth(elements) {
+                Some((start, ..)) => start == time,
+                // Nothing is left to do.
+                None => end == time && mesh.steps() == elements,
+            }
         });
         match on_grid {
             Some(mesh) => Ok((mesh, elements, origin)),

@@ -93,6 +93,8 @@ impl Rooms {
 /// An element that is to be looked into.
 pub(super) struct Passage<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) t: f64,
+    /// Where the force is first felt: at `t`, or beyond it by roundings where that is a break.
+    pub(super) begin: f64,
     pub(super) h: f64,
     pub(super) before: &'a L::State,
     pub(super) after: &'a L::State,
@@ -127,6 +129,8 @@ pub(super) struct Cut<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
 pub struct Severed<'a, 'm, const N: usize, L: Length<N> = FixedLength> {
     /// Where the element begins.
     pub(super) start: f64,
+    /// Where the force is first felt: at its start, or beyond it by roundings where that is a break.
+    pub(super) begin: f64,
     pub(super) length: f64,
     /// What its length was to be.
     pub(super) step: f64,
@@ -177,6 +181,11 @@ where
     /// Goes on with another model.
     pub(super) fn set_model(&mut self, model: Share<'m, M>) {
         (self.model, self.probe) = (model, None);
+        self.clear.forget();
+    }
+
+    /// What the model is given from outside is another: sides stay those that were seen, and what has jumped over zero is met at once.
+    pub(super) fn set_inputs(&mut self) {
         self.clear.forget();
     }
 
@@ -379,6 +388,7 @@ where
         let count = acting::within(arc.impulses, arc.t, place.length);
         Severed {
             start: arc.t,
+            begin: arc.begin,
             length: place.length,
             step: self.step,
             before: arc.before,
@@ -496,7 +506,9 @@ where
         /// Corrections of the length; each leaves the square of what was off.
         const MAX_TRIALS: u32 = 8;
 
-        let Passage { t, h, dense, .. } = *arc;
+        let Passage {
+            t, begin, h, dense, ..
+        } = *arc;
         let mut length = root.tau * h;
         let mut probe = match self.probe.take() {
             Some(probe) => probe,
@@ -509,7 +521,7 @@ where
             let mut inside = None;
             if length.abs() > resolution {
                 let impulses = &arc.impulses[..acting::within(arc.impulses, t, length)];
-                M::advance(&mut probe, (t, length), &mut state, impulses).ok()?;
+                M::advance(&mut probe, (begin, length), &mut state, impulses).ok()?;
                 inside = Some(M::inside(&mut probe, None, (t, t + length)));
             }
             let guess = dense.velocity_at_time(t + length);
@@ -523,9 +535,11 @@ where
                 velocity,
                 inside,
             });
-            let change = -value / self.slope(arc, root.function, length);
+            let slope = self.slope(arc, root.function, length);
+            let change = -value / slope;
             let next = (length + change) * h.signum();
-            if !(change.abs() < last && next >= 0.0 && next <= h.abs() + resolution)
+            if root.is_left_at_once(slope * h.signum())
+                || !(change.abs() < last && next >= 0.0 && next <= h.abs() + resolution)
                 || change.abs() <= 0.25 * resolution
             {
                 break;

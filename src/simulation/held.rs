@@ -94,6 +94,7 @@ where
             };
         };
         let names = steps.model().output_names();
+        steps.keep_outputs(names.len(), &node);
         let node = HeldNode {
             node,
             outputs: vec![0.0; names.len()],
@@ -113,7 +114,10 @@ where
     /// Sets an input from the node reached on. A name that the model does not declare, or a number that is not finite, changes nothing and stops the next step.
     pub fn set(&mut self, input: &str, value: f64) {
         match place(M::INPUTS, input) {
-            Ok(place) if value.is_finite() => self.cells.set(place, value),
+            Ok(place) if value.is_finite() => {
+                self.cells.set(place, value);
+                self.steps.set_inputs();
+            }
             Ok(_) => {
                 let name = input.to_owned();
                 self.refusal = Some(InputError::NotFinite { name, value });
@@ -202,6 +206,7 @@ where
                 });
             }
             self.cells.set(sampler.place, value);
+            self.steps.set_inputs();
             sampler.count += 1;
         }
         Ok(())
@@ -237,13 +242,8 @@ where
 
     fn observe(&mut self) {
         let HeldNode { node, outputs, .. } = &mut self.node;
-        if outputs.is_empty() {
-            return;
-        }
-        let (model, at) = (self.steps.model(), (&node.q, &node.p));
-        let seen = model.guarded(|| model.outputs(node.t, at, &node.v, outputs));
-        if seen.is_none() {
-            outputs.fill(f64::NAN);
+        if !outputs.is_empty() {
+            self.steps.outputs(node, outputs);
         }
     }
 }

@@ -197,7 +197,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     fn acting(impulses: &[L::Impulse], nodes: (f64, f64)) -> Vec<Impulse<N>>;
 
     /// Lets impulses act that do so between elements; whether there are any.
-    fn kick(&self, impulses: &[L::Impulse], t: f64, state: &mut L::State) -> bool;
+    fn kick(&self, impulses: &[L::Impulse], at: (f64, f64), state: &mut L::State) -> bool;
 
     /// Refuses a state from which a run cannot go on.
     ///

@@ -220,6 +220,7 @@ where
         if let Some(dense) = dense.as_ref().filter(|_| looks) {
             let arc = Passage {
                 t,
+                begin,
                 h,
                 before: &before,
                 after: state,

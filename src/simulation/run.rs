@@ -152,7 +152,7 @@ where
                 begin: mesh.begin(t, h),
                 impulses: mesh.impulses_in(t, next, is_last),
             };
-            let is_kicked = pieces.model.kick(&self.impulses, t, &mut state);
+            let is_kicked = pieces.model.kick(&self.impulses, (t, h), &mut state);
             let has_impulses = is_kicked || !planned.impulses.is_empty();
             recorder.begin(&*pieces.model, number, (t, h), &state, has_impulses);
             let passed = self.model.guarded(|| {

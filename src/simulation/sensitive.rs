@@ -362,7 +362,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             };
             let mut state = *severed.before;
             let length = severed.length;
-            probe.advance(severed.start, length, &mut state, severed.impulses)?;
+            probe.advance(severed.begin, length, &mut state, severed.impulses)?;
             let found = self.across(&mut probe, &[END]);
             self.probe = Some(probe);
             return found;

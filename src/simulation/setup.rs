@@ -290,7 +290,8 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Adds an impulse: a generalized force of the given time integral that acts at one instant. Inside an element it is weighted by the test
-    /// functions, at a node it changes the momentum there (`docs/theory.md`, impulses). The node at that instant shows the momentum before it.
+    /// functions, at a node it changes the momentum there (`docs/theory.md`, impulses). The node at that instant shows the momentum before it. A run that goes back in time takes it
+    /// away, as it does what any force gives.
     #[must_use]
     pub fn impulse(mut self, time: f64, impulse: [f64; N]) -> Self {
         self.impulses.push(Impulse {

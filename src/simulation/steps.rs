@@ -23,6 +23,7 @@ pub struct Steps<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     velocity: L::Vector,
     /// Nodes at events that are to be told yet.
     nodes: VecDeque<Result<Node<N, L>, RunErrorKind>>,
+    rows: Rows,
     watch: Watch,
     resolution: Resolution<'m, M, N, L>,
 }
@@ -42,6 +43,7 @@ pub(super) struct Way<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     model: Share<'m, M>,
     pub(super) course: Course<L::Stepper<'m, M>>,
     pub(super) state: L::State,
+    /// In the order in which the course meets them.
     impulses: Vec<L::Impulse>,
     /// None where no events are looked for.
     pub(super) pieces: Option<Box<Pieces<'m, M, N, L>>>,
@@ -68,8 +70,13 @@ where
         model: Share<'m, M>,
         beginning: Beginning<'m, M, N, L>,
         start: L::State,
-        impulses: Vec<L::Impulse>,
+        mut impulses: Vec<L::Impulse>,
     ) -> Self {
+        if let Ok((_, elements, _)) = &beginning {
+            let (.., h, _) = elements.element();
+            let place = |impulse: &L::Impulse| h.signum() * M::time_of(impulse);
+            impulses.sort_by(|a, b| place(a).total_cmp(&place(b)));
+        }
         let (way, pieces) = match beginning {
             Ok((stepper, elements, pieces)) => (Ok((stepper, elements)), pieces.map(Box::new)),
             Err(kind) => (Err(kind), None),
@@ -103,7 +110,7 @@ where
         pieces.events.met.clear();
         let advance = |stepper: &mut L::Stepper<'m, M>, leg: &Leg| {
             let (t, next) = leg.nodes;
-            pieces.model.kick(impulses, t, state);
+            pieces.model.kick(impulses, (t, leg.h), state);
             let impulses = M::acting(impulses, leg.nodes);
             let planned = Planned {
                 number: leg.number,
@@ -159,6 +166,7 @@ where
             way,
             velocity,
             nodes: VecDeque::new(),
+            rows: Rows::default(),
             watch,
             resolution: Resolution::new(again),
         }
@@ -177,6 +185,30 @@ where
         match &self.way.pieces {
             Some(pieces) => &pieces.model,
             None => &self.way.model,
+        }
+    }
+
+    /// Inputs of the model have other values from the next step on.
+    pub(super) fn set_inputs(&mut self) {
+        if let Some(pieces) = &mut self.way.pieces {
+            pieces.events.set_inputs();
+        }
+    }
+
+    /// From now on keeps so many outputs with each node that is to be told yet; those of this node are the first.
+    pub(super) fn keep_outputs(&mut self, count: usize, node: &Node<N, L>) {
+        let mut row = vec![0.0; count];
+        if count > 0 {
+            write_outputs(self.model(), node, &mut row);
+        }
+        self.rows.row = row;
+    }
+
+    /// The outputs at the node given last: of the model and with the inputs that it was passed with.
+    pub(super) fn outputs(&self, last: &Node<N, L>, values: &mut [f64]) {
+        match &self.way.pieces {
+            Some(_) => values.copy_from_slice(&self.rows.row),
+            None => write_outputs(&*self.way.model, last, values),
         }
     }
 
@@ -201,6 +233,7 @@ where
     fn look(&mut self) {
         let mut observer = Nodes {
             nodes: &mut self.nodes,
+            rows: &mut self.rows,
             velocity: &mut self.velocity,
             last: f64::NAN,
             watch: &mut self.watch,
@@ -240,7 +273,11 @@ where
             if self.nodes.is_empty() {
                 self.look();
             }
-            return self.nodes.pop_front();
+            let told = self.nodes.pop_front();
+            if matches!(told, Some(Ok(_))) {
+                self.rows.pop();
+            }
+            return told;
         }
         let Way {
             model,
@@ -254,7 +291,7 @@ where
         let velocity = &mut self.velocity;
         let advance = |stepper: &mut L::Stepper<'_, M>, leg: &Leg| {
             let (t, next) = leg.nodes;
-            let is_kicked = model.kick(impulses, t, state);
+            let is_kicked = model.kick(impulses, (t, leg.h), state);
             let impulses = M::acting(impulses, leg.nodes);
             let has_impulses = is_kicked || !impulses.is_empty();
             let before = state.clone();
@@ -289,9 +326,53 @@ where
     }
 }
 
+/// Outputs of the nodes that are to be told yet, where they are asked for.
+#[derive(Default)]
+struct Rows {
+    /// One row after the other.
+    queued: VecDeque<f64>,
+    /// Those of the node told last; none where outputs are not asked for.
+    row: Vec<f64>,
+}
+
+impl Rows {
+    /// Of a node that is told after all others.
+    fn push<M, const N: usize, L>(&mut self, model: &M, node: &Node<N, L>)
+    where
+        M: Simulated<N, L>,
+        L: Length<N>,
+    {
+        if !self.row.is_empty() {
+            write_outputs(model, node, &mut self.row);
+            self.queued.extend(&self.row);
+        }
+    }
+
+    /// The next node is told.
+    fn pop(&mut self) {
+        for value in &mut self.row {
+            *value = self.queued.pop_front().unwrap_or(f64::NAN);
+        }
+    }
+}
+
+/// The outputs at a node; NaN where they cannot be evaluated.
+fn write_outputs<M, const N: usize, L>(model: &M, node: &Node<N, L>, values: &mut [f64])
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    let at = (&node.q, &node.p);
+    let seen = model.guarded(|| model.outputs(node.t, at, &node.v, values));
+    if seen.is_none() {
+        values.fill(f64::NAN);
+    }
+}
+
 /// Lines up the nodes of an element.
 struct Nodes<'a, 'm, M, const N: usize, L: Length<N>> {
     nodes: &'a mut VecDeque<Result<Node<N, L>, RunErrorKind>>,
+    rows: &'a mut Rows,
     velocity: &'a mut L::Vector,
     /// The time of the last one.
     last: f64,
@@ -310,6 +391,7 @@ where
         self.watch.pass(Recorded::of(model, &node, false));
         self.velocity.clone_from(&node.v);
         self.last = node.t;
+        self.rows.push(model, &node);
         self.nodes.push_back(Ok(node));
     }
 }

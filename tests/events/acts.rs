@@ -612,3 +612,34 @@ fn parts_that_end_where_an_event_stops() {
         assert_eq!(ends.into_results(), whole.clone().into_results());
     }
 }
+
+/// A part that ends where it begins leaves the grid as it was.
+#[test]
+fn parts_without_a_length() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^4/4 + x*sin(3*t))]
+    struct Pushed;
+
+    let start = Pushed.state([1.0], [0.0]);
+    let simulation = Simulation::new(&Pushed).step(0.1);
+    let whole = simulation.run(start, 0.0..20.0).expect("a run");
+    let mut part = simulation.run(start, 0.0..8.0).expect("a run");
+    for _ in 0..2 {
+        let checkpoint = part.checkpoint().expect("complete");
+        part = simulation.resume(checkpoint, 8.0).expect("a run");
+        assert_eq!(part.states(), &whole.states()[80..=80]);
+    }
+    let checkpoint = part.checkpoint().expect("complete");
+    let rest = simulation.resume(checkpoint, 20.0).expect("a run");
+    assert_eq!(rest.states(), &whole.states()[80..]);
+
+    let starts = [1.0, 0.5, -0.3].map(|x| Pushed.state([x], [0.0]));
+    let ensemble = Ensemble::new(&Pushed).step(0.1);
+    let whole = ensemble.run(&starts, 0.0..20.0).expect("runs");
+    let mut parts = ensemble.begin(&starts, 0.0).expect("starts");
+    assert_eq!(parts.run_to(0.0).expect("runs").nodes().count(), 3);
+    let first = parts.run_to(8.0).expect("runs").into_results();
+    let again = parts.run_to(8.0).expect("runs").into_results();
+    assert_eq!(first, again);
+    let last = parts.run_to(20.0).expect("runs");
+    assert_eq!(last.into_results(), whole.into_results());
+}

@@ -314,3 +314,87 @@ fn sections_see_what_acts_on_their_surface() {
     }
     assert_eq!(count, 3);
 }
+
+/// Impulses act in the order of time, whatever the order in which they were declared: before an event in their element, too.
+#[test]
+fn impulses_before_an_event_act_in_order() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, event(place) = x - 0.05)]
+    struct Free;
+
+    let start = Free.state([0.0], [1.0]);
+    let simulation = Simulation::new(&Free)
+        .step(0.1)
+        .impulse(0.08, [1.0])
+        .impulse(0.02, [1.0])
+        .on("place", Crossing::Rising, |event| {
+            Act::Restart(event.state())
+        });
+    let motion = simulation.run(start, 0.0..0.2).expect("a run");
+    let nodes = &motion.states()[1..];
+    let steps: Vec<_> = simulation
+        .steps(start, 0.0)
+        .take(nodes.len())
+        .map(|node| node.expect("a step"))
+        .collect();
+    assert!(nodes.len() >= 4, "{nodes:?}");
+    for (step, node) in steps.iter().zip(nodes) {
+        let is_near = |a: f64, b: f64| (a - b).abs() < 1e-13;
+        assert!(
+            is_near(step.t, node.t)
+                && is_near(step.q[0], node.q[0])
+                && is_near(step.p[0], node.p[0]),
+            "{step:?} for {node:?}"
+        );
+    }
+    // One of the two has acted, then x = 0.02 + 2 (t − 0.02).
+    let at = steps[0];
+    assert!((at.p[0] - 2.0).abs() < 1e-13, "{at:?}");
+    assert!((at.t - 0.035).abs() < 1e-4 && (at.q[0] - 0.05).abs() < 1e-4);
+    let last = steps[steps.len() - 1];
+    assert!((last.p[0] - 3.0).abs() < 1e-13, "{last:?}");
+    let mut points = simulation.section("place", Crossing::Rising, start, 0.0);
+    let point = points.next().expect("a point").expect("a point");
+    assert!((point.p[0] - 2.0).abs() < 1e-13, "{point:?}");
+}
+
+/// An element with a point at its start that begins at a break finds the force behind it, up to an event, too.
+#[test]
+fn events_behind_a_break() {
+    #[dynamics(
+        coordinates(x),
+        lagrangian = dot(x)^2/2,
+        force(x) = select(t <= 0.5, 1, 0),
+        event(place) = x - 0.14,
+    )]
+    struct Pushed;
+
+    let start = Pushed.state([0.0], [0.0]);
+    let simulation = Simulation::new(&Pushed)
+        .element(Element::primal(3).lobatto())
+        .step(0.1)
+        .break_at(0.5)
+        .on("place", Crossing::Rising, |_| Act::Stop);
+    let is_there = |t: f64, x: f64, p: f64| {
+        // x = 1/8 with the velocity 1/2 at the break.
+        assert!(
+            (t - 0.53).abs() < 1e-13 && (x - 0.14).abs() < 1e-13 && (p - 0.5).abs() < 1e-13,
+            "t = {t}, x = {x}, p = {p}"
+        );
+    };
+    let motion = simulation.run(start, 0.0..1.0).expect("a run");
+    let last = motion.last();
+    is_there(last.t, last.q[0], last.p[0]);
+    let last = simulation.steps(start, 0.0).last();
+    let last = last.expect("a step").expect("a step");
+    is_there(last.t, last.q[0], last.p[0]);
+    // The momentum there does not depend on when the event comes.
+    let sensitive = simulation.run_sensitive(start, 0.0..1.0).expect("a run");
+    let slopes = sensitive.by_start().last();
+    let expected = [[1.0, 0.0], [0.0, 0.0]];
+    for (a, row) in expected.iter().enumerate() {
+        for (b, expected) in row.iter().enumerate() {
+            let slope = slopes[(a, b)];
+            assert!((slope - expected).abs() < 1e-11, "({a}, {b}): {slope}");
+        }
+    }
+}

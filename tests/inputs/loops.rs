@@ -124,3 +124,90 @@ fn feedback_is_sampled_at_late_times() {
     }
     assert_eq!(asked.load(Ordering::Relaxed), 20);
 }
+
+/// What is set may make an event at once: nothing is left of what was proved with the input before.
+#[test]
+fn events_of_what_is_held_are_met() {
+    #[dynamics(
+        coordinates(theta),
+        lagrangian = dot(theta)^2/2 + cos(theta),
+        input(limit),
+        event(trip) = limit - theta,
+    )]
+    struct Guarded;
+
+    let hold = |speed: f64| {
+        Simulation::new(&Guarded)
+            .step(0.01)
+            .on("trip", Crossing::Falling, |_| Act::Stop)
+            .hold(Guarded.state([0.0], [speed]), 0.0)
+            .expect("a loop")
+    };
+    // On its way up, and on its way down, on which it comes below the limit within the step.
+    for (speed, below) in [(0.5, 0.05), (-0.5, 0.05), (-0.5, 0.003)] {
+        let mut run = hold(speed);
+        run.set("limit", 2.0);
+        for _ in 0..20 {
+            run.advance().expect("a step");
+        }
+        let node = run.node().clone();
+        run.set("limit", node.q[0] - below);
+        run.advance().expect("a step");
+        let end = run.node();
+        assert_eq!((end.t, end.q), (node.t, node.q), "{speed}, {below}");
+        assert!(matches!(run.advance(), Err(RunErrorKind::Ended { .. })));
+    }
+    let mut run = hold(0.5);
+    let law = |node: &HeldNode<1>| match node.t < 0.15 {
+        true => 2.0,
+        false => node.q[0] - 0.05,
+    };
+    run.sample("limit", 0.1, law).expect("an input");
+    for _ in 0..20 {
+        run.advance().expect("a step");
+    }
+    let time = run.node().t;
+    run.advance().expect("a step");
+    assert_eq!(run.node().t, time);
+    assert!(run.advance().is_err());
+}
+
+/// The outputs of nodes at an event that sets a parameter are those of either side, with the inputs of their step.
+#[test]
+fn outputs_of_a_loop_are_those_of_each_node() {
+    #[dynamics(
+        coordinates(x),
+        lagrangian = dot(x)^2/2,
+        input(u),
+        force(x) = k*u,
+        event(line) = x - 0.75,
+        output(gain) = k,
+        output(pushed) = u,
+    )]
+    struct Mass {
+        k: f64,
+    }
+
+    let mass = Mass { k: 1.0 };
+    let mut run = Simulation::new(&mass)
+        .step(0.3)
+        .on("line", Crossing::Rising, |_| {
+            Act::Set(tfe::Settings::new("k", 2.0))
+        })
+        .hold(mass.state([0.0], [1.0]), 0.0)
+        .expect("a loop");
+    assert_eq!(run.node().output("gain"), Some(1.0));
+    // Nodes at 0.3, 0.6, two at 0.75, at 0.9 and 1.2; the input is set between those at 0.75.
+    let gains = [1.0, 1.0, 1.0, 2.0, 2.0, 2.0];
+    let inputs = [0.0, 0.0, 0.0, 0.0, 0.0, 5.0];
+    for (number, (gain, input)) in gains.into_iter().zip(inputs).enumerate() {
+        run.advance().expect("a step");
+        let node = run.node();
+        assert_eq!(node.output("gain"), Some(gain), "{node:?}");
+        assert_eq!(node.output("pushed"), Some(input), "{node:?}");
+        if number == 2 {
+            assert!((node.t - 0.75).abs() < 1e-12, "{node:?}");
+            run.set("u", 5.0);
+        }
+    }
+}

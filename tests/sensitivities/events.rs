@@ -209,3 +209,40 @@ fn losses_of_the_time_of_an_event_move_with_it() {
     let kind = error.kind();
     assert!(matches!(kind, RunErrorKind::Loss { .. }), "{kind}");
 }
+
+/// An impulse moves in an element whose end an event decides: that is told, and with a node there the derivatives are right.
+#[test]
+fn impulses_beside_events_are_at_nodes() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, event(wall) = x - 0.12)]
+    struct Free;
+    let start = Free.state([0.0], [1.0]);
+    let run =
+        Simulation::new(&Free)
+            .step(0.1)
+            .impulse(0.05, [1.0])
+            .on("wall", Crossing::Either, |_| Act::Stop);
+    let told = run.run_sensitive(start, 0.0..1.0).expect_err("refused");
+    assert!(told.to_string().contains("break_at(0.05)"), "{told}");
+    // t* = 0.05 + (0.12 − x₀ − 0.05)/2
+    let s = run.break_at(0.05).run_sensitive(start, 0.0..1.0);
+    let s = s.expect("derivatives");
+    assert!((s.motion().last().t - 0.085).abs() < 1e-14);
+    let by_start = s.motion().last();
+    assert!((by_start.q[0] - 0.12).abs() < 1e-14);
+}
+
+/// Losses of micrometres are those of metres.
+#[test]
+fn losses_of_small_numbers_have_their_gradients() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2)]
+    struct Free;
+    for size in [1.0, 1e-6, 1e-12] {
+        let run = Simulation::new(&Free).step(0.1);
+        let loss = Loss::at_end(|node: &tfe::Node<1>| 1.0 / node.q[0]);
+        let found = run.gradient(Free.state([size], [size]), 0.0..1.0, &loss);
+        let (_, gradient) = found.expect("a gradient");
+        let expected = -0.25 / (size * size);
+        let q = gradient.by_start().q[0];
+        assert!((q - expected).abs() < 1e-8 * expected.abs(), "{size}: {q}");
+    }
+}

@@ -212,6 +212,63 @@ struct Free {
     m: f64,
 }
 
+/// Back in time an impulse is taken away again: at nodes, inside elements, on constraints and on a linear model.
+#[test]
+fn impulses_back_in_time_are_undone() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + cos(x))]
+    struct Pendulum;
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
+    struct Linear;
+    #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - y, constraint(rod) = x^2 + y^2 - 1)]
+    struct Rod;
+    fn check<M: Model<N>, const N: usize>(model: &M, start: State<N>, impulse: [f64; N], by: f64) {
+        for (element, inside) in [
+            (Mixed::<8>.into(), false),
+            (Mixed::<8>.into(), true),
+            (Element::primal(6), false),
+        ] {
+            let run = Simulation::new(model).element(element).step(0.05);
+            let run = run.impulse(0.4 + if inside { 0.02 } else { 0.0 }, impulse);
+            let run = if inside {
+                run.impulse(0.42, impulse)
+            } else {
+                run.break_at(0.4)
+            };
+            let forth = run.run(start, 0.0..1.0).expect("a run");
+            let back = run.run(forth.last().state(), 1.0..0.0).expect("a run");
+            let end = back.last();
+            for a in 0..N {
+                let off = (end.q[a] - start.q[a])
+                    .abs()
+                    .max((end.p[a] - start.p[a]).abs());
+                assert!(off < by, "{element} {inside}: {off:e}");
+            }
+        }
+    }
+    // Symmetric elements go back on themselves.
+    check(&Pendulum, Pendulum.state([0.3], [0.7]), [1.5], 1e-12);
+    check(&Linear, Linear.state([0.3], [0.7]), [1.5], 1e-12);
+    check(&Rod, Rod.state([0.6, -0.8], [0.8, 0.6]), [0.8, 0.6], 1e-11);
+    let chain = Chain { n: 3 };
+    let start = chain.state([0.1, 0.2, 0.4], [0.0; 3]);
+    let run = Simulation::new(&chain)
+        .step(0.05)
+        .impulse(0.4, [1.0, 0.0, -2.0]);
+    let forth = run.run(start.clone(), 0.0..1.0).expect("a run");
+    let back = run.run(forth.last().state(), 1.0..0.0).expect("a run");
+    for a in 0..3 {
+        assert!((back.last().p[a] - start.p[a]).abs() < 1e-12);
+    }
+}
+
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2 + cos(q[i])) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2),
+)]
+struct Chain {
+    n: usize,
+}
+
 #[test]
 fn impulses_change_momentum_and_are_weighted_inside_elements() {
     let model = Free { m: 2.0 };

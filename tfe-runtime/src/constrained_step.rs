@@ -145,7 +145,7 @@ where
         layout,
         rows,
         parts.active,
-        total(impulses),
+        total(impulses, h),
     );
     let control = method.control.with_constraints();
     let beginning = if warm {

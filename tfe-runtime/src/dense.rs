@@ -93,7 +93,7 @@ impl<const N: usize> DenseElement<N> {
             let mut values = [0.0; MAX_RATES];
             legendre(interval.place(impulse), &mut values);
             for (m, row) in p.iter_mut().enumerate() {
-                let weight = (2 * m + 1) as f64 * values[m];
+                let weight = interval.length.signum() * ((2 * m + 1) as f64 * values[m]);
                 for a in 0..N {
                     row[a] += weight * impulse.value[a];
                 }

@@ -177,7 +177,8 @@ impl<S: Differentiable> Real for Dual<S> {
     fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
         const DISTANCE: f64 = 6e-6;
         let value = self.value.map(function);
-        let distance = self.value.map(&mut |x| DISTANCE * x.abs().max(1.0));
+        let distance =
+            (self.value).map(&mut |x| DISTANCE * Real::powf(x.abs().max(1.0), 1.0 / 3.0));
         let (before, after) = (self.value - distance, self.value + distance);
         let rate = (after.map(function) - before.map(function)) / (after - before);
         self.chain(value, rate)
@@ -301,7 +302,8 @@ impl<S: Differentiable> Real for Dual<S> {
         let by_base = exponent.value * Real::powf(self.value, exponent.value - number(1.0));
         let mut result = self.chain(value, by_base);
         let by_exponent = value * Real::ln(self.value) * exponent.slope;
-        result.slope += unless_zero(exponent.slope, by_exponent);
+        // Where the power vanishes the logarithm is infinite, and the slope zero.
+        result.slope += unless_zero(value * exponent.slope, by_exponent);
         result
     }
     fn less(self, other: Self) -> S::Mask {

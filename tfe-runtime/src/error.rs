@@ -296,6 +296,11 @@ pub enum TransitionError {
     Step(StepError),
     /// No step has been done whose matrix could be meant.
     NoStep,
+    /// An impulse acts inside an element whose start or end moves, as at an event: that it moves in the element is not differentiated.
+    MovedImpulse {
+        /// When it acts.
+        time: f64,
+    },
     /// The result needs more room.
     Shape {
         /// Numbers that are needed.
@@ -323,6 +328,10 @@ impl fmt::Display for TransitionError {
             Self::Element(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
             Self::NoStep => f.write_str("no step has been done"),
+            Self::MovedImpulse { time } => write!(
+                f,
+                "the impulse at {time} acts inside an element that an event cuts: let one end there, `break_at({time})`"
+            ),
             Self::Shape { needed, given } => {
                 write!(
                     f,

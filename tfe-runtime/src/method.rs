@@ -29,7 +29,7 @@ pub struct Interval<'a, const N: usize> {
     pub start: f64,
     /// Length h; negative to go back in time.
     pub length: f64,
-    /// Impulses inside, each weighted by the test functions (T-49).
+    /// Impulses inside, each weighted by the test functions (T-49); taken away where the element goes back in time.
     pub impulses: &'a [Impulse<N>],
 }
 
@@ -168,7 +168,7 @@ where
     matches!(M::FORM, Form::Hamiltonian) && M::CONSTRAINTS.is_empty()
 }
 
-/// ω_i(τ*) J for every row.
+/// ω_i(τ*) J for every row, −ω_i(τ*) J back in time.
 pub(crate) fn set_kicks<const N: usize>(
     scheme: &SchemeRef<'_>,
     interval: &Interval<'_, N>,
@@ -178,7 +178,7 @@ pub(crate) fn set_kicks<const N: usize>(
     for impulse in interval.impulses {
         let tau = interval.place(impulse);
         for (i, kick) in kicks.iter_mut().enumerate() {
-            let weight = scheme.impulse_weight(i, tau);
+            let weight = interval.length.signum() * scheme.impulse_weight(i, tau);
             for a in 0..N {
                 kick[a] += weight * impulse.value[a];
             }
@@ -186,12 +186,12 @@ pub(crate) fn set_kicks<const N: usize>(
     }
 }
 
-/// The sum of impulses.
-pub(crate) fn total<const N: usize>(impulses: &[Impulse<N>]) -> [f64; N] {
+/// What the impulses in an element of length `h` add to the momenta.
+pub(crate) fn total<const N: usize>(impulses: &[Impulse<N>], h: f64) -> [f64; N] {
     let mut sum = [0.0; N];
     for impulse in impulses {
         for a in 0..N {
-            sum[a] += impulse.value[a];
+            sum[a] += h.signum() * impulse.value[a];
         }
     }
     sum
@@ -348,7 +348,7 @@ pub(crate) fn end_of<const N: usize>(
         let force = integral(scheme.weights, scheme.weights_low, forces, a);
         let mut impulse = span.low.p[a];
         for one in impulses {
-            impulse += one.value[a];
+            impulse += span.h.signum() * one.value[a];
         }
         let moved = |start: f64, rate: DoubleDouble, low: f64| {
             let change = rate.times(h).plus(DoubleDouble::new(low));

@@ -266,6 +266,12 @@ pub trait Model<const N: usize> {
     ) {
     }
 
+    /// Whether the kernels ask the same functions for what is not a parameter as those of another model of the type do: runs of both may go side by side. Models whose inputs are given
+    /// ([`Controlled`](crate::Controlled)) may differ in them.
+    fn shares_inputs(&self, _other: &Self) -> bool {
+        true
+    }
+
     /// The number of parameters: fields that are numbers, and the elements of fields that are arrays of numbers, in the order of the struct. Zero for models of hand-written
     /// kernels that do not say. Kernels of those that do make each parameter by [`Real::parameter`], so that numbers may carry derivatives by it, or the values of other models.
     fn parameters(&self) -> usize {

@@ -8,9 +8,24 @@ use alloc::vec::Vec;
 
 use crate::method::sum;
 use crate::model::State;
+use crate::real::Real;
 
-/// A start so far away that constant forces take no digits from what it does. A power of two.
-const FAR: f64 = (1_u64 << 40) as f64;
+/// A start so far away that constant increments of such a size take no digits from what it does. A power of two.
+fn far(constant: &[f64]) -> f64 {
+    const FAR: i32 = 40;
+    const FARTHEST: i32 = 900;
+    let size = constant
+        .iter()
+        .fold(1.0, |size: f64, one| size.max(one.abs()));
+    Real::powi(2.0, (FAR + exponent(size)).min(FARTHEST))
+}
+
+/// e of 2ᵉ ≤ size < 2ᵉ⁺¹, for a size of at least one.
+fn exponent(size: f64) -> i32 {
+    const BITS: u32 = f64::MANTISSA_DIGITS - 1;
+    const BIAS: i32 = f64::MAX_EXP - 1;
+    (size.to_bits() >> BITS) as i32 - BIAS
+}
 
 /// The increment of a step as a function of its start.
 #[derive(Clone, Debug)]
@@ -31,20 +46,23 @@ impl<const N: usize> Propagator<N> {
     ) -> Result<Self, E> {
         let mut columns = vec![0.0; 2 * N * (2 * N + 1)];
         let constant = step(&State::ZERO)?;
+        let (far_p, far_q) = (far(&constant.p), far(&constant.q));
         let (matrix, last) = columns.split_at_mut(4 * N * N);
         last[..N].copy_from_slice(&constant.p);
         last[N..].copy_from_slice(&constant.q);
         for (k, column) in matrix.chunks_exact_mut((2 * N).max(1)).enumerate() {
             let mut start = State::ZERO;
-            if k < N {
-                start.p[k] = FAR;
+            let far = if k < N {
+                start.p[k] = far_p;
+                far_p
             } else {
-                start.q[k - N] = FAR;
-            }
+                start.q[k - N] = far_q;
+                far_q
+            };
             let increment = step(&start)?;
             for a in 0..N {
-                column[a] = (increment.p[a] - constant.p[a]) / FAR;
-                column[N + a] = (increment.q[a] - constant.q[a]) / FAR;
+                column[a] = (increment.p[a] - constant.p[a]) / far;
+                column[N + a] = (increment.q[a] - constant.q[a]) / far;
             }
         }
         Ok(Self {

@@ -287,6 +287,9 @@ where
             length: last.h,
             impulses,
         };
+        if let Some(time) = moved_impulse(&interval, directions) {
+            return Err(TransitionError::MovedImpulse { time });
+        }
         set_kicks(&scheme, &interval, parts.kicks);
         // The factors of a linear model are overwritten with equal ones, but that is not promised.
         memory.forget_factors();
@@ -333,7 +336,7 @@ where
                 layout,
                 rows,
                 parts.active,
-                total(impulses),
+                total(impulses, last.h),
             );
             let x = &*parts.unknowns;
             let linearised = wanted.of_constrained(&mut form, x, directions, system);
@@ -381,4 +384,14 @@ where
         }
         Ok(())
     }
+}
+
+/// The time of an impulse whose place τ in the element changes with one of the directions.
+fn moved_impulse<const N: usize>(
+    interval: &Interval<'_, N>,
+    directions: &[Direction],
+) -> Option<f64> {
+    let moves = |tau: f64| (directions.iter()).any(|one| one.time + tau * one.length != 0.0);
+    let moved = (interval.impulses.iter()).find(|impulse| moves(interval.place(impulse)));
+    moved.map(|impulse| impulse.time)
 }

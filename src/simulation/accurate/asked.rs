@@ -272,7 +272,7 @@ where
         mesh: &Mesh<N>,
         state: &mut L::State,
     ) -> Result<(), StepError> {
-        self.model.kick(&self.impulses, t, state);
+        self.model.kick(&self.impulses, (t, h), state);
         let impulses = mesh.impulses_in(t, next, mesh.end() == Some(next));
         let element = (mesh.begin(t, h), h);
         // Of a panic the motion that is recorded tells, which is the first.

@@ -13,6 +13,14 @@ pub(super) struct Root {
     pub(super) rises: bool,
 }
 
+impl Root {
+    /// Whether the function has jumped over zero at the start, and with this slope goes back: where it vanishes next is another root.
+    pub(super) fn is_left_at_once(&self, slope: f64) -> bool {
+        let back = if self.rises { -slope } else { slope };
+        self.tau == 0.0 && back > 0.0
+    }
+}
+
 /// Where a function is on no side at first it is looked at closer to the start, in parts of the first sample of 4⁻¹, 4⁻², …
 const CLOSER: i32 = 12;
 

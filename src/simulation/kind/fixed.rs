@@ -237,7 +237,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         impulses.iter().filter(acts).copied().collect()
     }
 
-    fn kick(&self, _: &[Impulse<N>], _: f64, _: &mut State<N>) -> bool {
+    fn kick(&self, _: &[Impulse<N>], _: (f64, f64), _: &mut State<N>) -> bool {
         false
     }
 

@@ -225,11 +225,16 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         Vec::new()
     }
 
-    fn kick(&self, impulses: &[(f64, Vec<f64>)], t: f64, state: &mut FamilyState) -> bool {
+    fn kick(
+        &self,
+        impulses: &[(f64, Vec<f64>)],
+        (t, h): (f64, f64),
+        state: &mut FamilyState,
+    ) -> bool {
         let mut is_kicked = false;
         for (_, impulse) in impulses.iter().filter(|(time, _)| is_same_time(*time, t)) {
             for (p, change) in state.p.iter_mut().zip(impulse) {
-                *p += change;
+                *p += h.signum() * change;
             }
             is_kicked = true;
         }

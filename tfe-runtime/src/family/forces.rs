@@ -275,8 +275,9 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
                 }
             }
             if outcome.converged {
-                evidence.check(self.control.solve)?;
-                return Ok(outcome);
+                // The matrix of a root that is refused proves none that is looked for from it.
+                let proof = evidence.check(self.control.solve);
+                return proof.map(|()| outcome).inspect_err(|_| tangent.forget());
             }
             // The first increment alone tells no rate: an old matrix may show a second one.
             let untried = known && outcome.iterations == 1;

@@ -322,7 +322,9 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             evidence.see(increment, own);
             match monitor.judge(increment) {
                 Ok(Verdict::Converged) => return evidence.check(self.control.solve),
-                Ok(Verdict::GoOn) if monitor.is_noise(fresh) => return Ok(()),
+                Ok(Verdict::GoOn) if monitor.is_noise(fresh) => {
+                    return evidence.check(self.control.solve);
+                }
                 Ok(Verdict::GoOn) => {}
                 Err(error) => {
                     self.matrix.forget();

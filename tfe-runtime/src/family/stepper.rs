@@ -81,7 +81,14 @@ impl<M> Way<M> {
 pub struct Suspended {
     element: Element,
     length: usize,
+    /// Those of the model, to the bit.
+    parameters: Vec<u64>,
     way: Way<()>,
+}
+
+fn parameters<M: Model>(model: &M) -> Vec<u64> {
+    let bits = |index| model.parameter(index).to_bits();
+    (0..model.parameters()).map(bits).collect()
 }
 
 impl Suspended {
@@ -142,11 +149,13 @@ impl<'m, M: Model> Stepper<'m, M> {
         Suspended {
             element: self.element,
             length: self.length,
+            parameters: parameters(&*self.model),
             way: self.way.hand_over(()),
         }
     }
 
-    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where that had another element, length or way to solve.
+    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where that had another element, length or way to
+    /// solve, or other parameters.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -158,7 +167,9 @@ impl<'m, M: Model> Stepper<'m, M> {
     ) -> Result<Self, ModelError> {
         model.check()?;
         let mut way = suspended.way.hand_over(model.clone());
-        let is_same = suspended.element == element && suspended.length == model.len();
+        let is_same = suspended.element == element
+            && suspended.length == model.len()
+            && suspended.parameters == parameters(&*model);
         if !is_same || way.control_mut().solve != control.solve {
             return Self::sharing(model, element, control);
         }

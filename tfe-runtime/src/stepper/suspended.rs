@@ -15,7 +15,14 @@ use alloc::vec::Vec;
 #[derive(Clone, Debug)]
 pub struct Suspended<const N: usize> {
     element: Element,
+    /// Those of the model, to the bit.
+    parameters: Vec<u64>,
     carried: Carried<N>,
+}
+
+fn parameters<M: Model<N>, const N: usize>(model: &M) -> Vec<u64> {
+    let bits = |index| model.parameter(index).to_bits();
+    (0..model.parameters()).map(bits).collect()
 }
 
 impl<const N: usize> Suspended<N> {
@@ -35,11 +42,12 @@ where
     pub fn suspend(self) -> Suspended<N> {
         Suspended {
             element: self.table.element(),
+            parameters: parameters(&*self.model),
             carried: self.carried,
         }
     }
 
-    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet.
+    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where the model had other parameters.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -48,6 +56,9 @@ where
         control: Control,
         suspended: Suspended<N>,
     ) -> Result<Self, ElementError> {
+        if suspended.parameters != parameters(&*model) {
+            return Self::sharing(model, suspended.element, control);
+        }
         let mut carried = suspended.carried;
         carried.memory.statistics = Statistics::NONE;
         Ok(Self {
