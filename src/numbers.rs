@@ -17,6 +17,15 @@ impl fmt::Display for Short {
     }
 }
 
+/// A number in a table with so many decimals, or with an exponent where these would say little.
+pub(crate) fn digits(number: f64, decimals: usize) -> String {
+    if number == 0.0 || (1e-2..1e9).contains(&number.abs()) {
+        format!("{number:.decimals$}")
+    } else {
+        format!("{number:.decimals$e}")
+    }
+}
+
 /// The larger one; NaN if one is, which `f64::max` would drop: `errors.fold(0.0, larger)`.
 pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }

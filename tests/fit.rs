@@ -271,6 +271,67 @@ fn bounds_hold() {
     assert!(g <= 9.5 && g > 9.499, "{g}");
 }
 
+/// However wide a range is, the fit begins where the model does: far from there the oscillator is out of phase.
+#[test]
+fn wide_bounds_do_not_move_the_first_values() {
+    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k*x^2/2)]
+    struct Oscillator {
+        k: f64,
+    }
+    let truth = Oscillator { k: 10.3 };
+    let start = truth.state([1.0], [0.0]);
+    let times: Vec<f64> = (1..=40).map(|k| 0.25 * f64::from(k)).collect();
+    let measured: Vec<f64> = times.iter().map(|t| (t * truth.k.sqrt()).cos()).collect();
+    let guess = Oscillator { k: 10.0 };
+    let fit = |low: f64, high: f64| {
+        let fit = Fit::new(&guess).start(start, 0.0).step(0.05);
+        let fit = fit.parameters(["k"]).bounds("k", low..=high);
+        fit.output("x", &times, &measured).solve().expect("a fit")
+    };
+    for (low, high) in [
+        (0.0, 1e4),
+        (0.0, 1e9),
+        (0.0, f64::INFINITY),
+        (-1e6, f64::INFINITY),
+        (-1e6, 1e6),
+        (10.0, 1e3),
+        (9.999_999, 1e9),
+        (f64::NEG_INFINITY, 1e5),
+    ] {
+        let fit = fit(low, high);
+        let first = fit.trials()[0].values[0];
+        let off = (first - 10.0).abs();
+        // A first value at an end of its range begins a little inside.
+        let inside = if low == 10.0 { 0.2 } else { 1e-9 };
+        assert!(off <= inside, "{low} to {high}: {first}");
+        let k = fit.value("k").expect("named");
+        assert!((k - 10.3).abs() < 1e-8, "{low} to {high}: {k}");
+    }
+}
+
+/// A fit that ends since all runs nearby fail has found nothing: a rod of another length does not hold the start.
+#[test]
+fn runs_that_fail_nearby_are_no_end() {
+    #[dynamics(
+        coordinates(x, y),
+        lagrangian = (dot(x)^2 + dot(y)^2)/2 - 9.81*y,
+        constraint(rod) = x^2 + y^2 - l^2,
+    )]
+    struct Rod {
+        l: f64,
+    }
+    let guess = Rod { l: 1.0 };
+    let start = guess.state([0.6, -0.8], [0.0, 0.0]);
+    let times: Vec<f64> = (1..=20).map(|k| 0.1 * f64::from(k)).collect();
+    let measured: Vec<f64> = times.iter().map(|t| 0.5 * (2.8 * t).cos()).collect();
+    let fit = Fit::new(&guess).start(start, 0.0).step(0.02);
+    let fit = fit.parameters(["l"]).output("x", &times, &measured);
+    let told = fit.solve().map(|fit| fit.to_string()).expect_err("no fit");
+    let is_told =
+        matches!(&told, FitError::NotConverged { why, .. } if why.contains("runs nearby fail"));
+    assert!(is_told, "{told}");
+}
+
 #[test]
 fn what_cannot_be_fitted_is_told() {
     let (times, measured) = (times(), heights());

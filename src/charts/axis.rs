@@ -72,6 +72,20 @@ impl Axis {
         })
     }
 
+    /// Whether an axis that begins here without a range of its own can be.
+    pub(super) fn check_start(&self, start: f64) -> Result<(), ChartError> {
+        match self.range {
+            None if self.scale == Scale::Logarithmic && start <= 0.0 => Err(self.not_positive()),
+            _ => Ok(()),
+        }
+    }
+
+    fn not_positive(&self) -> ChartError {
+        ChartError::NotPositive {
+            axis: self.label.clone(),
+        }
+    }
+
     fn checked(&self, range: &Range<f64>) -> Result<(f64, f64), ChartError> {
         let (start, end) = (range.start, range.end);
         if !(start.is_finite() && end.is_finite() && start < end) {
@@ -82,9 +96,7 @@ impl Axis {
             });
         }
         if self.scale == Scale::Logarithmic && start <= 0.0 {
-            return Err(ChartError::NotPositive {
-                axis: self.label.clone(),
-            });
+            return Err(self.not_positive());
         }
         Ok((start, end))
     }
@@ -104,9 +116,7 @@ impl Axis {
         }
         match self.scale {
             _ if !any => Err(ChartError::NoData),
-            _ if low > high => Err(ChartError::NotPositive {
-                axis: self.label.clone(),
-            }),
+            _ if low > high => Err(self.not_positive()),
             Scale::Linear => Ok(widened_linear(low, high, margin)),
             Scale::Logarithmic => Ok(widened_logarithmic(low, high, margin)),
         }

@@ -305,9 +305,13 @@ impl HeatMap {
 
     fn extents(&self) -> Result<(Extent, Extent), ChartError> {
         self.check_cells()?;
-        let ends = |count: usize| [0.0, count as f64].into_iter();
-        let x = self.x.extent(ends(self.columns), 0.0)?;
-        let y = self.y.extent(ends(self.rows), 0.0)?;
+        let extent = |axis: &Axis, count: usize| {
+            // Numbers of cells begin at zero.
+            axis.check_start(0.0)?;
+            axis.extent([0.0, count as f64].into_iter(), 0.0)
+        };
+        let x = extent(&self.x, self.columns)?;
+        let y = extent(&self.y, self.rows)?;
         Ok((x, y))
     }
 
@@ -359,7 +363,7 @@ impl HeatMap {
 
     fn has_missing(&self) -> bool {
         match &self.cells {
-            Cells::Values(values) => values.iter().any(Option::is_none),
+            Cells::Values(values) => !values.iter().all(|one| one.is_some_and(f64::is_finite)),
             Cells::Classes(indices, _) => indices.iter().any(Option::is_none),
         }
     }

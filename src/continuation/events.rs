@@ -45,11 +45,26 @@ pub(super) struct Circumstances<'a> {
 /// branch           ±∏ (μ_i − 1) / (|μ_i| + 1) ,   the sign that of the determinant of all equations
 /// ```
 ///
-/// over the multipliers that are not trivial. The denominators keep the functions bounded and have no zeros. The determinant changes
+/// over the multipliers that are not trivial, with the size of the smallest factor. The denominators keep the factors bounded and have no zeros. The determinant changes
 /// sign where branches cross, not at folds, where the product does; only together do they tell the two apart and show by how much.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tests {
     values: [f64; 4],
+}
+
+/// A product of factors none of which is larger than one, as a number that changes its sign where the product does: the smallest factor, turned as the product is. The
+/// product of many is rounding though none is near a zero.
+fn product(factors: impl Iterator<Item = Complex<f64>>) -> f64 {
+    let (mut turned, mut least) = (Complex::new(1.0, 0.0), 1.0_f64);
+    for factor in factors {
+        let size = factor.norm();
+        if size == 0.0 {
+            return 0.0;
+        }
+        turned *= factor / size;
+        least = least.min(size);
+    }
+    turned.re * least
 }
 
 impl Tests {
@@ -62,15 +77,12 @@ impl Tests {
             let factors = others
                 .iter()
                 .map(|one| beside(one.log_modulus, unit(one), by));
-            factors.product::<Complex<f64>>().re
+            product(factors)
         };
         let torus = if at.symplectic {
             1.0
         } else {
-            pairs(&others)
-                .map(|(one, other)| product_beside_one(one, other))
-                .product::<Complex<f64>>()
-                .re
+            product(pairs(&others).map(|(one, other)| product_beside_one(one, other)))
         };
         Self {
             values: [at.slope, shifted(-1.0), torus, at.sign * shifted(1.0).abs()],
@@ -249,6 +261,32 @@ mod tests {
                     .iter()
                     .all(|kind| tests.value(*kind).is_finite())
             );
+        }
+    }
+
+    #[test]
+    fn many_multipliers_hide_no_event() {
+        let others: Vec<Multiplier> = (0..18)
+            .flat_map(|k| {
+                let angle = 0.1 + 0.15 * f64::from(k);
+                [multiplier(0.98, angle), multiplier(0.98, -angle)]
+            })
+            .collect();
+        let with = |modulus: f64, angle: f64| {
+            let mut all = others.clone();
+            all.push(multiplier(modulus, angle));
+            if angle != 0.0 && angle != PI {
+                all.push(multiplier(modulus, -angle));
+            }
+            at(1.0, &all)
+        };
+        for (angle, kind) in [
+            (PI, EventKind::PeriodDoubling),
+            (0.0, EventKind::Branch),
+            (1.77, EventKind::Torus),
+        ] {
+            check(&with(0.99, angle), &with(1.01, angle), &[kind]);
+            check(&with(0.97, angle), &with(0.99, angle), &[]);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What a fit has found.
 
 use crate::motion::Motion;
-use crate::numbers::norm;
+use crate::numbers::{digits, norm};
 use nalgebra::DMatrix;
 use std::fmt;
 use tfe_runtime::State;
@@ -99,8 +99,9 @@ impl<M, const N: usize> fmt::Display for Fitted<M, N> {
             let deviation = self.deviations[place];
             writeln!(
                 f,
-                "{name:<widest$}  {:>12.6} -> {:>14.8} ± {deviation:.2e}",
-                self.first[place], self.values[place]
+                "{name:<widest$}  {:>12} -> {:>14} ± {deviation:.2e}",
+                digits(self.first[place], 6),
+                digits(self.values[place], 8)
             )?;
         }
         let mean = norm(&self.residuals) / (self.residuals.len().max(1) as f64).sqrt();

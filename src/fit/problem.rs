@@ -3,7 +3,7 @@
 use super::error::FitError;
 use super::fitted::Trial;
 use super::unknowns::Unknowns;
-use crate::numbers::{largest, norm};
+use crate::numbers::{digits, largest, norm};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::{DMatrix, DVector, Dyn, U1, VecStorage};
 
@@ -24,6 +24,17 @@ pub(super) struct Compared {
 }
 
 impl Compared {
+    /// Whether no unknown alone makes the sum of squares less: the residuals are perpendicular to their derivatives.
+    fn is_stationary(&self) -> bool {
+        /// Of the cosine, far above what noise leaves at a least sum.
+        const PERPENDICULAR: f64 = 1e-4;
+
+        let residuals = DVector::from_column_slice(&self.residuals);
+        let size = residuals.norm();
+        let mut columns = self.slopes.column_iter();
+        columns.all(|column| column.dot(&residuals).abs() <= PERPENDICULAR * column.norm() * size)
+    }
+
     /// s² (JᵀJ)⁻¹ (T-126), and the roots of its diagonal, whose squares may be less than any number.
     fn covariance(&self, names: &[String]) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
         /// Singular values below this part of the largest, of columns of length one, are roundings of the motion.
@@ -76,6 +87,8 @@ pub(super) struct Least<'r> {
     numbers: DVector<f64>,
     /// None where the run failed.
     here: Option<Compared>,
+    /// Why the last trial that failed has.
+    failure: Option<FitError>,
     /// Of residuals.
     count: usize,
     trials: Vec<Trial>,
@@ -106,6 +119,7 @@ impl<'r> Least<'r> {
             shows,
             numbers: DVector::from_vec(unknowns.numbers()),
             here: None,
+            failure: None,
             count: 0,
             trials: Vec::new(),
             unit: 1.0,
@@ -123,6 +137,8 @@ impl<'r> Least<'r> {
     pub(super) fn solve(self) -> Result<Solved, FitError> {
         /// Relative changes of the sum of squares and of the unknowns that end the iteration: far below what noise does to them.
         const TOLERANCE: f64 = 1e-12;
+        /// Those that decide at the end, and the run that is gone back to.
+        const LAST_TRIALS: usize = 3;
 
         let method = LevenbergMarquardt::new()
             .with_ftol(TOLERANCE)
@@ -136,6 +152,7 @@ impl<'r> Least<'r> {
             unknowns,
             numbers,
             here,
+            failure,
             trials,
             ..
         } = done;
@@ -145,7 +162,14 @@ impl<'r> Least<'r> {
             reason,
             ResidualsZero | Orthogonal | Converged { .. } | NoImprovementPossible(_)
         );
-        let Some(compared) = here.filter(|_| converged) else {
+        // Steps that became short because trials failed, not because there is nothing to gain.
+        let failure = failure.filter(|_| {
+            let mut last = trials.iter().rev().take(LAST_TRIALS);
+            last.any(|one| one.deviation.is_infinite())
+                && here.as_ref().is_some_and(|one| !one.is_stationary())
+        });
+        let is_found = converged && failure.is_none();
+        let Some(compared) = here.filter(|_| is_found) else {
             let least = trials.iter().fold(None, |least: Option<&Trial>, one| {
                 let is_less = least.is_none_or(|least| one.deviation < least.deviation);
                 if is_less { Some(one) } else { least }
@@ -154,7 +178,11 @@ impl<'r> Least<'r> {
                 best: least.map_or(values, |one| one.values.clone()),
                 deviation: least.map_or(f64::INFINITY, |one| one.deviation),
                 runs: trials.len(),
-                why: format!("{reason:?}"),
+                why: match failure {
+                    Some(FitError::Run(kind)) => format!("runs nearby fail, {kind}"),
+                    Some(_) => "outputs nearby are not finite".to_owned(),
+                    None => format!("{reason:?}"),
+                },
             });
         };
         let (covariance, deviations) = compared.covariance(&unknowns.names)?;
@@ -187,7 +215,9 @@ impl<'r> Least<'r> {
         });
         if self.shows {
             let named = self.unknowns.names.iter().zip(&values);
-            let named: Vec<_> = named.map(|(name, x)| format!("{name} {x:.6}")).collect();
+            let named: Vec<_> = named
+                .map(|(name, x)| format!("{name} {}", digits(*x, 6)))
+                .collect();
             eprintln!(
                 "run {}: deviation {deviation:.3e}, {}",
                 self.trials.len() + 1,
@@ -217,7 +247,13 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Least<'_> {
             return;
         }
         self.numbers.copy_from(numbers);
-        self.here = self.compare().ok();
+        self.here = match self.compare() {
+            Ok(compared) => Some(compared),
+            Err(error) => {
+                self.failure = Some(error);
+                None
+            }
+        };
         self.note();
     }
 

@@ -1,6 +1,7 @@
 //! What a fit looks for.
 
 use super::error::FitError;
+use std::f64::consts::FRAC_PI_2;
 use tfe_runtime::{Model, State};
 
 /// What is looked for: parameters, then the numbers of the start, ordered (p, q).
@@ -21,7 +22,7 @@ enum Way {
     Free,
     /// x = end ± unit (√(u² + 1) − 1)
     Beyond { end: f64, unit: f64 },
-    /// x = low + width (1 + sin u)/2
+    /// x = low + width sin² u
     Between { low: f64, width: f64 },
 }
 
@@ -54,27 +55,35 @@ impl Way {
             Self::Free => (u, 1.0),
             Self::Beyond { end, unit } => {
                 let root = u.hypot(1.0);
-                (end + unit * (root - 1.0), unit * u / root)
+                // √(u² + 1) − 1, with all digits where u is small.
+                (end + unit * (u * (u / (root + 1.0))), unit * u / root)
             }
             Self::Between { low, width } => {
                 let (sin, cos) = u.sin_cos();
-                (low + 0.5 * width * (1.0 + sin), 0.5 * width * cos)
+                (low + width * (sin * sin), 2.0 * width * sin * cos)
             }
         }
     }
 
-    /// u of x; a little inside of a bound, where x does not move with u.
+    /// u of x; where x is a bound it does not move with u, which is then a little inside.
     fn number(self, x: f64) -> f64 {
         const INSIDE: f64 = 1e-2;
         match self {
             Self::Free => x,
             Self::Beyond { end, unit } => {
-                let root = 1.0 + (x - end) / unit;
-                (root * root - 1.0).max(0.0).sqrt().max(INSIDE)
+                let beyond = (x - end) / unit;
+                let u = (beyond * (beyond + 2.0)).sqrt();
+                if u > 0.0 { u } else { INSIDE }
             }
             Self::Between { low, width } => {
-                let sin = 2.0 * (x - low) / width - 1.0;
-                sin.clamp(INSIDE - 1.0, 1.0 - INSIDE).asin()
+                let part = (x - low) / width;
+                if part <= 0.0 {
+                    INSIDE
+                } else if part >= 1.0 {
+                    FRAC_PI_2 - INSIDE
+                } else {
+                    part.sqrt().asin()
+                }
             }
         }
     }

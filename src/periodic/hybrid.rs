@@ -474,7 +474,7 @@ impl<const N: usize> HybridOrbit<N> {
         let trivial = self.trivial();
         let others = (0..self.floquet.len()).filter(|place| !trivial.contains(place));
         let moduli = others.map(|place| self.floquet[place].modulus());
-        Verdict::of(moduli.fold(0.0, f64::max))
+        Verdict::of(moduli)
     }
 
     /// How many corrections Newton's method made.

@@ -32,7 +32,7 @@ pub enum Verdict {
         /// 1 − max |μ|.
         margin: f64,
     },
-    /// The largest one is on the unit circle, to [`Verdict::NEUTRAL`]: the best that a conservative model can have.
+    /// The largest one is on the unit circle, to [`Verdict::NEUTRAL`], or all are trivial: the best that a conservative model can have.
     Neutral {
         /// 1 − max |μ|.
         margin: f64,
@@ -49,9 +49,9 @@ impl Verdict {
     /// its square root.
     pub const NEUTRAL: f64 = 1e-7;
 
-    /// From the largest modulus.
-    pub(crate) fn of(largest: f64) -> Self {
-        let margin = 1.0 - largest;
+    /// From the moduli of all that are not trivial. Without any, neighbours neither come nearer nor go away: an oscillator of one coordinate.
+    pub(crate) fn of(moduli: impl Iterator<Item = f64>) -> Self {
+        let margin = 1.0 - moduli.reduce(larger).unwrap_or(1.0);
         if margin > Self::NEUTRAL {
             Self::Stable { margin }
         } else if margin >= -Self::NEUTRAL {
@@ -201,11 +201,7 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
     pub fn verdict(&self) -> Verdict {
         let trivial = self.trivial();
         let others = (0..self.floquet.len()).filter(|place| !trivial.contains(place));
-        Verdict::of(
-            others
-                .map(|place| self.floquet[place].modulus())
-                .fold(0.0, larger),
-        )
+        Verdict::of(others.map(|place| self.floquet[place].modulus()))
     }
 
     /// The force γ v that had to be added to close an orbit of an autonomous model whose period or energy was given: as small as

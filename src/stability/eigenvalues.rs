@@ -248,10 +248,14 @@ pub(super) fn eigenvalues_of_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f6
         ];
     }
     let root = discriminant.sqrt();
-    [
-        Complex::new(mean + root, 0.0),
-        Complex::new(mean - root, 0.0),
-    ]
+    // A sum of like signs keeps all digits; the other one follows from the determinant.
+    let large = mean + root.copysign(mean);
+    let small = if large == 0.0 {
+        0.0
+    } else {
+        (a * d - b * c) / large
+    };
+    [large.max(small), large.min(small)].map(|value| Complex::new(value, 0.0))
 }
 
 /// A similar matrix D⁻¹AD whose rows and columns are of comparable size, and the diagonal of D, powers of two.
@@ -399,5 +403,15 @@ mod tests {
             eigenvalues(&broken),
             Err(EigenvalueError::NotFinite { row: 1, column: 2 })
         );
+    }
+
+    #[test]
+    fn the_small_one_of_two_has_all_digits() {
+        let of = |a: [[f64; 2]; 2]| eigenvalues_of_two(a).map(|one| one.re);
+        assert_eq!(of([[1.0, 0.0], [0.0, 1e-17]]), [1.0, 1e-17]);
+        assert_eq!(of([[-1e8, 3.0], [0.0, 1e-8]]), [1e-8, -1e8]);
+        assert_eq!(of([[0.0, 0.0], [0.0, 0.0]]), [0.0, 0.0]);
+        let [large, small] = of([[1e9, 1.0], [1.0, 1.0]]);
+        assert!((large * small - (1e9 - 1.0)).abs() < 1e-6 && small < 1.0);
     }
 }
