@@ -31,6 +31,7 @@ use crate::diagnostic::{Bag, Kind, Span};
 use crate::expr::graph::{ExprId, Graph};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
+use crate::expr::ordered::SortedMap;
 use crate::model::declared::{CoordinateArray, Declared, Form, Requirement};
 use crate::syntax::ast::{Expr, ExprKind};
 use crate::syntax::context::Context;
@@ -151,7 +152,7 @@ enum Value {
 }
 
 /// What `dot()` makes of a coordinate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum DotRule {
     /// Its velocity.
     Velocity,
@@ -162,7 +163,7 @@ enum DotRule {
 }
 
 /// Which rules hold for the formula at hand.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Setting {
     dot: DotRule,
     /// Loops must stay linear: it is an energy or a dissipation.
@@ -220,6 +221,8 @@ struct Lowerer<'a> {
     hamiltonian: Option<ExprId>,
     /// The values of `let`s outside any loop.
     lets: Vec<Option<Value>>,
+    /// Those inside so many loops and under other rules: each is lowered once, however many use it.
+    lets_here: SortedMap<(usize, u32, Setting), Value>,
     /// Which `let`s hold a `dot()`, themselves or by those they use.
     rates: Vec<bool>,
     /// How many `let`s stand before the formula at hand.
@@ -264,6 +267,7 @@ impl<'a> Lowerer<'a> {
             usual_dot: DotRule::Velocity,
             hamiltonian: None,
             lets: vec![None; model.lets.len()],
+            lets_here: SortedMap::new(),
             rates: lets_with_rates::lets_with_rates(model),
             visible_lets: model.lets.len(),
             indices: Vec::new(),

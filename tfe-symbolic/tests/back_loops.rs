@@ -437,3 +437,21 @@ fn a_long_chain_of_links_takes_seconds() {
     assert!(counts.weighted() < 20_000, "{counts}");
     assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
 }
+
+/// Each `let` is lowered once, however many paths lead to it: here 2²⁴ do.
+#[test]
+fn chains_of_lets_with_loops() {
+    let chain: Vec<String> = (1..=24)
+        .map(|k| format!("let a{k} = a{0} + a*a{0}", k - 1))
+        .collect();
+    let text = format!(
+        "coordinates(q[N]), let a0 = sum(i in 0..N, q[i]^2), {}, lagrangian = sum(i in 0..N, dot(q[i])^2/2) - a24",
+        chain.join(", ")
+    );
+    let found = results(&text, 3, ALL);
+    let environment = environment(3);
+    let factor = -2.0 * 1.25_f64.powi(24);
+    for (slope, q) in found.q.iter().zip(&environment.q) {
+        assert!((slope - factor * q).abs() < 1e-13 * slope.abs());
+    }
+}

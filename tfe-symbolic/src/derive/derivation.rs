@@ -414,72 +414,14 @@ impl Deriver<'_> {
 
     /// Splits an expression into terms, each a body inside its own loops; a body that is linear in no sum keeps its sums.
     fn terms(&mut self, nest: &[SumRange], expression: ExprId) -> Vec<Term> {
-        let mut bodies: SortedMap<Vec<SumRange>, Vec<(Constant, ExprId)>> = SortedMap::new();
+        let mut bodies = Bodies::new();
         let mut waiting = vec![(nest.to_vec(), Constant::ONE, expression)];
-        while let Some((nest, factor, id)) = waiting.pop() {
-            if !self.graph.contains_sum(id) {
-                bodies.get_or_default(nest).push((factor, id));
-                continue;
+        // Level by level: what several paths lead to is opened once, for the sum of their factors.
+        while !waiting.is_empty() {
+            for (nest, factor, id) in std::mem::take(&mut waiting) {
+                self.open(nest, factor, id, (&mut bodies, &mut waiting));
             }
-            match self.graph.node(id).clone() {
-                Node::Sum { constant, terms } => {
-                    if !constant.is_zero() {
-                        let one = self.graph.constant(Constant::ONE);
-                        bodies
-                            .get_or_default(nest.clone())
-                            .push((factor * constant, one));
-                    }
-                    waiting.extend(
-                        terms
-                            .into_iter()
-                            .map(|(c, x)| (nest.clone(), factor * c, x)),
-                    );
-                }
-                Node::Loop { range, body } => {
-                    let (range, body) = self.inside(&nest, range, body);
-                    let mut nest = nest;
-                    nest.push(range);
-                    waiting.push((nest, factor, body));
-                }
-                Node::Product(factors) => {
-                    let mut with_sums = factors
-                        .iter()
-                        .enumerate()
-                        .filter(|(_, (x, _))| self.graph.contains_sum(*x));
-                    let only = with_sums
-                        .next()
-                        .filter(|(_, (_, n))| *n == 1 && with_sums.next().is_none());
-                    let inner = only.map(|(at, (x, _))| (at, self.graph.node(*x).clone()));
-                    match inner {
-                        Some((at, Node::Loop { range, body })) => {
-                            let (range, body) = self.inside(&nest, range, body);
-                            let mut rest = factors.clone();
-                            rest.remove(at);
-                            rest.push((body, 1));
-                            let body = self.graph.product(Constant::ONE, &rest);
-                            let mut nest = nest;
-                            nest.push(range);
-                            waiting.push((nest, factor, body));
-                        }
-                        Some((at, Node::Sum { constant, terms })) => {
-                            let mut rest = factors.clone();
-                            rest.remove(at);
-                            for (c, x) in terms {
-                                let mut factors = rest.clone();
-                                factors.push((x, 1));
-                                let product = self.graph.product(Constant::ONE, &factors);
-                                waiting.push((nest.clone(), factor * c, product));
-                            }
-                            if !constant.is_zero() {
-                                let product = self.graph.product(Constant::ONE, &rest);
-                                waiting.push((nest, factor * constant, product));
-                            }
-                        }
-                        _ => bodies.get_or_default(nest).push((factor, id)),
-                    }
-                }
-                _ => bodies.get_or_default(nest).push((factor, id)),
-            }
+            waiting = merged(waiting);
         }
         let mut terms = Vec::with_capacity(bodies.len());
         for (nest, parts) in bodies {
@@ -489,6 +431,79 @@ impl Deriver<'_> {
             });
         }
         terms
+    }
+
+    /// Opens a sum, a loop, or a product that is linear in one of them, into parts that wait; anything else is a body.
+    fn open(
+        &mut self,
+        nest: Vec<SumRange>,
+        factor: Constant,
+        id: ExprId,
+        (bodies, waiting): (&mut Bodies, &mut Vec<Part>),
+    ) {
+        if !self.graph.contains_sum(id) {
+            bodies.get_or_default(nest).push((factor, id));
+            return;
+        }
+        match self.graph.node(id).clone() {
+            Node::Sum { constant, terms } => {
+                if !constant.is_zero() {
+                    let one = self.graph.constant(Constant::ONE);
+                    bodies
+                        .get_or_default(nest.clone())
+                        .push((factor * constant, one));
+                }
+                waiting.extend(
+                    terms
+                        .into_iter()
+                        .map(|(c, x)| (nest.clone(), factor * c, x)),
+                );
+            }
+            Node::Loop { range, body } => {
+                let (range, body) = self.inside(&nest, range, body);
+                let mut nest = nest;
+                nest.push(range);
+                waiting.push((nest, factor, body));
+            }
+            Node::Product(factors) => {
+                let mut with_sums = factors
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, (x, _))| self.graph.contains_sum(*x));
+                let only = with_sums
+                    .next()
+                    .filter(|(_, (_, n))| *n == 1 && with_sums.next().is_none());
+                let inner = only.map(|(at, (x, _))| (at, self.graph.node(*x).clone()));
+                match inner {
+                    Some((at, Node::Loop { range, body })) => {
+                        let (range, body) = self.inside(&nest, range, body);
+                        let mut rest = factors.clone();
+                        rest.remove(at);
+                        rest.push((body, 1));
+                        let body = self.graph.product(Constant::ONE, &rest);
+                        let mut nest = nest;
+                        nest.push(range);
+                        waiting.push((nest, factor, body));
+                    }
+                    Some((at, Node::Sum { constant, terms })) => {
+                        let mut rest = factors.clone();
+                        rest.remove(at);
+                        for (c, x) in terms {
+                            let mut factors = rest.clone();
+                            factors.push((x, 1));
+                            let product = self.graph.product(Constant::ONE, &factors);
+                            waiting.push((nest.clone(), factor * c, product));
+                        }
+                        if !constant.is_zero() {
+                            let product = self.graph.product(Constant::ONE, &rest);
+                            waiting.push((nest, factor * constant, product));
+                        }
+                    }
+                    _ => bodies.get_or_default(nest).push((factor, id)),
+                }
+            }
+            _ => bodies.get_or_default(nest).push((factor, id)),
+        }
     }
 
     /// A range and its body with an index that the nest does not use yet.
@@ -515,6 +530,29 @@ impl Deriver<'_> {
         let body = self.graph.substitute_loop(body, range.variable, &symbol);
         (SumRange { variable, ..range }, body)
     }
+}
+
+/// Bodies and their factors, by the loops around them.
+type Bodies = SortedMap<Vec<SumRange>, Vec<(Constant, ExprId)>>;
+
+/// A part of an expression inside loops, and its factor.
+type Part = (Vec<SumRange>, Constant, ExprId);
+
+/// Parts that are the same with one factor, in the order of the first of each.
+fn merged(parts: Vec<Part>) -> Vec<Part> {
+    let mut places: SortedMap<(Vec<SumRange>, ExprId), usize> = SortedMap::new();
+    let mut merged: Vec<Part> = Vec::with_capacity(parts.len());
+    for (nest, factor, id) in parts {
+        let key = (nest.clone(), id);
+        match places.get(&key) {
+            Some(&place) => merged[place].1 = merged[place].1 + factor,
+            None => {
+                places.insert(key, merged.len());
+                merged.push((nest, factor, id));
+            }
+        }
+    }
+    merged
 }
 
 fn first_place(slot: &Slot) -> Place {

@@ -246,7 +246,12 @@ impl Lowerer<'_> {
         value
     }
 
+    /// The same where it stands: its loops have indices of their own inside of so many others.
     fn named_here(&mut self, at: usize, loops: u32) -> Value {
+        let key = (at, loops, self.setting);
+        if let Some(value) = self.lets_here.get(&key) {
+            return value.clone();
+        }
         let model = self.model;
         let (indices, place) = (std::mem::take(&mut self.indices), self.place.take());
         let hidden = std::mem::replace(&mut self.hidden_loops, loops);
@@ -255,6 +260,7 @@ impl Lowerer<'_> {
         self.visible_lets = visible;
         self.hidden_loops = hidden;
         (self.indices, self.place) = (indices, place);
+        self.lets_here.insert(key, value.clone());
         value
     }
 
