@@ -35,6 +35,13 @@ pub enum OrbitError {
         /// When.
         time: f64,
     },
+    /// Events leave a parameter with another value than it has at the start: the state comes back, the model does not.
+    ParameterLeft {
+        /// The parameter.
+        parameter: String,
+        /// Its value at the end.
+        value: f64,
+    },
     /// Corrections no longer bring the end of a motion with events nearer to its start.
     Stalled {
         /// How far they are apart, in parts of the motion.
@@ -105,6 +112,10 @@ impl fmt::Display for OrbitError {
             Self::Stopped { time } => {
                 write!(f, "an event ends the motion at t = {time}, before a period has passed")
             }
+            Self::ParameterLeft { parameter, value } => write!(
+                f,
+                "events leave `{parameter}` at {value} after a period, which is not its value at the start"
+            ),
             Self::Stalled {
                 residual,
                 iterations,

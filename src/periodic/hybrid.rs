@@ -5,7 +5,7 @@ use super::orbit::{Verdict, sort, trivial_of};
 use super::phase::Period;
 use super::setup::PeriodicOrbit;
 use crate::linearised::Linearised;
-use crate::motion::Motion;
+use crate::motion::{Motion, Setting};
 use crate::numbers::{larger, largest};
 use crate::periodic_schur::Multiplier;
 use crate::simulation::Simulation;
@@ -274,6 +274,12 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         period: f64,
         iterations: u32,
     ) -> Result<HybridOrbit<N>, OrbitError> {
+        if let Some(left) = left_over(self.simulation.model(), run.motion().settings()) {
+            return Err(OrbitError::ParameterLeft {
+                parameter: left.parameter.clone(),
+                value: left.value,
+            });
+        }
         let mut floquet = run.multipliers().map_err(OrbitError::Multipliers)?;
         sort(&mut floquet);
         let (motion, transitions) = run.into_parts();
@@ -388,6 +394,22 @@ pub(super) fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
         q: largest(|state| &state.q),
         p: largest(|state| &state.p),
     }
+}
+
+/// The first parameter that events have left with another value than a model has: with it the next period is another motion.
+fn left_over<'s, M: Model<N>, const N: usize>(
+    model: &M,
+    settings: &'s [Setting],
+) -> Option<&'s Setting> {
+    let mut lasting = settings.iter().enumerate().filter(|(place, one)| {
+        let later = &settings[place + 1..];
+        later.iter().all(|later| later.parameter != one.parameter)
+    });
+    let left = lasting.find(|(_, one)| {
+        let own = model.find_parameter(&one.parameter);
+        own.map(|index| model.parameter(index)) != Some(one.value)
+    });
+    left.map(|(_, one)| one)
 }
 
 /// ẏ = (ṗ, q̇).

@@ -336,3 +336,29 @@ fn orbits_with_settings_and_unknown_periods() {
         .expect_err("it stops");
     assert!(matches!(error, tfe::periodic::OrbitError::Stopped { .. }));
 }
+
+/// A state that comes back with another spring behind it: the next period is another motion, so that this is no orbit.
+#[test]
+fn orbits_bring_parameters_back() {
+    let springs = Springs { m: 1.0, k: 1.0 };
+    let simulation =
+        Simulation::new(&springs)
+            .element(Mixed::<8>)
+            .on("middle", Crossing::Either, |event| {
+                let fall = State {
+                    q: event.q,
+                    p: [-2.0_f64.sqrt()],
+                };
+                Act::Set(match event.rises {
+                    true => Settings::new("k", 4.0),
+                    false => Settings::new("k", 2.0).and_state(fall),
+                })
+            });
+    let period = PI + PI / 8.0_f64.sqrt();
+    let orbit = PeriodicOrbit::of_simulation(&simulation)
+        .period(period)
+        .guess_from(springs.state([-1.0], [0.0]))
+        .solve();
+    let told = orbit.map(|orbit| orbit.period()).expect_err("no orbit");
+    assert!(told.to_string().contains("leave `k` at 2"), "{told}");
+}
