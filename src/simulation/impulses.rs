@@ -6,7 +6,7 @@ use tfe_runtime::family;
 
 impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
     /// Adds an impulse: a generalized force of the given time integral, one number for each coordinate, that acts at one instant. An element ends there, and the node shows the momentum
-    /// before it. One at the start of the span acts at once, one at its end on what [`resume`](Self::resume) goes on with. What is against the constraints
+    /// before it. One at the start of the span acts at once, one at its end on what [`resume`](Self::resume) goes on with. A run that goes back in time takes it away. What is against the constraints
     /// of a model these take up at once, as of [`Act::Impulse`](crate::Act::Impulse).
     ///
     /// ```
