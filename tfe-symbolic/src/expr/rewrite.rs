@@ -115,17 +115,32 @@ impl Graph {
         id: ExprId,
         new: &mut dyn FnMut(&mut Self, &Input) -> Option<ExprId>,
     ) -> ExprId {
+        let mapping = self.with_nodes(id, &mut |graph, old, _| match graph.node(old).clone() {
+            Node::Input(input) => new(graph, &input),
+            _ => None,
+        });
+        mapping.of(id)
+    }
+
+    /// What becomes of an expression and of all that it is made of where some nodes are others, children first; `None` makes a node anew of what its children became.
+    pub(crate) fn with_nodes(
+        &mut self,
+        id: ExprId,
+        new: &mut dyn FnMut(&mut Self, ExprId, &Mapping) -> Option<ExprId>,
+    ) -> Mapping {
         let mut mapping = Mapping::default();
         for old in self.reachable(&[id]) {
-            let node = self.node(old).clone();
-            let made = match &node {
-                Node::Input(input) => new(self, input).unwrap_or(old),
-                node if mapping.keeps(node) => old,
-                node => self.remake(node, &mapping),
-            };
+            let made = new(self, old, &mapping).unwrap_or_else(|| {
+                let node = self.node(old);
+                if mapping.keeps(node) {
+                    return old;
+                }
+                let node = node.clone();
+                self.remake(&node, &mapping)
+            });
             mapping.set(old, made);
         }
-        mapping.of(id)
+        mapping
     }
 
     /// A constant and terms that add up to the expression, sums inside of sums opened.

@@ -198,20 +198,14 @@ fn about(
     point: &Point,
     otherwise: Option<(ExprId, Side)>,
 ) -> Mapping {
-    let mut mapping = Mapping::default();
-    for old in graph.reachable(&[series]) {
-        let node = graph.node(old).clone();
-        let side = otherwise.filter(|(choice, _)| *choice == old);
-        let new = match (&node, side) {
-            (Node::Input(input), _) => at_point(graph, input, point).unwrap_or(old),
-            (_, Some((_, Side::Of(branch)))) => mapping.of(branch),
-            (_, Some((_, Side::Sign(sign)))) => graph.integer(sign),
-            (node, None) if mapping.keeps(node) => old,
-            (node, None) => graph.remake(node, &mapping),
-        };
-        mapping.set(old, new);
-    }
-    mapping
+    graph.with_nodes(series, &mut |graph, old, mapping| match otherwise {
+        Some((choice, Side::Of(branch))) if choice == old => Some(mapping.of(branch)),
+        Some((choice, Side::Sign(sign))) if choice == old => Some(graph.integer(sign)),
+        _ => match graph.node(old).clone() {
+            Node::Input(input) => at_point(graph, &input, point),
+            _ => None,
+        },
+    })
 }
 
 /// Whether something is divided by zero about the point, be it multiplied by zero: `norm([x, y])` at the origin.
