@@ -92,10 +92,11 @@ impl<const N: usize> DenseElement<N> {
             // An impulse is a rate too; its projection has the same integral.
             let mut values = [0.0; MAX_RATES];
             legendre(interval.place(impulse), &mut values);
+            let impulse = impulse.along(interval.length);
             for (m, row) in p.iter_mut().enumerate() {
-                let weight = interval.length.signum() * ((2 * m + 1) as f64 * values[m]);
+                let weight = (2 * m + 1) as f64 * values[m];
                 for a in 0..N {
-                    row[a] += weight * impulse.value[a];
+                    row[a] += weight * impulse[a];
                 }
             }
         }

@@ -22,6 +22,13 @@ pub struct Impulse<const N: usize> {
     pub value: [f64; N],
 }
 
+impl<const N: usize> Impulse<N> {
+    /// What it adds to the momenta in an element of length `h`: back in time, h < 0, it is taken away.
+    pub(crate) fn along(&self, h: f64) -> [f64; N] {
+        self.value.map(|value| h.signum() * value)
+    }
+}
+
 /// Where an element lies in time, and the impulses that act in it.
 #[derive(Clone, Copy, Debug)]
 pub struct Interval<'a, const N: usize> {
@@ -176,11 +183,11 @@ pub(crate) fn set_kicks<const N: usize>(
 ) {
     kicks.fill([0.0; N]);
     for impulse in interval.impulses {
-        let tau = interval.place(impulse);
+        let (tau, value) = (interval.place(impulse), impulse.along(interval.length));
         for (i, kick) in kicks.iter_mut().enumerate() {
-            let weight = interval.length.signum() * scheme.impulse_weight(i, tau);
+            let weight = scheme.impulse_weight(i, tau);
             for a in 0..N {
-                kick[a] += weight * impulse.value[a];
+                kick[a] += weight * value[a];
             }
         }
     }
@@ -190,8 +197,9 @@ pub(crate) fn set_kicks<const N: usize>(
 pub(crate) fn total<const N: usize>(impulses: &[Impulse<N>], h: f64) -> [f64; N] {
     let mut sum = [0.0; N];
     for impulse in impulses {
+        let value = impulse.along(h);
         for a in 0..N {
-            sum[a] += h.signum() * impulse.value[a];
+            sum[a] += value[a];
         }
     }
     sum
@@ -348,7 +356,7 @@ pub(crate) fn end_of<const N: usize>(
         let force = integral(scheme.weights, scheme.weights_low, forces, a);
         let mut impulse = span.low.p[a];
         for one in impulses {
-            impulse += span.h.signum() * one.value[a];
+            impulse += one.along(span.h)[a];
         }
         let moved = |start: f64, rate: DoubleDouble, low: f64| {
             let change = rate.times(h).plus(DoubleDouble::new(low));

@@ -52,13 +52,11 @@ impl<const N: usize> Propagator<N> {
         last[N..].copy_from_slice(&constant.q);
         for (k, column) in matrix.chunks_exact_mut((2 * N).max(1)).enumerate() {
             let mut start = State::ZERO;
-            let far = if k < N {
-                start.p[k] = far_p;
-                far_p
-            } else {
-                start.q[k - N] = far_q;
-                far_q
+            let (number, far) = match k.checked_sub(N) {
+                None => (&mut start.p[k], far_p),
+                Some(a) => (&mut start.q[a], far_q),
             };
+            *number = far;
             let increment = step(&start)?;
             for a in 0..N {
                 column[a] = (increment.p[a] - constant.p[a]) / far;
