@@ -493,10 +493,7 @@ impl<const N: usize> HybridOrbit<N> {
 
     /// Stability, from all but the trivial multipliers, with its margin.
     pub fn verdict(&self) -> Verdict {
-        let trivial = self.trivial();
-        let others = (0..self.floquet.len()).filter(|place| !trivial.contains(place));
-        let moduli = others.map(|place| self.floquet[place].modulus());
-        Verdict::of(moduli)
+        Verdict::of(&self.floquet, &self.trivial())
     }
 
     /// How many corrections Newton's method made.

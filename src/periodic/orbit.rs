@@ -49,8 +49,10 @@ impl Verdict {
     /// its square root.
     pub const NEUTRAL: f64 = 1e-7;
 
-    /// From the moduli of all that are not trivial. Without any, neighbours neither come nearer nor go away: an oscillator of one coordinate.
-    pub(crate) fn of(moduli: impl Iterator<Item = f64>) -> Self {
+    /// From all multipliers but the trivial ones, by their places. Without any, neighbours neither come nearer nor go away: an oscillator of one coordinate.
+    pub(crate) fn of(floquet: &[Multiplier], trivial: &[usize]) -> Self {
+        let others = (0..floquet.len()).filter(|place| !trivial.contains(place));
+        let moduli = others.map(|place| floquet[place].modulus());
         let margin = 1.0 - moduli.reduce(larger).unwrap_or(1.0);
         if margin > Self::NEUTRAL {
             Self::Stable { margin }
@@ -199,9 +201,7 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
 
     /// Stability, from all but the trivial multipliers, with its margin.
     pub fn verdict(&self) -> Verdict {
-        let trivial = self.trivial();
-        let others = (0..self.floquet.len()).filter(|place| !trivial.contains(place));
-        Verdict::of(others.map(|place| self.floquet[place].modulus()))
+        Verdict::of(&self.floquet, &self.trivial())
     }
 
     /// The force γ v that had to be added to close an orbit of an autonomous model whose period or energy was given: as small as
