@@ -1,5 +1,7 @@
 //! Runs where it hurts: what ends `Ok` is right, or says that it is doubtful.
 
+mod checkpoints;
+
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};
 use tfe::{RunErrorKind, Warning};
@@ -504,107 +506,6 @@ fn steps_below_the_resolution_of_the_time_are_refused() {
     assert!((far.last().q[0] - near.last().q[0]).abs() < 1e-12);
 }
 
-#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - 1)]
-struct Rod {
-    g: f64,
-}
-
-#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = -0.1*dot(x))]
-struct Damped;
-
-#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - 1e6*(x - cos(t))^2/2, force(x) = -1e3*dot(x))]
-struct Stiff;
-
-/// One run, and two of it that are cut anywhere: all states, velocities and energies are the same numbers.
-#[test]
-fn two_halves_are_one_run_to_the_bit() {
-    fn check<M: tfe::Model<N>, const N: usize>(
-        simulation: &Simulation<'_, M, N>,
-        start: State<N>,
-        (steps, h): (u32, f64),
-        cuts: u32,
-        seed: &mut u64,
-    ) {
-        let end = f64::from(steps) * h;
-        let whole = simulation.run(start, 0.0..end).expect("a run");
-        for _ in 0..cuts {
-            *seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            let cut = 1 + (*seed >> 33) as u32 % (steps - 1);
-            let first = simulation
-                .run(start, 0.0..f64::from(cut) * h)
-                .expect("a run");
-            let checkpoint = first.checkpoint().expect("complete");
-            let second = simulation.resume(checkpoint, end).expect("a run");
-            let at = cut as usize;
-            assert_eq!(first.states(), &whole.states()[..=at], "cut at {cut}");
-            assert_eq!(second.states(), &whole.states()[at..], "cut at {cut}");
-            assert_eq!(
-                second.velocities(),
-                &whole.velocities()[at..],
-                "cut at {cut}"
-            );
-            assert_eq!(second.energies(), &whole.energies()[at..], "cut at {cut}");
-        }
-    }
-    let mut seed = 1;
-    let kepler = Kepler.state([1.0, 0.0], [0.0, 1.2]);
-    for element in [
-        Element::mixed(4),
-        Element::mixed(8),
-        Element::primal(3),
-        Element::radau(4),
-    ] {
-        let h = 0.1;
-        check(
-            &Simulation::new(&Kepler).element(element).step(h),
-            kepler,
-            (200, h),
-            50,
-            &mut seed,
-        );
-        let stiff = Simulation::new(&Stiff).element(element).step(h);
-        check(
-            &stiff,
-            State { q: [2.0], p: [0.0] },
-            (100, h),
-            50,
-            &mut seed,
-        );
-        let damped = Simulation::new(&Damped).element(element).step(0.07);
-        check(
-            &damped,
-            State { q: [2.0], p: [0.0] },
-            (100, 0.07),
-            50,
-            &mut seed,
-        );
-        // Steps that are cut into pieces, too.
-        let double = Simulation::new(&PENDULUM).element(element).step(0.15);
-        check(
-            &double,
-            PENDULUM.state([1.0, 2.0], [0.0, 0.0]),
-            (50, 0.15),
-            50,
-            &mut seed,
-        );
-    }
-    let rod = Rod { g: 9.81 };
-    for nodes in [2, 3, 4, 5] {
-        let simulation = Simulation::new(&rod)
-            .element(Element::mixed(nodes))
-            .step(0.02);
-        check(
-            &simulation,
-            rod.state([1.0, 0.0], [0.0, 0.0]),
-            (150, 0.02),
-            50,
-            &mut seed,
-        );
-    }
-}
-
 /// A bead in a bowl drives a mass by its own one, and has almost no inertia left at the bottom, which it passes in a thousandth of a second. A step that has to be cut there is looked at, whatever its
 /// number.
 #[test]
@@ -635,19 +536,6 @@ fn steps_that_are_cut_are_looked_at() {
     );
 }
 
-/// A run that goes on looks for unstable steps as one that begins.
-#[test]
-fn runs_that_go_on_are_watched() {
-    let simulation = Simulation::new(&Oscillator).element(Primal::<3>).step(3.3);
-    let first = simulation.run(Oscillator.state([1.0], [0.0]), 0.0..33.0);
-    let first = first.expect("ten steps");
-    let checkpoint = first.checkpoint().expect("complete");
-    let second = simulation.resume(checkpoint, 330.0).expect("a run");
-    let told = second.warnings();
-    let is_unstable = |warning: &Warning| matches!(warning, Warning::UnstableStep { .. });
-    assert!(told.iter().any(is_unstable), "{told:?}");
-}
-
 /// Endless steps that are roundings of the time are refused before the first.
 #[test]
 fn endless_steps_below_the_resolution_of_the_time_are_refused() {
@@ -660,40 +548,6 @@ fn endless_steps_below_the_resolution_of_the_time_are_refused() {
         "{kind}"
     );
     assert!(steps.next().is_none());
-}
-
-/// A checkpoint of a model with other parameters: nothing that belongs to these is carried on.
-#[test]
-fn other_parameters_go_on_from_a_checkpoint() {
-    #[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - k*x^2/2 - y^2/2)]
-    struct Spring {
-        m: f64,
-        k: f64,
-    }
-    let (soft, stiff) = (Spring { m: 1.0, k: 1.0 }, Spring { m: 2.0, k: 4.0 });
-    let run = |model| {
-        let run = Simulation::new(model).element(Element::mixed(6)).step(0.1);
-        run.record_every(10)
-    };
-    let first = run(&soft).run(soft.state([1.0, 0.5], [0.0, 0.2]), 0.0..5.0);
-    let first = first.expect("a run");
-    let checkpoint = first.checkpoint().expect("complete");
-    let second = run(&stiff).resume(checkpoint, 10.0).expect("a run");
-    let anew = run(&stiff).run(*checkpoint.state(), 5.0..10.0);
-    let (one, other) = (second.last(), anew.expect("a run").last().state());
-    for a in 0..2 {
-        assert!((one.q[a] - other.q[a]).abs() < 1e-13);
-        assert!((one.p[a] - other.p[a]).abs() < 1e-13);
-    }
-    // A span that is empty does not begin a grid.
-    let run = Simulation::new(&soft).step(0.1).element(Element::mixed(4));
-    let start = soft.state([1.0, 0.5], [0.0, 0.2]);
-    let whole = run.run(start, 0.0..2.0).expect("a run");
-    let first = run.run(start, 0.0..1.0).expect("a run");
-    let same = run.resume(first.checkpoint().expect("complete"), 1.0);
-    let same = same.expect("nothing to do");
-    let second = run.resume(same.checkpoint().expect("complete"), 2.0);
-    assert_eq!(second.expect("a run").states(), &whole.states()[10..]);
 }
 
 /// Linear models of every mass, on which gravity acts: steps by one matrix are those that are solved.
