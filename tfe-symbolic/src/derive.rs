@@ -4,6 +4,7 @@
 pub(crate) mod constraint;
 pub mod derivation;
 pub(crate) mod entry;
+pub(crate) mod limits;
 pub(crate) mod quadratic;
 pub(crate) mod sensitivity;
 pub mod structure;

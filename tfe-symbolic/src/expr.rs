@@ -5,6 +5,7 @@ mod cancellation;
 pub mod comparison;
 pub mod constant;
 pub mod differentiate;
+mod factors;
 pub mod function;
 mod function_derivatives;
 pub mod graph;

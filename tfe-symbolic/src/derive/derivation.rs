@@ -11,6 +11,7 @@ use std::cell::RefCell;
 
 use crate::derive::constraint;
 use crate::derive::entry::Entry;
+use crate::derive::limits::take_limits;
 use crate::derive::quadratic;
 use crate::derive::structure::Structure;
 use crate::derive::sweep::{Sweep, along};
@@ -168,7 +169,12 @@ impl Derivation {
         for entries in std::iter::once(&mut entries).chain(&mut written) {
             entries.retain(|entry| !vanishing.contains(&entry.place));
         }
+        // What is chosen in a limit is no choice of the model.
         let structure = Structure::of(&graph, form, &dof, &entries);
+        take_limits(
+            &mut graph,
+            std::iter::once(&mut entries).chain(&mut written),
+        );
         Self {
             graph,
             entries,

@@ -195,6 +195,26 @@ impl Constant {
         Some(result)
     }
 
+    /// Whether an `f64` holds it with all digits: no zero, not subnormal, finite.
+    fn is_normal(self) -> bool {
+        // Fractions of 127-bit integers lie far inside the range of f64.
+        !self.is_zero() && (self.as_ratio().is_some() || self.to_f64().is_normal())
+    }
+
+    /// The product, unless it leaves the normal numbers, of which both are.
+    pub(crate) fn product_in_range(self, other: Self) -> Option<Self> {
+        let product = self * other;
+        let is_lost = !product.is_normal() && self.is_normal() && other.is_normal();
+        (!is_lost).then_some(product)
+    }
+
+    /// The power with an integer exponent, unless it leaves the normal numbers, of which this is one; `None` for 0 to a negative one, too.
+    pub(crate) fn powi_in_range(self, exponent: i32) -> Option<Self> {
+        let power = self.powi(exponent)?;
+        let is_lost = !power.is_normal() && self.is_normal();
+        (!is_lost).then_some(power)
+    }
+
     /// The square root where it is exact.
     pub fn exact_sqrt(self) -> Option<Self> {
         let (numerator, denominator) = self.as_ratio()?;
@@ -431,9 +451,27 @@ mod tests {
     #[test]
     fn overflow_falls_back_to_floats() {
         let large = Constant::integer(i64::MAX);
+        assert_eq!(large.powi_in_range(5), large.powi(5));
         let fifth = large.powi(5).unwrap();
         assert_eq!(fifth.as_ratio(), None);
         assert_eq!(fifth.to_f64(), (i64::MAX as f64).powi(5));
         assert_eq!(Constant::rational(1, i128::MIN), None);
+    }
+
+    #[test]
+    fn products_out_of_range_are_told() {
+        let [small, large] = [1e-200, 1e200].map(Constant::float);
+        assert_eq!(small.product_in_range(small), None);
+        assert_eq!(large.product_in_range(large), None);
+        assert_eq!(small.powi_in_range(2), None);
+        assert_eq!(small.powi_in_range(-2), None);
+        assert_eq!(Constant::float(1e-160).powi_in_range(2), None, "subnormal");
+        assert!(small.product_in_range(large).is_some());
+        let zero = Constant::ZERO;
+        assert_eq!(small.product_in_range(zero), Some(zero));
+        // What is subnormal already has no digits to lose.
+        let tiny = Constant::float(1e-310);
+        let half = ratio(1, 2);
+        assert_eq!(tiny.product_in_range(half), Some(tiny * half));
     }
 }

@@ -36,12 +36,14 @@ pub(crate) enum Node {
     Constant(Constant),
     Input(Input),
     /// `constant + Σ c x`: terms sorted, none constant. With several terms (counting the constant) the first coefficient is positive and
-    /// the coefficients are not all of one size other than 1; with one, it is a multiple `c x`, c ≠ 1.
+    /// the coefficients are not all of one size other than 1; with one, it is a multiple `c x`, c ≠ 1, of what is none, unless the product of both
+    /// numbers would leave the range of `f64`.
     Sum {
         constant: Constant,
         terms: Vec<(Constant, ExprId)>,
     },
-    /// `Π x^n`: factors sorted, n ≠ 0, none a short product or a multiple; constant only where it is 0 to a negative power.
+    /// `Π x^n`: factors sorted, n ≠ 0, none a short product; a multiple only where the power of its number would leave the range of `f64`; constant
+    /// only where it is 0 to a negative power.
     Product(Vec<(ExprId, i32)>),
     Power {
         base: ExprId,
@@ -313,11 +315,20 @@ impl Graph {
         })
     }
 
-    /// `c` and `x` with `id` = c x, where x is no multiple.
+    /// `c` and `x` with `id` = c x, where x is no multiple (but see [`Node::Sum`]).
     pub(crate) fn as_multiple(&self, id: ExprId) -> (Constant, ExprId) {
         match self.node(id) {
             Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => terms[0],
             _ => (Constant::ONE, id),
+        }
+    }
+
+    /// `c` times `id` as such a number and expression; as they are where the product of the numbers would leave the range of `f64`.
+    pub(crate) fn as_multiple_times(&self, c: Constant, id: ExprId) -> (Constant, ExprId) {
+        let (own, x) = self.as_multiple(id);
+        match c.product_in_range(own) {
+            Some(product) => (product, x),
+            None => (c, id),
         }
     }
 

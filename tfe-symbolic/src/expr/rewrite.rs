@@ -149,8 +149,7 @@ impl Graph {
         let mut terms = Vec::new();
         let mut waiting = vec![(Constant::ONE, id)];
         while let Some((factor, id)) = waiting.pop() {
-            let (multiple, inner) = self.as_multiple(id);
-            let factor = factor * multiple;
+            let (factor, inner) = self.as_multiple_times(factor, id);
             match (self.as_sum(inner), self.as_constant(inner)) {
                 (Some((own, inner)), _) => {
                     constant = constant + factor * own;
@@ -232,8 +231,7 @@ impl Graph {
                     let mut constant = *constant;
                     let mut opened = Vec::with_capacity(terms.len());
                     for (outer, x) in terms {
-                        let (multiple, inner) = self.as_multiple(mapping.of(*x));
-                        let factor = *outer * multiple;
+                        let (factor, inner) = self.as_multiple_times(*outer, mapping.of(*x));
                         match self.as_sum(inner).filter(|_| uses.of(*x) == 1) {
                             Some((own, inner))
                                 if opening_is_free(factor, own, inner)
@@ -281,7 +279,9 @@ fn opening_is_free(factor: Constant, constant: Constant, terms: &[(Constant, Exp
     let costly = |c: &Constant| !c.abs().is_one();
     let before = usize::from(costly(&factor)) + terms.iter().filter(|(c, _)| costly(c)).count();
     let after = terms.iter().filter(|(c, _)| costly(&(factor * *c))).count();
-    after <= before && (constant.is_zero() || !costly(&factor) || after < before)
+    let mut numbers = terms.iter().map(|(c, _)| *c).chain([constant]);
+    let are_in_range = numbers.all(|c| factor.product_in_range(c).is_some());
+    are_in_range && after <= before && (constant.is_zero() || !costly(&factor) || after < before)
 }
 
 /// `affine` with `value` in place of the variable, in the places of lists too.

@@ -8,10 +8,11 @@
 //! | c·sin²x·r + c·cos²x·r | → c·r |
 //! | r·uⁿ⁺¹ − c·r·uⁿ·w | → r·uⁿ·(u − c·w), where c·w is a term of u, a sum with positive coefficients, and n < 0: 1/√(x² + y²) − x²/√(x² + y²)³ → y²/√(x² + y²)³ |
 //! | products | x·0 → 0, x·1 → x; numbers come out in front; x·x → x², xᵃxᵇ → xᵃ⁺ᵇ; (x y)ⁿ → xⁿyⁿ (up to 16 factors) |
-//! | quotients | x/y → x·y⁻¹; x/x → 1 |
+//! | numbers | whose product or power leaves the normal numbers of `f64` stay beside their factors: (1e-200 x)² is not 0·x² |
+//! | quotients | x/y → x·y⁻¹; x/x → 1; xᵉ/xⁿ → xᵉ⁻ⁿ for a number e |
 //! | powers | x^n a product for whole n; x^(n/2) → √xⁿ |
 //! | √ | √x^(2n) → xⁿ; √(x²) → abs x |
-//! | abs | abs(x)^(2n) → x^(2n); abs(abs x) → abs x; abs(√x) → √x |
+//! | abs, sign | abs(x)^(2n) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x |
 //! | parity | sin(−x) → −sin x, cos(−x) → cos x, and so for each even or odd function |
 //! | min, max | of x and x → x; hypot(x, 0) → abs x |
 //! | select | with equal branches → the branch; with a decided condition → its branch |
@@ -131,6 +132,16 @@ impl Graph {
     }
 
     fn call_positive(&mut self, function: Function, x: ExprId) -> ExprId {
+        if matches!(function, Function::Abs | Function::Sign) {
+            let (size, inner) = self.as_multiple(x);
+            if inner != x {
+                let value = self.call(function, &[inner]);
+                return match function {
+                    Function::Abs => self.scale(size, value),
+                    _ => value,
+                };
+            }
+        }
         match (function, self.node(x)) {
             (Function::Sqrt, Node::Product(_) | Node::Sum { .. }) => {
                 if let Some(half) = self.root_of_square(x) {
@@ -218,6 +229,8 @@ impl Graph {
     /// c Π xᵢ^nᵢ: all rules of products are here.
     pub(crate) fn product(&mut self, coefficient: Constant, factors: &[(ExprId, i32)]) -> ExprId {
         let mut coefficient = coefficient;
+        // Numbers whose product with the others would leave the range of `f64`.
+        let mut apart: Vec<Constant> = Vec::new();
         let mut collected: SortedMap<ExprId, i64> = SortedMap::new();
         let mut waiting: Vec<(ExprId, i64)> =
             factors.iter().map(|(x, n)| (*x, i64::from(*n))).collect();
@@ -227,16 +240,22 @@ impl Graph {
             match self.node(inner) {
                 _ if n == 0 => {}
                 Node::Constant(value) => match small.and_then(|n| value.powi(n)) {
-                    Some(value) => coefficient = coefficient * value,
+                    Some(value) => match coefficient.product_in_range(value) {
+                        Some(product) => coefficient = product,
+                        None => apart.push(value),
+                    },
                     None => *collected.get_or_default(inner) += n,
                 },
-                _ if inner != x => match small.and_then(|n| multiple.powi(n)) {
-                    Some(value) => {
-                        coefficient = coefficient * value;
-                        waiting.push((inner, n));
+                _ if inner != x => {
+                    let power = small.and_then(|n| multiple.powi_in_range(n));
+                    match power.and_then(|power| coefficient.product_in_range(power)) {
+                        Some(product) => {
+                            coefficient = product;
+                            waiting.push((inner, n));
+                        }
+                        None => *collected.get_or_default(x) += n,
                     }
-                    None => *collected.get_or_default(x) += n,
-                },
+                }
                 Node::Product(inner) if inner.len() <= LONG_PRODUCT => waiting.extend(
                     inner
                         .iter()
@@ -248,7 +267,7 @@ impl Graph {
                 }
             }
             if waiting.is_empty() {
-                coefficient = coefficient * self.fold_even_powers(&mut collected, &mut waiting);
+                coefficient = coefficient * self.fold_powers(&mut collected, &mut waiting);
             }
         }
         collected.retain(|_, n| *n != 0);
@@ -267,111 +286,19 @@ impl Graph {
         }
         factors.sort_unstable();
         let product = match factors[..] {
-            [] => return self.constant(coefficient),
+            [] => {
+                let number = apart.into_iter().fold(coefficient, |a, b| a * b);
+                return self.constant(number);
+            }
             [(x, 1)] => x,
             // As it is: there are no terms to collect.
-            _ if coefficient.is_one() => return self.intern(Node::Product(factors)),
+            _ if coefficient.is_one() && apart.is_empty() => {
+                return self.intern(Node::Product(factors));
+            }
             _ => self.intern(Node::Product(factors)),
         };
-        self.scale(coefficient, product)
-    }
-
-    /// √x^(2n) → xⁿ, xⁿ/√x → xⁿ⁻¹ √x and abs(x)^(2n) → x^(2n); the number by which all is to be multiplied then.
-    fn fold_even_powers(
-        &self,
-        collected: &mut SortedMap<ExprId, i64>,
-        waiting: &mut Vec<(ExprId, i64)>,
-    ) -> Constant {
-        let coefficient = self.lift_roots(collected);
-        for (x, n) in collected.iter_mut() {
-            let Node::Call {
-                function,
-                arguments,
-            } = self.node(*x)
-            else {
-                continue;
-            };
-            let Some(&argument) = arguments.first() else {
-                continue;
-            };
-            match function {
-                Function::Sqrt if n.abs() >= 2 => {
-                    waiting.push((argument, *n / 2));
-                    *n %= 2;
-                }
-                Function::Abs if *n != 0 && *n % 2 == 0 => {
-                    waiting.push((argument, *n));
-                    *n = 0;
-                }
-                _ => {}
-            }
-        }
-        coefficient
-    }
-
-    /// xⁿ/√x → xⁿ⁻¹ √x for n > 0, x²/√abs(x) → abs(x) √abs(x) and x²/√(c x y) → x √(c x y)/(c y): the same numbers, and zero instead of 0/0 where x = 0. The number by which
-    /// all is to be multiplied then.
-    fn lift_roots(&self, collected: &mut SortedMap<ExprId, i64>) -> Constant {
-        let mut coefficient = Constant::ONE;
-        let below = |(x, n): &(ExprId, i64)| match self.node(*x) {
-            Node::Call {
-                function: Function::Sqrt,
-                arguments,
-            } if *n == -1 => Some((*x, *arguments.first()?)),
-            _ => None,
-        };
-        let roots: Vec<(ExprId, ExprId)> = collected.iter().filter_map(below).collect();
-        for (root, argument) in roots {
-            if let Some(n) = collected.get_mut(&argument).filter(|n| **n >= 1) {
-                *n -= 1;
-                *collected.get_or_default(root) = 1;
-                continue;
-            }
-            let Node::Call {
-                function: Function::Abs,
-                arguments,
-            } = self.node(argument)
-            else {
-                if let Some((multiple, factors)) = self.above_its_root(argument, collected) {
-                    for (x, n) in factors {
-                        *collected.get_or_default(x) -= i64::from(n);
-                    }
-                    *collected.get_or_default(root) = 1;
-                    coefficient = coefficient * multiple;
-                }
-                continue;
-            };
-            let squared = arguments.first().and_then(|x| collected.get_mut(x));
-            if let Some(n) = squared.filter(|n| **n >= 2) {
-                *n -= 2;
-                *collected.get_or_default(argument) += 1;
-                *collected.get_or_default(root) = 1;
-            }
-        }
-        coefficient
-    }
-
-    /// 1/c and the factors of an argument c Π xᵢ^mᵢ of a root, if all that stand above in it are among other factors as often, and one may vanish.
-    fn above_its_root(
-        &self,
-        argument: ExprId,
-        collected: &SortedMap<ExprId, i64>,
-    ) -> Option<(Constant, Vec<(ExprId, i32)>)> {
-        let (multiple, inner) = self.as_multiple(argument);
-        let factors = match self.node(inner) {
-            Node::Product(factors) => factors.clone(),
-            _ => vec![(inner, 1)],
-        };
-        let mut above = factors.iter().filter(|(_, n)| *n > 0);
-        let stands_above = |(x, n): &(ExprId, i32)| {
-            let here = collected.get(x).copied().unwrap_or_default();
-            here >= i64::from(*n)
-        };
-        let may_vanish = |(x, _): &(ExprId, i32)| !matches!(self.node(*x), Node::Input(_));
-        if !above.clone().all(stands_above) || !above.any(may_vanish) {
-            return None;
-        }
-        Some((multiple.reciprocal()?, factors))
+        let scaled = self.scale(coefficient, product);
+        apart.into_iter().fold(scaled, |x, c| self.scale(c, x))
     }
 }
 
@@ -393,19 +320,19 @@ fn fold(function: Function, arguments: &[Constant]) -> Option<Constant> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::expr::differentiate::derivative;
     use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
 
     /// A graph with x, y, z.
-    fn variables() -> (Graph, ExprId, ExprId, ExprId) {
+    pub(crate) fn variables() -> (Graph, ExprId, ExprId, ExprId) {
         let mut graph = Graph::default();
         let [x, y, z] = ["x", "y", "z"].map(|name| graph.input(Input::Parameter(name.to_owned())));
         (graph, x, y, z)
     }
 
-    fn number(graph: &mut Graph, text: &str) -> ExprId {
+    pub(crate) fn number(graph: &mut Graph, text: &str) -> ExprId {
         let value = Constant::parse(text).expect("a literal of the test");
         graph.constant(value)
     }
@@ -587,6 +514,23 @@ mod tests {
         assert_eq!(g.power(size, two), square);
         assert_eq!(g.call(Function::Abs, &[size]), size);
         assert_eq!(g.call(Function::Abs, &[root]), root);
+    }
+
+    #[test]
+    fn numbers_that_would_vanish_stay() {
+        let (mut g, x, ..) = variables();
+        let (small, two) = (number(&mut g, "1e-200"), g.integer(2));
+        let scaled = g.multiply(small, x);
+        let square = g.power(scaled, two);
+        assert_eq!(*g.node(square), Node::Product(vec![(scaled, 2)]));
+        let again = g.multiply(small, scaled);
+        let terms = vec![(Constant::float(1e-200), scaled)];
+        let constant = Constant::ZERO;
+        assert_eq!(*g.node(again), Node::Sum { constant, terms });
+        assert_eq!(g.divide(square, square), g.integer(1));
+        let half = number(&mut g, "0.5");
+        let halved = g.multiply(half, square);
+        assert_eq!(g.as_multiple(halved).1, square);
     }
 
     #[test]

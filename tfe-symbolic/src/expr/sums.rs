@@ -75,8 +75,7 @@ struct Collected {
 
 impl Collected {
     fn push(&mut self, graph: &Graph, coefficient: Constant, x: ExprId) {
-        let (multiple, x) = graph.as_multiple(x);
-        let coefficient = coefficient * multiple;
+        let (coefficient, x) = graph.as_multiple_times(coefficient, x);
         if let Some(value) = graph.as_constant(x) {
             self.constant = self.constant + coefficient * value;
             return;

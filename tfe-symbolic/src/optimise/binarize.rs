@@ -591,7 +591,11 @@ impl<'a> Arranger<'a> {
             op,
         };
         match family.meanings[at].clone() {
-            Meaning::Multiple(multiple) => self.built[&multiple],
+            Meaning::Multiple(multiple) => match kind {
+                Kind::Sum => self.built[&multiple],
+                // A factor may be a multiple.
+                Kind::Product => self.value(multiple.0),
+            },
             Meaning::Number(value) => positive(self.plan.push(Op::Constant(value))),
             Meaning::Group(set) => self.build_set(kind, set),
             Meaning::Fraction(fraction) => self.build_quotient(self.fraction_sets[fraction]),

@@ -2,6 +2,7 @@
 
 use crate::derive::derivation::Derivation;
 use crate::derive::entry::Entry;
+use crate::derive::limits::take_limits;
 use crate::derive::sensitivity::{Leaf, entries_by};
 use crate::model::declared::Declared;
 use crate::optimise::passes::Passes;
@@ -104,7 +105,8 @@ impl Derivation {
             },
         };
         let mut graph = self.graph.clone();
-        let entries = entries_by(&mut graph, &self.entries, leaf);
+        let mut entries = entries_by(&mut graph, &self.entries, leaf);
+        take_limits(&mut graph, [&mut entries]);
         Draft::best(&graph, vec![entries], self.passes)
     }
 

@@ -46,8 +46,7 @@ impl Terms {
 
 /// c x as a positive multiple of something that is no multiple, and whether the sign was lost.
 pub(super) fn multiple(graph: &Graph, c: Constant, x: ExprId) -> (Multiple, bool) {
-    let (inner, x) = graph.as_multiple(x);
-    let c = c * inner;
+    let (c, x) = graph.as_multiple_times(c, x);
     ((x, PositiveConstant(c.abs())), c.is_negative())
 }
 

@@ -1,0 +1,231 @@
+//! Derivatives where they are zero times infinity or zero over zero, and have a limit.
+//!
+//! ```text
+//! m = max(x, 0)        ∂²(m √m)/∂x² = 3/(4 √m) { 1  where x ≥ 0;  0  elsewhere }  →  { 3/(4 √m)  where x ≥ 0;  0  elsewhere }
+//! h = √(x² + y²)       ∂²h³/∂x∂y = 3 x y/h                                        →  3 x y/{ 1  where h ≤ 0;  h  elsewhere }
+//! ```
+//!
+//! Of a product with a choice between something and zero, what may be infinite goes inside of the choice. Norms are told in `norms.rs`. Both are done
+//! to the entries at last: before, factors have met, so that m/√m is √m and nothing has to be chosen.
+
+mod norms;
+
+use crate::derive::entry::Entry;
+use crate::expr::comparison::Comparison;
+use crate::expr::constant::Constant;
+use crate::expr::function::Function;
+use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::rewrite::Mapping;
+use crate::program::Array;
+use norms::Norms;
+
+/// Factors are looked into to this depth for what may be infinite.
+const MAX_DEPTH: usize = 4;
+
+/// Writes derivatives and forces so that they have their limits; products without one stay as they are.
+pub(crate) fn take_limits<'a>(
+    graph: &mut Graph,
+    lists: impl IntoIterator<Item = &'a mut Vec<Entry>>,
+) {
+    let is_slope = |entry: &&mut Entry| is_slope(entry.place.array);
+    let mut entries: Vec<&mut Entry> = lists.into_iter().flatten().filter(is_slope).collect();
+    let roots: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
+    let mut mapping = Mapping::default();
+    let mut norms = Norms::default();
+    for old in graph.reachable(&roots) {
+        let node = graph.node(old);
+        let is_product = matches!(node, Node::Product(_));
+        let keeps = mapping.keeps(node);
+        if keeps && !is_product {
+            continue;
+        }
+        let mut new = old;
+        if !keeps {
+            let node = node.clone();
+            new = graph.remake(&node, &mapping);
+        }
+        if is_product {
+            new = norms.limit(graph, new);
+            new = inside_choices(graph, new);
+        }
+        mapping.set(old, new);
+    }
+    for entry in &mut entries {
+        entry.value = mapping.of(entry.value);
+    }
+}
+
+/// Derivatives of the energy, forces and their derivatives.
+fn is_slope(array: Array) -> bool {
+    matches!(
+        array,
+        Array::ByZ
+            | Array::ByQ
+            | Array::Force
+            | Array::ZZ
+            | Array::ZQ
+            | Array::QQ
+            | Array::ForceZ
+            | Array::ForceQ
+    )
+}
+
+/// A choice between something and zero.
+#[derive(Clone, Copy)]
+struct OrZero {
+    comparison: Comparison,
+    left: ExprId,
+    right: ExprId,
+    /// Whether the something is taken where the condition holds.
+    holds: bool,
+    value: ExprId,
+}
+
+impl OrZero {
+    /// The choice that a factor is.
+    fn of(graph: &Graph, x: ExprId, exponent: i32) -> Option<Self> {
+        let Node::Select {
+            comparison,
+            left,
+            right,
+            then,
+            otherwise,
+        } = *graph.node(x)
+        else {
+            return None;
+        };
+        let is_zero = |x| graph.as_constant(x).is_some_and(Constant::is_zero);
+        let (holds, value) = match (is_zero(then), is_zero(otherwise)) {
+            (false, true) => (true, then),
+            (true, false) => (false, otherwise),
+            _ => return None,
+        };
+        (exponent > 0).then_some(Self {
+            comparison,
+            left,
+            right,
+            holds,
+            value,
+        })
+    }
+
+    fn is_chosen_with(&self, other: &Self) -> bool {
+        let key = |choice: &Self| (choice.comparison, choice.left, choice.right, choice.holds);
+        key(self) == key(other)
+    }
+
+    /// The choice between something else and zero.
+    fn with(&self, graph: &mut Graph, value: ExprId) -> ExprId {
+        let zero = graph.constant(Constant::ZERO);
+        let (then, otherwise) = match self.holds {
+            true => (value, zero),
+            false => (zero, value),
+        };
+        graph.select(self.comparison, self.left, self.right, then, otherwise)
+    }
+
+    /// Whether the condition and an expression hold a leaf in common.
+    fn concerns(&self, graph: &Graph, x: ExprId) -> bool {
+        let leaves = graph.inputs_of(x);
+        let mut held = [self.left, self.right]
+            .into_iter()
+            .flat_map(|side| graph.inputs_of(side));
+        held.any(|leaf| leaves.contains(&leaf))
+    }
+}
+
+/// A product with what may be infinite inside of its choices. Recursion is as deep as there are choices in it.
+fn inside_choices(graph: &mut Graph, x: ExprId) -> ExprId {
+    let (coefficient, product) = graph.as_multiple(x);
+    let Node::Product(factors) = graph.node(product) else {
+        return x;
+    };
+    let choices = factors
+        .iter()
+        .filter_map(|(y, n)| OrZero::of(graph, *y, *n));
+    let choices: Vec<OrZero> = choices.collect();
+    if choices.is_empty() {
+        return x;
+    }
+    let factors = factors.clone();
+    for choice in choices {
+        let belongs = |(y, n): &(ExprId, i32)| {
+            let own = OrZero::of(graph, *y, *n).filter(|own| own.is_chosen_with(&choice))?;
+            Some((own.value, *n))
+        };
+        let diverges = |(y, n): &(ExprId, i32)| {
+            may_be_infinite(graph, *y, *n, MAX_DEPTH) && choice.concerns(graph, *y)
+        };
+        let mut beside = factors.iter().filter(|factor| belongs(factor).is_none());
+        if beside.any(diverges) {
+            let inside = |factor: &(ExprId, i32)| belongs(factor).unwrap_or(*factor);
+            let inside: Vec<(ExprId, i32)> = factors.iter().map(inside).collect();
+            let value = graph.product(coefficient, &inside);
+            let value = inside_choices(graph, value);
+            let (number, value) = graph.as_multiple(value);
+            let chosen = choice.with(graph, value);
+            return graph.scale(number, chosen);
+        }
+    }
+    x
+}
+
+/// Whether xⁿ may be infinite where something in it vanishes.
+fn may_be_infinite(graph: &Graph, x: ExprId, n: i32, depth: usize) -> bool {
+    let Some(depth) = depth.checked_sub(1) else {
+        return false;
+    };
+    let x = graph.as_multiple(x).1;
+    match graph.node(x) {
+        Node::Call {
+            function,
+            arguments,
+        } => {
+            let diverges = match function {
+                Function::Sqrt
+                | Function::Hypot
+                | Function::Abs
+                | Function::Min
+                | Function::Max => n < 0,
+                Function::Ln => n > 0,
+                _ => false,
+            };
+            diverges && !arguments.iter().any(|y| is_surely_positive(graph, *y))
+        }
+        Node::Select { .. } => n < 0,
+        Node::Power { base, exponent } => {
+            let diverges = match graph.as_constant(*exponent) {
+                Some(exponent) => exponent.is_negative() == (n > 0),
+                None => true,
+            };
+            diverges && !is_surely_positive(graph, *base)
+        }
+        Node::Product(factors) if n > 0 => {
+            (factors.iter()).any(|(y, m)| may_be_infinite(graph, *y, *m, depth))
+        }
+        Node::Sum { terms, .. } if n > 0 => {
+            (terms.iter()).any(|(_, y)| may_be_infinite(graph, *y, 1, depth))
+        }
+        // The square of a norm.
+        Node::Sum { .. } => {
+            let root = Node::Call {
+                function: Function::Sqrt,
+                arguments: vec![x],
+            };
+            graph.find(&root).is_some() && !is_surely_positive(graph, x)
+        }
+        _ => false,
+    }
+}
+
+/// Whether it is a positive number, or the sum of one and of others without a minus, as 1 + x².
+fn is_surely_positive(graph: &Graph, x: ExprId) -> bool {
+    let is_positive = |c: Constant| !c.is_zero() && !c.is_negative();
+    if let Some(number) = graph.as_constant(x) {
+        return is_positive(number);
+    }
+    let (_, x) = graph.as_multiple(x);
+    graph.as_sum(x).is_some_and(|(constant, terms)| {
+        is_positive(constant) && terms.iter().all(|(c, _)| is_positive(*c))
+    })
+}
