@@ -2,7 +2,10 @@
 
 pub(super) mod act;
 mod clear;
+mod locate;
 pub(super) mod on;
+mod order;
+mod remaining;
 pub(super) mod remodel;
 mod search;
 pub(super) mod settings;
@@ -16,9 +19,11 @@ use crate::length::{FixedLength, Length, Polynomial};
 use crate::motion::{LastCut, Seen};
 use act::{Act, After, Event, On};
 use clear::Clear;
+use remaining::{Crossed, Remaining};
 use remodel::Remodel;
 use search::Course;
 use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::fmt;
 use tfe_runtime::Share;
 use tfe_runtime::dual::Dual;
@@ -42,14 +47,26 @@ type Look<'m, M, const N: usize, L> = fn(
 type KeepOff<'m, M, const N: usize, L> =
     fn(&mut Events<'m, M, N, L>, &mut <L as Length<N>>::Stepper<'m, M>, (f64, f64)) -> bool;
 
+/// [`Events::meet_due`], or nothing.
+type MeetDue<'m, M, const N: usize, L> = fn(
+    &mut Events<'m, M, N, L>,
+    f64,
+    &<L as Length<N>>::State,
+) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind>;
+
 /// Looks for the events of a run.
 pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     model: Share<'m, M>,
     remodel: Option<Remodel<'m, M>>,
     look: Look<'m, M, N, L>,
     keep_off: KeepOff<'m, M, N, L>,
+    meet_due: MeetDue<'m, M, N, L>,
     watched: Vec<Watched<'m, N, L>>,
     pub(super) seen: Seen,
+    /// The last cut that each of them has made.
+    lasts: Vec<Option<LastCut>>,
+    /// Those that come at the time of the last cut, or have come before it, and are still to be met.
+    due: VecDeque<Crossed>,
     /// Of the steps that look for the times of events, as of those of the run.
     chosen: Chosen,
     rooms: Rooms,
@@ -102,6 +119,37 @@ pub(super) struct Passage<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) impulses: &'a [Impulse<N>],
 }
 
+impl<'a, const N: usize, L: Length<N>> Passage<'a, N, L> {
+    pub(super) fn origin(&self) -> Origin<'a, N, L> {
+        Origin {
+            t: self.t,
+            begin: self.begin,
+            before: self.before,
+            impulses: self.impulses,
+        }
+    }
+
+    /// The time of a place in the element: that of a node where they differ by roundings.
+    fn time(&self, length: f64, resolution: f64) -> f64 {
+        if (self.h - length).abs() <= resolution {
+            self.dense.end()
+        } else if length.abs() <= resolution {
+            self.t
+        } else {
+            self.t + length
+        }
+    }
+}
+
+/// Where an element begins that an event has cut.
+pub(super) struct Origin<'a, const N: usize, L: Length<N> = FixedLength> {
+    pub(super) t: f64,
+    /// As in a [`Passage`].
+    pub(super) begin: f64,
+    pub(super) before: &'a L::State,
+    pub(super) impulses: &'a [Impulse<N>],
+}
+
 /// An event in an element.
 #[derive(Clone, Copy, Debug)]
 struct Place {
@@ -147,24 +195,11 @@ pub struct Severed<'a, 'm, const N: usize, L: Length<N> = FixedLength> {
     pub(super) goes_on: bool,
 }
 
-/// What has come of a search for the time of an event.
-struct Met<const N: usize, L: Length<N>> {
-    length: f64,
-    state: L::State,
-    velocity: L::Vector,
-    inside: Option<L::Polynomial>,
-}
-
-impl<const N: usize, L: Length<N>> Met<N, L> {
-    /// Of the polynomial alone, where no element can end there.
-    fn between(dense: &L::Polynomial, t: f64, length: f64) -> Self {
-        Self {
-            length,
-            state: dense.at_time(t + length),
-            velocity: dense.velocity_at_time(t + length),
-            inside: None,
-        }
-    }
+/// What has been done at an event that ends an element.
+struct Done<'m, M: 'm, const N: usize, L: Length<N>> {
+    place: Place,
+    /// None where the run ends there.
+    after: Option<After<'m, M, N, L>>,
 }
 
 impl<'m, M, const N: usize, L> Events<'m, M, N, L>
@@ -196,6 +231,7 @@ where
     /// A new step of the run.
     pub(super) fn begin(&mut self, step: f64) {
         (self.cuts, self.step) = (0, step);
+        self.due.clear();
     }
 
     /// Whether it is proved, for less than the polynomial of the element takes that was done last, that nothing that is watched vanishes there.
@@ -244,6 +280,20 @@ where
         (self.look)(self, arc)
     }
 
+    /// Whether events are to be met at the time of the last cut, before the run goes on.
+    pub(super) fn has_due(&self) -> bool {
+        !self.due.is_empty()
+    }
+
+    /// Does what is to be done at these, in the state that the last one has left, up to the first that acts.
+    pub(super) fn pass_due(
+        &mut self,
+        time: f64,
+        state: &L::State,
+    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
+        (self.meet_due)(self, time, state)
+    }
+
     fn look(&mut self, arc: &Passage<'_, N, L>) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
         let Passage { t, h, dense, .. } = *arc;
         self.recorded.clear();
@@ -273,144 +323,175 @@ where
             self.outputs(time, state, &v, row);
         };
         let mut course = |function, part| self.course(dense, function, part);
-        let resolution_of_tau = resolution / h.abs();
-        let (found, sides) = search::crossings(
+        let (found, ends) = search::crossings(
             &self.seen.sides,
             samples,
-            resolution_of_tau,
+            resolution / h.abs(),
             &value,
             &mut course,
         );
-        for (number, root) in found.iter().enumerate() {
-            let on = &self.watched[root.function].on;
-            if !on.crossing.counts(root.rises) {
-                continue;
-            }
-            let name = on.name.clone();
-            let met = self.locate(arc, root, resolution);
-            let met = met.unwrap_or_else(|| Met::between(dense, t, root.tau * h));
-            if self.is_seen_again(root, t + met.length) {
-                continue;
-            }
-            let time = if (h - met.length).abs() <= resolution {
-                dense.end()
-            } else {
-                t + met.length
-            };
-            let (q, p) = L::parts(&met.state);
-            let event = Event {
-                name: name.clone(),
-                t: time,
-                q: q.clone(),
-                v: met.velocity,
-                p: p.clone(),
-                rises: root.rises,
-            };
-            let watched = &self.watched[root.function];
-            let act = act::act(&*self.model, (&watched.on, &watched.value), &event);
-            let goes_by = act == Act::Record;
-            let after = act::after(&*self.model, self.remodel, &event, act);
-            let place = Place {
-                watched: root.function,
-                met: self.met.len(),
-                length: met.length,
-                inside: met.inside.is_some(),
-            };
-            self.met.push(event);
-            let after = after?;
-            if goes_by {
-                self.recorded.push(place);
-                continue;
-            }
-            self.cuts += 1;
-            let returns = after.is_some() && self.comes_soon(root, time).is_some();
-            let is_idle =
-                |after: &After<'m, M, N, L>| after.model.is_none() && after.state == met.state;
-            self.seen.last = Some(LastCut {
-                time,
+        let mut remaining = Remaining::new(found, ends);
+        while let Some(root) = remaining.first() {
+            let crossed = Crossed {
                 function: root.function,
                 rises: root.rises,
-                is_idle: after.as_ref().is_some_and(is_idle),
-            });
-            if returns || self.cuts > Self::MAX_CUTS {
-                return Err(RunErrorKind::EventsWithoutEnd { name, time });
+            };
+            if !self.counts(crossed) {
+                remaining.take(root.function);
+                continue;
             }
-            self.forget_sides(&found[number..], root.tau, resolution_of_tau);
-            return Ok(Some(Cut {
-                t: time,
-                at: met.state,
-                inside: met.inside,
-                after,
-                place,
-            }));
+            let met = self.located(arc, &root, resolution);
+            let (root, met) = self.earliest(arc, &remaining, (root, met), resolution);
+            if self.is_seen_again(arc, &root, met.time) {
+                remaining.take(root.function);
+                continue;
+            }
+            let meeting = self.meeting(arc, &remaining, (&root, &met), resolution);
+            for number in 0..meeting.together.len() {
+                let crossed = meeting.together[number];
+                remaining.take(crossed.function);
+                let at = (met.time, &met.state, &met.velocity);
+                let place = (met.length, met.inside.is_some());
+                let Some(Done { place, after }) = self.meet(crossed, at, place)? else {
+                    continue;
+                };
+                self.leave((meeting, number), &met, after.as_ref());
+                return Ok(Some(Cut {
+                    t: met.time,
+                    at: met.state,
+                    inside: met.inside,
+                    after,
+                    place,
+                }));
+            }
         }
-        self.seen.sides = sides;
+        self.seen.sides = remaining.into_sides();
         Ok(None)
     }
 
-    /// Whether this is the event that has cut the element before, where nothing was done: its polynomial has another velocity than the node at which this one begins.
-    fn is_seen_again(&self, root: &search::Root, time: f64) -> bool {
-        let is_last = |last: LastCut| last.is_idle && last.rises == root.rises;
-        self.comes_soon(root, time).is_some_and(is_last)
+    /// Does what is to be done at an event at the end of an element of a length; nothing has been done where it is only recorded.
+    fn meet(
+        &mut self,
+        Crossed { function, rises }: Crossed,
+        (time, state, velocity): (f64, &L::State, &L::Vector),
+        (length, inside): (f64, bool),
+    ) -> Result<Option<Done<'m, M, N, L>>, RunErrorKind> {
+        let Watched { on, value } = &self.watched[function];
+        let (q, p) = L::parts(state);
+        let event = Event {
+            name: on.name.clone(),
+            t: time,
+            q: q.clone(),
+            v: velocity.clone(),
+            p: p.clone(),
+            rises,
+        };
+        let act = act::act(&*self.model, (on, value), &event);
+        let goes_by = act == Act::Record;
+        let after = act::after(&*self.model, self.remodel, &event, act);
+        let place = Place {
+            watched: function,
+            met: self.met.len(),
+            length,
+            inside,
+        };
+        let name = event.name.clone();
+        self.met.push(event);
+        let after = after?;
+        if goes_by {
+            self.recorded.push(place);
+            return Ok(None);
+        }
+        self.cuts += 1;
+        let is_it = |last: LastCut| last.function == function && self.is_soon(last.time, time);
+        let returns = after.is_some() && self.seen.last.is_some_and(is_it);
+        let is_idle = |after: &After<'m, M, N, L>| after.model.is_none() && after.state == *state;
+        let last = Some(LastCut {
+            time,
+            function,
+            rises,
+            is_idle: after.as_ref().is_some_and(is_idle),
+        });
+        (self.seen.last, self.lasts[function]) = (last, last);
+        if returns || self.cuts > Self::MAX_CUTS {
+            return Err(RunErrorKind::EventsWithoutEnd { name, time });
+        }
+        Ok(Some(Done { place, after }))
     }
 
-    /// The last cut, where this event made it and comes again too soon.
-    fn comes_soon(&self, root: &search::Root, time: f64) -> Option<LastCut> {
-        let soon = Self::SOON * self.step.abs();
-        let is_soon =
-            |last: &LastCut| last.function == root.function && (time - last.time).abs() < soon;
-        self.seen.last.filter(is_soon)
+    /// Whether this is the event that has cut the element before: the polynomial behind it has another velocity than the node at which it begins.
+    fn is_seen_again(&self, arc: &Passage<'_, N, L>, root: &search::Root, time: f64) -> bool {
+        let crossed = Crossed {
+            function: root.function,
+            rises: root.rises,
+        };
+        let last = self.last_of(crossed, time);
+        last.is_some_and(|last| last.is_idle || self.begins_behind(arc, root))
+    }
+
+    /// Whether it is seen only since the polynomial begins where the function has come from, and goes where the node is already.
+    fn begins_behind(&self, arc: &Passage<'_, N, L>, root: &search::Root) -> bool {
+        let before = if root.rises { -1.0 } else { 1.0 };
+        let value = |state: &L::State, time: f64, v: &L::Vector| {
+            before * self.row(time, state, v)[root.function]
+        };
+        let inside = |part: f64| {
+            let time = arc.t + part * root.tau * arc.h;
+            let state = arc.dense.at_time(time);
+            value(&state, time, &arc.dense.velocity_at_time(time))
+        };
+        let (begin, middle) = (inside(0.0), inside(0.5));
+        let guess = arc.dense.velocity_at_time(arc.t);
+        let Some(v) = self.model.velocity(arc.t, arc.before, &guess) else {
+            return false;
+        };
+        begin > 0.0 && middle < begin && value(arc.before, arc.t, &v) < 0.5 * begin
+    }
+
+    /// Whether two times are nearer to each other than an event may come again.
+    fn is_soon(&self, last: f64, time: f64) -> bool {
+        (time - last).abs() < Self::SOON * self.step.abs()
     }
 
     /// A cut, with all that derivatives need.
     pub(super) fn severed<'c>(
         &'c self,
-        arc: &Passage<'c, N, L>,
+        origin: &Origin<'c, N, L>,
         cut: &Cut<'m, M, N, L>,
     ) -> Severed<'c, 'm, N, L> {
-        self.place(arc, &cut.place, cut.after.is_some())
+        self.place(origin, &cut.place, cut.after.is_some())
     }
 
     /// The events that did not end the element looked into last.
     pub(super) fn gone_by<'c>(
         &'c self,
-        arc: &Passage<'c, N, L>,
+        origin: Origin<'c, N, L>,
     ) -> impl Iterator<Item = Severed<'c, 'm, N, L>> {
-        (self.recorded.iter()).map(|place| self.place(arc, place, true))
+        (self.recorded.iter()).map(move |place| self.place(&origin, place, true))
     }
 
     fn place<'c>(
         &'c self,
-        arc: &Passage<'c, N, L>,
+        origin: &Origin<'c, N, L>,
         place: &Place,
         goes_on: bool,
     ) -> Severed<'c, 'm, N, L> {
-        let count = acting::within(arc.impulses, arc.t, place.length);
+        let event = &self.met[place.met];
+        let count = acting::behind(origin.impulses, event.t, self.step);
         Severed {
-            start: arc.t,
-            begin: arc.begin,
+            start: origin.t,
+            begin: origin.begin,
             length: place.length,
             step: self.step,
-            before: arc.before,
-            impulses: &arc.impulses[..count],
+            before: origin.before,
+            impulses: &origin.impulses[..count],
             inside: place.inside,
             watched: &self.watched[place.watched],
             which: place.watched,
-            event: &self.met[place.met],
+            event,
             number: place.met,
             goes_on,
         }
-    }
-
-    /// After a jump of the state outputs are on new sides, but for those that are to cross at the same time.
-    fn forget_sides(&mut self, found: &[search::Root], tau: f64, resolution: f64) {
-        let mut sides = vec![0.0; self.seen.sides.len()];
-        for root in &found[1..] {
-            if root.tau - tau <= 16.0 * resolution && root.function != found[0].function {
-                sides[root.function] = if root.rises { -1.0 } else { 1.0 };
-            }
-        }
-        self.seen.sides = sides;
     }
 
     /// Whether anything that is watched is a function of velocities; those of a Hamiltonian are of momenta.
@@ -435,8 +516,25 @@ where
 
     /// The values of what is watched.
     fn outputs(&self, t: f64, state: &L::State, v: &L::Vector, row: &mut Vec<f64>) {
+        self.outputs_of(&self.model, (t, state, v), row);
+    }
+
+    /// The same, by themselves.
+    fn row(&self, t: f64, state: &L::State, v: &L::Vector) -> Vec<f64> {
+        let mut row = Vec::with_capacity(self.watched.len());
+        self.outputs(t, state, v, &mut row);
+        row
+    }
+
+    /// The same of another model.
+    fn outputs_of(
+        &self,
+        model: &M,
+        (t, state, v): (f64, &L::State, &L::Vector),
+        row: &mut Vec<f64>,
+    ) {
         let mut values = self.rooms.values.borrow_mut();
-        self.model.outputs(t, L::parts(state), v, &mut values);
+        model.outputs(t, L::parts(state), v, &mut values);
         let (q, _) = L::parts(state);
         row.extend(self.watched.iter().map(|watched| match &watched.value {
             Value::Column(column) => values[*column],
@@ -493,81 +591,5 @@ where
         } else {
             Course::Bent
         }
-    }
-
-    /// The length of the element that ends at the event: nodes are more accurate than the polynomial between them, which tells where to begin. None where such an element
-    /// cannot be solved.
-    fn locate(
-        &mut self,
-        arc: &Passage<'_, N, L>,
-        root: &search::Root,
-        resolution: f64,
-    ) -> Option<Met<N, L>> {
-        /// Corrections of the length; each leaves the square of what was off.
-        const MAX_TRIALS: u32 = 8;
-
-        let Passage {
-            t, begin, h, dense, ..
-        } = *arc;
-        let mut length = root.tau * h;
-        let mut probe = match self.probe.take() {
-            Some(probe) => probe,
-            None => M::stepper(self.model.clone(), self.chosen).ok()?,
-        };
-        let mut last = f64::INFINITY;
-        let mut met = None;
-        for _ in 0..MAX_TRIALS {
-            let mut state = arc.before.clone();
-            let mut inside = None;
-            if length.abs() > resolution {
-                let impulses = &arc.impulses[..acting::within(arc.impulses, t, length)];
-                M::advance(&mut probe, (begin, length), &mut state, impulses).ok()?;
-                inside = Some(M::inside(&mut probe, None, (t, t + length)));
-            }
-            let guess = dense.velocity_at_time(t + length);
-            let velocity = self.model.velocity(t + length, &state, &guess)?;
-            let mut row = Vec::new();
-            self.outputs(t + length, &state, &velocity, &mut row);
-            let value = row[root.function];
-            met = Some(Met {
-                length,
-                state,
-                velocity,
-                inside,
-            });
-            let slope = self.slope(arc, root.function, length);
-            let change = -value / slope;
-            let next = (length + change) * h.signum();
-            if root.is_left_at_once(slope * h.signum())
-                || !(change.abs() < last && next >= 0.0 && next <= h.abs() + resolution)
-                || change.abs() <= 0.25 * resolution
-            {
-                break;
-            }
-            last = change.abs();
-            length = next.min(h.abs()) * h.signum();
-        }
-        self.probe = Some(probe);
-        met
-    }
-
-    /// dg/dt on the polynomial.
-    fn slope(&self, arc: &Passage<'_, N, L>, function: usize, length: f64) -> f64 {
-        const NEAR: f64 = 1e-4;
-        let Passage { t, h, dense, .. } = *arc;
-        let value = |length: f64| {
-            let (state, v) = (
-                dense.at_time(t + length),
-                dense.velocity_at_time(t + length),
-            );
-            let mut row = Vec::new();
-            self.outputs(t + length, &state, &v, &mut row);
-            row[function]
-        };
-        let (from, to) = (
-            (length / h - NEAR).max(0.0) * h,
-            (length / h + NEAR).min(1.0) * h,
-        );
-        (value(to) - value(from)) / (to - from)
     }
 }

@@ -3,7 +3,7 @@
 use super::acting;
 use super::events::act::After;
 use super::events::remodel::Changed;
-use super::events::{Cut, Events, Passage};
+use super::events::{Cut, Events, Origin, Passage};
 use super::follow::{Follow, Passed};
 use super::kind::Simulated;
 use crate::error::RunErrorKind;
@@ -147,12 +147,19 @@ where
                 ..planned
             };
             let before = state.clone();
-            let cut = self.pass_piece(stepper, piece, state, observer);
+            let is_due = self.events.has_due();
+            let cut = match is_due {
+                true => self.pass_due(piece, state, observer),
+                false => self.pass_piece(stepper, piece, state, observer),
+            };
             let cut = cut.map_err(|kind| Broken {
                 kind,
                 piece: Some((from, length, before)),
             })?;
             let Some(cut) = cut else {
+                if is_due && from != next {
+                    continue;
+                }
                 return Ok(left(observer.reached(stepper, next, state)));
             };
             let Cut {
@@ -180,12 +187,44 @@ where
             good.map_err(|kind| Broken { kind, piece: None })?;
             observer.at_event(stepper, &self.model, Side::After, (time, &after));
             *state = after;
-            if time == next {
+            if time != next {
+                length -= time - from;
+            } else if !self.events.has_due() {
                 return Ok(left(observer.reached(stepper, next, state)));
             }
-            length -= time - from;
             from = time;
         }
+    }
+
+    /// Meets the events that come at the start of a piece, where another one has cut the element, up to the first that acts.
+    fn pass_due(
+        &mut self,
+        piece: Planned<'_, N>,
+        state: &L::State,
+        observer: &mut impl Observe<'m, M, N, L>,
+    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
+        let Planned { number, t, h, .. } = piece;
+        let cut = self.events.pass_due(t, state)?;
+        let no_matrix = |source| RunErrorKind::Transition {
+            element: number,
+            time: t,
+            step: h,
+            source,
+        };
+        let origin = || Origin::<N, L> {
+            t,
+            begin: t,
+            before: state,
+            impulses: &[],
+        };
+        for severed in self.events.gone_by(origin()) {
+            observer.met(&severed).map_err(no_matrix)?;
+        }
+        if let Some(cut) = &cut {
+            let severed = self.events.severed(&origin(), cut);
+            observer.cut(&severed).map_err(no_matrix)?;
+        }
+        Ok(cut)
     }
 
     /// Moves a state to the end of a piece, unless an event cuts it.
@@ -228,11 +267,11 @@ where
                 impulses,
             };
             let cut = self.events.pass(&arc)?;
-            for severed in self.events.gone_by(&arc) {
+            for severed in self.events.gone_by(arc.origin()) {
                 observer.met(&severed).map_err(no_matrix)?;
             }
             if let Some(cut) = cut {
-                let severed = self.events.severed(&arc, &cut);
+                let severed = self.events.severed(&arc.origin(), &cut);
                 observer.cut(&severed).map_err(no_matrix)?;
                 return Ok(Some(cut));
             }

@@ -4,6 +4,7 @@ mod acts;
 mod clear;
 mod derivatives;
 mod meeting;
+mod near;
 #[path = "../../examples/events_beside_scans.rs"]
 mod scans;
 

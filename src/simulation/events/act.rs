@@ -13,7 +13,7 @@ use std::ops::Deref;
 use std::sync::Arc;
 use tfe_runtime::{Model, State};
 
-/// Which changes of sign count.
+/// Which changes of sign count. They are those that the run sees: what rises in a run falls in one that goes back over it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crossing {
     /// From below zero to above.

@@ -15,10 +15,15 @@ where
     /// Does `act` whenever the event or output `name` of the model changes its sign in the direction of `crossing`; [`Motion::events`](crate::Motion::events) lists what was met. Of several
     /// events the run does what is to be done in the order of time.
     ///
+    /// Events at the same time, as far as roundings of the time can tell, are all met there, in the order in which they were declared. So are two calls of `on` for the same event. Each act is
+    /// given the state that the acts before it have left; after one that [stops](Act::Stop) the run there are no others. A change of sign that an act itself makes, by another state or other
+    /// parameters, is no event.
+    ///
     /// Times are those of an element that ends at the event, so that they are as accurate as nodes. An element ends there too where the state or parameters change: two nodes have that
     /// time then, with the states before and after. None is missed: where an output cannot change its sign on an element's polynomial is proved by interval arithmetic, and what is left is
     /// searched (`docs/theory.md` §10.8). Pairs closer than 10⁻⁶ of an element may be, and those of functions given to [inputs](Self::input), which are known at samples. A value that
-    /// touches zero without changing its sign is no event.
+    /// touches zero without changing its sign is no event. Nor is one that is zero at the start of the run; one that is zero at the end has its event when the run is
+    /// [resumed](Self::resume), if it changes its sign then. Where a value stays at zero for a while between two signs, there is one event, at a time in between.
     ///
     /// ```
     /// use tfe::prelude::*;

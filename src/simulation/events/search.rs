@@ -16,8 +16,13 @@ pub(super) struct Root {
 impl Root {
     /// Whether the function has jumped over zero at the start, and with this slope goes back: where it vanishes next is another root.
     pub(super) fn is_left_at_once(&self, slope: f64) -> bool {
-        let back = if self.rises { -slope } else { slope };
-        self.tau == 0.0 && back > 0.0
+        self.tau == 0.0 && self.is_crossed_with(-slope)
+    }
+
+    /// Whether a function with this slope goes over zero as here.
+    pub(super) fn is_crossed_with(&self, slope: f64) -> bool {
+        let on = if self.rises { slope } else { -slope };
+        on > 0.0
     }
 }
 

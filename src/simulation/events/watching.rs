@@ -4,11 +4,12 @@ use super::act::{Act, Crossing, Occurrence, On};
 use super::clear::Clear;
 use super::remodel::{Remodel, remodel};
 use super::value::{Function, Value};
-use super::{Events, KeepOff, Look, Rooms, Watched};
+use super::{Events, KeepOff, Look, MeetDue, Rooms, Watched};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::motion::Seen;
 use crate::simulation::kind::{Chosen, Simulated};
+use std::collections::VecDeque;
 use std::fmt;
 use std::sync::Arc;
 use tfe_runtime::{CoordinateName, Share};
@@ -21,6 +22,7 @@ pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength
     /// Called where there is anything to look for, and so compiled for models with events only.
     look: Look<'m, M, N, L>,
     keep_off: KeepOff<'m, M, N, L>,
+    meet_due: MeetDue<'m, M, N, L>,
 }
 
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Watching<'_, M, N, L> {
@@ -46,6 +48,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
         remodel: None,
         look: |_, _| Ok(None),
         keep_off: |_, _, _| false,
+        meet_due: |_, _, _| Ok(None),
     };
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -59,6 +62,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
     {
         self.on.push(on);
         (self.look, self.keep_off) = (Events::look, Events::keep_off);
+        self.meet_due = Events::meet_due;
     }
 
     /// The same before all others, also where they come at one time.
@@ -165,7 +169,10 @@ where
             remodel: watching.remodel,
             look: watching.look,
             keep_off: watching.keep_off,
+            meet_due: watching.meet_due,
             seen: unseen(&watched),
+            lasts: vec![None; watched.len()],
+            due: VecDeque::new(),
             watched,
             chosen,
             clear: Clear::default(),

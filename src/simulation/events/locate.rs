@@ -1,0 +1,166 @@
+//! The time of an event: an element that ends there is looked for (T-122).
+
+use super::search::Root;
+use super::{Events, Passage};
+use crate::length::{Length, Polynomial};
+use crate::simulation::acting;
+use crate::simulation::kind::Simulated;
+
+/// What has come of a search for the time of an event.
+pub(super) struct Met<const N: usize, L: Length<N>> {
+    pub(super) length: f64,
+    /// The time; that of a node where only roundings separate them.
+    pub(super) time: f64,
+    pub(super) state: L::State,
+    pub(super) velocity: L::Vector,
+    /// The values of all that is watched.
+    pub(super) values: Vec<f64>,
+    pub(super) inside: Option<L::Polynomial>,
+}
+
+impl<'m, M, const N: usize, L> Events<'m, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    /// The event of a root: of an element that ends there, or of the polynomial alone where no such element can be solved.
+    pub(super) fn located(
+        &mut self,
+        arc: &Passage<'_, N, L>,
+        root: &Root,
+        resolution: f64,
+    ) -> Met<N, L> {
+        if let Some(met) = self.locate(arc, root, resolution) {
+            return met;
+        }
+        let Passage { t, h, dense, .. } = *arc;
+        let length = root.tau * h;
+        let state = dense.at_time(t + length);
+        let velocity = dense.velocity_at_time(t + length);
+        Met {
+            length,
+            time: arc.time(length, resolution),
+            values: self.row(t + length, &state, &velocity),
+            state,
+            velocity,
+            inside: None,
+        }
+    }
+
+    /// The length of the element that ends at the event: nodes are more accurate than the polynomial between them, which tells where to begin. None where such an element
+    /// cannot be solved.
+    pub(super) fn locate(
+        &mut self,
+        arc: &Passage<'_, N, L>,
+        root: &Root,
+        resolution: f64,
+    ) -> Option<Met<N, L>> {
+        /// Corrections of the length; each leaves the square of what was off.
+        const MAX_TRIALS: u32 = 8;
+        /// How far beyond the element a correction may lead, relative to itself; it then ends at the node.
+        const OVERSHOOT: f64 = 0.5;
+
+        let Passage {
+            t, begin, h, dense, ..
+        } = *arc;
+        let mut length = root.tau * h;
+        let mut probe = match self.probe.take() {
+            Some(probe) => probe,
+            None => M::stepper(self.model.clone(), self.chosen).ok()?,
+        };
+        let mut last = f64::INFINITY;
+        let mut passed = None;
+        let mut met = None;
+        for _ in 0..MAX_TRIALS {
+            let time = arc.time(length, resolution);
+            let mut state = arc.before.clone();
+            let mut inside = None;
+            if length.abs() > resolution {
+                let impulses = &arc.impulses[..acting::behind(arc.impulses, time, h)];
+                M::advance(&mut probe, (begin, length), &mut state, impulses).ok()?;
+                inside = Some(M::inside(&mut probe, None, (t, time)));
+            }
+            let guess = dense.velocity_at_time(t + length);
+            let velocity = self.model.velocity(t + length, &state, &guess)?;
+            let values = self.row(t + length, &state, &velocity);
+            let value = values[root.function];
+            met = Some(Met {
+                length,
+                time,
+                state,
+                velocity,
+                values,
+                inside,
+            });
+            let along = self.slopes(arc, length)[root.function];
+            let slope = self.slope(arc, root, along, (length, value), passed);
+            let change = -value / slope;
+            let next = (length + change) * h.signum();
+            let beyond = (-next).max(next - h.abs());
+            let most = (OVERSHOOT * change.abs()).max(resolution);
+            if root.is_left_at_once(along * h.signum())
+                || !(change.abs() < last && beyond <= most)
+                || change.abs() <= 0.25 * resolution
+            {
+                break;
+            }
+            last = change.abs();
+            passed = Some((length, value));
+            length = next.clamp(0.0, h.abs()) * h.signum();
+        }
+        self.probe = Some(probe);
+        met
+    }
+
+    /// dg/dt for a correction of the length: between the last two nodes, if that is about what it is `along` the polynomial. Where the function does not cross zero along the polynomial as between its nodes,
+    /// as velocities of low degree, it is what nodes tell.
+    fn slope(
+        &self,
+        arc: &Passage<'_, N, L>,
+        root: &Root,
+        along: f64,
+        (length, value): (f64, f64),
+        passed: Option<(f64, f64)>,
+    ) -> f64 {
+        let crosses = |slope: &f64| root.is_crossed_with(slope * arc.h.signum());
+        let secant = passed.map(|(from, before)| (value - before) / (length - from));
+        let secant = secant.filter(crosses);
+        if crosses(&along) {
+            let is_near = |slope: &f64| (0.25..4.0).contains(&(slope / along));
+            return secant.filter(is_near).unwrap_or(along);
+        }
+        let chord = || {
+            let at = |time: f64, state: &L::State| {
+                let guess = arc.dense.velocity_at_time(time);
+                let velocity = self.model.velocity(time, state, &guess)?;
+                Some(self.row(time, state, &velocity)[root.function])
+            };
+            let ends = (at(arc.t, arc.before)?, at(arc.dense.end(), arc.after)?);
+            Some((ends.1 - ends.0) / arc.h).filter(crosses)
+        };
+        secant.or_else(chord).unwrap_or(along)
+    }
+
+    /// dg/dt of all that is watched, on the polynomial.
+    pub(super) fn slopes(&self, arc: &Passage<'_, N, L>, length: f64) -> Vec<f64> {
+        const NEAR: f64 = 1e-4;
+        let Passage { t, h, dense, .. } = *arc;
+        let values = |length: f64| {
+            let (state, v) = (
+                dense.at_time(t + length),
+                dense.velocity_at_time(t + length),
+            );
+            self.row(t + length, &state, &v)
+        };
+        let (from, to) = (
+            (length / h - NEAR).max(0.0) * h,
+            (length / h + NEAR).min(1.0) * h,
+        );
+        let slope = |(low, high): (f64, f64)| (high - low) / (to - from);
+        values(from)
+            .into_iter()
+            .zip(values(to))
+            .map(slope)
+            .collect()
+    }
+}

@@ -1,0 +1,329 @@
+//! Which of several events comes first, which come together, and what is known of the others after one has changed the state.
+//!
+//! The roots of an element are those of its polynomial; the nodes of elements that end at the events are more accurate, and may have them in another order. The order of the nodes counts.
+
+use super::act::After;
+use super::locate::Met;
+use super::remaining::{Crossed, Remaining};
+use super::search::Root;
+use super::{Cut, Events, Passage};
+use crate::error::RunErrorKind;
+use crate::length::Length;
+use crate::motion::LastCut;
+use crate::simulation::kind::Simulated;
+
+/// What the node of an event tells of a function that is not that of the event.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Standing {
+    /// It changes its sign at the same time, for all that is known of this.
+    Together,
+    /// It has changed its sign before, although its root on the polynomial is later.
+    Passed,
+    /// It is on this side.
+    On(f64),
+    /// It has left zero at a time that roundings do not separate from this one.
+    Unknown,
+}
+
+/// Of a function that was on `side`, with its value and its derivative along the run.
+///
+/// `uncertainty` is that of the time. `is_beside` says that its root on the polynomial is where that of the event is.
+fn standing(side: f64, (value, slope): (f64, f64), uncertainty: f64, is_beside: bool) -> Standing {
+    if side == 0.0 || value.is_nan() {
+        return Standing::Unknown;
+    }
+    let crosses = side * slope < 0.0;
+    let is_near = value.abs() <= uncertainty * slope.abs();
+    if (is_beside && side * value < 0.0) || (is_near && crosses) {
+        Standing::Together
+    } else if is_near && slope != 0.0 {
+        Standing::Unknown
+    } else if crosses && side * value < 0.0 {
+        Standing::Passed
+    } else if value == 0.0 {
+        // Nothing else was seen of it.
+        Standing::On(side)
+    } else {
+        Standing::On(value.signum())
+    }
+}
+
+/// What comes at the time of an event.
+pub(super) struct Meeting {
+    /// All that change their signs then, in the order in which they were declared.
+    pub(super) together: Vec<Crossed>,
+    /// Those that have changed their signs before, and could not be met there.
+    pub(super) passed: Vec<Crossed>,
+    /// The sides of all others; 0 where they are not known.
+    pub(super) sides: Vec<f64>,
+}
+
+/// How near to each other events are to be to count as one time, in roundings of the time.
+const TOGETHER: f64 = 8.0;
+
+/// The same of roots of one polynomial.
+const BESIDE: f64 = 16.0;
+
+impl<'m, M, const N: usize, L> Events<'m, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    /// Whether a change of sign is looked for.
+    pub(super) fn counts(&self, Crossed { function, rises }: Crossed) -> bool {
+        self.watched[function].on.crossing.counts(rises)
+    }
+
+    /// The event that nodes meet first: the given one, or one whose function has changed its sign at the node of that already, although its root on the polynomial comes later.
+    pub(super) fn earliest(
+        &mut self,
+        arc: &Passage<'_, N, L>,
+        remaining: &Remaining,
+        (mut root, mut met): (Root, Met<N, L>),
+        resolution: f64,
+    ) -> (Root, Met<N, L>) {
+        let count = self.watched.len();
+        if count == 1 {
+            return (root, met);
+        }
+        let mut is_tried = vec![false; count];
+        is_tried[root.function] = true;
+        loop {
+            let slopes = self.slopes(arc, met.length);
+            let has_passed = |function: usize| {
+                let along = arc.h.signum() * slopes[function];
+                let here = (met.values[function], along);
+                let side = remaining.side(function);
+                standing(side, here, TOGETHER * resolution, false) == Standing::Passed
+            };
+            let untried = (0..count).filter(|function| !is_tried[*function]);
+            let mut roots = untried.filter_map(|function| remaining.next(function));
+            let other = roots.find(|other| {
+                let crossed = Crossed {
+                    function: other.function,
+                    rises: other.rises,
+                };
+                self.counts(crossed) && has_passed(other.function)
+            });
+            let Some(other) = other else {
+                return (root, met);
+            };
+            is_tried[other.function] = true;
+            let found = self.locate(arc, &other, resolution);
+            if let Some(found) = found.filter(|found| found.length.abs() < met.length.abs()) {
+                (root, met) = (other, found);
+            }
+        }
+    }
+
+    /// What comes at the time of an event.
+    pub(super) fn meeting(
+        &self,
+        arc: &Passage<'_, N, L>,
+        remaining: &Remaining,
+        (root, met): (&Root, &Met<N, L>),
+        resolution: f64,
+    ) -> Meeting {
+        let own = Crossed {
+            function: root.function,
+            rises: root.rises,
+        };
+        let count = self.watched.len();
+        let mut meeting = Meeting {
+            together: Vec::with_capacity(1),
+            passed: Vec::new(),
+            sides: vec![0.0; count],
+        };
+        if count == 1 {
+            meeting.together.push(own);
+            return meeting;
+        }
+        let slopes = self.slopes(arc, met.length);
+        // What the search for the time has left.
+        let left = (met.values[root.function] / slopes[root.function]).abs();
+        let left = if left.is_finite() { 2.0 * left } else { 0.0 };
+        let usual = TOGETHER * resolution;
+        for function in 0..count {
+            if function == root.function {
+                meeting.together.push(own);
+                continue;
+            }
+            let side = remaining.side(function);
+            let crossed = Crossed {
+                function,
+                rises: side < 0.0,
+            };
+            let is_beside = remaining.next(function).is_some_and(|other| {
+                (other.tau - root.tau).abs() * arc.h.abs() <= BESIDE * resolution
+            });
+            let uncertainty = match is_beside {
+                true => usual.max(left),
+                false => usual,
+            };
+            let along = arc.h.signum() * slopes[function];
+            let here = (met.values[function], along);
+            let last = self.last_of(crossed, met.time);
+            let counts = self.counts(crossed) && last.is_none_or(|last| !last.is_idle);
+            match standing(side, here, uncertainty, is_beside) {
+                Standing::Together if counts => meeting.together.push(crossed),
+                Standing::Passed if counts => meeting.passed.push(crossed),
+                Standing::Passed => meeting.sides[function] = -side,
+                Standing::On(side) => meeting.sides[function] = side,
+                Standing::Together | Standing::Unknown => {}
+            }
+        }
+        meeting
+    }
+
+    /// The last cut that this event made, where it was so short a time ago that its function may not have moved since.
+    pub(super) fn last_of(&self, crossed: Crossed, time: f64) -> Option<LastCut> {
+        let Crossed { function, rises } = crossed;
+        let last = self.lasts[function].or(self.seen.last)?;
+        let is_it = last.function == function && last.rises == rises;
+        (is_it && self.is_soon(last.time, time)).then_some(last)
+    }
+
+    /// After an event has cut the element: what of the others is due at once, and on which sides they are.
+    pub(super) fn leave(
+        &mut self,
+        (meeting, number): (Meeting, usize),
+        met: &Met<N, L>,
+        after: Option<&After<'m, M, N, L>>,
+    ) {
+        let Meeting {
+            together,
+            passed,
+            sides,
+        } = meeting;
+        for recorded in &together[..number] {
+            self.note_recorded(*recorded, met.time);
+        }
+        self.due.clear();
+        if after.is_some() {
+            self.due.extend(passed);
+            self.due.extend(&together[number + 1..]);
+            let due = self.due.make_contiguous();
+            due.sort_by_key(|crossed| crossed.function);
+        }
+        self.seen.sides = sides;
+        self.carry_sides(&met.values, after, (met.time, &met.velocity));
+    }
+
+    /// What is recorded at a node from which the run goes on is not met there again, where the polynomial behind it begins with another velocity.
+    fn note_recorded(&mut self, Crossed { function, rises }: Crossed, time: f64) {
+        self.lasts[function] = Some(LastCut {
+            time,
+            function,
+            rises,
+            is_idle: true,
+        });
+    }
+
+    /// Of the values before an act, sides that are known are kept where it has left the values as they were, but for roundings. What it has moved is on a side that is found out anew, and a
+    /// change of sign that it makes is no event.
+    fn carry_sides(
+        &mut self,
+        values: &[f64],
+        after: Option<&After<'m, M, N, L>>,
+        (time, guess): (f64, &L::Vector),
+    ) {
+        let now = after.and_then(|after| self.values_after(after, time, guess));
+        let Some(now) = now else {
+            self.seen.sides.fill(0.0);
+            return;
+        };
+        for ((side, before), now) in self.seen.sides.iter_mut().zip(values).zip(&now) {
+            let is_near = (now - before).abs() <= 0.5 * before.abs();
+            let has_stayed = now == before || (*side * now > 0.0 && is_near);
+            if !has_stayed {
+                *side = 0.0;
+            }
+        }
+    }
+
+    /// The values of all that is watched after an act, if the run can go on from there.
+    fn values_after(
+        &self,
+        after: &After<'m, M, N, L>,
+        time: f64,
+        guess: &L::Vector,
+    ) -> Option<Vec<f64>> {
+        let After { state, model } = after;
+        let model = match model {
+            Some((model, _)) => &**model,
+            None => &*self.model,
+        };
+        model.check_restart(time, self.step, state).ok()?;
+        let velocity = if self.needs_velocity() {
+            model.velocity(time, state, guess)?
+        } else {
+            L::zero(guess)
+        };
+        let mut row = Vec::with_capacity(self.watched.len());
+        self.outputs_of(model, (time, state, &velocity), &mut row);
+        Some(row)
+    }
+
+    /// Meets the events that are due at the time of the last cut, in the state that it has left, up to the first that acts.
+    pub(super) fn meet_due(
+        &mut self,
+        time: f64,
+        state: &L::State,
+    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
+        self.recorded.clear();
+        while let Some(crossed) = self.due.pop_front() {
+            let (q, _) = L::parts(state);
+            let velocity = self.model.velocity(time, state, &L::zero(q));
+            let velocity = velocity.unwrap_or_else(|| L::unknown(q));
+            let Some(done) = self.meet(crossed, (time, state, &velocity), (0.0, false))? else {
+                self.note_recorded(crossed, time);
+                continue;
+            };
+            if done.after.is_none() {
+                self.due.clear();
+            }
+            let values = self.row(time, state, &velocity);
+            self.carry_sides(&values, done.after.as_ref(), (time, &velocity));
+            return Ok(Some(Cut {
+                t: time,
+                at: state.clone(),
+                inside: None,
+                after: done.after,
+                place: done.place,
+            }));
+        }
+        Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RESOLUTION: f64 = 1e-15;
+
+    fn of(side: f64, value: f64, slope: f64) -> Standing {
+        standing(side, (value, slope), TOGETHER * RESOLUTION, false)
+    }
+
+    /// A function that rises from below zero.
+    #[test]
+    fn a_node_tells_where_a_function_is() {
+        assert_eq!(of(-1.0, -1e-9, 2.0), Standing::On(-1.0));
+        assert_eq!(of(-1.0, 1e-9, 2.0), Standing::Passed);
+        for value in [-1e-15, 0.0, 1e-15] {
+            assert_eq!(of(-1.0, value, 2.0), Standing::Together);
+            // It has risen at an event before.
+            assert_eq!(of(1.0, value, 2.0), Standing::Unknown);
+        }
+        // Its root, which did not count, is behind this node after all.
+        assert_eq!(of(1.0, -1e-9, 2.0), Standing::On(-1.0));
+        // Zero over an interval.
+        assert_eq!(of(1.0, 0.0, 0.0), Standing::On(1.0));
+        assert_eq!(of(0.0, 1.0, 1.0), Standing::Unknown);
+        assert_eq!(of(1.0, f64::NAN, 1.0), Standing::Unknown);
+        // It has jumped where the event is.
+        let beside = standing(1.0, (-1.0, 3.0), TOGETHER * RESOLUTION, true);
+        assert_eq!(beside, Standing::Together);
+    }
+}
