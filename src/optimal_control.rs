@@ -3,6 +3,8 @@
 mod block;
 mod condensed;
 mod correction;
+mod curvature;
+mod dependence;
 mod error;
 mod optimum;
 mod problem;
@@ -43,7 +45,8 @@ pub use search::Iteration;
 /// Defaults: `Mixed::<4>` (order 6, of states, inputs' integrals and multipliers alike), 40 equal elements, inputs with as many coefficients in an element as it has rates, a guess of
 /// straight lines between the coordinates that are given, with inputs that are zero.
 ///
-/// The minimum is one among neighbours: which one, the guess decides.
+/// The minimum is one among neighbours: which one, the guess decides. Where the search comes to a point that is stationary without being a minimum, it goes on along a change that lowers the cost
+/// to second order, (T-163); if that leads to no minimum, it is [`OptimalControlErrorKind::NoMinimum`].
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -285,6 +288,11 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
                 time: places.get(element).map_or(self.span.end, |(t, _)| *t),
                 iterations,
             },
+            Err(Failure::NoMinimum { element }) => OptimalControlErrorKind::NoMinimum {
+                element,
+                time: places.get(element).map_or(self.span.end, |(t, _)| *t),
+                iterations,
+            },
             Err(Failure::Singular) => OptimalControlErrorKind::Singular { iterations },
             Err(Failure::Stalled { correction }) => OptimalControlErrorKind::Stalled {
                 iterations,
@@ -334,18 +342,10 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
 
     /// Costs of the end do not depend on inputs, which have no value there of their own.
     fn check_end(&self, columns: &[usize]) -> Result<(), OptimalControlErrorKind> {
-        use tfe_runtime::dual::Dual;
-        let constant = |value: f64| Dual::new(value, 0.0);
-        let (q, _) = straight::<N>(&self.conditions, &self.span)(self.span.end);
-        let z = [constant(0.0); N];
-        for (column, name) in columns.iter().zip(&self.end) {
-            for input in 0..M::INPUTS.len() {
-                let mut inputs = [constant(1.0); tfe_runtime::MAX_INPUTS];
-                inputs[input] = Dual::new(1.0, 1.0);
-                let mut values = vec![Dual::ZERO; self.model.columns()];
-                let t = constant(self.span.end);
-                (self.model).observables_with(&inputs, t, &q.map(constant), &z, &mut values);
-                if values[*column].slope != 0.0 {
+        for input in 0..M::INPUTS.len() {
+            let holding = dependence::holding::<M, N>(self.model, input);
+            for (column, name) in columns.iter().zip(&self.end) {
+                if holding[*column] {
                     return Err(OptimalControlErrorKind::EndCostOfInput {
                         output: name.clone(),
                         input: M::INPUTS[input],

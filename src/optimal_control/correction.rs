@@ -56,7 +56,7 @@ impl Problem<'_> {
     }
 
     /// The weights of changes of the inputs of an element: ∫ P_k² dt.
-    fn metric(&self, element: usize, weight: f64) -> impl Iterator<Item = (usize, f64)> {
+    pub(super) fn metric(&self, element: usize, weight: f64) -> impl Iterator<Item = (usize, f64)> {
         let Sizes { inputs, .. } = self.sizes;
         let h = self.lengths[element].abs();
         let first = self.sizes.interior + 2 * self.sizes.dof;

@@ -104,6 +104,16 @@ pub enum OptimalControlErrorKind {
         /// What was asked for.
         tolerance: f64,
     },
+    /// The search came to a point where small changes of the inputs, and of what is free of the start, do not change the cost to first order but lower it to second: a saddle or a maximum, as a pendulum
+    /// that hangs at rest where that costs most. No minimum was found on from there; or the cost falls without end.
+    NoMinimum {
+        /// The number of the element in which the changes begin that lower the cost, from 0.
+        element: usize,
+        /// Its start time.
+        time: f64,
+        /// Iterations done.
+        iterations: usize,
+    },
 }
 
 impl<const N: usize> From<OptimalControlErrorKind> for OptimalControlError<N> {
@@ -211,6 +221,15 @@ impl fmt::Display for OptimalControlErrorKind {
                 f,
                 "no minimum after {iterations} iterations: the last correction is {correction:.1e} of the solution, {tolerance:.1e} was asked for; \
                  a better guess or more elements may help"
+            ),
+            Self::NoMinimum {
+                element,
+                time,
+                iterations,
+            } => write!(
+                f,
+                "no minimum after {iterations} iterations, but a stationary point from which the cost falls along small changes that begin in element {element}, at t = {time}; \
+                 begin with another guess of the inputs (`.guess_input(…)`), or see whether the cost falls without end"
             ),
         }
     }

@@ -132,15 +132,27 @@ impl Problem<'_> {
         self.evaluate(iterate).cost
     }
 
+    /// The multipliers of the rows of a block: interior, then end.
+    fn multipliers(&self, iterate: &Iterate, block: usize) -> DVector<f64> {
+        let inner = iterate.multipliers[block].as_slice();
+        let end = match block < self.blocks.len() {
+            true => iterate.costates[block + 1].as_slice(),
+            false => &[],
+        };
+        DVector::from_vec([inner, end].concat())
+    }
+
+    /// 𝓛: the cost of an iterate and its residuals, weighed with its multipliers (theory.md, (T-145)).
+    pub(super) fn lagrangian(&self, evaluation: &Evaluation, iterate: &Iterate) -> f64 {
+        let blocks = evaluation.rows.iter().enumerate();
+        let rows = blocks.map(|(at, rows)| rows.dot(&self.multipliers(iterate, at)));
+        evaluation.cost + rows.sum::<f64>()
+    }
+
     /// All blocks about an iterate; the number of one that has no linearisation.
     pub(super) fn linearise(&self, iterate: &Iterate) -> Result<Vec<Condensed>, usize> {
         let blocks = self.blocks().enumerate().map(|(at, block)| {
-            let inner = iterate.multipliers[at].as_slice();
-            let end = match at < self.blocks.len() {
-                true => iterate.costates[at + 1].as_slice(),
-                false => &[],
-            };
-            let multipliers = DVector::from_vec([inner, end].concat());
+            let multipliers = self.multipliers(iterate, at);
             let linear = block.linearise(self.model, &self.variables(iterate, at), &multipliers);
             Condensed::new(block, linear).ok_or(at)
         });

@@ -2,11 +2,14 @@
 
 use super::condensed::Condensed;
 use super::correction::Step;
+use super::curvature::Descent;
 use super::problem::{Evaluation, Iterate, Problem};
 use crate::assembly::size;
 use nalgebra::DVector;
 
 /// One iteration, as it went.
+///
+/// A correction below the tolerance that other iterations follow was that of a stationary point that is no minimum, which the search has left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Iteration {
     /// The cost before it.
@@ -32,6 +35,10 @@ pub(super) enum Failure {
     Singular,
     Stalled {
         correction: f64,
+    },
+    /// A stationary point from which the cost falls, along changes that begin in an element.
+    NoMinimum {
+        element: usize,
     },
 }
 
@@ -81,6 +88,19 @@ const NEAR: f64 = 1e-7;
 /// Corrections below this one that no longer fall are round-off.
 const ROUND_OFF: f64 = 1e-9;
 
+/// The least share of a downward curvature in the sizes of what it is the sum of. At best the cost falls by some square of it along such a change, which below some 10⁻⁸ is lost in the roundings of the
+/// cost; and where a search comes near slowly, as where inputs cost nothing, second derivatives are known to some hundred of its last corrections.
+const FLAT: f64 = 1e-7;
+
+/// How often a search leaves stationary points that are no minima.
+const DEPARTURES: usize = 8;
+
+/// The share of what the curvature promises by which the Lagrangian must fall for a stationary point to be left so far: a half, as it does at the minimum of a polynomial of fourth degree.
+const PROMISED: f64 = 0.5;
+
+/// How often the distance to which a point is left is halved or doubled.
+const DISTANCES: usize = 128;
+
 impl Problem<'_> {
     /// The correction beside the iterate.
     fn size(&self, step: &Step, condensed: &[Condensed], iterate: &Iterate) -> f64 {
@@ -128,6 +148,7 @@ impl Problem<'_> {
         let mut weights: Vec<DVector<f64>> = Vec::new();
         let mut past: Vec<Evaluation> = Vec::new();
         let mut last = f64::INFINITY;
+        let (mut departures, mut left): (usize, Option<usize>) = (0, None);
         loop {
             let condensed = self.linearise(iterate);
             let condensed = condensed.map_err(|element| Failure::Undefined { element })?;
@@ -151,7 +172,25 @@ impl Problem<'_> {
                 if correction <= control.tolerance || is_round_off {
                     iterate.add(1.0, &step.change);
                     self.tell(control, history, note);
-                    return Ok(());
+                    let is_last =
+                        departures == DEPARTURES || history.len() >= control.max_iterations;
+                    let Some((element, there)) = self.leave(iterate, correction, is_last)? else {
+                        return Ok(());
+                    };
+                    if control.progress {
+                        eprintln!(
+                            "no minimum: left along a change that begins in element {element}"
+                        );
+                    }
+                    evaluation = there;
+                    // The search begins anew: what counts is no longer whether the merit falls below that of the point that was left.
+                    past.clear();
+                    weights.clear();
+                    last = f64::INFINITY;
+                    departures += 1;
+                    left = Some(element);
+                    outcome = Ok(());
+                    break;
                 }
                 if !(step.curvature >= LEAST_CURVATURE * step.of_cost.abs()) {
                     continue;
@@ -183,8 +222,82 @@ impl Problem<'_> {
                 outcome = Ok(());
                 break;
             }
-            outcome?;
+            outcome.map_err(|failure| match (failure, left) {
+                (Failure::Singular, Some(element)) => Failure::NoMinimum { element },
+                _ => failure,
+            })?;
         }
+    }
+
+    /// Leaves a stationary point that is no minimum, with the element in which the change begins that leads away; none at a minimum.
+    ///
+    /// `is_last` says that no search would follow.
+    fn leave(
+        &self,
+        iterate: &mut Iterate,
+        correction: f64,
+        is_last: bool,
+    ) -> Result<Option<(usize, Evaluation)>, Failure> {
+        let condensed = self.linearise(iterate);
+        let condensed = condensed.map_err(|element| Failure::Undefined { element })?;
+        let Some(descent) = self.descent(&condensed, correction.max(FLAT)) else {
+            return Ok(None);
+        };
+        let element = descent.element;
+        let no_minimum = Failure::NoMinimum { element };
+        if is_last {
+            return Err(no_minimum);
+        }
+        let (next, evaluation) = self.departed(iterate, &descent).ok_or(no_minimum)?;
+        *iterate = next;
+        Ok(Some((element, evaluation)))
+    }
+
+    /// As far along a change that curves down as the Lagrangian falls as the curvature promises; none where that is nowhere, or everywhere.
+    ///
+    /// The Lagrangian tells it rather than the merit, which may rise along every straight line from a point where equations are curved. The better one of both sides is taken.
+    fn departed(&self, iterate: &Iterate, descent: &Descent) -> Option<(Iterate, Evaluation)> {
+        let start = self.evaluate(iterate);
+        let level = self.lagrangian(&start, iterate);
+        let tried = |distance: f64| {
+            let promised = 0.5 * distance * distance * descent.curvature;
+            if !(-promised > f64::EPSILON * level.abs()) {
+                return None;
+            }
+            let mut lowest = PROMISED * promised;
+            let mut found: Option<(Iterate, Evaluation)> = None;
+            for signed in [distance, -distance] {
+                let mut next = iterate.clone();
+                next.add(signed, &descent.change);
+                let evaluation = self.evaluate(&next);
+                let change = self.lagrangian(&evaluation, &next) - level;
+                if change.is_finite() && change < lowest {
+                    lowest = change;
+                    found = Some((next, evaluation));
+                }
+            }
+            found
+        };
+        let scale = if start.cost == 0.0 {
+            1.0
+        } else {
+            start.cost.abs()
+        };
+        let mut distance = (2.0 * scale / -descent.curvature).sqrt();
+        let Some(mut found) = tried(distance) else {
+            return (0..DISTANCES).find_map(|_| {
+                distance *= 0.5;
+                tried(distance)
+            });
+        };
+        for _ in 0..DISTANCES {
+            distance *= 2.0;
+            let Some(farther) = tried(distance) else {
+                return Some(found);
+            };
+            found = farther;
+        }
+        None
     }
 
     /// Takes a part of a step with which the merit falls; the part, and what is then.
