@@ -1,6 +1,7 @@
 //! Runs where it hurts: what ends `Ok` is right, or says that it is doubtful.
 
 mod checkpoints;
+mod steppers;
 
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};

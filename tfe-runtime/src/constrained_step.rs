@@ -275,7 +275,7 @@ fn check_start<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let v = own_velocity(model, t, &state.q, &state.p, v);
+    let v = own_velocity(model, t, &state.q, &state.p, v)?;
     for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
         let (position, velocity) = relative_residual(rows, c, &state.q, &v, h);
         for (residual, is_position) in [(position, true), (velocity, false)] {

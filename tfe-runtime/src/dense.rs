@@ -40,6 +40,17 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
+    /// An element whose ends alone are known: NaN between them.
+    pub(crate) fn unknown(scheme: &SchemeRef<'_>, times: (f64, f64), last: &Last<N>) -> Self {
+        Self {
+            times,
+            start: last.start,
+            end: last.end,
+            rates: vec![[f64::NAN; N]; 2 * scheme.rates()].into_boxed_slice(),
+            pieces: Box::new([]),
+        }
+    }
+
     /// An element that was cut (T-116), from time `start` to time `end`.
     pub(crate) fn of_pieces((start, end): (f64, f64), mut pieces: Vec<Self>) -> Option<Self> {
         let last = pieces.last_mut()?;

@@ -51,8 +51,8 @@ pub(crate) trait Kinked:
     /// The next step continues none.
     fn forget(&mut self);
 
-    /// Adds the values of all switching functions.
-    fn switches(&mut self, t: f64, state: &Self::State, values: &mut Vec<f64>);
+    /// Adds the values of all switching functions; false, with nothing added, where there is no velocity to know them by.
+    fn switches(&mut self, t: f64, state: &Self::State, values: &mut Vec<f64>) -> bool;
 
     /// Points of an element; whether there are some at its ends.
     fn points(&self) -> (usize, bool);
@@ -67,19 +67,22 @@ pub(crate) trait Kinked:
     fn trust(&mut self, all: bool);
 }
 
-/// The values of the switching functions of a model, where there is a velocity.
+/// The values of the switching functions of a model; false, with nothing added, where there is no velocity.
 pub(crate) fn switches<M, const N: usize>(
     model: &M,
     t: f64,
     state: &crate::State<N>,
     values: &mut Vec<f64>,
-) where
+) -> bool
+where
     M: Model<N>,
 {
     let z = match M::FORM {
         Form::Lagrangian => {
             let velocity = velocity_of(model, t, &state.q, &state.p, &[0.0; N]);
-            let Ok(velocity) = velocity else { return };
+            let Ok(velocity) = velocity else {
+                return false;
+            };
             velocity
         }
         Form::Hamiltonian => state.p,
@@ -96,6 +99,7 @@ pub(crate) fn switches<M, const N: usize>(
     let results = first.z.iter().chain(&first.q).chain(&first.force);
     let origin = log.deciding(results);
     *values = log.decisive(origin);
+    true
 }
 
 /// What all arcs of a step have cost.

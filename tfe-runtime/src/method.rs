@@ -137,6 +137,12 @@ impl<const N: usize> Memory<N> {
     pub(crate) fn forget_factors(&mut self) {
         self.factored = None;
     }
+
+    /// Says that the workspace is another one: what is known of its factors and of its extrapolation is not known of that.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn forget_workspace(&mut self) {
+        (self.factored, self.ratio) = (None, None);
+    }
 }
 
 impl<const N: usize> Default for Memory<N> {

@@ -7,13 +7,13 @@ mod wanted;
 
 #[cfg(feature = "alloc")]
 use crate::backwards::Backwards;
-use crate::condense::{Direction, EndForces, System};
+use crate::condense::{Direction, EndForces, Parameter, System};
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
 use crate::constrained::rows::Rows;
 use crate::equations::Span;
-use crate::error::StepError;
 pub use crate::error::TransitionError;
+use crate::error::{ConstraintError, StepError};
 #[cfg(feature = "alloc")]
 use crate::inside::InsideLoss;
 #[cfg(feature = "alloc")]
@@ -282,6 +282,7 @@ where
             }
             .into());
         }
+        check_parameters(self.model, directions)?;
         let interval = Interval {
             start: last.t,
             length: last.h,
@@ -383,6 +384,26 @@ where
             wanted.of_velocities(&mut equations, parts.unknowns, given, system)?;
         }
         Ok(())
+    }
+}
+
+/// Refuses parameters that the model does not have: the derivatives by these would be zeros.
+fn check_parameters<M, const N: usize>(
+    model: &M,
+    directions: &[Direction],
+) -> Result<(), TransitionError>
+where
+    M: Model<N>,
+{
+    let is_known = |direction: &Direction| match direction.parameter {
+        None => true,
+        Some(Parameter::Named(index)) => index < M::SENSITIVITIES.len(),
+        Some(Parameter::Any(index)) => index < model.parameters(),
+    };
+    if directions.iter().all(is_known) {
+        Ok(())
+    } else {
+        Err(StepError::from(ConstraintError::Parameter).into())
     }
 }
 

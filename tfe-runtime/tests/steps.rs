@@ -525,6 +525,35 @@ fn failures_are_typed_and_leave_the_state() {
     assert!(Stepper::new(&model, element, Control::default()).is_err());
 }
 
+/// Neither the polynomial nor the matrix of a step that failed is that of the step before.
+#[test]
+fn a_failed_step_has_no_inside() {
+    let (model, start) = duffing();
+    let element = Element::mixed(4);
+    let zero = State { q: [0.0], p: [0.0] };
+    for ends_only in [false, true] {
+        let mut stepper = Stepper::new(&model, element, Control::default()).expect("valid");
+        if ends_only {
+            stepper = stepper.ends_only();
+        }
+        let mut state = start;
+        stepper.advance(0.0, 0.1, &mut state, &[]).expect("a step");
+        let reached = state;
+        for h in [0.0, f64::NAN] {
+            let failed = stepper.advance(0.1, h, &mut state, &[]);
+            failed.expect_err("no step");
+            assert_eq!(state, reached);
+            assert_eq!(stepper.dense(0.1, 0.2).at(0.5), zero);
+            let matrix = stepper.transition(&mut [0.0; 4]);
+            assert_eq!(matrix, Err(transition::TransitionError::NoStep));
+        }
+        let next = stepper.advance(0.1, 0.1, &mut state, &[]);
+        next.expect("as good as new");
+        let expected = run(&model, element, start, 0.1, 2);
+        assert_close(&vector(&state), &vector(&expected), 1e-14, "after failures");
+    }
+}
+
 #[test]
 fn a_rest_stays_a_rest() {
     let model = DoublePendulum { g: 9.81 };

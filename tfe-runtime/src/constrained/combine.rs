@@ -1,7 +1,8 @@
 //! Redundant holonomic constraints in an element: as many combinations of them as are independent (T-118, T-132).
 
 use super::rows::{
-    COMBINED, Constrains, DEPENDENT, Rows, add_row, dot, longest, norm, scaled, subtract_part, unit,
+    COMBINED, Constrains, DEPENDENT, Rows, add_row, dot, has_digits, longest, norm, scaled,
+    scaled_norm, subtract_part, unit,
 };
 use crate::legendre::largest;
 
@@ -32,12 +33,11 @@ impl<const N: usize> Rows<'_, N> {
         self.evaluate_declared(model, middle.0, middle.1);
         self.weights.fill(0.0);
         for c in 0..count {
-            let length = norm(&self.rows[c]);
-            self.squares[c] = length * length;
+            self.lengths[c] = norm(&self.rows[c]);
             self.spare[c] = [0.0; N];
         }
-        for c in holonomic().filter(|&c| self.squares[c] > 0.0) {
-            self.spare[c] = scaled(&self.rows[c], self.squares[c]);
+        for c in holonomic().filter(|&c| self.lengths[c] > 0.0) {
+            self.spare[c] = scaled(&self.rows[c], self.lengths[c]);
         }
         for c in holonomic() {
             active[c] = 0;
@@ -54,10 +54,10 @@ impl<const N: usize> Rows<'_, N> {
             if !declared[c].kind.is_holonomic() {
                 self.weights[c * count + c] = 1.0;
                 self.basis[c * count + c] = 1.0;
-                self.squares[c] = 1.0;
+                self.lengths[c] = 1.0;
                 continue;
             }
-            let length = crate::real::Real::sqrt(self.squares[c]);
+            let length = self.lengths[c];
             for place in 0..count {
                 let weight = &mut self.weights[place * count + c];
                 *weight = if length > 0.0 { *weight / length } else { 0.0 };
@@ -156,9 +156,9 @@ impl<const N: usize> Rows<'_, N> {
         self.differentiate(model, t, q, rate);
         let mut largest = 0.0_f64;
         for c in 0..count {
-            let (rates, square) = (&mut self.rates[c], self.squares[c]);
-            *rates = if holonomic(c) && square > 0.0 {
-                scaled(rates, square)
+            let (rates, length) = (&mut self.rates[c], self.lengths[c]);
+            *rates = if holonomic(c) && length > 0.0 {
+                scaled(rates, length)
             } else {
                 [0.0; N]
             };
@@ -233,8 +233,7 @@ impl<const N: usize> Rows<'_, N> {
         let count = self.spare.len();
         let (mut best, mut column) = (least, None);
         for a in 0..N {
-            let own: f64 = self.spare.iter().map(|row| row[a] * row[a]).sum();
-            let own = crate::real::Real::sqrt(own);
+            let own = column_norm(self.spare, a);
             if own > best {
                 (best, column) = (own, Some(a));
             }
@@ -272,7 +271,7 @@ impl<const N: usize> Rows<'_, N> {
             let basis = &self.basis[place * count..(place + 1) * count];
             let mut sum = 0.0;
             for c in 0..count {
-                sum += basis[c] * crate::real::Real::sqrt(self.squares[c]) * multipliers[c];
+                sum += basis[c] * self.lengths[c] * multipliers[c];
             }
             self.mu[place] = sum;
         }
@@ -288,5 +287,16 @@ impl<const N: usize> Rows<'_, N> {
                 .sum();
         }
         multipliers.copy_from_slice(self.mu);
+    }
+}
+
+/// The norm of a column.
+fn column_norm<const N: usize>(rows: &[[f64; N]], column: usize) -> f64 {
+    let entries = rows.iter().map(|row| row[column]);
+    let square: f64 = entries.clone().map(|entry| entry * entry).sum();
+    if has_digits(square) {
+        crate::real::Real::sqrt(square)
+    } else {
+        scaled_norm(entries)
     }
 }

@@ -453,10 +453,11 @@ where
         );
         let inner = self.inner.measure(&x[..rates], &step[..rates]);
         let end = 0.25 * relative(1.0, &[], &x[end.clone()], &step[end]);
-        let relative = if end.is_nan() {
+        // `f64::max` would ignore a NaN.
+        let relative = if end > inner.relative || end.is_nan() {
             end
         } else {
-            inner.relative.max(end)
+            inner.relative
         };
         Increment { relative, ..inner }
     }

@@ -1,7 +1,7 @@
 //! What constraints say at one instant of a motion: reactions, and the gradients that span what they allow.
 
 use crate::constrained::derivative::{DualRows, explicit};
-use crate::constrained::rows::{Constrains, dot, rows_len};
+use crate::constrained::rows::{Constrains, dot, norm, rows_len, scaled};
 use crate::constrained::states::chosen;
 use crate::dual::{Dual, duals};
 use crate::error::{ConstraintError, StepError};
@@ -122,31 +122,48 @@ fn balance<const N: usize>(
     if !vector.iter().all(|value| value.is_finite()) {
         return Err(StepError::NonFinite);
     }
-    Ok(spread(rows, &chosen, &vector[N..]))
+    spread(rows, &chosen, &vector[N..])
 }
 
+/// Lengths whose squares, and products of these, are numbers with all digits.
+const ORDINARY: core::ops::Range<f64> = 1e-70..1e70;
+
 /// The multipliers of all rows with the least Σ λ² that give the same Aᵀλ as those of the independent ones.
-fn spread<const N: usize>(rows: &[[f64; N]], chosen: &[usize], multipliers: &[f64]) -> Vec<f64> {
+fn spread<const N: usize>(
+    rows: &[[f64; N]],
+    chosen: &[usize],
+    multipliers: &[f64],
+) -> Result<Vec<f64>, StepError> {
     let rank = chosen.len();
-    let mut all = vec![0.0; rows.len()];
     if rank == rows.len() {
-        all.copy_from_slice(multipliers);
-        return all;
+        return Ok(multipliers.to_vec());
     }
+    // Rows over their lengths where products of these are no numbers; else over one.
+    let mut lengths: Vec<f64> = rows.iter().map(norm).collect();
+    let is_ordinary = (lengths.iter()).all(|length| *length == 0.0 || ORDINARY.contains(length));
+    for length in &mut lengths {
+        if is_ordinary || *length == 0.0 {
+            *length = 1.0;
+        }
+    }
+    let pairs = rows.iter().zip(&lengths);
+    let units: Vec<[f64; N]> = pairs.map(|(row, length)| scaled(row, *length)).collect();
     let mut pivots = vec![0; rank];
     let mut gram: Vec<f64> = chosen
         .iter()
-        .flat_map(|a| chosen.iter().map(|b| dot(&rows[*a], &rows[*b])))
+        .flat_map(|a| chosen.iter().map(|b| dot(&units[*a], &units[*b])))
         .collect();
-    if lu::factor(rank, &mut gram, &mut pivots).is_err() {
-        return vec![f64::NAN; rows.len()];
-    }
+    lu::factor(rank, &mut gram, &mut pivots).map_err(|_| StepError::NonFinite)?;
     // Every row is a combination of the independent ones, A = C A_i; then λ = C (CᵀC)⁻¹ λ_i.
-    let combinations: Vec<Vec<f64>> = rows
+    let combinations: Vec<Vec<f64>> = units
         .iter()
-        .map(|row| {
-            let mut side: Vec<f64> = chosen.iter().map(|c| dot(row, &rows[*c])).collect();
+        .zip(&lengths)
+        .map(|(unit, length)| {
+            let mut side: Vec<f64> = chosen.iter().map(|c| dot(unit, &units[*c])).collect();
             lu::solve(rank, &gram, &pivots, &mut side);
+            for (entry, c) in side.iter_mut().zip(chosen) {
+                *entry *= length / lengths[*c];
+            }
             side
         })
         .collect();
@@ -159,12 +176,16 @@ fn spread<const N: usize>(rows: &[[f64; N]], chosen: &[usize], multipliers: &[f6
         }
     }
     let mut weights = multipliers.to_vec();
-    if lu::factor(rank, &mut normal, &mut pivots).is_err() {
-        return vec![f64::NAN; rows.len()];
-    }
+    lu::factor(rank, &mut normal, &mut pivots).map_err(|_| StepError::NonFinite)?;
     lu::solve(rank, &normal, &pivots, &mut weights);
-    for (value, combination) in all.iter_mut().zip(&combinations) {
-        *value = combination.iter().zip(&weights).map(|(c, w)| c * w).sum();
+    let all = combinations.iter().map(|combination| {
+        let parts = combination.iter().zip(&weights);
+        parts.map(|(c, w)| c * w).sum::<f64>()
+    });
+    let all: Vec<f64> = all.collect();
+    if all.iter().all(|value| value.is_finite()) {
+        Ok(all)
+    } else {
+        Err(StepError::NonFinite)
     }
-    all
 }

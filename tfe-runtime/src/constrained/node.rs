@@ -127,13 +127,16 @@ pub(crate) fn is_regular<const N: usize>(mut zz: [[f64; N]; N]) -> bool {
 /// The velocity that a momentum has without regard to the constraints, `v` being the one with it: the same if the state is consistent.
 ///
 /// Where the mass matrix is singular up to rounding, as for quaternions, the momentum alone has no velocity: then it is `v`.
+///
+/// # Errors
+/// [`LegendreError`] where a regular mass matrix leads to none.
 pub(crate) fn own_velocity<M, const N: usize>(
     model: &M,
     t: f64,
     q: &[f64; N],
     p: &[f64; N],
     v: &[f64; N],
-) -> [f64; N]
+) -> Result<[f64; N], LegendreError>
 where
     M: Model<N>,
 {
@@ -141,8 +144,8 @@ where
         let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
         model.first_and_mass(t, q, v, &mut first, &mut zz);
         if !is_regular(zz) {
-            return *v;
+            return Ok(*v);
         }
     }
-    free_velocity(model, t, q, p, v).unwrap_or(*v)
+    free_velocity(model, t, q, p, v)
 }

@@ -95,8 +95,8 @@ pub(crate) struct Rows<'a, const N: usize> {
     pub(super) weights: &'a mut [f64],
     /// U, with which multipliers are combined, a row for each column of it.
     pub(super) basis: &'a mut [f64],
-    /// The squared lengths of the rows of A where they were combined.
-    pub(super) squares: &'a mut [f64],
+    /// The lengths of the rows of A where they were combined.
+    pub(super) lengths: &'a mut [f64],
     pub(super) is_combined: bool,
 }
 
@@ -117,7 +117,7 @@ impl<'a, const N: usize> Rows<'a, N> {
         let (memory, kept) = memory.split_at_mut(constraints * (5 * N + 3));
         memory.fill(0.0);
         let (weights, kept) = kept.split_at_mut(constraints * constraints);
-        let (basis, squares) = kept.split_at_mut(constraints * constraints);
+        let (basis, lengths) = kept.split_at_mut(constraints * constraints);
         let matrix = constraints * N;
         let (start, rest) = memory.split_at_mut(matrix);
         let (rows, rest) = rest.split_at_mut(matrix);
@@ -138,7 +138,7 @@ impl<'a, const N: usize> Rows<'a, N> {
             mu,
             weights,
             basis,
-            squares,
+            lengths,
             is_combined: false,
         }
     }
@@ -352,8 +352,11 @@ impl<'a, const N: usize> Rows<'a, N> {
                     } else {
                         active[c] < 2
                     };
+                    if constraint.kind.is_holonomic() != holonomic || !open {
+                        continue;
+                    }
                     let own = norm(&self.spare[c]);
-                    if constraint.kind.is_holonomic() == holonomic && open && own > best.0 {
+                    if own > best.0 {
                         best = (own, Some(c));
                     }
                 }
@@ -408,9 +411,8 @@ pub(super) fn add_row(matrix: &mut [f64], (from, to): (usize, usize), part: f64)
     }
 }
 
-/// A row over the root of `square`.
-pub(super) fn scaled<const N: usize>(row: &[f64; N], square: f64) -> [f64; N] {
-    let length = crate::real::Real::sqrt(square);
+/// A row over a length.
+pub(super) fn scaled<const N: usize>(row: &[f64; N], length: f64) -> [f64; N] {
     let mut scaled = *row;
     for entry in &mut scaled {
         *entry /= length;
@@ -439,15 +441,66 @@ pub(crate) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     sum
 }
 
+/// Whether a sum of squares has its digits: smaller ones have lost some, or all, and larger ones are infinite.
+pub(crate) fn has_digits(square: f64) -> bool {
+    (1e-290..=f64::MAX).contains(&square)
+}
+
 pub(crate) fn norm<const N: usize>(row: &[f64; N]) -> f64 {
-    crate::real::Real::sqrt(dot(row, row))
+    let square = dot(row, row);
+    if has_digits(square) {
+        crate::real::Real::sqrt(square)
+    } else {
+        scaled_norm(row.iter().copied())
+    }
+}
+
+/// The norm of numbers whose squares are too small or too large; NaN if one is.
+#[cold]
+#[inline(never)]
+pub(crate) fn scaled_norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {
+    let mut size = 0.0_f64;
+    for entry in entries.clone() {
+        if entry.is_nan() {
+            return entry;
+        }
+        size = size.max(entry.abs());
+    }
+    if size == 0.0 || size == f64::INFINITY {
+        return size;
+    }
+    let mut sum = 0.0;
+    for entry in entries {
+        sum += (entry / size) * (entry / size);
+    }
+    size * crate::real::Real::sqrt(sum)
 }
 
 pub(super) fn unit<const N: usize>(row: &[f64; N]) -> [f64; N] {
-    let length = norm(row);
-    let mut unit = *row;
-    for entry in &mut unit {
-        *entry /= length;
+    scaled(row, norm(row))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn norms_have_all_digits_whatever_the_size() {
+        for size in [5e-324, 1e-200, 1e-160, 1e-100, 1.0, 1e100, 1e160, 1e200] {
+            let length = norm(&[3.0 * size, 0.0, -4.0 * size]);
+            assert!((length / size - 5.0).abs() < 4e-15, "{size}: {length}");
+        }
+        assert!(norm(&[0.0, 0.0]) == 0.0);
+        assert!(norm(&[f64::INFINITY, 1.0]) == f64::INFINITY);
+        assert!(norm(&[1e300, f64::NAN]).is_nan());
     }
-    unit
+
+    /// Lengths are kept where their squares were.
+    #[test]
+    fn the_root_of_a_square_is_the_number() {
+        for k in 1..10_000 {
+            let number = f64::from(k).sqrt() * 1.1_f64.powi(k % 700 - 350);
+            assert!((number * number).sqrt() == number);
+        }
+    }
 }

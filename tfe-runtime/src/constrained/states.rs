@@ -153,7 +153,7 @@ where
     Ok(if const { M::CONSTRAINTS.is_empty() } {
         v
     } else {
-        own_velocity(model, t, q, p, &v)
+        own_velocity(model, t, q, p, &v)?
     })
 }
 

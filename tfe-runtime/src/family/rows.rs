@@ -2,6 +2,7 @@
 
 use super::model::Model;
 use super::pattern::Pattern;
+use crate::constrained::rows::has_digits;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -73,9 +74,38 @@ impl Rows {
         for ((constraint, _), value) in self.places().zip(&self.values) {
             lengths[constraint] += value * value;
         }
+        let sizes = if lengths.iter().all(|square| has_digits(*square)) {
+            vec![0.0; lengths.len()]
+        } else {
+            self.scale(&mut lengths)
+        };
+        for (length, size) in lengths.iter_mut().zip(sizes) {
+            let root = length.sqrt();
+            *length = if size > 0.0 { size * root } else { root };
+        }
         lengths
-            .iter_mut()
-            .for_each(|length| *length = length.sqrt());
-        lengths
+    }
+
+    /// Computes sums of squares that have lost their digits anew, divided by the squares of the largest entries of their rows. Returns these entries, and zeros for all other rows.
+    #[cold]
+    fn scale(&self, squares: &mut [f64]) -> Vec<f64> {
+        let mut sizes = vec![0.0_f64; squares.len()];
+        for ((constraint, _), value) in self.places().zip(&self.values) {
+            if !has_digits(squares[constraint]) {
+                sizes[constraint] = sizes[constraint].max(value.abs());
+            }
+        }
+        for (square, size) in squares.iter_mut().zip(&sizes) {
+            if *size > 0.0 {
+                *square = 0.0;
+            }
+        }
+        for ((constraint, _), value) in self.places().zip(&self.values) {
+            let size = sizes[constraint];
+            if size > 0.0 {
+                squares[constraint] += (value / size) * (value / size);
+            }
+        }
+        sizes
     }
 }

@@ -17,7 +17,7 @@ pub(super) struct Crossing {
 const ROUNDING: f64 = 1e-13;
 
 /// Finds the first change of sign of any of the functions that `values` gives at τ; the signs are looked at in `samples` equal parts of the range, and where a function
-/// comes close to zero between two of them. Roots are known to `resolution`; one that is as near to the start as that has been passed before.
+/// comes close to zero between two of them. Roots are known to `resolution`; one that is as near to the start as that has been passed before. Places without values are passed over.
 pub(super) fn first_crossing(
     range: Range<f64>,
     samples: usize,
@@ -40,12 +40,12 @@ pub(super) fn first_crossing(
     }
     // What a function may do within the resolution of the start, relative to what it does in the first part.
     let passed = (16.0 * resolution / part).max(ROUNDING);
-    let count = rows.iter().map(Vec::len).min()?;
+    let count = rows.iter().map(Vec::len).max()?;
     let mut first: Option<Crossing> = None;
     // All functions at the first root, once they are asked for.
     let mut there = Vec::new();
     for switch in 0..count {
-        let column: Vec<f64> = rows.iter().map(|row| row[switch]).collect();
+        let column: Vec<f64> = rows.iter().map(|row| value_in(row, switch)).collect();
         let found = bracket(&times, &column, passed, &mut |tau| {
             value(values, switch, tau)
         });
@@ -79,6 +79,11 @@ pub(super) fn first_crossing(
 fn value(values: &mut dyn FnMut(f64, &mut Vec<f64>), switch: usize, tau: f64) -> f64 {
     let mut row = Vec::new();
     values(tau, &mut row);
+    value_in(&row, switch)
+}
+
+/// One of the values at a place; NaN, which has no sign, where there are none.
+fn value_in(row: &[f64], switch: usize) -> f64 {
     row.get(switch).copied().unwrap_or(f64::NAN)
 }
 
@@ -166,6 +171,17 @@ mod tests {
         let mut values = |tau: f64, row: &mut Vec<f64>| row.extend([tau - 0.7, 0.3 - tau, 1.0]);
         let found = first_crossing(0.0..1.0, 8, 1e-15, &mut values).expect("a root");
         assert_eq!(found.switch, 1);
+        assert!((found.tau - 0.3).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_place_without_values_hides_no_root() {
+        let mut values = |tau: f64, row: &mut Vec<f64>| {
+            if tau != 0.5 {
+                row.push(0.3 - tau);
+            }
+        };
+        let found = first_crossing(0.0..1.0, 8, 1e-15, &mut values).expect("a root");
         assert!((found.tau - 0.3).abs() < 1e-15);
     }
 

@@ -52,10 +52,14 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        let error = match self.whole(t, h, state, impulses) {
-            Err(error) if may_be_cut(&error, M::FACTS.linear, self.control.solve) => error,
-            outcome => return outcome,
+        let Err(error) = self.whole(t, h, state, impulses) else {
+            return Ok(());
         };
+        if !may_be_cut(&error, M::FACTS.linear, self.control.solve) {
+            // What is in the workspace may not be of the step before.
+            self.carried.memory.last = None;
+            return Err(error);
+        }
         let (start, low, steps) = (
             *state,
             self.carried.memory.low,
@@ -73,10 +77,12 @@ where
         Ok(())
     }
 
-    /// Whether kernels choose by the sign of anything; where they do not nobody asks again.
+    /// Whether kernels choose by the sign of anything; where they do not nobody asks again. A start without a velocity tells nothing: the step says why.
     fn has_kinks(&mut self, t: f64, state: &State<N>) -> bool {
         let mut switches = Vec::new();
-        self.switches(t, state, &mut switches);
+        if !self.switches(t, state, &mut switches) {
+            return false;
+        }
         self.at_kinks = !switches.is_empty();
         // The inside of every step is looked at.
         self.carried.ends_only &= !self.at_kinks;
@@ -216,7 +222,7 @@ where
         Ok(end)
     }
 
-    /// A step that was done before, or that nothing can mislead.
+    /// A step of a linear model, whose iteration nothing can mislead.
     pub(super) fn ordinary(
         &self,
         memory: &mut Memory<N>,
@@ -276,6 +282,10 @@ where
                 Together::LeftToOthers => {}
             }
         }
+        if Self::MAY_HAVE_POINTS && !impulses.is_empty() {
+            // It continues what is in the workspace, as a step that all points at once have left.
+            self.look_inside();
+        }
         self.carried.skipped = false;
         self.make_room();
         let interval = Interval {
@@ -296,10 +306,11 @@ where
     }
 
     fn passed(&mut self, t: f64, h: f64, kicks: Vec<Impulse<N>>) {
-        if let Some(numbers) = self.retrace() {
-            self.carried.numbers = numbers;
-            self.carried.skipped = false;
-        }
+        self.look_inside();
+        debug_assert!(
+            !self.carried.skipped,
+            "steps of linear models have no pieces"
+        );
         let dense = self.dense_of_last(None, t, t + h);
         if let Some(last) = self.carried.memory.last {
             self.carried.pieces.push(Piece {
@@ -332,8 +343,8 @@ where
         self.carried.memory.last = None;
     }
 
-    fn switches(&mut self, t: f64, state: &State<N>, values: &mut Vec<f64>) {
-        switches(&*self.model, t, state, values);
+    fn switches(&mut self, t: f64, state: &State<N>, values: &mut Vec<f64>) -> bool {
+        switches(&*self.model, t, state, values)
     }
 
     fn points(&self) -> (usize, bool) {

@@ -2,6 +2,7 @@
 
 use super::setup::Stepper;
 use crate::dense::DenseElement;
+use crate::error::StepError;
 use crate::method::{Interval, Memory, may_be_phase};
 use crate::model::{Model, State};
 use crate::points::reach::{Reach, Weights};
@@ -13,18 +14,34 @@ impl<M, const N: usize> Stepper<'_, M, N>
 where
     M: Model<N>,
 {
-    /// The workspace of the last step, where it was gone past.
-    pub(super) fn retrace(&self) -> Option<Vec<f64>> {
+    /// The workspace of the last step, where it was gone past; nothing where the stepper's own one is that.
+    ///
+    /// Steps with all points at once keep the root that they have found, and no other one is looked for. A step by the matrix of a linear model is solved, which has one root.
+    ///
+    /// # Errors
+    /// [`StepError`] where the step of a linear model cannot be solved.
+    pub(super) fn retrace(&self) -> Result<Option<Vec<f64>>, StepError> {
         if !(Self::MAY_HAVE_POINTS || Self::MAY_BE_PROPAGATED) {
-            return None;
+            return Ok(None);
         }
-        let last = self.carried.memory.last.filter(|_| self.carried.skipped)?;
+        let Some(last) = self.carried.memory.last.filter(|_| self.carried.skipped) else {
+            return Ok(None);
+        };
         let (mut numbers, mut pivots) = self.room();
+        if Self::MAY_HAVE_POINTS {
+            let kept = (self.carried.points.clone())
+                .is_some_and(|mut points| points.write_back::<M>(&self.table, &mut numbers));
+            debug_assert!(kept, "only steps with all points at once go past it");
+            return if kept {
+                Ok(Some(numbers))
+            } else {
+                Err(StepError::NonFinite)
+            };
+        }
         let mut state = last.start;
         let (mut memory, place) = (Memory::new(), (last.t, last.h));
-        self.ordinary(&mut memory, (&mut numbers, &mut pivots), place, &mut state)
-            .ok()
-            .map(|()| numbers)
+        self.ordinary(&mut memory, (&mut numbers, &mut pivots), place, &mut state)?;
+        Ok(Some(numbers))
     }
 
     /// A box that the polynomial of the last step does not leave, for much less than that polynomial takes; none where it is not to be had for so little: of steps that were cut or not made by
@@ -53,14 +70,15 @@ where
 
     /// Makes the inside of the last step ready to be looked at, where [`ends_only`](Self::ends_only) has left it out.
     pub fn look_inside(&mut self) {
-        if self.carried.skipped && self.is_of_points && self.write_back() {
+        if self.carried.skipped && self.write_back() {
             self.carried.skipped = false;
         }
     }
 
     /// The polynomial of the last step, from time `start` to time `end`.
     ///
-    /// Before the first step, and after a failed one, it is the constant zero.
+    /// Before the first step, and after a failed one, it is the constant zero. Where the inside of a step by the matrix of a linear model is not found again, it is NaN between
+    /// the ends.
     #[must_use]
     pub fn dense(&self, start: f64, end: f64) -> DenseElement<N> {
         self.dense_in(None, start, end)
@@ -90,7 +108,9 @@ where
         let Some(last) = self.carried.memory.last else {
             return DenseElement::constant(start, end, State::ZERO);
         };
-        let retraced = self.retrace();
+        let Ok(retraced) = self.retrace() else {
+            return DenseElement::unknown(&scheme, (start, end), &last);
+        };
         let numbers = retraced.as_ref().unwrap_or(&self.carried.numbers);
         if const { !M::CONSTRAINTS.is_empty() } {
             let m = interior_len(&scheme.element, M::FORM, N, M::CONSTRAINTS.len());

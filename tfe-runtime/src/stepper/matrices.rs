@@ -191,7 +191,7 @@ where
     fn recall(&mut self, piece: usize) {
         let piece = &self.carried.pieces[piece];
         self.carried.memory.last = Some(piece.last);
-        self.carried.memory.forget_factors();
+        self.carried.memory.forget_workspace();
         self.carried.numbers.clone_from(&piece.numbers);
         self.carried.pivots.clone_from(&piece.pivots);
         self.carried.impulses.clone_from(&piece.impulses);
@@ -269,7 +269,9 @@ where
             self.extra = vec![0.0; length];
         }
         self.make_room();
-        if let Some(numbers) = self.retrace() {
+        self.look_inside();
+        if let Some(numbers) = self.retrace()? {
+            self.carried.memory.forget_workspace();
             self.carried.numbers = numbers;
             self.carried.skipped = false;
         }

@@ -23,15 +23,15 @@ impl<M: Model> Stepper<'_, M> {
         }
     }
 
-    /// Whether kernels choose by the sign of anything; where they do not nobody asks again.
+    /// Whether kernels choose by the sign of anything; where they do not nobody asks again. A start without a velocity tells nothing: the step says why.
     pub(super) fn has_kinks(&mut self, t: f64, state: &FamilyState) -> bool {
         let is_right = state.q.len() == self.length && state.p.len() == self.length;
-        if is_right {
-            let mut switches = Vec::new();
-            self.switches(t, state, &mut switches);
-            self.at_kinks = !switches.is_empty();
+        let mut switches = Vec::new();
+        if !(is_right && self.switches(t, state, &mut switches)) {
+            return false;
         }
-        is_right && self.at_kinks
+        self.at_kinks = !switches.is_empty();
+        self.at_kinks
     }
 
     #[cold]
@@ -73,11 +73,11 @@ impl<M: Model> Kinked for Stepper<'_, M> {
         }
     }
 
-    fn switches(&mut self, t: f64, state: &FamilyState, values: &mut Vec<f64>) {
+    fn switches(&mut self, t: f64, state: &FamilyState, values: &mut Vec<f64>) -> bool {
         let velocity = match M::FORM {
             Form::Lagrangian => match self.legendre.velocity(&*self.model, t, state) {
                 Ok(velocity) => Some(velocity),
-                Err(_) => return,
+                Err(_) => return false,
             },
             Form::Hamiltonian => None,
         };
@@ -102,6 +102,7 @@ impl<M: Model> Kinked for Stepper<'_, M> {
         let origin = log.deciding(results);
         drop((q, z, by_z, by_q, force));
         *values = log.decisive(origin);
+        true
     }
 
     fn points(&self) -> (usize, bool) {
