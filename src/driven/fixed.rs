@@ -1,9 +1,11 @@
 //! Models of fixed size whose inputs are given.
 
 use super::Driven;
+use super::sources::distance;
+use std::array;
 use tfe_runtime::{
     By, Constraint, ConstraintSecond, Controlled, CoordinateName, Facts, First, Form, InputFailure,
-    InputPanicked, Model, Real, Second,
+    InputPanicked, MAX_INPUTS, Model, Real, Second,
 };
 
 impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
@@ -86,23 +88,26 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         self.model.sensitivity_parameter(index)
     }
 
-    /// Derivatives by the time are differences where an input is a function or a table: good to some 1e-10 of what these do in a unit of time.
+    /// Derivatives by the time are those at fixed inputs and, where an input is a function or a table, differences along the rates of the inputs: good to some 1e-10 of what these do in a unit of
+    /// time.
     fn first_by<R: Real>(&self, by: By, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
-        const DISTANCE: f64 = 6e-6;
         let inputs = self.sources.values(t);
         if by != By::Time || self.sources.is_constant() {
             return self.model.first_by_with(by, &inputs, t, q, z, first);
         }
-        let distance = t.map(&mut |t| DISTANCE * t.abs().max(1.0).cbrt());
-        let (early, late) = (t - distance, t + distance);
-        let (mut before, mut after) = (First::zero(), First::zero());
-        self.first(early, q, z, &mut before);
-        self.first(late, q, z, &mut after);
-        let rate = |before: R, after: R| (after - before) / (late - early);
+        let (mut fixed, mut before, mut after) = (First::zero(), First::zero(), First::zero());
+        self.model.first_by_with(by, &inputs, t, q, z, &mut fixed);
+        let (rates, distance) = (self.sources.rates(t), distance(t));
+        // What an input is at another time may be beyond a jump.
+        let moved = |by: R| -> [R; MAX_INPUTS] { array::from_fn(|k| inputs[k] + by * rates[k]) };
+        self.model
+            .first_with(&moved(-distance), t, q, z, &mut before);
+        self.model.first_with(&moved(distance), t, q, z, &mut after);
+        let rate = |before: R, after: R| (after - before) / (distance + distance);
         for a in 0..N {
-            first.z[a] = rate(before.z[a], after.z[a]);
-            first.q[a] = rate(before.q[a], after.q[a]);
-            first.force[a] = rate(before.force[a], after.force[a]);
+            first.z[a] = fixed.z[a] + rate(before.z[a], after.z[a]);
+            first.q[a] = fixed.q[a] + rate(before.q[a], after.q[a]);
+            first.force[a] = fixed.force[a] + rate(before.force[a], after.force[a]);
         }
     }
 

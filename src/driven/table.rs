@@ -64,6 +64,25 @@ impl Table {
         let s = t - self.times[piece];
         self.values[piece] + s * (a + s * (b + s * c))
     }
+
+    /// The derivative of an order, 0 the value: that of the piece in which a time lies, whatever there is beyond its ends. Where values are kept, it is zero.
+    pub(super) fn derivative(&self, order: u32, t: f64) -> f64 {
+        if order == 0 || t.is_nan() {
+            return self.at(t);
+        }
+        let piece = self.times.partition_point(|time| *time <= t).checked_sub(1);
+        let inside = piece.and_then(|piece| Some((self.times[piece], self.pieces.get(piece)?)));
+        let Some((begin, [a, b, c])) = inside else {
+            return 0.0;
+        };
+        let s = t - begin;
+        match order {
+            1 => a + s * (2.0 * b + s * (3.0 * c)),
+            2 => 2.0 * b + s * (6.0 * c),
+            3 => 6.0 * c,
+            _ => 0.0,
+        }
+    }
 }
 
 /// The slopes of the chords.
@@ -200,6 +219,38 @@ mod tests {
         }
         let held = table(Interpolation::Hold, |t| t * t, 6);
         assert_eq!(held.at(0.999), 0.2 * 0.2);
+    }
+
+    /// At a time of the table and beyond by roundings, each side has derivatives of its own.
+    #[test]
+    fn derivatives_are_those_of_the_own_piece() {
+        let held = table(Interpolation::Hold, |t| t * t, 6);
+        let lines = table(Interpolation::Linear, |t| t * t, 6);
+        let slopes: Vec<f64> = lines.pieces.iter().map(|piece| piece[0]).collect();
+        for (k, t) in TIMES.iter().enumerate() {
+            // Kept before the first time and from the last one on.
+            let before = k.checked_sub(1).map_or(0.0, |piece| slopes[piece]);
+            let after = slopes.get(k).copied().unwrap_or(0.0);
+            for (time, slope) in [(t.next_down(), before), (*t, after), (t.next_up(), after)] {
+                assert_eq!(lines.derivative(0, time), lines.at(time));
+                assert_eq!(lines.derivative(1, time), slope, "{time}");
+                assert_eq!(lines.derivative(2, time), 0.0);
+                assert!((1..4).all(|order| held.derivative(order, time) == 0.0));
+            }
+        }
+        let cubic = table(
+            Interpolation::Spline,
+            |t| 1.0 + t * (2.0 + t * (-3.0 + t * 0.5)),
+            6,
+        );
+        for t in [-0.9, 0.2, 0.7, 2.4] {
+            let expected = [2.0 + t * (-6.0 + 1.5 * t), -6.0 + 3.0 * t, 3.0, 0.0];
+            for (order, expected) in (1..).zip(expected) {
+                let found = cubic.derivative(order, t);
+                assert!((found - expected).abs() < 1e-10, "{order}: {found}");
+            }
+        }
+        assert!(held.derivative(1, f64::NAN).is_nan());
     }
 
     #[test]

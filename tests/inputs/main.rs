@@ -2,6 +2,7 @@
 
 mod failures;
 mod loops;
+mod rates;
 
 use tfe::Driven;
 use tfe::prelude::*;

@@ -183,6 +183,13 @@ impl<S: Differentiable> Real for Dual<S> {
         let rate = (after.map(function) - before.map(function)) / (after - before);
         self.chain(value, rate)
     }
+    fn map_with_derivatives(self, derivatives: &mut dyn FnMut(u32, f64) -> f64) -> Self {
+        let value = self.value.map_with_derivatives(derivatives);
+        let rate = self
+            .value
+            .map_with_derivatives(&mut |order, x| derivatives(order + 1, x));
+        self.chain(value, rate)
+    }
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = Real::sin_cos(self.value);
         (self.chain(sin, cos), self.chain(cos, -sin))

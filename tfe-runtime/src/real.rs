@@ -95,6 +95,12 @@ pub trait Real:
     fn map(self, _function: &mut dyn FnMut(f64) -> f64) -> Self {
         self.like(f64::NAN)
     }
+    /// The same where all derivatives are known, `derivatives(k, x)` the k-th at x and `derivatives(0, x)` the function: numbers with slopes take these, and no differences, which would see what
+    /// lies on the other side of a jump.
+    #[must_use]
+    fn map_with_derivatives(self, derivatives: &mut dyn FnMut(u32, f64) -> f64) -> Self {
+        self.map(&mut |x| derivatives(0, x))
+    }
 }
 
 /// x y + z with one rounding, as an instruction of processors does it that have registers for lanes; without the feature `simd`, where it would be a call of a function, with
