@@ -159,6 +159,17 @@ pub enum RunErrorKind {
         /// What was called.
         call: &'static str,
     },
+    /// An event set a parameter to a value that depends on the state at the event, or on its time if that does, in a run with transition matrices. These go from state to state, and the motion behind
+    /// the event is a function of the parameter, too. A coordinate can take its place: one whose momentum does not appear in the Hamiltonian is constant until [`Act::Restart`](crate::Act::Restart)
+    /// changes it, and is differentiated as all are.
+    SetByState {
+        /// The event.
+        event: String,
+        /// When it came.
+        time: f64,
+        /// What it set.
+        parameter: String,
+    },
     /// An input that the model does not have, or that is none.
     Input(InputError),
     /// An earlier step failed: nothing goes on from here.
@@ -356,7 +367,15 @@ impl fmt::Display for RunErrorKind {
             ),
             Self::SetUnsupported { call } => write!(
                 f,
-                "`{call}` does not differentiate a run whose events set parameters; `run` and `run_linearised` go through them"
+                "`{call}` does not differentiate a run whose events set parameters; `run` goes through them, and `run_linearised` where the values do not depend on the state"
+            ),
+            Self::SetByState {
+                event,
+                time,
+                parameter,
+            } => write!(
+                f,
+                "the event `{event}` at t = {time} sets `{parameter}` to a value that depends on the state, which transition matrices leave out: take differences of `run`, or put a coordinate in its place whose momentum does not appear in the Hamiltonian"
             ),
             Self::Input(error) => error.fmt(f),
             Self::Ended { time } => {

@@ -32,16 +32,11 @@ fn estimated<R: Repeatable<N>, const N: usize>(
     };
     let mut watcher = Watcher::new(run, &mut stepper, (t0, start));
     let mut times = Vec::new();
-    let motion = run.record(
-        &mut stepper,
-        mesh,
-        (t0, start),
-        &mut |stepper, t, state, acts| {
-            times.push(t);
-            watcher.pass(run, stepper, (t, state), acts, true);
-            ControlFlow::Continue(())
-        },
-    )?;
+    let motion = run.record(&mut stepper, mesh, (t0, start), &mut |stepper, at| {
+        times.push(at.t);
+        watcher.pass(run, stepper, at, true);
+        ControlFlow::Continue(())
+    })?;
     let other = || {
         // The same steps with one node more, or two steps for each of the same number where there are no more.
         let more = Element::mixed(element.nodes() + 1);

@@ -29,7 +29,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element has no transition matrix, [`RunErrorKind::KinksUnsupported`] where steps were to be cut at
-    /// [kinks](Self::at_kinks), whose times move.
+    /// [kinks](Self::at_kinks), whose times move, [`RunErrorKind::SetByState`] where an event [sets](crate::Act::Set) a parameter to a value that depends on the state.
     pub fn run_linearised(
         &self,
         start: State<N>,

@@ -196,7 +196,8 @@ impl<'m, M: family::Model + 'm> Carry<'m, M, 0, RunTimeLength> for Infallible {
 
 impl<M: Model<N>, const N: usize> Section<'_, M, N> {
     /// Points with their [transition matrices](SectionPoint::transition) from now on: a factorisation and 2N solutions a step, and as much again at each point. Where steps are to be cut at
-    /// [kinks](Simulation::at_kinks), whose times move, the next point is [`RunErrorKind::KinksUnsupported`].
+    /// [kinks](Simulation::at_kinks), whose times move, the next point is [`RunErrorKind::KinksUnsupported`]; [`RunErrorKind::SetByState`] ends the points where an event sets a parameter to a value
+    /// that depends on the state.
     #[must_use]
     pub fn linearised(mut self) -> Self {
         let Chosen {

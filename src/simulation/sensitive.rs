@@ -1,19 +1,19 @@
 //! Runs with derivatives by parameters and by the start (T-123, T-124).
 
+mod acts;
 mod family;
 
-use super::checks::{check_kinks, check_start};
+use super::checks::check_kinks;
 use super::events::Severed;
-use super::events::act::{Near, state_after};
 use super::follow::{Follow, Passed};
 use super::setup::Simulation;
 use crate::constraints::tangent_basis;
-use crate::differences::SIXTH;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
 use crate::sensitivity::inside::{Before, Inside, Moved};
 use crate::sensitivity::slopes::{Along, Change, Place, directions};
 use crate::sensitivity::{Sensitive, Slopes};
+use acts::Acting;
 use nalgebra::{DMatrix, RowDVector};
 use std::convert::identity;
 use std::ops::Range;
@@ -100,6 +100,8 @@ pub struct Tangents<'m, M, const N: usize> {
     before: Before,
     /// ∂(p, q)/∂(start, parameters) after an act that is to come.
     acted: Option<DMatrix<f64>>,
+    /// A parameter that this act sets to a value which depends on the state.
+    dependent: Option<RunErrorKind>,
     nodes: Vec<Slopes>,
     /// Along the elements so far, where that is asked for.
     inside: Option<Vec<Inside>>,
@@ -150,6 +152,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
                 start: None,
             },
             acted: None,
+            dependent: None,
             nodes: Vec::new(),
             inside: None,
             events: Vec::new(),
@@ -402,72 +405,6 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             inside: Vec::new(),
         })
     }
-
-    /// The derivatives after the act of an event, from those of the state and the time before it.
-    fn through(
-        &self,
-        severed: &Severed<'_, '_, N>,
-        along: &Along<'_, M, N>,
-        (at, rate): (&DMatrix<f64>, &DMatrix<f64>),
-        times: &[f64],
-    ) -> Result<DMatrix<f64>, TransitionError> {
-        /// Distances relative to the state: the error of the formula is below roundings, and these are some 1e-13.
-        const DISTANCE: f64 = 2e-3;
-
-        let event = severed.event;
-        let largest = |values: &[f64; N]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let scale = |size: f64| if size > 0.0 { size } else { 1.0 };
-        // An event is where something vanishes, and be it the only coordinate: what it does in a step tells more.
-        let rate = Change::<N>::of_column(rate, 0);
-        let step = severed.step.abs();
-        let q = scale(largest(&event.q).max(step * largest(&rate.q)));
-        let p = scale(largest(&event.p).max(step * largest(&rate.p)));
-        let by = (&severed.watched.on, &severed.watched.value);
-        let mut after = at.clone();
-        for (column, dt) in times.iter().enumerate() {
-            let change = Change::<N>::of_column(at, column);
-            let parameter = self.parameter(column);
-            let value = parameter.map_or(0.0, |index| self.model.parameter(index));
-            let mut size = (largest(&change.q) / q).max(largest(&change.p) / p);
-            if parameter.is_some() {
-                size = size.max(1.0 / scale(value.abs()));
-            }
-            if size == 0.0 && *dt == 0.0 {
-                continue;
-            }
-            let distance = DISTANCE / scale(size);
-            let by_parameter = along.velocity(&Change {
-                parameter,
-                ..Change::ZERO
-            });
-            let moved = |s: f64| {
-                let state = State {
-                    q: std::array::from_fn(|a| event.q[a] + s * change.q[a]),
-                    p: std::array::from_fn(|a| event.p[a] + s * change.p[a]),
-                };
-                let t = event.t + s * dt;
-                let near = Near {
-                    t,
-                    state,
-                    velocity: by_parameter.map(|v| s * v),
-                    parameter: parameter.map(|index| (index, s)),
-                };
-                let found = state_after(&*self.model, by, event, &near);
-                let found = found.filter(|found| check_start(found).is_ok());
-                found.ok_or(TransitionError::from(StepError::NonFinite))
-            };
-            after.column_mut(column).fill(0.0);
-            for (k, weight) in (1..).zip(SIXTH) {
-                let s = f64::from(k) * distance;
-                let (high, low) = (moved(s)?, moved(-s)?);
-                for a in 0..N {
-                    after[(a, column)] += weight * (high.p[a] - low.p[a]) / distance;
-                    after[(N + a, column)] += weight * (high.q[a] - low.q[a]) / distance;
-                }
-            }
-        }
-        Ok(after)
-    }
 }
 
 impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
@@ -492,6 +429,9 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
         if !self.indices.is_empty() {
             let call = "run_sensitive";
             return Err(RunErrorKind::SetUnsupported { call });
+        }
+        if let Some(dependent) = self.dependent.take() {
+            return Err(dependent);
         }
         (self.model, self.probe) = (model.clone(), None);
         Ok(())
@@ -524,10 +464,22 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
         for (mut column, dt) in at.column_iter_mut().zip(&times) {
             column.axpy(*dt, &rate.column(0), 1.0);
         }
-        self.acted = match severed.goes_on {
-            true => Some(self.through(severed, &along, (&at, &rate), &times)?),
-            false => None,
-        };
+        (self.acted, self.dependent) = (None, None);
+        if severed.goes_on {
+            let acting = Acting {
+                model: &*model,
+                along: &along,
+                severed,
+                at: &at,
+                rate: &rate,
+                times: &times,
+            };
+            self.acted = Some(acting.after(|column| self.parameter(column))?);
+            // With parameters, nothing that is set is differentiated.
+            if self.indices.is_empty() {
+                self.dependent = acting.dependent();
+            }
+        }
         self.before.state = at;
         self.events.push((severed.number, times.clone()));
         self.before.start = Some(times);

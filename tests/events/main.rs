@@ -7,6 +7,7 @@ mod meeting;
 mod near;
 #[path = "../../examples/events_beside_scans.rs"]
 mod scans;
+mod setting;
 
 use std::f64::consts::PI;
 use tfe::RunErrorKind;

@@ -7,7 +7,7 @@ use super::super::mesh::{Grid, Mesh};
 use super::super::setup::Simulation;
 use super::super::times::check_span;
 use super::graded::Steps;
-use super::repeatable::{Broken, Passing, Repeatable, trusting};
+use super::repeatable::{At, Broken, Passing, Repeatable, trusting};
 use super::{Accurate, accurate, check_accuracy, estimated};
 use crate::accuracy::{Asked, Estimated};
 use crate::error::{RunError, RunErrorKind};
@@ -17,7 +17,7 @@ use std::ops::{ControlFlow, Range};
 use tfe_runtime::constrained::Trail;
 use tfe_runtime::step::Control;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Element, Solve, Statistics, StepError};
+use tfe_runtime::{Element, Share, Solve, Statistics, StepError};
 
 impl<M, const N: usize, L> Simulation<'_, M, N, L>
 where
@@ -215,6 +215,7 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
+    type Model = M;
     type State = L::State;
     type Stepper = L::Stepper<'m, M>;
     type Motion = Motion<N, L>;
@@ -304,7 +305,14 @@ where
         M::take_statistics(stepper)
     }
 
-    fn row(&self, stepper: &mut Self::Stepper, t: f64, state: &L::State, row: &mut [f64]) {
+    fn model(&self) -> &M {
+        &self.model
+    }
+
+    fn row(&self, stepper: &mut Self::Stepper, at: &At<'_, M, L::State>, row: &mut [f64]) {
+        let At {
+            model, t, state, ..
+        } = *at;
         let (q, p) = L::parts(state);
         let n = q.as_ref().len();
         row[..n].copy_from_slice(q.as_ref());
@@ -314,10 +322,10 @@ where
         }
         let still = L::zero(q);
         let velocity = match M::NEEDS_VELOCITY {
-            true => M::node(stepper, &self.model, (t, state), &still).v,
+            true => M::node(stepper, model, (t, state), &still).v,
             false => still,
         };
-        self.model.outputs(t, (q, p), &velocity, &mut row[2 * n..]);
+        model.outputs(t, (q, p), &velocity, &mut row[2 * n..]);
     }
 
     fn record(
@@ -325,10 +333,11 @@ where
         stepper: &mut Self::Stepper,
         mesh: &Mesh<N>,
         (t, start): (f64, &L::State),
-        passed: &mut Passing<'_, Self::Stepper, L::State>,
+        passed: &mut Passing<'_, M, Self::Stepper, L::State>,
     ) -> Result<Motion<N, L>, Broken<Motion<N, L>>> {
         let mut compared = Compared {
             passed,
+            model: self.model.clone(),
             acts: 0,
             last: t,
             goes_on: ControlFlow::Continue(()),
@@ -339,17 +348,45 @@ where
         if self.crosses_kinks() {
             motion.add_warning(Warning::KinksCrossed);
         }
-        // A run that an event has stopped stays where it is.
-        let (acts, last) = (compared.acts, compared.last);
-        if compared.goes_on.is_break() {
+        // A run that an event has stopped stays where it is, with the parameters that it had there.
+        let Compared {
+            model,
+            acts,
+            last,
+            goes_on,
+            ..
+        } = compared;
+        if goes_on.is_break() {
             return Ok(motion);
         }
         let rest = mesh.elements().map(|(_, next, _)| next);
         let ahead = rest.filter(|next| (next - last) * (next - t).signum() > 0.0);
-        for next in ahead {
-            let _ = passed(stepper, next, &motion.last().state(), acts);
+        let ahead: Vec<f64> = ahead.collect();
+        if ahead.is_empty() {
+            return Ok(motion);
         }
-        Ok(motion)
+        let is_changed = !motion.settings().is_empty();
+        let exchanged = |stepper: &mut Self::Stepper, model: &Share<'m, M>| match is_changed {
+            true => M::exchange(stepper, model.clone()),
+            false => Ok(()),
+        };
+        if let Err(kind) = exchanged(stepper, &model) {
+            return Err(Box::new((kind, motion)));
+        }
+        let state = motion.last().state();
+        for t in ahead {
+            let at = At {
+                model: &*model,
+                t,
+                state: &state,
+                acts,
+            };
+            let _ = passed(stepper, &at);
+        }
+        match exchanged(stepper, &self.model) {
+            Ok(()) => Ok(motion),
+            Err(kind) => Err(Box::new((kind, motion))),
+        }
     }
 
     fn crosses_kinks(&self) -> bool {
@@ -395,21 +432,29 @@ fn with_times<K>(breaks: &[f64], impulses: &[K], time: fn(&K) -> f64) -> Vec<f64
 }
 
 /// Shows what a run is compared by.
-struct Compared<'a, 'p, T, S> {
-    passed: &'a mut Passing<'p, T, S>,
+struct Compared<'a, 'p, 'm, M, T, S> {
+    passed: &'a mut Passing<'p, M, T, S>,
+    /// As events have left it.
+    model: Share<'m, M>,
     /// Events that have cut elements.
     acts: usize,
     last: f64,
     goes_on: ControlFlow<()>,
 }
 
-impl<'m, M, const N: usize, L> Follow<'m, M, N, L> for Compared<'_, '_, L::Stepper<'m, M>, L::State>
+impl<'m, M, const N: usize, L> Follow<'m, M, N, L>
+    for Compared<'_, '_, 'm, M, L::Stepper<'m, M>, L::State>
 where
     M: 'm,
     L: Length<N>,
 {
     fn cut(&mut self, _: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         self.acts += 1;
+        Ok(())
+    }
+
+    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+        self.model = model.clone();
         Ok(())
     }
 
@@ -420,7 +465,13 @@ where
         state: &L::State,
     ) -> ControlFlow<()> {
         self.last = t;
-        self.goes_on = (self.passed)(stepper, t, state, self.acts);
+        let at = At {
+            model: &*self.model,
+            t,
+            state,
+            acts: self.acts,
+        };
+        self.goes_on = (self.passed)(stepper, &at);
         self.goes_on
     }
 }

@@ -68,7 +68,7 @@ impl<'r, R: Repeatable<N>, const N: usize> Pilots<'r, R, N> {
             steppers,
         };
         let [_, row] = &mut pair.rows;
-        run.row(&mut pair.steppers[1], span.start, start, row);
+        run.row(&mut pair.steppers[1], &run.at(span.start, start), row);
         pair.trace.pass(row, 0, false);
         pair.trace.sizes_with(row, &mut pair.sizes);
         Ok(pair)
@@ -114,8 +114,8 @@ impl<R: Repeatable<N>, const N: usize> Pair for Pilots<'_, R, N> {
                 self.slides = error == StepError::Slides;
                 return false;
             }
-            self.run
-                .row(stepper, next, &self.ends[k], &mut self.rows[k]);
+            let at = self.run.at(next, &self.ends[k]);
+            self.run.row(stepper, &at, &mut self.rows[k]);
         }
         self.newton = newton(&self.steppers[1]) - before;
         let [row, better] = &self.rows;

@@ -68,11 +68,11 @@ fn is_passed<R: Repeatable<N>, const N: usize>(
     let mut trace = Trace::new(run.coordinates(), run.columns());
     let mut rows = [vec![0.0; trace.width()], vec![0.0; trace.width()]];
     let [row, _] = &mut rows;
-    run.row(&mut stepper, time, state, row);
+    run.row(&mut stepper, &run.at(time, state), row);
     trace.pass(row, 0, false);
     for (row, first) in rows.iter_mut().zip([step, OTHER * step]) {
         match beyond(run, &mut stepper, mesh, (time, step, first), state) {
-            Beyond::Reached(end, state) => run.row(&mut stepper, end, &state, row),
+            Beyond::Reached(end, state) => run.row(&mut stepper, &run.at(end, &state), row),
             Beyond::Stopped => return false,
             Beyond::Unknown => return true,
         }

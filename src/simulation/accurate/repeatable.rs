@@ -7,8 +7,19 @@ use tfe_runtime::constrained::Trail;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Solve, Statistics, StepError};
 
+/// A place of a run.
+pub(crate) struct At<'a, M, S> {
+    /// With the parameters that hold there.
+    pub(crate) model: &'a M,
+    pub(crate) t: f64,
+    pub(crate) state: &'a S,
+    /// How many events have changed the motion so far.
+    pub(crate) acts: usize,
+}
+
 /// A run that can be made with other elements and steps.
 pub(crate) trait Repeatable<const N: usize> {
+    type Model;
     type State: Clone;
     type Stepper;
     type Motion;
@@ -48,15 +59,31 @@ pub(crate) trait Repeatable<const N: usize> {
     fn statistics(stepper: &Self::Stepper) -> Statistics;
     /// The same since the last call.
     fn take_statistics(stepper: &mut Self::Stepper) -> Statistics;
-    /// Coordinates, momenta and outputs, one after the other.
-    fn row(&self, stepper: &mut Self::Stepper, t: f64, state: &Self::State, row: &mut [f64]);
+    /// The model as it was given.
+    fn model(&self) -> &Self::Model;
+    /// A place before which no event has changed anything.
+    fn at<'a>(&'a self, t: f64, state: &'a Self::State) -> At<'a, Self::Model, Self::State> {
+        At {
+            model: self.model(),
+            t,
+            state,
+            acts: 0,
+        }
+    }
+    /// Coordinates, momenta and outputs, one after the other. The stepper has the model of the place.
+    fn row(
+        &self,
+        stepper: &mut Self::Stepper,
+        at: &At<'_, Self::Model, Self::State>,
+        row: &mut [f64],
+    );
     /// The steps of a mesh as motion; every end of an element is shown to `passed`.
     fn record(
         &self,
         stepper: &mut Self::Stepper,
         mesh: &Mesh<N>,
         start: (f64, &Self::State),
-        passed: &mut Passing<'_, Self::Stepper, Self::State>,
+        passed: &mut Passing<'_, Self::Model, Self::Stepper, Self::State>,
     ) -> Result<Self::Motion, Broken<Self::Motion>>;
     /// Whether the run looks for events, so that elements alone do not make it.
     fn has_events(&self) -> bool;
@@ -72,8 +99,8 @@ pub(crate) trait Repeatable<const N: usize> {
     fn nodes(&self) -> Option<&[f64]>;
 }
 
-/// Is shown the end of every element: the stepper, the time, the state, and how many events have changed the motion so far. Says whether the run goes on.
-pub(crate) type Passing<'a, T, S> = dyn FnMut(&mut T, f64, &S, usize) -> ControlFlow<()> + 'a;
+/// Is shown the end of every element, with the stepper. Says whether the run goes on.
+pub(crate) type Passing<'a, M, T, S> = dyn FnMut(&mut T, &At<'_, M, S>) -> ControlFlow<()> + 'a;
 
 /// Why a recorded run has stopped, and what there is of it.
 pub(crate) type Broken<T> = Box<(RunErrorKind, T)>;

@@ -117,7 +117,7 @@ impl<'a, R: Repeatable<N>, const N: usize> Runs<'a, R, N> {
         &mut self,
         stepper: &mut R::Stepper,
         mesh: &Mesh<N>,
-        passed: &mut Passing<'_, R::Stepper, R::State>,
+        passed: &mut Passing<'_, R::Model, R::Stepper, R::State>,
     ) -> Result<(), Failed> {
         match self.run.record(stepper, mesh, self.start, passed) {
             Ok(motion) => {
@@ -144,9 +144,9 @@ impl<'a, R: Repeatable<N>, const N: usize> Runs<'a, R, N> {
         if way.keeps {
             let mut watcher = Watcher::new(run, stepper, self.start);
             let mut times = times.iter().peekable();
-            self.record(stepper, mesh, &mut |stepper, t, state, acts| {
-                let keeps = times.next_if_eq(&&t).is_some();
-                watcher.pass(run, stepper, (t, state), acts, keeps);
+            self.record(stepper, mesh, &mut |stepper, at| {
+                let keeps = times.next_if_eq(&&at.t).is_some();
+                watcher.pass(run, stepper, at, keeps);
                 ControlFlow::Continue(())
             })?;
             return Ok(watcher.trace);
@@ -202,7 +202,7 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
         let mut failure = None;
         let mut goes_on = ControlFlow::Continue(());
         let (mut apart, mut sizes) = (Vec::new(), Vec::new());
-        let passed = self.record(&mut first.stepper, &mesh, &mut |stepper, t, end, acts| {
+        let passed = self.record(&mut first.stepper, &mesh, &mut |stepper, at| {
             let [one, other] = &mut watchers;
             // The other one makes the same step.
             let Some((element, (from, next, h))) = elements.next() else {
@@ -220,13 +220,14 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
             if let Some((_, (from, _, h))) = elements.peek() {
                 R::foresee(stepper, &before, (*from, *h));
             }
-            times.push(t);
-            one.pass(run, stepper, (t, end), acts, true);
-            other.pass(run, &mut second.stepper, (t, &state), acts, true);
+            times.push(at.t);
+            one.pass(run, stepper, at, true);
+            // Runs with events, which may set parameters, are not made side by side.
+            other.pass(run, &mut second.stepper, &run.at(at.t, &state), true);
             other.trace.apart(&one.row, &other.row, &mut apart);
             other.trace.sizes_with(&one.row, &mut sizes);
             goes_on = judge(&Beside {
-                time: t,
+                time: at.t,
                 apart: &apart,
                 sizes: &sizes,
             });

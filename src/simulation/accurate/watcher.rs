@@ -1,6 +1,6 @@
 //! What runs are compared by.
 
-use super::repeatable::Repeatable;
+use super::repeatable::{At, Repeatable};
 use crate::accuracy::Trace;
 use crate::error::RunErrorKind;
 use crate::simulation::mesh::Mesh;
@@ -26,7 +26,7 @@ impl Watcher {
             row: vec![0.0; trace.width()],
             trace,
         };
-        watcher.pass(run, stepper, (t, start), 0, false);
+        watcher.pass(run, stepper, &run.at(t, start), false);
         watcher
     }
 
@@ -34,12 +34,11 @@ impl Watcher {
         &mut self,
         run: &R,
         stepper: &mut R::Stepper,
-        (t, state): (f64, &R::State),
-        acts: usize,
+        at: &At<'_, R::Model, R::State>,
         keeps: bool,
     ) {
-        run.row(stepper, t, state, &mut self.row);
-        self.trace.pass(&self.row, acts, keeps);
+        run.row(stepper, at, &mut self.row);
+        self.trace.pass(&self.row, at.acts, keeps);
     }
 }
 
@@ -57,16 +56,11 @@ pub(super) fn follow<R: Repeatable<N>, const N: usize>(
     let mut watcher = Watcher::new(run, stepper, (t0, start));
     let mut times = times.iter().peekable();
     if run.has_events() {
-        let passed = run.record(
-            stepper,
-            mesh,
-            (t0, start),
-            &mut |stepper, t, state, acts| {
-                let keeps = times.next_if_eq(&&t).is_some();
-                watcher.pass(run, stepper, (t, state), acts, keeps);
-                ControlFlow::Continue(())
-            },
-        );
+        let passed = run.record(stepper, mesh, (t0, start), &mut |stepper, at| {
+            let keeps = times.next_if_eq(&&at.t).is_some();
+            watcher.pass(run, stepper, at, keeps);
+            ControlFlow::Continue(())
+        });
         return match passed {
             Ok(_) => Ok(watcher.trace),
             Err(broken) => Err((broken.0, t0, start.clone())),
@@ -80,7 +74,7 @@ pub(super) fn follow<R: Repeatable<N>, const N: usize>(
             return Err((kind, t, state));
         }
         let keeps = times.next_if_eq(&&next).is_some();
-        watcher.pass(run, stepper, (next, &state), 0, keeps);
+        watcher.pass(run, stepper, &run.at(next, &state), keeps);
         bar.advance();
     }
     Ok(watcher.trace)

@@ -12,6 +12,9 @@ use tfe_runtime::CoordinateName;
 /// Coordinates and momenta stay as they are at the event, unless a [state](Self::and_state) or a [velocity](Self::and_velocity) is given: the momentum that stays has another velocity where a
 /// mass is set.
 ///
+/// Values may depend on the state at the event. [Transition matrices](crate::Simulation::run_linearised) do not hold that, and such runs are refused by them
+/// ([`RunErrorKind::SetByState`](crate::RunErrorKind::SetByState)).
+///
 /// ```
 /// use tfe::Settings;
 /// use tfe::prelude::*;
@@ -79,6 +82,11 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
     pub fn and_velocity(mut self, v: L::Vector) -> Self {
         self.from = From::Velocity(v);
         self
+    }
+
+    /// The parameters and their values.
+    pub(in crate::simulation) fn values(&self) -> &[(String, f64)] {
+        &self.values
     }
 
     /// The model with these values, and the numbers of the parameters.

@@ -1,0 +1,165 @@
+//! What acts of events make of states near those of their events: differences (T-124).
+
+use crate::differences::{SIXTH, derivative};
+use crate::error::RunErrorKind;
+use crate::sensitivity::slopes::{Along, Change};
+use crate::simulation::checks::check_start;
+use crate::simulation::events::act::{Act, Near, Occurrence, On, state_after};
+use crate::simulation::events::{Severed, Watched};
+use nalgebra::DMatrix;
+use std::sync::{Arc, Mutex, PoisonError};
+use tfe_runtime::transition::TransitionError;
+use tfe_runtime::{Model, State, StepError};
+
+/// Distances relative to the state: the error of the formula is below roundings, and these are some 1e-13.
+const DISTANCE: f64 = 2e-3;
+
+/// An event, with the derivatives of its state and of its time before anything is done.
+pub(super) struct Acting<'a, 'm, M, const N: usize> {
+    pub(super) model: &'a M,
+    pub(super) along: &'a Along<'a, M, N>,
+    pub(super) severed: &'a Severed<'a, 'm, N>,
+    /// Of the state where the event is met, a column for each number of the start and each parameter.
+    pub(super) at: &'a DMatrix<f64>,
+    /// ẏ at the event.
+    pub(super) rate: &'a DMatrix<f64>,
+    /// Of its time.
+    pub(super) times: &'a [f64],
+}
+
+/// How an event moves along a column.
+struct Way<const N: usize> {
+    change: Change<N>,
+    time: f64,
+    /// Among all.
+    parameter: Option<usize>,
+    /// What the parameter adds to the velocity.
+    velocity: [f64; N],
+    /// That of differences, in parts of the change.
+    distance: f64,
+}
+
+impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
+    /// The derivatives after the act; `parameter` tells which one a column is by.
+    pub(super) fn after(
+        &self,
+        parameter: impl Fn(usize) -> Option<usize>,
+    ) -> Result<DMatrix<f64>, TransitionError> {
+        let by = (&self.severed.watched.on, &self.severed.watched.value);
+        let mut after = self.at.clone();
+        for column in 0..self.times.len() {
+            let Some(way) = self.way(column, parameter(column)) else {
+                continue;
+            };
+            let moved = |s: f64| {
+                let near = self.near(&way, s);
+                let found = state_after(self.model, by, self.severed.event, &near);
+                let found = found.filter(|found| check_start(found).is_ok());
+                found.ok_or(TransitionError::from(StepError::NonFinite))
+            };
+            after.column_mut(column).fill(0.0);
+            for (k, weight) in (1..).zip(SIXTH) {
+                let s = f64::from(k) * way.distance;
+                let (high, low) = (moved(s)?, moved(-s)?);
+                for a in 0..N {
+                    after[(a, column)] += weight * (high.p[a] - low.p[a]) / way.distance;
+                    after[(N + a, column)] += weight * (high.q[a] - low.q[a]) / way.distance;
+                }
+            }
+        }
+        Ok(after)
+    }
+
+    /// Why a run is refused whose act sets a parameter to a value that depends on the state: the motion behind it is a function of that value, too, and matrices from state to state do not hold it.
+    pub(super) fn dependent(&self) -> Option<RunErrorKind> {
+        /// What a value may change by where the state changes by all of itself, relative to the value: roundings.
+        const ROUNDINGS: f64 = 1e-10;
+
+        let Watched { on, value } = self.severed.watched;
+        // What the act sets wherever it is called.
+        let seen = Arc::new(Mutex::new(None));
+        let (act, sets) = (Arc::clone(&on.act), Arc::clone(&seen));
+        let watched = move |event: &Occurrence<'_, N>| {
+            let act = act(event);
+            if let Act::Set(settings) = &act {
+                let mut sets = sets.lock().unwrap_or_else(PoisonError::into_inner);
+                *sets = Some(settings.values().to_vec());
+            }
+            act
+        };
+        let on = On {
+            act: Arc::new(watched),
+            ..on.clone()
+        };
+        let set = |way: &Way<N>, s: f64| {
+            let near = self.near(way, s);
+            let _ = state_after(self.model, (&on, value), self.severed.event, &near);
+            seen.lock().unwrap_or_else(PoisonError::into_inner).take()
+        };
+        for way in (0..self.times.len()).filter_map(|column| self.way(column, None)) {
+            for (place, (name, value)) in set(&way, 0.0)?.into_iter().enumerate() {
+                // Not a number where nearby it sets something else.
+                let nearby = |s: f64| {
+                    let settings = set(&way, s).unwrap_or_default();
+                    let own = settings.get(place).filter(|(other, _)| *other == name);
+                    own.map_or(f64::NAN, |(_, value)| *value)
+                };
+                let change = derivative(way.distance, nearby) * way.distance / DISTANCE;
+                let known = self.model.find_parameter(&name);
+                let before = known.map_or(0.0, |index| self.model.parameter(index));
+                let size = value.abs().max(before.abs());
+                if !(change.abs() <= ROUNDINGS * size) {
+                    return Some(RunErrorKind::SetByState {
+                        event: self.severed.event.name.clone(),
+                        time: self.severed.event.t,
+                        parameter: name,
+                    });
+                }
+            }
+        }
+        None
+    }
+
+    /// How the event moves along a column; none where it stays.
+    fn way(&self, column: usize, parameter: Option<usize>) -> Option<Way<N>> {
+        let event = self.severed.event;
+        let largest = |values: &[f64; N]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let scale = |size: f64| if size > 0.0 { size } else { 1.0 };
+        // An event is where something vanishes, and be it the only coordinate: what it does in a step tells more.
+        let rate = Change::<N>::of_column(self.rate, 0);
+        let step = self.severed.step.abs();
+        let q = scale(largest(&event.q).max(step * largest(&rate.q)));
+        let p = scale(largest(&event.p).max(step * largest(&rate.p)));
+        let change = Change::<N>::of_column(self.at, column);
+        let mut size = (largest(&change.q) / q).max(largest(&change.p) / p);
+        if let Some(index) = parameter {
+            let value = self.model.parameter(index);
+            size = size.max(1.0 / scale(value.abs()));
+        }
+        let time = self.times[column];
+        (size != 0.0 || time != 0.0).then(|| Way {
+            change,
+            time,
+            parameter,
+            velocity: self.along.velocity(&Change {
+                parameter,
+                ..Change::ZERO
+            }),
+            distance: DISTANCE / scale(size),
+        })
+    }
+
+    /// The event at a part of the change.
+    fn near(&self, way: &Way<N>, s: f64) -> Near<N> {
+        let event = self.severed.event;
+        Near {
+            t: event.t + s * way.time,
+            state: State {
+                q: std::array::from_fn(|a| event.q[a] + s * way.change.q[a]),
+                p: std::array::from_fn(|a| event.p[a] + s * way.change.p[a]),
+            },
+            velocity: way.velocity.map(|v| s * v),
+            parameter: way.parameter.map(|index| (index, s)),
+        }
+    }
+}

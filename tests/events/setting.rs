@@ -1,0 +1,203 @@
+//! Parameters that events set: what runs are compared by, and matrices where the values depend on the state.
+
+use super::*;
+use tfe::periodic::OrbitError;
+
+type Sets = fn(&tfe::Occurrence<'_, 1>) -> Settings<1>;
+
+const SPRINGS: Springs = Springs { m: 1.0, k: 4.0 };
+
+fn setting(sets: Sets) -> Simulation<'static, Springs, 1> {
+    Simulation::new(&SPRINGS).element(Mixed::<8>).step(0.1).on(
+        "middle",
+        Crossing::Either,
+        move |event| Act::Set(sets(event)),
+    )
+}
+
+fn numbers<const N: usize>(state: &State<N>) -> Vec<f64> {
+    [state.p, state.q].concat()
+}
+
+/// The derivative of the end of a run by a number of its start, ordered (p, q): of fourth order.
+fn by_start<const N: usize>(
+    start: State<N>,
+    column: usize,
+    end: &dyn Fn(State<N>) -> State<N>,
+) -> Vec<f64> {
+    let pair = |distance: f64| {
+        let moved = |s: f64| {
+            let mut moved = start;
+            match column.checked_sub(N) {
+                None => moved.p[column] += s,
+                Some(a) => moved.q[a] += s,
+            }
+            numbers(&end(moved))
+        };
+        let (high, low) = (moved(distance), moved(-distance));
+        let pairs = high.into_iter().zip(low);
+        let slopes = pairs.map(|(high, low)| (high - low) / (2.0 * distance));
+        slopes.collect::<Vec<_>>()
+    };
+    let (near, far) = (pair(1e-3), pair(2e-3));
+    let pairs = near.into_iter().zip(far);
+    pairs.map(|(near, far)| (4.0 * near - far) / 3.0).collect()
+}
+
+/// The mass flies free, with no energy but its own, up to the spring that an event lets it meet: what the estimate of an output knows is that of the parameters behind the event, also where the motion
+/// stays at an event that stops it.
+#[test]
+fn estimates_of_outputs_are_those_of_the_parameters_set() {
+    let free = Springs { m: 1.0, k: 0.0 };
+    let (speed, end): (f64, f64) = (1.03, 4.0);
+    let potential = |t: f64| match t - 1.0 / speed {
+        past if past > 0.0 => speed * speed / 2.0 * (2.0 * past).sin().powi(2),
+        _ => 0.0,
+    };
+    for stops in [false, true] {
+        let motion = Simulation::new(&free)
+            .element(Mixed::<2>)
+            .step(0.1)
+            .on("middle", Crossing::Either, move |event| {
+                if stops && !event.rises {
+                    return Act::Stop;
+                }
+                Act::Set(Settings::new("k", 4.0))
+            })
+            .run_estimated(free.state([-1.0], [speed]), 0.0..end)
+            .expect("a run");
+        assert_eq!(motion.last().t < end, stops);
+        let outputs = motion.outputs();
+        let found = outputs.column("potential").expect("an output");
+        let mut off = 0.0_f64;
+        for (node, found) in motion.states().iter().zip(&found) {
+            off = off.max((found - potential(node.t)).abs());
+        }
+        let off = off / (speed * speed / 2.0);
+        let estimate = motion.error_estimate_of("potential").expect("an output");
+        assert!(
+            off > 1e-7 && 0.5 * off < estimate && estimate < 2.0 * off,
+            "stops: {stops}: {estimate:e} for {off:e}"
+        );
+    }
+}
+
+/// A value that depends on the state goes with it into the motion behind the event, and matrices from state to state do not hold it.
+#[test]
+fn matrices_refuse_settings_by_the_state() {
+    #[track_caller]
+    fn check(kind: &RunErrorKind) {
+        let (event, parameter) = match kind {
+            RunErrorKind::SetByState {
+                event, parameter, ..
+            } => (event.as_str(), parameter.as_str()),
+            other => panic!("{other}"),
+        };
+        assert_eq!((event, parameter), ("middle", "k"));
+    }
+
+    let by_state: [Sets; 3] = [
+        |event| Settings::new("k", 3.0 + event.v[0].abs()),
+        |event| Settings::new("k", 3.0 + event.t),
+        |event| Settings::new("m", 1.0).and("k", 4.0 + event.p[0] / 2.0),
+    ];
+    let start = SPRINGS.state([1.0], [0.0]);
+    for sets in by_state {
+        let simulation = setting(sets);
+        simulation.run(start, 0.0..3.0).expect("a run");
+        let error = simulation.run_linearised(start, 0.0..3.0);
+        let error = error.expect_err("it depends on the state");
+        check(error.kind());
+        assert!((error.partial().last().t - PI / 4.0).abs() < 1e-9);
+        let section = simulation.section("middle", Crossing::Rising, start, 0.0);
+        let told = section.linearised().take(4).find_map(Result::err);
+        check(&told.expect("it depends on the state"));
+        let orbit = PeriodicOrbit::of_simulation(&simulation)
+            .unknown_period(4.5)
+            .guess_from(start)
+            .solve();
+        match orbit.map(|orbit| orbit.period()) {
+            Err(OrbitError::Run(kind)) => check(&kind),
+            other => panic!("{other:?}"),
+        }
+        // By parameters it is refused whatever is set.
+        let error = simulation.run_sensitive(start, 0.0..3.0);
+        let error = error.expect_err("it depends on parameters");
+        assert!(matches!(error.kind(), RunErrorKind::SetUnsupported { .. }));
+    }
+}
+
+/// Values that are what they are for all motions nearby: of a coordinate that vanishes at the event, on one side of a jump, of a parameter.
+#[test]
+fn matrices_go_across_settings_that_stay() {
+    let kept: [Sets; 4] = [
+        |event| Settings::new("k", 2.0 + event.q[0]),
+        |event| Settings::new("k", if event.v[0] < -1.99 { 1.0 } else { 3.0 }),
+        |event| Settings::new("k", event.parameter("k").map_or(0.0, |k| 5.0 - k)),
+        |event| Settings::new("k", 2.0).and_velocity([1.1 * event.v[0]]),
+    ];
+    let (start, span) = (SPRINGS.state([1.0], [0.0]), 0.0..3.0);
+    for (number, sets) in kept.into_iter().enumerate() {
+        let simulation = setting(sets);
+        let run = simulation.run_linearised(start, span.clone());
+        let run = run.unwrap_or_else(|error| panic!("{number}: {error}"));
+        assert!(!run.motion().events().is_empty());
+        let product = run.product();
+        let end = |start: State<1>| {
+            let motion = simulation.run(start, span.clone()).expect("a run");
+            motion.last().state()
+        };
+        for column in 0..2 {
+            for (row, expected) in by_start(start, column, &end).iter().enumerate() {
+                let found = product[(row, column)];
+                assert!(
+                    (found - expected).abs() < 1e-8 * product.amax(),
+                    "{number} ({row}, {column}): {found} for {expected}"
+                );
+            }
+        }
+    }
+}
+
+/// What is to depend on the state belongs to it: a coordinate without a momentum in the Hamiltonian is constant between events, and goes into the matrices.
+#[test]
+fn a_coordinate_takes_the_place_of_a_parameter() {
+    #[dynamics(
+        coordinates(x, k),
+        momenta(p, s),
+        hamiltonian = p^2/2 + k/2*x^2,
+        event(middle) = x,
+    )]
+    struct Adapting;
+
+    let simulation = Simulation::new(&Adapting).element(Mixed::<8>).step(0.1).on(
+        "middle",
+        Crossing::Either,
+        |event| {
+            Act::Restart(State {
+                q: [event.q[0], 3.0 + event.v[0]],
+                p: event.p,
+            })
+        },
+    );
+    let start = State {
+        q: [1.0, 4.0],
+        p: [0.1, 0.0],
+    };
+    let run = simulation.run_linearised(start, 0.0..5.0).expect("a run");
+    assert_eq!(run.motion().events().len(), 2);
+    let product = run.product();
+    let end = |start: State<2>| {
+        let motion = simulation.run(start, 0.0..5.0).expect("a run");
+        motion.last().state()
+    };
+    for column in 0..4 {
+        for (row, expected) in by_start(start, column, &end).iter().enumerate() {
+            let found = product[(row, column)];
+            assert!(
+                (found - expected).abs() < 1e-8 * product.amax(),
+                "({row}, {column}): {found} for {expected}"
+            );
+        }
+    }
+}
