@@ -6,6 +6,7 @@
 //! elements and without the growth of round-off that stepping from one end to the other has.
 
 mod chain;
+mod constraints;
 mod control;
 mod convergence;
 mod derivative;
@@ -19,9 +20,9 @@ pub use mesh::MeshError;
 
 pub(crate) use chain::{Chain, ClosureMut, DenseMut};
 pub(crate) use control::Control;
-#[cfg(feature = "sparse")]
-pub(crate) use convergence::Convergence;
 pub(crate) use convergence::size;
+#[cfg(feature = "sparse")]
+pub(crate) use convergence::{Convergence, Size, sizes};
 pub(crate) use derivative::derivatives;
 pub(crate) use mesh::Mesh;
 pub(crate) use newton::{Assembly, By, Iterate, Problem};

@@ -19,6 +19,7 @@ mod moving;
 pub(crate) mod orbit;
 mod phase;
 pub(crate) mod problem;
+mod rest;
 mod sensitive;
 mod setup;
 

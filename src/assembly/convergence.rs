@@ -2,6 +2,7 @@
 
 use super::control::Control;
 use super::error::AssemblyError;
+use crate::numbers::larger;
 
 /// Corrections below this one that no longer fall are round-off: a step from here would square them.
 const ROUND_OFF: f64 = 1e-9;
@@ -9,40 +10,95 @@ const ROUND_OFF: f64 = 1e-9;
 /// The shortest part of a step that is tried.
 const SHORTEST: f64 = 1.0 / 256.0;
 
+/// Corrections below this part of a component square to its roundings: the next one need not be seen.
+const SQUARED: f64 = 1e-8;
+
+/// A component that is known to less than this part is not settled, even if its corrections do not fall.
+const SETTLED: f64 = 1e-3;
+
+/// Components below this part of the largest of their kind hold roundings of it, such as those that are zero by symmetry: they are not looked at by themselves. An angle beside a
+/// distance of 1.5·10¹¹ m is 10⁻¹¹ of it.
+const ROUNDINGS: f64 = 1e-12;
+
+/// The most iterations for the sake of small components, once the large ones have arrived.
+const MAX_MORE: u32 = 6;
+
+/// How large a correction is beside the iterate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Size {
+    /// Coordinates beside the largest coordinate, momenta beside the largest momentum, globals beside their scales; the largest of these parts.
+    whole: f64,
+    /// The largest part that it is of one coordinate or momentum beside the size of this one alone.
+    own: f64,
+}
+
+impl Size {
+    const UNKNOWN: Self = Self {
+        whole: f64::INFINITY,
+        own: f64::INFINITY,
+    };
+
+    /// The same with a correction of something else, beside the size of that. What is not a number stays so.
+    pub(crate) fn and(self, other: f64) -> Self {
+        Self {
+            whole: larger(self.whole, other),
+            ..self
+        }
+    }
+}
+
 /// The course of the corrections.
 ///
 /// A step after which the next correction would be more than twice as large, or which leaves where the model is defined, is tried again
-/// at half its length.
+/// at half its length. Once the corrections are small beside the iterate, components that are much smaller than the largest are corrected for as long as that makes them better.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Convergence {
     control: Control,
-    size: f64,
-    last: f64,
+    size: Size,
+    last: Size,
     fraction: f64,
     iterations: u32,
+    /// Iterations after the correction was small beside the whole iterate.
+    more: u32,
 }
 
 impl Convergence {
     /// From the size of the first correction.
-    pub(crate) fn new(control: Control, size: f64) -> Self {
+    pub(crate) fn new(control: Control, size: Size) -> Self {
         Self {
             control,
             size,
-            last: f64::INFINITY,
+            last: Size::UNKNOWN,
             fraction: 1.0,
             iterations: 0,
+            more: 0,
         }
     }
 
     /// Whether the present correction is the last.
     pub(crate) fn is_done(&self) -> bool {
-        let stagnates = self.last < ROUND_OFF && self.size >= 0.25 * self.last;
-        self.size <= self.control.tolerance || stagnates
+        self.has_arrived() && !self.is_unsettled()
+    }
+
+    /// Whether the correction is small beside the whole iterate, or round-off.
+    fn has_arrived(&self) -> bool {
+        let (size, last) = (self.size.whole, self.last.whole);
+        let stagnates = last < ROUND_OFF && size >= 0.25 * last;
+        size <= self.control.tolerance || stagnates
+    }
+
+    /// Whether a component is still made better that is small beside the others, while iterations are left.
+    fn is_unsettled(&self) -> bool {
+        let (size, last) = (self.size.own, self.last.own);
+        let stagnates = size < SETTLED && size >= 0.25 * last;
+        let is_known = size <= SQUARED.max(self.control.tolerance) || stagnates;
+        let may_follow = self.more < MAX_MORE && self.iterations < self.control.max_iterations;
+        !is_known && may_follow
     }
 
     /// Whether another iteration may follow.
     pub(crate) fn go_on(&self) -> Result<(), AssemblyError> {
-        if self.size.is_finite() && self.iterations < self.control.max_iterations {
+        if self.size.whole.is_finite() && self.iterations < self.control.max_iterations {
             return Ok(());
         }
         Err(self.stalled())
@@ -54,10 +110,12 @@ impl Convergence {
     }
 
     /// Judges the correction that follows a step.
-    pub(crate) fn accepts(&mut self, is_defined: bool, next: f64) -> bool {
+    pub(crate) fn accepts(&mut self, is_defined: bool, next: Size) -> bool {
         self.iterations += 1;
-        let accepted = is_defined && (next <= 2.0 * self.size || next < ROUND_OFF);
+        let is_smaller = next.whole <= 2.0 * self.size.whole || next.whole < ROUND_OFF;
+        let accepted = is_defined && is_smaller;
         if accepted {
+            self.more += u32::from(self.has_arrived());
             (self.last, self.size) = (self.size, next);
             self.fraction = (2.0 * self.fraction).min(1.0);
         }
@@ -79,7 +137,7 @@ impl Convergence {
     fn stalled(&self) -> AssemblyError {
         AssemblyError::Stalled {
             iterations: self.iterations,
-            correction: self.size,
+            correction: self.size.whole,
             tolerance: self.control.tolerance,
         }
     }
@@ -95,12 +153,20 @@ struct Largest {
 }
 
 impl Largest {
-    fn take(&mut self, values: &[f64], corrections: &[f64]) {
-        for (value, correction) in values.iter().zip(corrections) {
-            self.value = self.value.max(value.abs());
-            self.correction = self.correction.max(correction.abs());
-            self.sum += 0.0 * correction;
-        }
+    fn take(&mut self, value: f64, correction: f64) {
+        self.value = self.value.max(value.abs());
+        self.correction = self.correction.max(correction.abs());
+        self.sum += 0.0 * correction;
+    }
+
+    /// The largest of all components.
+    fn of(components: &[Self]) -> Self {
+        let with = |all: Self, one: &Self| Self {
+            value: all.value.max(one.value),
+            correction: all.correction.max(one.correction),
+            sum: all.sum + one.sum,
+        };
+        components.iter().fold(Self::default(), with)
     }
 
     /// The correction beside the value or beside another scale, whichever is larger; one at most.
@@ -114,40 +180,127 @@ impl Largest {
 }
 
 /// The correction beside the iterate: the largest of those of coordinates, momenta and (already beside their scales) globals. Nodes are (p, q, correction).
-///
-/// An orbit near an equilibrium may have no momenta to compare with. The matrices of the elements tell what its coordinates are
-/// worth: momenta count as small beside max |∂p₁/∂q₀| max |q|, and coordinates the other way round.
 pub(crate) fn size<'a>(
     nodes: impl Iterator<Item = (&'a [f64], &'a [f64], &'a [f64])>,
     matrices: &[f64],
     globals: impl Iterator<Item = f64>,
 ) -> f64 {
-    let [mut p, mut q] = [Largest::default(); 2];
-    let mut n = 0;
-    for (node_p, node_q, correction) in nodes {
-        n = node_p.len();
-        let (by_p, by_q) = correction.split_at(n);
-        p.take(node_p, by_p);
-        q.take(node_q, by_q);
+    sizes(nodes, matrices, globals).whole
+}
+
+/// The same, with the largest of single components.
+///
+/// An orbit near an equilibrium may have no momenta to compare with. The matrices of the elements tell what its coordinates are
+/// worth: momenta count as small beside max |∂p₁/∂q₀| max |q|, and coordinates the other way round. So a component counts as small beside itself and beside what
+/// each other one makes of it in an element, max |∂y₁/∂z₀| max |z|.
+pub(crate) fn sizes<'a>(
+    nodes: impl Iterator<Item = (&'a [f64], &'a [f64], &'a [f64])>,
+    matrices: &[f64],
+    globals: impl Iterator<Item = f64>,
+) -> Size {
+    let mut components: Vec<Largest> = Vec::new();
+    for (p, q, correction) in nodes {
+        components.resize(correction.len(), Largest::default());
+        let pairs = p.iter().chain(q).zip(correction);
+        for (component, (value, correction)) in components.iter_mut().zip(pairs) {
+            component.take(*value, *correction);
+        }
     }
-    let (mut p_by_q, mut q_by_p) = (0.0_f64, 0.0_f64);
-    for (row, entries) in matrices.chunks_exact((2 * n).max(1)).enumerate() {
-        let (by_p, by_q) = entries.split_at(n);
-        let (entries, largest) = if row % (2 * n) < n {
-            (by_q, &mut p_by_q)
-        } else {
-            (by_p, &mut q_by_p)
-        };
-        *largest = entries
-            .iter()
-            .fold(*largest, |largest, entry| largest.max(entry.abs()));
-    }
+    let width = components.len();
+    let n = width / 2;
+    let largest = largest_entries(width, matrices);
+    let block = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
+        let entries = rows.flat_map(|row| &largest[row * width..][columns.clone()]);
+        entries.fold(0.0_f64, |most, entry| most.max(*entry))
+    };
+    let (p, q) = (Largest::of(&components[..n]), Largest::of(&components[n..]));
+    let (p_by_q, q_by_p) = (block(0..n, n..width), block(n..width, 0..n));
     let mut size = p.beside(p_by_q * q.value).max(q.beside(q_by_p * p.value));
     let mut sum = p.sum + q.sum;
     for correction in globals {
         size = size.max(correction.abs());
         sum += 0.0 * correction;
     }
-    // Maxima ignore what is not a number; the sum does not.
-    size + sum
+    Size {
+        // Maxima ignore what is not a number; the sum does not.
+        whole: size + sum,
+        own: own_size(&components, &largest),
+    }
+}
+
+/// The largest magnitude at each place of some square matrices.
+fn largest_entries(width: usize, matrices: &[f64]) -> Vec<f64> {
+    let mut largest = vec![0.0_f64; width * width];
+    for matrix in matrices.chunks_exact((width * width).max(1)) {
+        for (most, entry) in largest.iter_mut().zip(matrix) {
+            *most = most.max(entry.abs());
+        }
+    }
+    largest
+}
+
+/// The largest correction of a component beside the size of it alone, of those that are more than roundings of others.
+fn own_size(components: &[Largest], matrix: &[f64]) -> f64 {
+    let width = components.len();
+    let n = width / 2;
+    let scales: Vec<f64> = (matrix.chunks_exact(width.max(1)))
+        .zip(components)
+        .map(|(row, component)| {
+            let parts = row.iter().zip(components);
+            parts.fold(component.value, |most, (entry, other)| {
+                most.max(entry * other.value)
+            })
+        })
+        .collect();
+    let largest = |kind: &[f64]| kind.iter().fold(0.0_f64, |most, scale| most.max(*scale));
+    let kinds = [largest(&scales[..n]), largest(&scales[n..])];
+    let parts = components.iter().zip(&scales).enumerate();
+    parts.fold(0.0, |most, (place, (component, scale))| {
+        let kind = kinds[usize::from(place >= n)];
+        if *scale > ROUNDINGS * kind {
+            most.max(component.beside(*scale))
+        } else {
+            most
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Control, Convergence, Size, sizes};
+
+    /// Two coordinates with their corrections.
+    fn size(q: [f64; 2], [first, second]: [f64; 2]) -> Size {
+        let (p, correction) = ([0.0; 2], [0.0, 0.0, first, second]);
+        let node = (&p[..], &q[..], &correction[..]);
+        sizes([node].into_iter(), &[], std::iter::empty())
+    }
+
+    /// How many iterations follow a first correction, which is small beside the larger coordinate.
+    #[track_caller]
+    fn check(q: [f64; 2], corrections: impl IntoIterator<Item = f64>, expected: usize) {
+        let mut corrections = corrections.into_iter().map(|second| size(q, [0.0, second]));
+        let first = corrections.next().expect("one at least");
+        let mut convergence = Convergence::new(Control::default(), first);
+        let mut more = 0;
+        while !convergence.is_done() {
+            let next = corrections.next().expect("too many iterations");
+            assert!(convergence.accepts(true, next));
+            more += 1;
+        }
+        assert_eq!(more, expected);
+    }
+
+    #[test]
+    fn a_small_coordinate_is_corrected_for_as_long_as_it_becomes_better() {
+        let beside = [1e11, 1.0];
+        check(beside, [1e-3, 1e-6, 1e-12], 2);
+        check(beside, [1e-9], 0);
+        // Roundings, which do not fall.
+        check(beside, [1e-4, 1e-5, 1e-5], 2);
+        // It goes nowhere: enough.
+        check(beside, [5e-3; 10], 6);
+        // Zero by symmetry.
+        check([1.0, 1e-17], [1e-17], 0);
+    }
 }

@@ -20,6 +20,18 @@ pub enum AssemblyError {
     },
     /// A velocity or a momentum at a node could not be found.
     Legendre(LegendreError),
+    /// The solution violates a constraint at a node. Of constraints that depend on one another elements keep only as many as are independent: here they contradict, or the
+    /// position is singular; or coordinates that are asked for at the ends are not on the constraints.
+    Violated {
+        /// The constraint.
+        constraint: &'static str,
+        /// The time of the node.
+        time: f64,
+        /// Whether positions violate it, or velocities.
+        position: bool,
+        /// By how much: |φ| or |A v + a| over the length of its row, relative to the largest position or velocity of the solution.
+        residual: f64,
+    },
     /// The equations of the chain are singular: there is no solution, or there are many near each other.
     Singular {
         /// Iterations done.
@@ -46,6 +58,17 @@ impl fmt::Display for AssemblyError {
                 source,
             } => write!(f, "element {element}, at t = {time}: {source}"),
             Self::Legendre(error) => error.fmt(f),
+            Self::Violated {
+                constraint,
+                time,
+                position,
+                residual,
+            } => write!(
+                f,
+                "the solution violates the constraint `{constraint}` at t = {time}: {} off by {residual:.1e} of the largest; constraints that depend on one another contradict, \
+                 the position is singular, or what is asked for at the ends is not on the constraints",
+                if *position { "position" } else { "velocity" }
+            ),
             Self::Singular { iterations } => write!(
                 f,
                 "the assembled equations are singular after {iterations} iterations: no solution near the guess, or a whole family of them"

@@ -10,8 +10,9 @@
 //! with Y_e the end of the element after its own Newton step; what closes the chain is the [`Problem`]'s.
 
 use super::chain::{Chain, ClosureMut, DenseMut};
+use super::constraints;
 use super::control::Control;
-use super::convergence::{Convergence, size};
+use super::convergence::{Convergence, Size, sizes};
 use super::error::AssemblyError;
 use tfe_runtime::condenser::{Condensed, Condenser, Direction, Placed};
 use tfe_runtime::{Element, ElementError, LegendreError, Model, State, Statistics};
@@ -371,18 +372,17 @@ impl<const N: usize> Assembly<N> {
     }
 
     /// The correction beside the iterate.
-    pub(crate) fn size<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> f64 {
+    fn size<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> Size {
         let nodes = iterate.nodes.iter().enumerate();
         let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], self.chain.node(e)));
         let globals = self.chain.globals().iter().enumerate();
         let globals = globals.map(|(k, correction)| correction / problem.scale(k));
-        let size = size(nodes, self.chain.matrices(), globals);
-        if const { P::Model::CONSTRAINTS.is_empty() } || size.is_nan() {
+        let size = sizes(nodes, self.chain.matrices(), globals);
+        if const { P::Model::CONSTRAINTS.is_empty() } {
             return size;
         }
         // Nodes at rest do not feel the reactions, but the matrices do.
-        let reactions = REACTIONS * self.interior_size(iterate);
-        size.max(reactions)
+        size.and(REACTIONS * self.interior_size(iterate))
     }
 
     /// The largest correction of interior unknowns beside the largest of them.
@@ -426,7 +426,7 @@ impl<const N: usize> Assembly<N> {
         }
     }
 
-    /// Iterates to a solution. Afterwards the linearisation is that of the solution, up to the tolerance.
+    /// Iterates to a solution, which fulfils all constraints. Afterwards the linearisation is that of the solution, up to the tolerance.
     pub(crate) fn solve<P: Problem<N>>(
         &mut self,
         problem: &mut P,
@@ -440,7 +440,12 @@ impl<const N: usize> Assembly<N> {
             if convergence.is_done() {
                 self.correct(iterate, 1.0);
                 problem.set_globals(&iterate.globals);
-                return Ok(());
+                if const { P::Model::CONSTRAINTS.is_empty() } {
+                    return Ok(());
+                }
+                let times = times(problem, iterate.nodes.len() - 1);
+                let nodes = (&times[..], &iterate.nodes[..]);
+                return constraints::check(problem.model(), nodes, control.tolerance);
             }
             convergence.go_on()?;
             let before = iterate.clone();
@@ -469,3 +474,13 @@ fn inner(a: &[f64], b: &[f64]) -> f64 {
 
 /// How much a relative correction of reactions counts beside one of the nodes: they carry the rounding of positions over h².
 const REACTIONS: f64 = 1e-3;
+
+/// The times of all nodes.
+fn times<P: Problem<N>, const N: usize>(problem: &P, elements: usize) -> Vec<f64> {
+    let start = problem.place(0).0;
+    let ends = (0..elements).map(|element| {
+        let (start, length) = problem.place(element);
+        start + length
+    });
+    std::iter::once(start).chain(ends).collect()
+}

@@ -241,6 +241,9 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
     }
 
     /// When the iteration is done: the relative size of the last correction, 10⁻¹³ by default. The correction that meets it is applied.
+    ///
+    /// Coordinates are measured by the largest of them, and so are momenta. Those that are much smaller, as an angle beside a distance, are corrected further for as long as that makes
+    /// them better, by at most six iterations.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;

@@ -126,7 +126,11 @@ impl<M: Model<N> + Clone, const N: usize> Problem<N> for Continued<'_, M, N> {
 
     fn span(&self, k: usize, iterate: &Iterate<N>, dense: DenseMut<'_>) {
         if k < self.orbit.dense() {
-            self.orbit.span(k, iterate, dense);
+            let orbit = Periodic {
+                model: &self.model,
+                ..self.orbit.clone()
+            };
+            orbit.span(k, iterate, dense);
         } else {
             self.row.write(iterate, dense);
         }

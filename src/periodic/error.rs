@@ -58,6 +58,8 @@ pub enum OrbitError {
         /// The kind of models.
         of: &'static str,
     },
+    /// The motion that was found does not move: an equilibrium, which repeats after any time, or a period that shrinks to nothing.
+    AtRest,
     /// The assembled equations were not solved.
     Assembly(AssemblyError),
     /// An autonomous model has no orbit of this period: the equations can only be met with an additional force γ v.
@@ -125,6 +127,10 @@ impl fmt::Display for OrbitError {
             ),
             Self::HybridConstraints => f.write_str(
                 "orbits with events are found for models without constraints only: declare minimal coordinates",
+            ),
+            Self::AtRest => f.write_str(
+                "the search for an orbit comes to rest: an equilibrium, which repeats after any time; begin from a state that moves, nearer to the orbit \
+                 (the multipliers of an equilibrium itself are those of `.period(T)` and a guess at rest)",
             ),
             Self::Assembly(error) => error.fmt(f),
             Self::NoFamily { unfolding } => write!(

@@ -5,9 +5,11 @@ mod sensitive;
 mod shooting;
 
 use super::error::OrbitError;
+use super::kind::Chained;
 use super::orbit::Orbit;
 use super::phase::Period;
 use super::problem::Global;
+use super::rest::{Extent, is_at_rest, may_rest};
 use super::setup::{Guess, PeriodicOrbit};
 use crate::assembly::Mesh;
 use crate::length::RunTimeLength;
@@ -60,7 +62,20 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
                 shooting.energy = energy;
             }
         }
-        shooting.solve(self.control)?;
+        let extent = |shooting: &Shooting<'_, M>| {
+            let places = shooting.nodes.iter().map(|node| &node.q[..]);
+            Extent::of(places)
+        };
+        let guess = extent(&shooting);
+        let solved = shooting.solve(self.control);
+        // Where a phase is asked for, a motion is.
+        if shooting.phase.is_some()
+            && may_rest(&solved)
+            && is_at_rest(extent(&shooting), &guess, || shooting.motion())
+        {
+            return Err(OrbitError::AtRest);
+        }
+        solved?;
         Ok(shooting)
     }
 

@@ -3,6 +3,8 @@
 use super::error::OrbitError;
 use super::orbit::{Verdict, sort, trivial_of};
 use super::phase::Period;
+use super::problem::force_at;
+use super::rest::{Extent, is_at_rest};
 use super::setup::PeriodicOrbit;
 use crate::linearised::Linearised;
 use crate::motion::{Motion, Setting};
@@ -10,7 +12,7 @@ use crate::numbers::{larger, largest};
 use crate::periodic_schur::Multiplier;
 use crate::simulation::Simulation;
 use nalgebra::{Complex, DMatrix, DVector};
-use tfe_runtime::{First, Form, Model, State};
+use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// An orbit of a simulation with [events](Simulation::on) that change the state: an oscillator that hits a wall, a machine that switches. The simulation brings model, element and events;
@@ -145,7 +147,8 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     /// Finds the orbit and its multipliers.
     ///
     /// # Errors
-    /// [`OrbitError`]: [`Run`](OrbitError::Run) where a motion fails, [`Stalled`](OrbitError::Stalled) where no orbit is found near the guess; models with constraints are
+    /// [`OrbitError`]: [`Run`](OrbitError::Run) where a motion fails, [`Stalled`](OrbitError::Stalled) where no orbit is found near the guess, [`AtRest`](OrbitError::AtRest) where the
+    /// search for an unknown period comes to rest; models with constraints are
     /// [not supported](OrbitError::HybridConstraints).
     pub fn solve(&self) -> Result<HybridOrbit<N>, OrbitError> {
         /// Corrections below this that shrink no more are roundings.
@@ -164,6 +167,8 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
             p: [0.0; N],
         });
         let mut run = self.run(&state, period)?;
+        let guess = Extent::of_nodes(run.motion());
+        self.check_moves(&run, &guess)?;
         let mut last = f64::INFINITY;
         let mut iterations = 0;
         while iterations < self.max_iterations {
@@ -211,6 +216,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
             let is_best = tried.is_err() && size < ROUNDED;
             if !is_best {
                 (state, period, run) = tried?;
+                self.check_moves(&run, &guess)?;
             }
             if is_done || is_best {
                 // What no correction changes may be left: then the motion does not close.
@@ -230,6 +236,16 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
             residual,
             iterations,
         })
+    }
+
+    /// Refuses a motion that goes nowhere where the period is unknown: of a known one an equilibrium is an orbit.
+    fn check_moves(&self, run: &Linearised<N>, guess: &Extent) -> Result<(), OrbitError> {
+        let motion = run.motion();
+        let is_free = matches!(self.period, Period::Guess(_));
+        if is_free && is_at_rest(Extent::of_nodes(motion), guess, || motion.clone()) {
+            return Err(OrbitError::AtRest);
+        }
+        Ok(())
     }
 
     /// Those of another simulation.
@@ -419,14 +435,9 @@ fn rate<M: Model<N>, const N: usize>(
     state: &State<N>,
     v: &[f64; N],
 ) -> DVector<f64> {
-    let (z, sign) = match M::FORM {
-        Form::Lagrangian => (v, 1.0),
-        Form::Hamiltonian => (&state.p, -1.0),
-    };
-    let mut first = First::ZERO;
-    model.first(t, &state.q, z, &mut first);
+    let force = force_at(model, t, state, v);
     DVector::from_fn(2 * N, |row, _| match row.checked_sub(N) {
-        None => sign * first.q[row] + first.force[row],
+        None => force[row],
         Some(a) => v[a],
     })
 }

@@ -58,6 +58,25 @@ impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
         check(self.period, self.unfolding, self.inertia)
     }
 
+    /// The row Σ h_e ẏ_e · δy_e = 0 of a few elements, with the flow by the equations of motion.
+    fn orthogonal_to_flow_at(&self, nodes: &[State<N>], weights: &mut [f64]) {
+        weights.fill(0.0);
+        for (element, weights) in weights.chunks_exact_mut(2 * N).enumerate() {
+            if element == self.mesh.elements() {
+                // The last node is the first one a period later.
+                break;
+            }
+            let (time, length) = self.place(element);
+            let flow = flow_at(self.model, time, &nodes[element]);
+            // Where there is none the equations are singular, which says so.
+            let [by_p, by_q] = flow.unwrap_or([[0.0; N]; 2]);
+            for a in 0..N {
+                weights[a] = length * by_p[a];
+                weights[N + a] = length * by_q[a];
+            }
+        }
+    }
+
     /// How many multipliers are one: none of a forced orbit, one of an autonomous, two of a conservative one.
     pub(crate) fn trivial(&self) -> usize {
         let unfolded = self.globals.contains(&Global::Unfolding);
@@ -108,14 +127,13 @@ pub(crate) fn close_periodically<const N: usize>(
     }
 }
 
+/// With fewer elements the nodes before and behind a node are one, a period apart: they say nothing of the flow.
+pub(crate) const NEIGHBOURED: usize = 3;
+
 /// The row Σ h_e ẏ_e · δy_e = 0: the correction is orthogonal to the flow, so that the phase of the guess stays.
 ///
 /// The flow is the difference of the neighbours; a condition of phase need not be exact.
-pub(crate) fn orthogonal_to_flow<const N: usize>(
-    advance: &[f64; N],
-    nodes: &[State<N>],
-    weights: &mut [f64],
-) {
+fn orthogonal_to_flow<const N: usize>(advance: &[f64; N], nodes: &[State<N>], weights: &mut [f64]) {
     let last = nodes.len() - 1;
     for e in 0..last {
         let previous = if e == 0 {
@@ -131,6 +149,44 @@ pub(crate) fn orthogonal_to_flow<const N: usize>(
         }
     }
     weights[last * 2 * N..].fill(0.0);
+}
+
+/// The rate ṗ of the momenta without what constraints add: L_q + Q.
+pub(super) fn force_at<M: Model<N>, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+    v: &[f64; N],
+) -> [f64; N] {
+    let (z, sign) = match M::FORM {
+        Form::Lagrangian => (v, 1.0),
+        Form::Hamiltonian => (&state.p, -1.0),
+    };
+    let mut first = First::ZERO;
+    model.first(t, &state.q, z, &mut first);
+    std::array::from_fn(|a| sign * first.q[a] + first.force[a])
+}
+
+/// The flow ẏ = (ṗ, q̇) at a state, by the equations of motion, ordered (p, q); none where no velocity belongs to the momentum, or no reactions.
+fn flow_at<M: Model<N>, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &State<N>,
+) -> Option<[[f64; N]; 2]> {
+    let v = velocity_of(model, t, state).ok()?;
+    let mut force = force_at(model, t, state, &v);
+    if const { !M::CONSTRAINTS.is_empty() } {
+        let reactions = constrained::reactions(model, t, state, &v).ok()?;
+        let mut rows = vec![[0.0; N]; reactions.len()];
+        let mut drift = vec![0.0; reactions.len()];
+        model.constraint_rows(t, &state.q, &mut rows, &mut drift);
+        for (row, reaction) in rows.iter().zip(&reactions) {
+            for a in 0..N {
+                force[a] += row[a] * reaction;
+            }
+        }
+    }
+    Some([force, v])
 }
 
 /// The velocity of a momentum; where it has none of its own, the one that constraints leave.
@@ -278,7 +334,11 @@ impl<M: Model<N>, const N: usize> Problem<N> for Periodic<'_, M, N> {
     }
 
     fn span(&self, _k: usize, iterate: &Iterate<N>, dense: DenseMut<'_>) {
-        orthogonal_to_flow(&self.advance, &iterate.nodes, dense.nodes);
+        if self.mesh.elements() < NEIGHBOURED {
+            self.orthogonal_to_flow_at(&iterate.nodes, dense.nodes);
+        } else {
+            orthogonal_to_flow(&self.advance, &iterate.nodes, dense.nodes);
+        }
         dense.global.fill(0.0);
         *dense.right = 0.0;
     }

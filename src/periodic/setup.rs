@@ -5,11 +5,12 @@ use super::kind::Closed;
 use super::orbit::Orbit;
 use super::phase::{Period, Phase};
 use super::problem::{Global, Periodic, inertia_of};
-use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh};
+use super::rest::{Extent, is_at_rest, may_rest};
+use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh, Solution};
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Motion;
 use crate::simulation::Simulation;
-use tfe_runtime::{Element, LegendreError, Mixed, Model, constrained, legendre};
+use tfe_runtime::{Element, LegendreError, Mixed, Model, Statistics, constrained, legendre};
 
 /// A curve t ↦ (q, dq/dt).
 type Around<'m, V> = Box<dyn Fn(f64) -> (V, V) + 'm>;
@@ -27,6 +28,9 @@ pub(super) enum Guess<'m, const N: usize, L: Length<N>> {
 /// - *Autonomous with damping or forces*: isolated orbits; T is unknown ([`unknown_period`](Self::unknown_period)) and a [`Phase`] is chosen.
 /// - *Conservative*: orbits come in families. Give the period, or with an unknown one the [`energy`](Self::energy) (that of the guess if none
 ///   is given). The equations are made regular by an unfolding force γ v, which vanishes in the solution ([`Orbit::unfolding`]).
+///
+/// A search for an orbit of an autonomous model that comes to rest ends with [`OrbitError::AtRest`]. An equilibrium whose multipliers are asked for is that of a known period and a guess
+/// that does not move.
 ///
 /// Defaults: `Mixed::<4>` (order 6), 40 equal elements, a solution to round-off.
 ///
@@ -183,6 +187,9 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
     }
 
     /// When the iteration is done: the relative size of the last correction, 10⁻¹³ by default. The correction that meets it is applied.
+    ///
+    /// Coordinates are measured by the largest of them, and so are momenta. Those that are much smaller, as an angle beside a distance, are corrected further for as long as that makes
+    /// them better, by at most six iterations.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;
@@ -269,9 +276,36 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         let mut iterate = assembly
             .along(&problem, &curve, globals)
             .map_err(AssemblyError::Legendre)?;
-        assembly.solve(&mut problem, &mut iterate, self.control)?;
-        problem.check()?;
+        let guess = extent_of(&iterate);
+        let solved = assembly.solve(&mut problem, &mut iterate, self.control);
+        let solved = (solved.map_err(OrbitError::from)).and_then(|()| problem.check());
+        // Where a phase is asked for, a motion is.
+        if problem.phase.is_some()
+            && may_rest(&solved)
+            && is_at_rest(extent_of(&iterate), &guess, || {
+                self.motion_of(&problem, &iterate)
+            })
+        {
+            return Err(OrbitError::AtRest);
+        }
+        solved?;
         Ok((problem, iterate, assembly))
+    }
+
+    /// The motion of an iterate, with the polynomials of its elements.
+    fn motion_of(&self, problem: &Periodic<'_, M, N>, iterate: &Iterate<N>) -> Motion<N> {
+        let solution = Solution {
+            model: problem.model,
+            element: self.element,
+            mesh: problem.mesh.clone(),
+            start: problem.start,
+            length: problem.period,
+            damping: problem.unfolding,
+            iterate: iterate.clone(),
+            transitions: Vec::new(),
+            statistics: Statistics::NONE,
+        };
+        solution.motion()
     }
 
     /// The element, and how a solution is iterated.
@@ -341,6 +375,11 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         }
         Ok(energy)
     }
+}
+
+/// Between which values the coordinates of the nodes lie.
+fn extent_of<const N: usize>(iterate: &Iterate<N>) -> Extent {
+    Extent::of(iterate.nodes.iter().map(|node| &node.q[..]))
 }
 
 /// The equations of an orbit, their solution and the memory that it took.

@@ -1,7 +1,10 @@
 //! Orbits of constrained models against those of their twins in minimal coordinates.
 
 use std::f64::consts::{PI, TAU};
+use tfe::AssemblyError;
+use tfe::boundary::BoundaryError;
 use tfe::continuation::Branch;
+use tfe::periodic::OrbitError;
 use tfe::prelude::*;
 
 const OMEGA: f64 = 2.3;
@@ -142,6 +145,108 @@ fn a_free_swing() {
         // Double and defective: the square root of the error.
         assert!((multiplier - 1.0).norm() < 1e-5, "{multiplier}");
     }
+}
+
+/// A pendulum that is held twice: with l = 1 the second equation follows from the first.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
+    constraint(rod) = x^2 + y^2 - 1,
+    constraint(length) = sqrt(x^2 + y^2) - l,
+)]
+struct Twice {
+    g: f64,
+    l: f64,
+}
+
+/// A swing of a pendulum of length one through the bottom, where rows have their lengths to the last bit.
+fn swing(amplitude: f64, omega: f64, t: f64) -> ([f64; 2], [f64; 2]) {
+    let angle = twins(0.0, 0.0, 0.0).0;
+    let (sin, cos) = (omega * t).sin_cos();
+    mass(&angle, t, amplitude * sin, amplitude * omega * cos)
+}
+
+/// Elements keep the first of two rows that are one: the other one is off by a tenth of the length.
+#[track_caller]
+fn assert_violated(error: &AssemblyError) {
+    let AssemblyError::Violated {
+        constraint,
+        position,
+        residual,
+        ..
+    } = error
+    else {
+        panic!("{error}");
+    };
+    assert_eq!((*constraint, *position), ("length", true));
+    assert!((residual - 0.1).abs() < 1e-9, "{residual}");
+    assert!(error.to_string().contains("`length`"), "{error}");
+}
+
+#[test]
+fn constraints_that_contradict_have_no_orbit() {
+    const PERIOD: f64 = 6.5;
+    fn swings<M: Model<2>>(model: &M) -> PeriodicOrbit<'_, M, 2> {
+        PeriodicOrbit::of(model)
+            .element(Mixed::<6>)
+            .elements(20)
+            .period(PERIOD)
+            .guess(|t| swing(0.7, TAU / PERIOD, t))
+    }
+    let (rod, agreed) = (Free { g: 1.0 }, Twice { g: 1.0, l: 1.0 });
+    let alone = swings(&rod).solve().expect("a swing").start();
+    let twice = swings(&agreed)
+        .solve()
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(twice.multipliers().len(), 2);
+    let start = twice.start();
+    for a in 0..2 {
+        assert!((start.q[a] - alone.q[a]).abs() < 1e-11);
+        assert!((start.p[a] - alone.p[a]).abs() < 1e-11);
+    }
+    let contradicting = Twice { g: 1.0, l: 1.1 };
+    match swings(&contradicting).solve().map(|orbit| orbit.period()) {
+        Err(OrbitError::Assembly(error)) => assert_violated(&error),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn constraints_that_contradict_have_no_motion_between_ends() {
+    let between = |l: f64| {
+        let twice = Twice { g: 1.0, l };
+        let (q, v) = swing(0.5, 1.0, 0.0);
+        let arc = BoundaryValue::of(&twice)
+            .elements(10)
+            .initial(twice.state(q, v), 0.0..1.0)
+            .guess(|t| swing(0.5, 1.0, t))
+            .solve();
+        arc.map(|arc| arc.end())
+    };
+    let end = between(1.0).expect("an arc");
+    assert!((end.q[0].hypot(end.q[1]) - 1.0).abs() < 1e-12);
+    match between(1.1) {
+        Err(BoundaryError::Assembly(error)) => assert_violated(&error),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Two elements of a period: their nodes do not tell the flow, and reactions belong to it.
+#[test]
+fn a_free_swing_of_two_elements() {
+    let rod = Free { g: 1.0 };
+    let energy = |elements: usize, nodes: usize| {
+        let orbit = PeriodicOrbit::of(&rod)
+            .element(Element::mixed(nodes))
+            .elements(elements)
+            .period(6.5)
+            .guess(|t| swing(0.7, TAU / 6.5, t))
+            .solve()
+            .unwrap_or_else(|error| panic!("{elements}: {error}"));
+        orbit.motion().energies()[0]
+    };
+    let off = energy(2, 12) - energy(30, 6);
+    assert!(off.abs() < 1e-4, "{off:e}");
 }
 
 /// A body about a fixed point, by a unit quaternion, whose mass matrix is singular: it swings about its first axis, as a pendulum in one angle does. A spring keeps its axis from turning about the vertical.

@@ -65,11 +65,8 @@ fn orbits_that_are_ill_posed() {
 fn orbits_that_do_not_exist() {
     let pendulum = Pendulum {};
     let rest = PeriodicOrbit::of(&pendulum).unknown_period(6.0).solve();
-    // Everything is an orbit of an equilibrium: no period is singled out.
-    assert!(matches!(
-        rest,
-        Err(OrbitError::Assembly(AssemblyError::Singular { .. }))
-    ));
+    // Every time is a period of an equilibrium: none is singled out.
+    assert!(matches!(rest, Err(OrbitError::AtRest)));
     let far = VanDerPol { mu: 1.0 };
     let error = PeriodicOrbit::of(&far)
         .unknown_period(6.0)
@@ -100,6 +97,7 @@ fn orbits_that_do_not_exist() {
     for error in [
         OrbitError::NoPeriod,
         OrbitError::ForcedPeriod,
+        OrbitError::AtRest,
         OrbitError::NoFamily { unfolding: 0.3 },
         OrbitError::Phase { index: 3 },
     ] {
@@ -107,6 +105,63 @@ fn orbits_that_do_not_exist() {
     }
 }
 
+/// Where one is found it is the limit cycle, whose amplitude is 2: rest is none, whether the guess is there or the search is led there.
+#[test]
+fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
+    let pendulum = Pendulum {};
+    let turning = Phase::Momentum {
+        index: 0,
+        value: 0.0,
+    };
+    for angle in [0.0, PI] {
+        for phase in [Phase::Orthogonal, turning] {
+            let rest = PeriodicOrbit::of(&pendulum)
+                .unknown_period(6.0)
+                .guess(move |_| ([angle], [0.0]))
+                .phase(phase)
+                .solve();
+            assert_eq!(rest.err(), Some(OrbitError::AtRest), "{angle} {phase:?}");
+        }
+        let rest = PeriodicOrbit::of_simulation(&Simulation::new(&pendulum))
+            .unknown_period(6.0)
+            .guess_from(pendulum.state([angle], [0.0]))
+            .solve();
+        assert_eq!(rest.err(), Some(OrbitError::AtRest), "{angle}");
+    }
+    for mu in [1.0, -0.2] {
+        let oscillator = VanDerPol { mu };
+        let simulation = Simulation::new(&oscillator);
+        let near = |amplitude: f64, period: f64| {
+            PeriodicOrbit::of_simulation(&simulation)
+                .unknown_period(period)
+                .guess_from(oscillator.state([amplitude], [0.0]))
+                .solve()
+        };
+        assert_eq!(near(0.0, 6.3).err(), Some(OrbitError::AtRest));
+        for (amplitude, period) in [(1e-100, 6.3), (1e-6, 6.3), (1e-3, 9.0), (0.1, 3.0)] {
+            match near(amplitude, period) {
+                Ok(orbit) => {
+                    let nodes = orbit.motion().states().iter();
+                    let largest = nodes.map(|node| node.q[0].abs()).fold(0.0, f64::max);
+                    assert!(largest > 1.9, "{mu} {amplitude:e}: {largest:e}");
+                }
+                Err(error) => assert_eq!(error, OrbitError::AtRest, "{mu} {amplitude:e}"),
+            }
+            let orbit = PeriodicOrbit::of(&oscillator)
+                .unknown_period(period)
+                .guess_from(oscillator.state([amplitude], [0.0]))
+                .solve();
+            if let Ok(orbit) = orbit {
+                let nodes = orbit.nodes();
+                let largest = nodes.iter().map(|node| node.q[0].abs());
+                let largest = largest.fold(0.0, f64::max);
+                assert!(largest > 1.9, "{mu} {amplitude:e}: {largest:e}");
+            }
+        }
+    }
+}
+
+/// With a given period it is one: see `a_saddle_of_a_simulation_is_unstable` too.
 #[test]
 fn multipliers_of_an_equilibrium() {
     let pendulum = Pendulum {};

@@ -441,6 +441,57 @@ impl Hill<'_> {
     }
 }
 
+/// One element or two of high degree: the phase stays that of the guess here too.
+#[test]
+fn one_element_or_two_over_a_period() {
+    let model = VanDerPol { mu: 0.2 };
+    let many = limit_cycle(&model, Element::mixed(8), 40);
+    // Of 11 Gauss points each: the periods are 6.300093 and 6.298876885.
+    for (elements, tolerance) in [(1, 4e-4), (2, 1e-7)] {
+        for phase in [
+            Phase::Orthogonal,
+            Phase::Momentum {
+                index: 0,
+                value: 0.0,
+            },
+        ] {
+            let few = PeriodicOrbit::of(&model)
+                .element(Mixed::<12>)
+                .elements(elements)
+                .unknown_period(6.3)
+                .phase(phase)
+                .guess(|t| ([2.0 * t.cos()], [-2.0 * t.sin()]))
+                .solve()
+                .expect("a limit cycle");
+            assert_relative(few.period(), many.period(), tolerance);
+            assert_eq!(few.trivial(), [0]);
+        }
+    }
+    let pendulum = Pendulum {};
+    let amplitude = 0.5_f64;
+    let period = pendulum_period(amplitude);
+    let guess = move |t: f64| {
+        let (s, c) = (TAU / period * t).sin_cos();
+        ([amplitude * c], [-amplitude * s * TAU / period])
+    };
+    for (elements, tolerance) in [(1, 1e-4), (2, 1e-8)] {
+        let few = || {
+            PeriodicOrbit::of(&pendulum)
+                .element(Mixed::<12>)
+                .elements(elements)
+                .guess(guess)
+        };
+        let by_period = few().period(period).solve().expect("a swing");
+        assert_relative(by_period.start().q[0], amplitude, tolerance);
+        let by_energy = few()
+            .unknown_period(0.99 * period)
+            .energy(-amplitude.cos())
+            .solve()
+            .expect("a swing");
+        assert_relative(by_energy.period(), period, tolerance);
+    }
+}
+
 #[test]
 fn graded_elements_serve_a_relaxation_oscillation() {
     let model = VanDerPol { mu: 10.0 };

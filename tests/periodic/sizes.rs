@@ -1,6 +1,7 @@
 //! Units of masses, lengths and times make no difference.
 
-use std::f64::consts::TAU;
+use crate::models::Pendulum;
+use std::f64::consts::{PI, TAU};
 use tfe::periodic::OrbitError;
 use tfe::prelude::*;
 
@@ -38,6 +39,15 @@ struct Pushed {
     force(x) = m*(1 - x^2)*dot(x),
 )]
 struct VanDerPol {
+    m: f64,
+}
+
+/// A pendulum in something that is a long way off, and goes farther.
+#[dynamics(
+    coordinates(x, theta),
+    lagrangian = m*dot(x)^2/2 + dot(theta)^2/2 + cos(theta),
+)]
+struct Carried {
     m: f64,
 }
 
@@ -112,6 +122,38 @@ fn forced_orbits_have_the_same_multipliers() {
         for (one, other) in moduli.iter().zip(&others) {
             assert!((one - other).abs() < 1e-11, "{of:?}: {moduli:?} {others:?}");
         }
+    }
+}
+
+/// An angle beside a distance is as right as it is alone, whatever is small beside the distance.
+#[test]
+fn small_coordinates_are_right_beside_large_ones() {
+    let pendulum = Pendulum {};
+    let alone = BoundaryValue::of(&pendulum)
+        .element(Mixed::<8>)
+        .elements(20)
+        .from_to([0.0], [PI], 0.0..3.0)
+        .solve()
+        .expect("a swing up");
+    for m in [1.0, 1e6] {
+        let carried = Carried { m };
+        let far = BoundaryValue::of(&carried)
+            .element(Mixed::<8>)
+            .elements(20)
+            .from_to([0.0, 0.0], [1.5e11, PI], 0.0..3.0)
+            .solve()
+            .expect("a swing up");
+        for (far, alone) in far.nodes().iter().zip(alone.nodes()) {
+            let off = (far.q[1] - alone.q[0])
+                .abs()
+                .max((far.p[1] - alone.p[0]).abs());
+            assert!(off < 1e-12, "{m:e}, t = {}: {off:e}", far.t);
+        }
+        let iterations = far.statistics().newton_iterations;
+        assert!(
+            iterations <= alone.statistics().newton_iterations,
+            "{m:e}: {iterations}"
+        );
     }
 }
 

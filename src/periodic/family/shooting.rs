@@ -3,8 +3,8 @@
 use super::super::error::OrbitError;
 use super::super::orbit::sort;
 use super::super::phase::Phase;
-use super::super::problem::{Global, check, inertia_of};
-use crate::assembly::{AssemblyError, Chain, Control, Convergence, Mesh};
+use super::super::problem::{Global, NEIGHBOURED, check, inertia_of};
+use crate::assembly::{AssemblyError, Chain, Control, Convergence, Mesh, Size, sizes};
 use crate::constraints::allowed::{self, basis_of};
 use crate::periodic_schur::{self, Multiplier};
 use nalgebra::DMatrix;
@@ -27,6 +27,8 @@ pub struct Shooting<'m, M> {
     pub(super) energy: Option<f64>,
     pub(super) nodes: Vec<FamilyState>,
     pub(super) transitions: Vec<DMatrix<f64>>,
+    /// The flow ẏ at the ends of elements, ordered (p, q), where these are so few that their nodes do not tell it.
+    flows: Vec<Vec<f64>>,
     pub(super) statistics: Statistics,
 }
 
@@ -52,6 +54,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             energy: None,
             nodes,
             transitions: Vec::new(),
+            flows: Vec::new(),
             statistics: Statistics::NONE,
         }
     }
@@ -154,6 +157,8 @@ impl<'m, M: family::Model> Shooting<'m, M> {
     /// Steps all elements from their nodes and solves for the correction, which is then in the chain.
     fn linearise(&mut self, chain: &mut Chain) -> Result<(), OrbitError> {
         let mut transitions = Vec::with_capacity(self.mesh.elements());
+        let mut flows = Vec::new();
+        let are_few = self.mesh.elements() < NEIGHBOURED;
         let places = self.places(self.period);
         let steps = places.iter().zip(&self.nodes);
         let steps = steps.map(|((t, h), node)| (*t, *h, node));
@@ -165,6 +170,9 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             for (row, right) in right.iter_mut().enumerate() {
                 *right = component(end, row) - component(next, row);
             }
+            if are_few {
+                flows.push(transition.by_length().to_vec());
+            }
             transitions.push(matrix);
         };
         let stepped = family::TransitionOperator::of_steps(
@@ -175,7 +183,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             each,
         );
         stepped.map_err(|failed| step_failed(failed, &places))?;
-        self.transitions = transitions;
+        (self.transitions, self.flows) = (transitions, flows);
         self.statistics.iterations += 1;
         self.statistics.newton_iterations += 1;
         self.statistics.steps += places.len() as u64;
@@ -259,9 +267,13 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             for e in 0..last {
                 // The flow is the difference of the neighbours; a condition of phase need not be exact.
                 let previous = &self.nodes[if e == 0 { last - 1 } else { e - 1 }];
+                // That of the first node is found a period later.
+                let own = self.flows.get(if e == 0 { last - 1 } else { e - 1 });
                 for k in 0..size {
-                    let flow = component(&self.nodes[e + 1], k) - component(previous, k);
-                    dense.nodes[e * size + k] = flow;
+                    dense.nodes[e * size + k] = match own {
+                        Some(flow) => self.mesh.share(e) * self.period * flow[k],
+                        None => component(&self.nodes[e + 1], k) - component(previous, k),
+                    };
                 }
             }
             dense.nodes[last * size..].fill(0.0);
@@ -294,13 +306,13 @@ impl<'m, M: family::Model> Shooting<'m, M> {
     }
 
     /// The correction beside the iterate, as for orbits of fixed size.
-    fn size(&self, chain: &Chain) -> f64 {
+    fn size(&self, chain: &Chain) -> Size {
         let nodes = self.nodes.iter().enumerate();
         let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)));
         let globals = self.globals.iter().zip(chain.globals());
         let globals = globals
             .map(|(global, correction)| correction / global.scale(self.period, self.inertia));
-        crate::assembly::size(nodes, chain.matrices(), globals)
+        sizes(nodes, chain.matrices(), globals)
     }
 
     /// Adds a fraction of the correction.
