@@ -100,6 +100,69 @@ pub mod shadowed {
     pub struct Fourth<const N: usize> {}
 }
 
+/// Without the prelude of Rust, and where the name of the crate is taken.
+pub mod without_prelude {
+    #![no_implicit_prelude]
+
+    /// Not the crate.
+    pub mod tfe {}
+
+    /// Pairs whose forces add up to zero, so many that they stay in loops; parameters are called like the sums of these.
+    #[::tfe::dynamics(
+        coordinates(x[18]),
+        lagrangian = sum(i in 0..18, sums/2*dot(x[i])^2) + sum(i in 0..18, sum(j in 0..i, sum_*column*cos(x[i] - x[j]))),
+        output(spread) = row*(x[17] - x[0]),
+    )]
+    pub struct Ring {
+        /// Mass.
+        pub sums: f64,
+        /// Stiffness.
+        pub sum_: f64,
+        /// A factor.
+        pub column: f64,
+        /// Another.
+        pub row: f64,
+    }
+
+    /// The same of any length.
+    #[::tfe::dynamics(
+        coordinates(x[N]),
+        lagrangian = sum(i in 0..N, dot(x[i])^2/2) + sum(i in 0..N, sum(j in 0..i, k*cos(x[i] - x[j]))),
+    )]
+    pub struct AnyRing<const N: usize> {
+        /// Stiffness.
+        pub k: f64,
+    }
+
+    /// Forces in one loop, which is taken in strides; parameters and outputs are called like what is in it.
+    #[::tfe::dynamics(
+        coordinates(q[n]),
+        lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, __to/2*(q[i+1] - q[i])^2 + __end*(q[i+1] - q[i])^4),
+        output(forces_inline) = q[n-1],
+    )]
+    pub struct Chain {
+        /// Length.
+        pub n: usize,
+        /// Stiffness.
+        pub __to: f64,
+        /// Hardening.
+        pub __end: f64,
+    }
+
+    /// A solver, and a model made from this one.
+    #[::tfe::dynamics(
+        coordinates(x, y),
+        lagrangian = (dot(x)^2 + dot(y)^2)/2 - k*select(y < 1, y^2, 2*y - 1),
+        constraint(still) = x - 1,
+        solver(Bare, Mixed::<3>),
+        model(Soft, elastic(still = original)),
+    )]
+    pub struct Held {
+        /// Stiffness.
+        pub k: f64,
+    }
+}
+
 /// Fields named like the emitter's own variables.
 #[dynamics(
     coordinates(x),
@@ -128,6 +191,123 @@ pub struct Raw {
     pub r#type: f64,
 }
 
+/// Keywords of all editions.
+#[dynamics(coordinates(r#dyn), lagrangian = r#gen/2*dot(r#dyn)^2 - r#async*sin(r#dyn), output(r#try) = r#dyn)]
+pub struct Keywords {
+    /// A keyword since 2024.
+    pub r#gen: f64,
+    /// A keyword since 2018.
+    pub r#async: f64,
+}
+
+/// Outputs named like kernels.
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2 - cos(x),
+    output(first_inline) = 2*x,
+    output(first_and_mass_inline) = 3*x,
+    output(energy_function) = 4*x,
+)]
+pub struct Kernels {}
+
+/// Fields that cannot be borrowed.
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k*cos(x),
+    solver(PackedSolver, Mixed::<2>),
+    model(PackedNear, truncated(2)),
+)]
+#[repr(C, packed)]
+pub struct Packed {
+    /// Mass.
+    pub m: f64,
+    /// Stiffness.
+    pub k: f64,
+}
+
+/// A bound, and a destructor.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - sum(i in 0..N, w[i]*x^2))]
+pub struct Bounded<const N: usize>
+where
+    [f64; N]: Copy,
+{
+    /// Weights.
+    pub w: [f64; N],
+}
+
+impl<const N: usize> Drop for Bounded<N>
+where
+    [f64; N]: Copy,
+{
+    fn drop(&mut self) {}
+}
+
+/// Lints that users may deny, and every visibility.
+pub mod strict {
+    #![deny(
+        clippy::pedantic,
+        missing_copy_implementations,
+        missing_debug_implementations,
+        unused_qualifications
+    )]
+
+    /// Seen by all.
+    #[tfe::dynamics(
+        coordinates(x, y),
+        lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+        constraint(rod) = x^2 + y^2 - 1,
+        output(height) = y,
+        sensitivity(g),
+        solver(Stepper, Mixed::<3>),
+        model(Soft, elastic(rod = k)),
+    )]
+    #[derive(Clone, Copy, Debug)]
+    pub struct Pendulum {
+        /// Mass.
+        pub m: f64,
+        /// Gravity.
+        pub g: f64,
+    }
+
+    /// Seen in the crate.
+    #[tfe::dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - x^2/2, solver(CrateStepper, Mixed::<3>), model(CrateNear, truncated(2)))]
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct OfCrate {
+        pub(crate) m: f64,
+    }
+
+    /// Seen in a path.
+    #[tfe::dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - x^2/2, solver(PathStepper, Mixed::<3>), model(PathNear, truncated(2)))]
+    #[derive(Clone, Copy, Debug)]
+    pub(in super::strict) struct OfPath {
+        pub(in super::strict) m: f64,
+    }
+
+    /// The momentum of a velocity of one, of all but the first.
+    pub(crate) fn momenta() -> [f64; 2] {
+        let (own, path) = (OfCrate { m: 2.0 }, OfPath { m: 3.0 });
+        let near = PathNear::of(&path);
+        [own.state([0.0], [1.0]).p[0], near.state([0.0], [1.0]).p[0]]
+    }
+}
+
+/// A model that is no longer recommended, with a field that is not either.
+#[deprecated]
+#[dynamics(
+    coordinates(x),
+    lagrangian = m/2*dot(x)^2 - k*cos(x),
+    output(twice) = 2*x,
+    solver(OldSolver, Mixed::<2>),
+    model(OldNear, truncated(2)),
+)]
+pub struct Old {
+    /// Mass.
+    #[deprecated]
+    pub m: f64,
+    /// Stiffness.
+    pub k: f64,
+}
+
 macro_rules! oscillator {
     ($name:ident, $potential:expr) => {
         /// From a macro.
@@ -146,6 +326,40 @@ mod elsewhere {
 /// Finds the crate where it is told to.
 #[dynamics(crate = elsewhere::dynamics_engine, coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
 pub struct Renamed {}
+
+macro_rules! renamed {
+    ($name:ident, $path:path) => {
+        /// Finds the crate from where the macro is.
+        #[dynamics(crate = $crate::elsewhere::dynamics_engine, coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
+        pub struct $name {}
+
+        /// Finds the crate at a path that the macro is given.
+        pub mod at_path {
+            use super::elsewhere;
+
+            /// A model there.
+            #[tfe::dynamics(crate = $path, coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
+            pub struct AtPath {}
+        }
+    };
+}
+
+renamed!(FromMacro, elsewhere::dynamics_engine);
+
+macro_rules! spring {
+    ($vis:vis $name:ident { $mass:ident, $stiffness:ident } $solver:ident) => {
+        /// Names of fields from a macro.
+        #[dynamics(coordinates(x), lagrangian = $mass/2*dot(x)^2 - $stiffness/2*x^2, solver($solver, Mixed::<2>))]
+        $vis struct $name {
+            /// Mass.
+            $vis $mass: f64,
+            /// Stiffness.
+            $vis $stiffness: f64,
+        }
+    };
+}
+
+spring!(pub Spring { out, self_ } SpringSolver);
 
 /// A constant called like a parameter.
 pub mod constants {
@@ -254,4 +468,136 @@ fn they_all_move() {
     let mut derivatives = tfe::runtime::First::<f64, 1>::ZERO;
     Model::first(&soft, 0.0, &[1.0], &[0.0], &mut derivatives);
     assert_eq!(derivatives.q, [-12.0]);
+}
+
+#[test]
+fn they_move_without_a_prelude() {
+    use without_prelude::{AnyRing, Bare, Chain, Held, Ring, Soft};
+
+    let ring = Ring {
+        sums: 2.0,
+        sum_: 3.0,
+        column: 0.5,
+        row: 4.0,
+    };
+    let mut q = [0.0; 18];
+    (q[0], q[17]) = (0.1, 0.3);
+    assert_eq!(ring.state(q, [1.0; 18]).p, [2.0; 18]);
+    assert!((ring.spread(0.0, q, [0.0; 18]) - 0.8).abs() < 1e-15);
+    // The derivative of the balanced forces by all angles at once vanishes, row by row, in both kinds of loops.
+    let mut derivatives = tfe::runtime::First::<f64, 18>::ZERO;
+    let mut second = tfe::runtime::Second::<f64, 18>::ZERO;
+    let any = AnyRing::<18> { k: 1.5 };
+    Model::second(&ring, 0.0, &q, &[0.0; 18], &mut derivatives, &mut second);
+    let of_ring = second.qq;
+    Model::second(&any, 0.0, &q, &[0.0; 18], &mut derivatives, &mut second);
+    for (row, other) in of_ring.iter().zip(&second.qq) {
+        assert!(row.iter().sum::<f64>().abs() < 1e-12);
+        let differ = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-12;
+        assert!(!row.iter().zip(other).any(differ));
+    }
+
+    let chain = Chain {
+        n: 3,
+        __to: 1.0,
+        __end: 0.0,
+    };
+    assert_eq!(
+        chain.forces_inline(0.0, &[1.0, 2.0, 3.0], &[0.0; 3]),
+        Ok(3.0)
+    );
+    let motion = Simulation::new(&chain)
+        .step(0.1)
+        .run(chain.state([0.0, 0.1, 0.2], [0.0; 3]), 0.0..1.0)
+        .expect("a run");
+    assert!(motion.energy_error() < 1e-9);
+
+    let held = Held { k: 2.0 };
+    let mut state = held.state([1.0, 0.5], [0.0, 0.0]);
+    let mut solver = Bare::new(&held, 0.1);
+    solver.advance(&mut state).expect("a step");
+    assert!((state.q[0] - 1.0).abs() < 1e-12);
+    let soft = Soft::of(&held, 5.0);
+    assert_eq!((soft.k, soft.original), (2.0, 5.0));
+}
+
+#[test]
+fn names_and_attributes_are_theirs() {
+    let keywords = Keywords {
+        r#gen: 3.0,
+        r#async: 1.0,
+    };
+    assert_eq!(keywords.state([0.0], [2.0]).p, [6.0]);
+    assert_eq!(keywords.r#try(0.0, [0.5], [0.0]), 0.5);
+
+    let kernels = Kernels {};
+    assert_eq!(kernels.first_inline(0.0, [1.0], [0.0]), 2.0);
+    assert_eq!(kernels.first_and_mass_inline(0.0, [1.0], [0.0]), 3.0);
+    let mut derivatives = tfe::runtime::First::<f64, 1>::ZERO;
+    Model::first(&kernels, 0.0, &[1.0], &[0.5], &mut derivatives);
+    assert_eq!(derivatives.z, [0.5]);
+    assert!((derivatives.q[0] - 1.0_f64.sin()).abs() < 1e-15);
+
+    let packed = Packed { m: 2.0, k: 1.0 };
+    let mut state = packed.state([0.0], [1.0]);
+    assert_eq!(state.p, [2.0]);
+    let mut solver = PackedSolver::new(&packed, 0.1);
+    solver.advance(&mut state).expect("a step");
+    assert_eq!(PackedNear::of(&packed).m, 2.0);
+
+    let bounded = Bounded { w: [1.0, 2.0] };
+    let changed = <Bounded<2> as Model<1>>::with_parameter(&bounded, 1, 5.0);
+    let changed = changed.expect("numbers can be copied");
+    assert_eq!(changed.w, [1.0, 5.0]);
+
+    assert_eq!(strict::momenta(), [2.0, 3.0]);
+    let pendulum = strict::Pendulum { m: 1.0, g: 9.81 };
+    assert_eq!(pendulum.height(0.0, [0.0, -1.0], [0.0; 2]), -1.0);
+    let _ = (strict::Stepper::BYTES, strict::Soft::of(&pendulum, 1e3).k);
+
+    assert_eq!(FromMacro {}.state([0.0], [1.0]).p, [1.0]);
+    assert_eq!(at_path::AtPath {}.state([0.0], [1.0]).p, [1.0]);
+    let spring = Spring {
+        out: 2.0,
+        self_: 1.0,
+    };
+    let mut state = spring.state([0.0], [1.0]);
+    assert_eq!(state.p, [2.0]);
+    let mut solver = SpringSolver::new(&spring, 0.1);
+    solver.advance(&mut state).expect("a step");
+}
+
+#[test]
+#[allow(deprecated)]
+fn a_deprecated_model_still_moves() {
+    let old = Old { m: 2.0, k: 1.0 };
+    let mut state = old.state([0.0], [1.0]);
+    assert_eq!(state.p, [2.0]);
+    OldSolver::new(&old, 0.1)
+        .advance(&mut state)
+        .expect("a step");
+    assert_eq!(OldNear::of(&old).m, 2.0);
+    assert_eq!(old.twice(0.0, [1.0], [0.0]), 2.0);
+}
+
+#[test]
+fn several_models_in_one_function() {
+    /// One.
+    #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - cos(x), output(twice) = 2*x, solver(Fast, Mixed::<2>), model(Near, truncated(2)))]
+    struct One {
+        m: f64,
+    }
+
+    /// Another.
+    #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2) - q[0]^2/2)]
+    struct Other {
+        n: usize,
+    }
+
+    let one = One { m: 2.0 };
+    let mut state = one.state([0.0], [1.0]);
+    assert_eq!(one.twice(0.0, [1.0], [0.0]), 2.0);
+    Fast::new(&one, 0.1).advance(&mut state).expect("a step");
+    assert_eq!(Near::of(&one).m, 2.0);
+    assert_eq!(Other { n: 2 }.state([0.0; 2], [1.0; 2]).p.len(), 2);
 }

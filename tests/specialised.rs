@@ -50,6 +50,16 @@ struct Blade {
     c: f64,
 }
 
+/// Fields of which formulas know nothing: the solver keeps copies.
+#[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/4*x^4, solver(OfNamed, Mixed::<3>))]
+struct Named {
+    m: f64,
+    k: f64,
+    _name: String,
+    _parts: Vec<usize>,
+    _note: Option<&'static str>,
+}
+
 /// A hundred steps both ways, every coordinate and momentum the same to the last bit.
 macro_rules! same {
     ($model:expr, $start:expr, $solver:ident, $element:expr, $h:expr) => {{
@@ -117,6 +127,19 @@ fn the_same_numbers_as_the_generic_path() {
         Element::mixed(4),
         0.1
     );
+}
+
+#[test]
+fn the_same_numbers_where_the_model_has_other_fields() {
+    let named = Named {
+        m: 2.0,
+        k: 3.0,
+        _name: "spring".to_owned(),
+        _parts: vec![1, 2],
+        _note: None,
+    };
+    let start = named.state([1.0], [0.5]);
+    same!(named, start, OfNamed, Element::mixed(3), 0.05);
 }
 
 /// Steps so long that the fixed point is given up, and taken up again later.

@@ -171,7 +171,7 @@ const _: () = {
             z: &[R; N],
             first: &mut __tfe::First<R, N>,
         ) {
-            self.first_inline(t, q, z, first);
+            __tfe::Model::first_inline(self, t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -181,7 +181,7 @@ const _: () = {
             first: &mut __tfe::First<R, N>,
             zz: &mut [[R; N]; N],
         ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
+            __tfe::Model::first_and_mass_inline(self, t, q, z, first, zz);
         }
         /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 11 +−, 8 ×, 1 sin/cos; those of a loop for one turn
         fn second<R: __tfe::Real>(

@@ -150,7 +150,7 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            self.first_inline(t, q, z, first);
+            __tfe::Model::first_inline(self, t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -160,7 +160,7 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
+            __tfe::Model::first_and_mass_inline(self, t, q, z, first, zz);
         }
         /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 3 +−, 13 ×, 1 sin/cos, 5 other
         fn second<R: __tfe::Real>(
@@ -444,11 +444,11 @@ impl Fast {
     fn new(model: &Contact, h: f64) -> Self {
         Self {
             model: Contact {
-                m: ::core::clone::Clone::clone(&model.m),
-                r: ::core::clone::Clone::clone(&model.r),
-                g: ::core::clone::Clone::clone(&model.g),
-                k: ::core::clone::Clone::clone(&model.k),
-                c: ::core::clone::Clone::clone(&model.c),
+                m: model.m,
+                r: model.r,
+                g: model.g,
+                k: model.k,
+                c: model.c,
             },
             engine: ::tfe::__private::Specialised::new(model, &Self::TABLES, h),
         }

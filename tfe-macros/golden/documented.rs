@@ -300,9 +300,9 @@ impl Fast {
     fn new(model: &Spring, h: f64) -> Self {
         Self {
             model: Spring {
-                m: ::core::clone::Clone::clone(&model.m),
-                k: ::core::clone::Clone::clone(&model.k),
-                l: ::core::clone::Clone::clone(&model.l),
+                m: model.m,
+                k: model.k,
+                l: model.l,
             },
             engine: ::tfe::__private::Specialised::new(model, &Self::TABLES, h),
         }
@@ -589,9 +589,9 @@ impl Rigid {
     /// The model with the parameters of a [`Spring`].
     fn of(original: &Spring) -> Self {
         Self {
-            m: ::core::clone::Clone::clone(&original.m),
-            k: ::core::clone::Clone::clone(&original.k),
-            l: ::core::clone::Clone::clone(&original.l),
+            m: original.m,
+            k: original.k,
+            l: original.l,
         }
     }
 }

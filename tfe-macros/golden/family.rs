@@ -305,11 +305,11 @@ const _: () = {
             value: f64,
         ) -> ::core::option::Option<Self> {
             let mut made = Self {
-                n: ::core::clone::Clone::clone(&self.n),
-                w: ::core::clone::Clone::clone(&self.w),
+                n: self.n,
+                w: self.w,
                 m: ::core::clone::Clone::clone(&self.m),
-                k: ::core::clone::Clone::clone(&self.k),
-                a: ::core::clone::Clone::clone(&self.a),
+                k: self.k,
+                a: self.a,
             };
             if index < self.m.len() {
                 made.m[index] = value;

@@ -145,7 +145,7 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            self.first_inline(t, q, z, first);
+            __tfe::Model::first_inline(self, t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -155,7 +155,7 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
+            __tfe::Model::first_and_mass_inline(self, t, q, z, first, zz);
         }
         /// L_v and L_q, L_vv, L_vq and L_qq: 4 +−, 15 ×, 1 sin/cos
         fn second<R: __tfe::Real>(
@@ -471,7 +471,7 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            self.first_inline(t, q, z, first);
+            __tfe::Model::first_inline(self, t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -481,7 +481,7 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
+            __tfe::Model::first_and_mass_inline(self, t, q, z, first, zz);
         }
         /// L_v and L_q, L_vv, L_vq and L_qq: 2 +−, 8 ×, 1 ÷
         fn second<R: __tfe::Real>(
@@ -653,9 +653,9 @@ impl Rod {
     /// The model with the parameters of a [`SpringPendulum`].
     pub fn of(original: &SpringPendulum) -> Self {
         Self {
-            m: ::core::clone::Clone::clone(&original.m),
-            l: ::core::clone::Clone::clone(&original.l),
-            g: ::core::clone::Clone::clone(&original.g),
+            m: original.m,
+            l: original.l,
+            g: original.g,
         }
     }
 }

@@ -112,7 +112,7 @@ const _: () = {
             z: &[R; 2],
             first: &mut __tfe::First<R, 2>,
         ) {
-            self.first_inline(t, q, z, first);
+            __tfe::Model::first_inline(self, t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -122,7 +122,7 @@ const _: () = {
             first: &mut __tfe::First<R, 2>,
             zz: &mut [[R; 2]; 2],
         ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
+            __tfe::Model::first_and_mass_inline(self, t, q, z, first, zz);
         }
         /// H_p and H_q, H_pp, H_pq and H_qq: 4 +−, 7 ×
         fn second<R: __tfe::Real>(

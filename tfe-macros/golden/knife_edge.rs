@@ -388,10 +388,10 @@ impl Fast {
     fn new(model: &KnifeEdge, h: f64) -> Self {
         Self {
             model: KnifeEdge {
-                m: ::core::clone::Clone::clone(&model.m),
-                j: ::core::clone::Clone::clone(&model.j),
-                g: ::core::clone::Clone::clone(&model.g),
-                alpha: ::core::clone::Clone::clone(&model.alpha),
+                m: model.m,
+                j: model.j,
+                g: model.g,
+                alpha: model.alpha,
             },
             engine: ::tfe::__private::Specialised::new(model, &Self::TABLES, h),
         }

@@ -12,11 +12,11 @@ const _: () = {
         const OBSERVABLES: &'static [&'static str] = &["pull"];
         fn energy_function<__R: __tfe::Real>(
             &self,
-            t: __R,
+            __tfe_t: __R,
             _: &[__R; 1],
             _: &[__R; 1],
         ) -> __R {
-            t
+            __tfe_t
         }
         fn first<__R: __tfe::Real>(
             &self,
@@ -55,11 +55,11 @@ const _: () = {
         fn energy_function_with<__R: __tfe::Real>(
             &self,
             _: &[__R; __tfe::MAX_INPUTS],
-            t: __R,
+            __tfe_t: __R,
             _: &[__R; 1],
             _: &[__R; 1],
         ) -> __R {
-            t
+            __tfe_t
         }
         fn first_with<__R: __tfe::Real>(
             &self,
@@ -92,8 +92,11 @@ const _: () = {
 #[automatically_derived]
 #[allow(dead_code, missing_docs, clippy::all)]
 impl Oscillator {
-    fn state(&self, q: [f64; 1], _: [f64; 1]) -> ::tfe::__private::State<1> {
-        ::tfe::__private::State { q, p: q }
+    fn state(&self, __tfe_q: [f64; 1], _: [f64; 1]) -> ::tfe::__private::State<1> {
+        ::tfe::__private::State {
+            q: __tfe_q,
+            p: __tfe_q,
+        }
     }
     fn structure() -> ::tfe::__private::Structure {
         ::tfe::__private::Structure::UNKNOWN

@@ -111,7 +111,7 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            self.first_inline(t, q, z, first);
+            __tfe::Model::first_inline(self, t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -121,7 +121,7 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
+            __tfe::Model::first_and_mass_inline(self, t, q, z, first, zz);
         }
         /// L_v and L_q, L_vv, L_vq and L_qq: 6 ×, 1 sin/cos
         fn second<R: __tfe::Real>(

@@ -125,7 +125,7 @@ const _: () = {
             z: &[R; 1],
             first: &mut __tfe::First<R, 1>,
         ) {
-            self.first_inline(t, q, z, first);
+            __tfe::Model::first_inline(self, t, q, z, first);
         }
         fn first_and_mass<R: __tfe::Real>(
             &self,
@@ -135,7 +135,7 @@ const _: () = {
             first: &mut __tfe::First<R, 1>,
             zz: &mut [[R; 1]; 1],
         ) {
-            self.first_and_mass_inline(t, q, z, first, zz);
+            __tfe::Model::first_and_mass_inline(self, t, q, z, first, zz);
         }
         /// L_v, L_q and Q, L_vv, L_vq, L_qq, Q_v and Q_q: 3 +−, 8 ×, 1 sin/cos
         fn second<R: __tfe::Real>(

@@ -7,6 +7,8 @@ use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::program::{Array, Place};
 
 /// The sums of all columns at once where their number is known, else one by one.
+///
+/// No methods of iterators: their traits are in scope with the prelude of Rust only.
 pub(crate) fn balance(second: &TokenStream, output: &Place, length: &Affine) -> TokenStream {
     let entry = |output: &Place, row: &TokenStream, column: &TokenStream| {
         let array = match output.array {
@@ -35,18 +37,22 @@ pub(crate) fn balance(second: &TokenStream, output: &Place, length: &Affine) -> 
         .as_constant()
         .and_then(|length| usize::try_from(length).ok())
     {
+        // In braces: parameters may be called like the sums.
         Some(length) => quote! {
-            let mut sums = [t.like(0.0); #length];
-            for row in 0..#length {
-                for column in 0..#length {
-                    if row != column {
-                        sums[column] -= #off;
+            {
+                let mut sums = [t.like(0.0); #length];
+                for row in 0..#length {
+                    for column in 0..#length {
+                        if row != column {
+                            sums[column] -= #off;
+                        }
                     }
                 }
-            }
-            for (column, sum) in sums.into_iter().enumerate() {
-                #on = sum;
-                #other
+                for column in 0..#length {
+                    let sum = sums[column];
+                    #on = sum;
+                    #other
+                }
             }
         },
         None => {
@@ -54,8 +60,10 @@ pub(crate) fn balance(second: &TokenStream, output: &Place, length: &Affine) -> 
             quote! {
                 for column in 0..#length {
                     let mut sum = t.like(0.0);
-                    for row in (0..#length).filter(|row| *row != column) {
-                        sum -= #off;
+                    for row in 0..#length {
+                        if row != column {
+                            sum -= #off;
+                        }
                     }
                     #on = sum;
                     #other

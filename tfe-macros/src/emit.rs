@@ -13,6 +13,26 @@ use tfe_symbolic::expr::input::{Affine, Input};
 use tfe_symbolic::expr::ordered::{SortedMap, SortedSet};
 use tfe_symbolic::program::{Array, Operand, Operation, Place, Program, Statement, Temporary};
 
+/// The arguments and variables of kernels, beside temporaries (`t0`, `sin_x`), indices, and names that begin with two underscores.
+pub(crate) const LOCALS: [&str; 16] = [
+    "q",
+    "z",
+    "v",
+    "first",
+    "second",
+    "entries",
+    "zz",
+    "values",
+    "row",
+    "rows",
+    "drift",
+    "mu",
+    "psi_q",
+    "row_rates",
+    "kept",
+    "inputs",
+];
+
 /// Writes programs of one model.
 pub(crate) struct Emitter<'a> {
     /// The names of the coordinates by flat index, for readable temporaries.
@@ -670,33 +690,16 @@ impl<'a> Emitter<'a> {
 
     /// The local variable of a parameter: its own name unless that could be one of the emitter's.
     fn local_name(&self, field: &str) -> Ident {
-        let taken = [
-            "q",
-            "z",
-            "v",
-            "first",
-            "second",
-            "entries",
-            "zz",
-            "values",
-            "row",
-            "rows",
-            "drift",
-            "mu",
-            "psi_q",
-            "row_rates",
-            "kept",
-            "inputs",
-        ];
         let temporary = field
             .strip_prefix('t')
             .is_some_and(|rest| rest.chars().all(|c| c.is_ascii_digit()))
             || field.starts_with("sin_")
-            || field.starts_with("cos_");
+            || field.starts_with("cos_")
+            || field.starts_with("__");
         // A `let` cannot have the name of a constant around it, such as `G`.
         let constant = field.starts_with(char::is_uppercase);
         let mut local =
-            if taken.contains(&field) || temporary || constant || self.indices.contains(field) {
+            if LOCALS.contains(&field) || temporary || constant || self.indices.contains(field) {
                 format_ident!("{field}_")
             } else {
                 identifier(field)

@@ -15,6 +15,7 @@ use quote::quote;
 use syn::ItemStruct;
 use tfe_symbolic::compile;
 use tfe_symbolic::derive::derivation::Derivation;
+use tfe_symbolic::diagnostic::Kind;
 use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::model::declared::{Declared, Form, Observable, Parameter, names};
@@ -32,41 +33,64 @@ const UNOPTIMISED_LANES_LIMIT: usize = 500;
 /// Expands `#[dynamics(arguments)] item`.
 pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
     let map = SourceMap::new(arguments);
-    let wrong = |errors: TokenStream| {
+    let wrong = |item: TokenStream, errors: TokenStream| {
         // Of an item that is no type, only the error can be told.
         let stubs = syn::parse2(item.clone())
-            .map(|item| fallback::stubs(&item, &map.text))
+            .map(|item| fallback::stubs(&item, &map))
             .unwrap_or_default();
         quote!(#item #stubs #errors)
     };
-    let item_struct = match input::parse(item.clone()) {
+    let mut item_struct = match input::parse(item.clone()) {
         Ok(item) => item,
-        Err(error) => return wrong(error.to_compile_error()),
+        Err(error) => return wrong(item, error.to_compile_error()),
     };
+    let mut misplaced = input::take_repeated(&mut item_struct);
+    misplaced.extend(fallback::attributes_of_arguments(&map));
+    let item = quote!(#item_struct);
     if let Err(error) = input::check(&item_struct) {
-        return wrong(error.to_compile_error());
+        misplaced.extend(error.to_compile_error());
+        return wrong(item, misplaced);
     }
+    let solvers = solver::of_many_types(&item_struct, &map);
     match compile::declare(&map.text, &input::context(&item_struct)) {
-        Ok(declared) => model(&declared, item_struct, &Docs::of(&map)),
-        Err(diagnostics) => wrong(
-            diagnostics
+        Ok(declared) if solvers.is_empty() => {
+            let model = model(
+                &declared,
+                item_struct,
+                &Docs::of(&map),
+                &runtime_path(&declared, &map),
+            );
+            quote!(#model #misplaced)
+        }
+        Ok(_) => wrong(item, quote!(#solvers #misplaced)),
+        Err(diagnostics) => {
+            let messages = diagnostics
                 .iter()
-                .map(|d| fallback::compile_error(d, &map, &item_struct))
-                .collect(),
-        ),
+                .map(|d| fallback::compile_error(d, &map, &item_struct));
+            // Of coordinates whose number is a const parameter the engine has said so.
+            let is_said = diagnostics
+                .iter()
+                .any(|d| matches!(d.kind, Kind::SolverOfFamily { .. }));
+            let solvers = (!is_said).then_some(solvers);
+            wrong(item, quote!(#(#messages)* #solvers #misplaced))
+        }
     }
 }
 
 /// The struct with the derived model in its documentation, the kernels, the methods, and the specialised solvers.
-pub(crate) fn model(declared: &Declared, mut item: ItemStruct, docs: &Docs) -> TokenStream {
+fn model(
+    declared: &Declared,
+    mut item: ItemStruct,
+    docs: &Docs,
+    path: &TokenStream,
+) -> TokenStream {
     let derivation = Derivation::of(declared);
-    let path = runtime_path(declared);
     let variants: Vec<_> = declared
         .variants
         .iter()
         .map(|one| {
-            let (made, methods) = variant::expand(one, &item, &path, docs);
-            let model = model(&one.model, made, &docs.of_outputs());
+            let (made, methods) = variant::expand(one, &item, path, docs);
+            let model = model(&one.model, made, &docs.of_outputs(), path);
             quote!(#model #methods)
         })
         .collect();
@@ -81,16 +105,16 @@ pub(crate) fn model(declared: &Declared, mut item: ItemStruct, docs: &Docs) -> T
         item.attrs.push(syn::parse_quote!(#[doc = #line]));
     }
     if declared.is_of_run_time_length() {
-        let family = family::expand(declared, &derivation, (&item, docs), &path);
+        let family = family::expand(declared, &derivation, (&item, docs), path);
         return quote!(#item #family #(#variants)*);
     }
-    let kernels = Kernels::new(declared, &derivation, &item, &path);
+    let kernels = Kernels::new(declared, &derivation, &item, path);
     let implementation = kernels.implementation();
     let methods = kernels.methods(docs);
     let solvers = declared
         .solvers
         .iter()
-        .map(|solver| solver::expand(solver, declared, (&item, docs), &path));
+        .map(|solver| solver::expand(solver, declared, (&item, docs), path));
     quote! {
         #item
         #implementation
@@ -101,15 +125,10 @@ pub(crate) fn model(declared: &Declared, mut item: ItemStruct, docs: &Docs) -> T
 }
 
 /// Where emitted code finds the runtime: `::tfe`, or what `crate = path` says.
-pub(crate) fn runtime_path(declared: &Declared) -> TokenStream {
-    match declared
-        .crate_path
-        .as_deref()
-        .map(syn::parse_str::<syn::Path>)
-    {
-        Some(Ok(path)) => quote!(#path),
-        _ => quote!(::tfe),
-    }
+fn runtime_path(declared: &Declared, map: &SourceMap) -> TokenStream {
+    let path = declared.crate_path.as_deref();
+    path.and_then(|path| map.path(path))
+        .unwrap_or_else(|| quote!(::tfe))
 }
 
 /// Everything that the emitted implementations have in common.
@@ -219,7 +238,7 @@ impl<'a> Kernels<'a> {
             && operations <= LANES_LIMIT;
         let lanes_here = match operations <= UNOPTIMISED_LANES_LIMIT {
             true => quote!(true),
-            false => quote!(cfg!(not(debug_assertions))),
+            false => quote!(::core::cfg!(not(debug_assertions))),
         };
         let [value_doc, first_doc, mass_doc, second_doc] = self.docs();
         let firsts = |name| Signature {
@@ -305,11 +324,11 @@ impl<'a> Kernels<'a> {
                 }
 
                 fn first<R: __tfe::Real>(&self, #first_parameters) {
-                    self.first_inline(t, q, z, first);
+                    __tfe::Model::first_inline(self, t, q, z, first);
                 }
 
                 fn first_and_mass<R: __tfe::Real>(&self, #mass_parameters) {
-                    self.first_and_mass_inline(t, q, z, first, zz);
+                    __tfe::Model::first_and_mass_inline(self, t, q, z, first, zz);
                 }
             },
         };
@@ -369,7 +388,9 @@ impl<'a> Kernels<'a> {
                 (self.without_inputs(lanes), controlled)
             }
         };
+        let of_deprecated = input::of_deprecated(item);
         quote! {
+            #of_deprecated
             const _: () = {
                 use #path::__private as __tfe;
 
@@ -692,7 +713,7 @@ impl<'a> Kernels<'a> {
         let Self {
             path, dof, item, ..
         } = self;
-        let (name, vis) = (&item.ident, &item.vis);
+        let (name, vis) = (&item.ident, &input::visibility(item));
         let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
         let (second, second_doc) = match self.declared.form {
             Form::Lagrangian => (quote!(v), "velocities"),
@@ -724,7 +745,9 @@ impl<'a> Kernels<'a> {
         });
         let structure = page::structure(self.declared, self.derivation, path);
         let state = state::methods(self.declared, vis, path);
+        let of_deprecated = input::of_deprecated(item);
         quote! {
+            #of_deprecated
             #[automatically_derived]
             #[allow(dead_code)]
             impl #impl_generics #name #type_generics #where_clause {

@@ -28,10 +28,24 @@ pub(crate) fn compile_error(
         Some(help) => format!("{}\nhelp: {help}", diagnostic.message()),
         None => diagnostic.message(),
     };
+    error((first, last), &message)
+}
+
+/// `compile_error!` under everything from one token to another.
+pub(crate) fn error((first, last): (Span, Span), message: &str) -> TokenStream {
     // The first span on the path and the last on the group make rustc underline everything between them.
     let path = quote_spanned!(first=> ::core::compile_error!);
     let group = quote_spanned!(last=> { #message });
     quote!(#path #group)
+}
+
+/// A message under each attribute between arguments, such as a `cfg`: these are read without it.
+pub(crate) fn attributes_of_arguments(map: &SourceMap) -> TokenStream {
+    let message = "arguments have no attributes but doc comments\nhelp: put a `cfg` on the whole struct, and declare it once for each configuration";
+    map.attributes
+        .iter()
+        .map(|spans| error(*spans, message))
+        .collect()
 }
 
 fn field_span(name: &str, item: &ItemStruct) -> (Span, Span) {
@@ -45,8 +59,10 @@ fn field_span(name: &str, item: &ItemStruct) -> (Span, Span) {
 }
 
 /// Stub implementations for a type whose declaration is wrong: uses of the model type-check, so only the mistake itself is reported.
-pub(crate) fn stubs(item: &DeriveInput, text: &str) -> TokenStream {
-    let guess = Guess::from(text, item);
+///
+/// Their arguments have names that no const parameter has, which may be what is wrong.
+pub(crate) fn stubs(item: &DeriveInput, map: &SourceMap) -> TokenStream {
+    let guess = Guess::from(map, item);
     let own = implementations(item, &guess);
     let solvers = guess
         .solvers
@@ -103,8 +119,8 @@ fn implementations(item: &DeriveInput, guess: &Guess) -> TokenStream {
                 const FACTS: __tfe::Facts = __tfe::Facts::UNKNOWN;
                 const OBSERVABLES: &'static [&'static str] = &[#(#names),*];
 
-                fn energy_function<__R: __tfe::Real>(&self, t: __R, _: &[__R; #dof], _: &[__R; #dof]) -> __R {
-                    t
+                fn energy_function<__R: __tfe::Real>(&self, __tfe_t: __R, _: &[__R; #dof], _: &[__R; #dof]) -> __R {
+                    __tfe_t
                 }
 
                 fn first<__R: __tfe::Real>(
@@ -149,11 +165,11 @@ fn implementations(item: &DeriveInput, guess: &Guess) -> TokenStream {
                 fn energy_function_with<__R: __tfe::Real>(
                     &self,
                     _: &[__R; __tfe::MAX_INPUTS],
-                    t: __R,
+                    __tfe_t: __R,
                     _: &[__R; #dof],
                     _: &[__R; #dof],
                 ) -> __R {
-                    t
+                    __tfe_t
                 }
 
                 fn first_with<__R: __tfe::Real>(
@@ -262,7 +278,8 @@ struct Guess {
 }
 
 impl Guess {
-    fn from(text: &str, item: &DeriveInput) -> Self {
+    fn from(map: &SourceMap, item: &DeriveInput) -> Self {
+        let text = map.text.as_str();
         let mut guess = Self {
             path: quote!(::tfe),
             dof: quote!(1),
@@ -297,8 +314,8 @@ impl Guess {
                     guess.variants.push(Variant::of(&name.node, &passes));
                 }
                 Some(Item::Crate(path)) => {
-                    if let Ok(path) = syn::parse_str::<syn::Path>(&path.node) {
-                        guess.path = quote!(#path);
+                    if let Some(path) = map.path(&path.node) {
+                        guess.path = path;
                     }
                 }
                 _ => {}
@@ -335,18 +352,18 @@ impl Guess {
         let (path, dof, extended) = (&self.path, &self.dof, self.extended_dof());
         if !self.transformed {
             return quote! {
-                #vis fn state(&self, q: [f64; #dof], _: [f64; #dof]) -> #path::__private::State<#dof> {
-                    #path::__private::State { q, p: q }
+                #vis fn state(&self, __tfe_q: [f64; #dof], _: [f64; #dof]) -> #path::__private::State<#dof> {
+                    #path::__private::State { q: __tfe_q, p: __tfe_q }
                 }
             };
         }
         quote! {
-            #vis fn state(&self, q: [f64; #dof], p: [f64; #dof]) -> #path::__private::State<#extended> {
-                self.state_at(0.0, q, p)
+            #vis fn state(&self, _: [f64; #dof], _: [f64; #dof]) -> #path::__private::State<#extended> {
+                #path::__private::State { q: [0.0; #extended], p: [0.0; #extended] }
             }
 
-            #vis fn state_at(&self, t: f64, _: [f64; #dof], _: [f64; #dof]) -> #path::__private::State<#extended> {
-                #path::__private::State { q: [t; #extended], p: [t; #extended] }
+            #vis fn state_at(&self, _: f64, _: [f64; #dof], _: [f64; #dof]) -> #path::__private::State<#extended> {
+                #path::__private::State { q: [0.0; #extended], p: [0.0; #extended] }
             }
         }
     }

@@ -11,6 +11,7 @@ use crate::docs::Docs;
 use crate::emit::{Body, Emitter};
 use crate::headings::Headings;
 use crate::indices;
+use crate::input;
 use crate::page::{self, Formulas};
 use crate::parameters::RunTimeParameters;
 use proc_macro2::{Ident, Literal, TokenStream};
@@ -148,7 +149,12 @@ impl Kernels<'_> {
             parameter,
             argument,
         } = Controls::of(self.declared);
-        let all_at_once = quote!(self.#forces(#argument t, q, z, first));
+        let kernels = match self.declared.inputs.is_empty() {
+            true => quote!(__tfe::FamilyModel),
+            false => quote!(__tfe::FamilyControlled),
+        };
+        // Not as a method: an output may have this name.
+        let all_at_once = quote!(#kernels::#forces(self, #argument t, q, z, first));
         let body = self
             .emitter()
             .onto_zeros()
@@ -335,7 +341,9 @@ impl Kernels<'_> {
                 (zero, Some(controlled))
             }
         };
+        let of_deprecated = input::of_deprecated(item);
         quote! {
+            #of_deprecated
             const _: () = {
                 use #path::__private as __tfe;
 
@@ -479,7 +487,7 @@ impl Kernels<'_> {
 
     /// `state`, `structure`, and one method for each observable.
     fn methods(&self, item: &ItemStruct, docs: &Docs, path: &TokenStream) -> TokenStream {
-        let (name, vis) = (&item.ident, &item.vis);
+        let (name, vis) = (&item.ident, &input::visibility(item));
         let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
         let (second, second_doc) = match self.declared.form {
             Form::Lagrangian => (quote!(v), "velocities"),
@@ -492,7 +500,9 @@ impl Kernels<'_> {
             quote!(#own #method)
         });
         let structure = page::structure(self.declared, self.derivation, path);
+        let of_deprecated = input::of_deprecated(item);
         quote! {
+            #of_deprecated
             #[automatically_derived]
             #[allow(dead_code)]
             impl #impl_generics #name #type_generics #where_clause {

@@ -6,10 +6,13 @@ use tfe_symbolic::expr::input::{Affine, IndexSymbol, LoopVariable};
 
 /// An identifier, raw where it must be; with a line below where not even that is a name (which has been reported).
 pub(crate) fn identifier(name: &str) -> Ident {
-    syn::parse_str::<Ident>(name).unwrap_or_else(|_| match name {
+    match name {
         "_" | "crate" | "self" | "super" | "Self" => format_ident!("__{name}"),
-        name => Ident::new_raw(name, Span::call_site()),
-    })
+        // A keyword of the edition of generated code that `syn` does not know.
+        "gen" => Ident::new_raw(name, Span::call_site()),
+        name => syn::parse_str::<Ident>(name)
+            .unwrap_or_else(|_| Ident::new_raw(name, Span::call_site())),
+    }
 }
 
 pub(crate) fn loop_name(variable: LoopVariable) -> Ident {

@@ -1,9 +1,11 @@
 //! The annotated struct: its fields are the parameters of the model.
 
-use proc_macro2::{Span, TokenStream};
+use crate::emit::LOCALS;
+use proc_macro2::{Ident, Span, TokenStream};
+use quote::quote;
 use syn::{
-    DeriveInput, Expr, ExprLit, Fields, GenericArgument, GenericParam, ItemStruct, Lit,
-    PathArguments, Type,
+    Attribute, DeriveInput, Expr, ExprLit, Fields, GenericArgument, GenericParam, ItemStruct, Lit,
+    PathArguments, Type, Visibility,
 };
 use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
@@ -46,23 +48,100 @@ pub(crate) fn check(item: &ItemStruct) -> syn::Result<()> {
         ));
     }
     for parameter in &item.generics.params {
-        match parameter {
-            GenericParam::Const(parameter) if parameter.ident == "R" => {
-                return Err(syn::Error::new_spanned(
-                    &parameter.ident,
-                    "the name `R` is taken by the scalar of the generated code\nhelp: choose another name, such as `N`",
-                ));
+        let message = match parameter {
+            GenericParam::Const(parameter) => match taken_by_generated_code(&parameter.ident) {
+                Some(message) => {
+                    return Err(syn::Error::new_spanned(&parameter.ident, message));
+                }
+                None => continue,
+            },
+            GenericParam::Lifetime(_) => {
+                "a model can have const parameters only\nhelp: let it own its parameters: `f64`, `[f64; N]` or `Vec<f64>`"
             }
-            GenericParam::Const(_) => {}
             _ => {
-                return Err(syn::Error::new_spanned(
-                    parameter,
-                    "a model can have const parameters only\nhelp: use `const N: usize` for a length; all parameters are `f64`",
-                ));
+                "a model can have const parameters only\nhelp: use `const N: usize` for a length; all parameters are `f64`"
+            }
+        };
+        return Err(syn::Error::new_spanned(parameter, message));
+    }
+    Ok(())
+}
+
+/// Why a const parameter cannot have this name. No variable can have the name of a const parameter.
+fn taken_by_generated_code(name: &Ident) -> Option<String> {
+    let name = plain(name);
+    let what = match name.as_str() {
+        "R" => "the scalar",
+        "t" => "a variable",
+        other if LOCALS.contains(&other) || other.starts_with("__") => "a variable",
+        _ => return None,
+    };
+    Some(format!(
+        "the name `{name}` is taken by {what} of the generated code\nhelp: choose another name, such as `N`"
+    ))
+}
+
+/// Takes further `#[dynamics]` away from the struct, and gives a message under each: the implementations would conflict.
+pub(crate) fn take_repeated(item: &mut ItemStruct) -> TokenStream {
+    let (repeated, others) = std::mem::take(&mut item.attrs)
+        .into_iter()
+        .partition::<Vec<_>, _>(is_dynamics);
+    item.attrs = others;
+    repeated
+        .iter()
+        .map(|attribute| {
+            syn::Error::new_spanned(
+                attribute.path(),
+                "a struct declares one model\nhelp: declare the other one on a struct of its own, or by `model(Name, …)`",
+            )
+            .to_compile_error()
+        })
+        .collect()
+}
+
+/// Whether the attribute is `#[dynamics(…)]` or `#[tfe::dynamics(…)]`.
+fn is_dynamics(attribute: &Attribute) -> bool {
+    let segments: Vec<&Ident> = (attribute.path().segments.iter())
+        .map(|segment| &segment.ident)
+        .collect();
+    match segments[..] {
+        [name] => name == "dynamics",
+        [path, name] => path == "tfe" && name == "dynamics",
+        _ => false,
+    }
+}
+
+/// The visibility of the struct, for what is generated, in tokens of the generated code: with the user's own `pub`, lints would take generated functions for the user's.
+pub(crate) fn visibility(item: &ItemStruct) -> TokenStream {
+    match &item.vis {
+        Visibility::Inherited => TokenStream::new(),
+        Visibility::Public(_) => quote!(pub),
+        Visibility::Restricted(restricted) => {
+            let word = restricted.path.get_ident().map(generated);
+            match word.filter(|_| restricted.in_token.is_none()) {
+                Some(word) => quote!(pub(#word)),
+                None => {
+                    let vis = &item.vis;
+                    quote!(#vis)
+                }
             }
         }
     }
-    Ok(())
+}
+
+/// The same name as a token of the generated code.
+pub(crate) fn generated(name: &Ident) -> Ident {
+    let mut name = name.clone();
+    name.set_span(Span::call_site());
+    name
+}
+
+/// Lets generated code use a struct or a field that is deprecated; nothing where none is.
+pub(crate) fn of_deprecated(item: &ItemStruct) -> Option<TokenStream> {
+    let of_fields = item.fields.iter().flat_map(|field| &field.attrs);
+    let mut attributes = item.attrs.iter().chain(of_fields);
+    let is_deprecated = attributes.any(|one| one.path().is_ident("deprecated"));
+    is_deprecated.then(|| quote!(#[allow(deprecated)]))
 }
 
 /// What the engine is told about the struct.

@@ -3,19 +3,40 @@
 
 use crate::indices::{identifier, index};
 use crate::input;
-use proc_macro2::{Ident, Literal, TokenStream};
+use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;
 use tfe_symbolic::expr::input::{Affine, IndexSymbol};
 use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::syntax::context::{Field, FieldKind, Length};
 
+/// Whether fields of this kind are `Copy`.
+pub(crate) fn is_copy(kind: &FieldKind) -> bool {
+    matches!(
+        kind,
+        FieldKind::Scalar | FieldKind::Array(_) | FieldKind::Length
+    )
+}
+
+/// `name: from.name` for each field, or a clone of it where it is not `Copy`; nothing where a field is of a type that may not be `Clone`.
+fn copies(item: &ItemStruct, from: &TokenStream) -> Option<TokenStream> {
+    let fields = input::context(item).fields;
+    let copied = fields.iter().map(|field| {
+        let name = identifier(&field.name);
+        match &field.kind {
+            FieldKind::Other(_) => None,
+            kind if is_copy(kind) => Some(quote!(#name: #from.#name)),
+            _ => Some(quote!(#name: ::core::clone::Clone::clone(&#from.#name))),
+        }
+    });
+    let copied = copied.collect::<Option<Vec<_>>>()?;
+    Some(quote!(#(#copied),*))
+}
+
 /// The number of the parameter that a field is, or that its first element is.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Parameters {
     fields: Vec<Place>,
-    /// Whether every field can be copied, or cloned.
-    all_cloned: bool,
     /// Whether every field is `Copy`.
     all_copies: bool,
 }
@@ -55,17 +76,9 @@ impl Parameters {
                 });
             }
         }
-        let is_copy = |field: &Field| {
-            matches!(
-                field.kind,
-                FieldKind::Scalar | FieldKind::Array(_) | FieldKind::Length
-            )
-        };
-        let is_other = |field: &Field| matches!(field.kind, FieldKind::Other(_));
         Self {
             fields,
-            all_cloned: !context.fields.iter().any(is_other),
-            all_copies: context.fields.iter().all(is_copy),
+            all_copies: context.fields.iter().all(|field| is_copy(&field.kind)),
         }
     }
 
@@ -118,13 +131,10 @@ impl Parameters {
             let place = place(one);
             quote!(self.#place)
         });
-        let with_parameter = self.all_cloned.then(|| {
-            let fields: Vec<_> = item.fields.iter().map(|field| &field.ident).collect();
+        let with_parameter = copies(item, &quote!(self)).map(|copies| {
             let made = match self.all_copies {
                 true => quote!(Self { ..*self }),
-                false => {
-                    quote!(Self { #(#fields: ::core::clone::Clone::clone(&self.#fields)),* })
-                }
+                false => quote!(Self { #copies }),
             };
             let set: TokenStream = self
                 .fields
@@ -173,8 +183,8 @@ fn numbered(count: &TokenStream, names: &TokenStream, values: &TokenStream) -> T
 pub(crate) struct RunTimeParameters {
     /// Names, and how many there are; of single numbers nothing.
     fields: Vec<(String, Option<TokenStream>)>,
-    /// All fields of the struct, unless one is of a type that may not be `Clone`.
-    cloned: Option<Vec<Ident>>,
+    /// Copies of all fields of the struct, unless one is of a type that may not be `Clone`.
+    copies: Option<TokenStream>,
 }
 
 impl RunTimeParameters {
@@ -197,12 +207,9 @@ impl RunTimeParameters {
             Some((field.name, size))
         };
         let context = input::context(item);
-        let is_other = |field: &Field| matches!(field.kind, FieldKind::Other(_));
-        let all = item.fields.iter().filter_map(|field| field.ident.clone());
-        let cloned = (!context.fields.iter().any(is_other)).then(|| all.collect());
         Self {
             fields: context.fields.into_iter().filter_map(size).collect(),
-            cloned,
+            copies: copies(item, &quote!(self)),
         }
     }
 
@@ -246,7 +253,7 @@ impl RunTimeParameters {
             }
         });
         let numbered = numbered(&count, &names, &values);
-        let with_parameter = self.cloned.as_ref().map(|cloned| {
+        let with_parameter = self.copies.as_ref().map(|copies| {
             let return_made = quote!(return ::core::option::Option::Some(made););
             let set = arms_of(&self.fields, |name, is_single| {
                 let name = identifier(name);
@@ -257,7 +264,7 @@ impl RunTimeParameters {
             });
             quote! {
                 fn with_parameter(&self, index: usize, value: f64) -> ::core::option::Option<Self> {
-                    let mut made = Self { #(#cloned: ::core::clone::Clone::clone(&self.#cloned)),* };
+                    let mut made = Self { #copies };
                     #set
                     ::core::option::Option::None
                 }

@@ -2,11 +2,43 @@
 
 use crate::docs::Docs;
 use crate::indices::{identifier, index};
-use proc_macro2::{Literal, TokenStream};
-use quote::{format_ident, quote};
+use crate::parameters::is_copy;
+use crate::source_map::SourceMap;
+use crate::{fallback, input};
+use proc_macro2::{Literal, Span, TokenStream};
+use quote::{format_ident, quote, quote_spanned};
 use syn::ItemStruct;
+use tfe_symbolic::diagnostic::Bag;
 use tfe_symbolic::model::declared::{Declared, Form, Solver};
+use tfe_symbolic::syntax::ast::Item;
+use tfe_symbolic::syntax::context::FieldKind;
+use tfe_symbolic::syntax::parse;
 use tfe_symbolic::vocabulary::element::Rule;
+
+/// A message under each solver of a struct with const parameters: its memory is of one size, and its code for one type.
+pub(crate) fn of_many_types(item: &ItemStruct, map: &SourceMap) -> TokenStream {
+    let Some(parameter) = item.generics.const_params().next() else {
+        return TokenStream::new();
+    };
+    let [model, parameter] = [&item.ident, &parameter.ident].map(input::plain);
+    let message = format!(
+        "a solver is for one type, but `{model}` has the const parameter `{parameter}`\nhelp: write a number in place of `{parameter}`, or use `Simulation`"
+    );
+    let arguments = parse::split_arguments(&map.text).into_iter();
+    let elements = arguments.filter_map(|range| {
+        let mut bag = Bag::new();
+        let argument = parse::parse_item(&map.text[range.clone()], range.start, &mut bag);
+        // The engine tells the mistakes; this bag is emptied, not read.
+        let _ = bag.finish(());
+        match argument?.node {
+            Item::Solver { element, .. } => Some(element.span),
+            _ => None,
+        }
+    });
+    elements
+        .map(|span| fallback::error(map.spans(span.start..span.end), &message))
+        .collect()
+}
 
 /// The struct `solver.name` with everything that it needs as constants: element, tables, sizes.
 pub(crate) fn expand(
@@ -16,7 +48,8 @@ pub(crate) fn expand(
     path: &TokenStream,
 ) -> TokenStream {
     let path = quote!(#path::__private);
-    let (model, vis) = (&item.ident, &item.vis);
+    let (model, vis) = (&input::generated(&item.ident), &input::visibility(item));
+    let of_deprecated = input::of_deprecated(item);
     let name = identifier(&solver.name);
     let dof = index(&declared.dof);
     let constraints = Literal::usize_unsuffixed(declared.constraints.len());
@@ -25,11 +58,7 @@ pub(crate) fn expand(
         Form::Lagrangian => quote!(Lagrangian),
         Form::Hamiltonian => quote!(Hamiltonian),
     };
-    let fields: Vec<_> = item
-        .fields
-        .iter()
-        .filter_map(|field| field.ident.as_ref())
-        .collect();
+    let (kept, fields) = fields(item);
     let title = format!(
         " Steps [`{model}`] with one element, `{}`: no generics, no allocation, tables and sizes constant.",
         solver.element
@@ -41,6 +70,7 @@ pub(crate) fn expand(
     quote! {
         #own
         #[doc = #title]
+        #of_deprecated
         #vis struct #name {
             model: #model,
             engine: #path::Specialised<
@@ -51,6 +81,7 @@ pub(crate) fn expand(
             >,
         }
 
+        #of_deprecated
         #[automatically_derived]
         #[allow(dead_code)]
         impl #name {
@@ -64,8 +95,9 @@ pub(crate) fn expand(
 
             /// A stepper of length `h` that begins at time zero. It keeps a copy of the parameters.
             #vis fn new(model: &#model, h: f64) -> Self {
+                #kept
                 Self {
-                    model: #model { #(#fields: ::core::clone::Clone::clone(&model.#fields)),* },
+                    model: #model { #fields },
                     engine: #path::Specialised::new(model, &Self::TABLES, h),
                 }
             }
@@ -105,6 +137,50 @@ pub(crate) fn expand(
                     .field("step", &self.engine.step())
                     .field("statistics", self.engine.statistics())
                     .finish_non_exhaustive()
+            }
+        }
+    }
+}
+
+/// What copies fields that may not be `Clone`, where there are any; and the fields of a copy of `model`.
+fn fields(item: &ItemStruct) -> (Option<TokenStream>, TokenStream) {
+    let context = input::context(item);
+    let (mut kept, mut fields) = (None, TokenStream::new());
+    for own in item.fields.iter().filter_map(|field| field.ident.as_ref()) {
+        let name = input::generated(own);
+        let kind = context.field(&input::plain(own)).map(|field| &field.kind);
+        fields.extend(match kind {
+            Some(kind) if is_copy(kind) => quote!(#name: model.#name,),
+            Some(FieldKind::Other(_)) => {
+                kept.get_or_insert_with(keep);
+                // Under the field, where its type stands.
+                let at = Span::call_site().located_at(own.span());
+                let mut name = own.clone();
+                name.set_span(at);
+                quote_spanned!(at=> #name: __TfeKeep::keep(&model.#name),)
+            }
+            _ => quote!(#name: ::core::clone::Clone::clone(&model.#name),),
+        });
+    }
+    (kept, fields)
+}
+
+/// `Clone` for the fields of a model, with a message of its own where a type is not.
+fn keep() -> TokenStream {
+    quote! {
+        #[diagnostic::on_unimplemented(
+            message = "a solver keeps a copy of its model, but `{Self}` is not `Clone`",
+            label = "this field cannot be copied",
+            note = "derive `Clone` for its type, or use `Simulation`, which borrows the model"
+        )]
+        trait __TfeKeep {
+            fn keep(&self) -> Self;
+        }
+
+        #[diagnostic::do_not_recommend]
+        impl<__T: ::core::clone::Clone> __TfeKeep for __T {
+            fn keep(&self) -> Self {
+                ::core::clone::Clone::clone(self)
             }
         }
     }

@@ -3,8 +3,12 @@
 //! The engine parses text. On stable Rust the only precise spans are those of whole tokens, so every token's text is appended to a
 //! string together with a table of byte ranges; a diagnostic's range is translated to the first and the last token it touches.
 
-use proc_macro2::{Delimiter, Spacing, Span, TokenStream, TokenTree};
+use proc_macro2::{Delimiter, Ident, Spacing, Span, TokenStream, TokenTree};
+use quote::quote;
 use std::ops::Range;
+
+/// What stands in the text for `$crate`, which is no word.
+const DOLLAR_CRATE: &str = "__tfe_crate";
 
 /// The text of an attribute, and where each part of it came from.
 pub(crate) struct SourceMap {
@@ -14,6 +18,10 @@ pub(crate) struct SourceMap {
     end: Span,
     /// Doc comments between arguments, which are no part of the text: where they stood, and what stood right of `doc =`.
     pub(crate) docs: Vec<(usize, TokenStream)>,
+    /// Other attributes between arguments, which are mistakes and no part of the text either: their first and last tokens.
+    pub(crate) attributes: Vec<(Span, Span)>,
+    /// `$crate` of the `macro_rules!` macro that wrote `crate = $crate::path`.
+    dollar_crate: Option<Ident>,
 }
 
 impl SourceMap {
@@ -24,15 +32,20 @@ impl SourceMap {
             entries: Vec::new(),
             end: Span::call_site(),
             docs: Vec::new(),
+            attributes: Vec::new(),
+            dollar_crate: None,
         };
         let mut tokens = tokens.into_iter().peekable();
         let mut before_docs = Vec::new();
         while let Some(token) = tokens.next() {
-            match doc_text(&token, tokens.peek()) {
-                Some(text) => {
+            match attribute(&token, tokens.peek()) {
+                Some(attribute) => {
                     tokens.next();
                     map.walk(before_docs.drain(..).collect());
-                    map.docs.push((map.text.len(), text));
+                    match attribute {
+                        Attribute::Doc(text) => map.docs.push((map.text.len(), text)),
+                        Attribute::Other(spans) => map.attributes.push(spans),
+                    }
                 }
                 None => before_docs.push(token),
             }
@@ -52,7 +65,7 @@ impl SourceMap {
                     // An invisible group is an expression substituted by a `macro_rules!` macro: it binds like parentheses, and a
                     // single word needs none (a length such as `$n` must stay a number).
                     let (open, close) = match group.delimiter() {
-                        Delimiter::None if is_word(group.stream()) => {
+                        Delimiter::None if is_word(group.stream()) || self.is_at_path() => {
                             self.walk(group.stream());
                             continue;
                         }
@@ -63,6 +76,10 @@ impl SourceMap {
                     self.push(open, group.span_open());
                     self.walk(group.stream());
                     self.push(close, group.span_close());
+                }
+                TokenTree::Ident(ident) if ident == "$crate" && self.is_at_path() => {
+                    self.push_separated(DOLLAR_CRATE, ident.span());
+                    self.dollar_crate = Some(ident);
                 }
                 TokenTree::Ident(ident) => {
                     let text = ident.to_string();
@@ -93,6 +110,25 @@ impl SourceMap {
         self.text.push(' ');
     }
 
+    /// Whether the path of `crate = path` comes next.
+    fn is_at_path(&self) -> bool {
+        let argument = self.text.rsplit(',').next().unwrap_or_default();
+        let words: Vec<&str> = argument.split_whitespace().collect();
+        words == ["crate", "="]
+    }
+
+    /// The tokens of a path in the text; nothing if it is none.
+    pub(crate) fn path(&self, text: &str) -> Option<TokenStream> {
+        let path: syn::Path = syn::parse_str(text).ok()?;
+        match &self.dollar_crate {
+            Some(own) if path.segments.first()?.ident == DOLLAR_CRATE => {
+                let rest = path.segments.iter().skip(1);
+                Some(quote!(#own #(::#rest)*))
+            }
+            _ => Some(quote!(#path)),
+        }
+    }
+
     /// The spans of the first and the last token that the byte range touches. A range behind the last token, or between two tokens, is
     /// taken to the token before it.
     pub(crate) fn spans(&self, range: Range<usize>) -> (Span, Span) {
@@ -119,19 +155,30 @@ impl SourceMap {
     }
 }
 
-/// What stands right of `doc =` in `#[doc = …]`, of which `///` is short for.
-fn doc_text(hash: &TokenTree, brackets: Option<&TokenTree>) -> Option<TokenStream> {
+/// An attribute between arguments.
+enum Attribute {
+    /// What stands right of `doc =` in `#[doc = …]`, of which `///` is short for.
+    Doc(TokenStream),
+    /// The first and the last token of another one.
+    Other((Span, Span)),
+}
+
+/// The attribute that begins with these tokens.
+fn attribute(hash: &TokenTree, brackets: Option<&TokenTree>) -> Option<Attribute> {
     let (TokenTree::Punct(hash), Some(TokenTree::Group(group))) = (hash, brackets) else {
         return None;
     };
+    if hash.as_char() != '#' || group.delimiter() != Delimiter::Bracket {
+        return None;
+    }
     let mut tokens = group.stream().into_iter();
-    match (tokens.next()?, tokens.next()?) {
-        (TokenTree::Ident(word), TokenTree::Punct(equals))
-            if hash.as_char() == '#' && word == "doc" && equals.as_char() == '=' =>
+    match (tokens.next(), tokens.next()) {
+        (Some(TokenTree::Ident(word)), Some(TokenTree::Punct(equals)))
+            if word == "doc" && equals.as_char() == '=' =>
         {
-            Some(tokens.collect())
+            Some(Attribute::Doc(tokens.collect()))
         }
-        _ => None,
+        _ => Some(Attribute::Other((hash.span(), group.span_close()))),
     }
 }
 
@@ -186,6 +233,30 @@ mod tests {
         assert_eq!(substituted("a + b"), "(a + b )");
         assert_eq!(substituted("8").trim_end(), "8");
         assert_eq!(substituted("n").trim_end(), "n");
+    }
+
+    #[test]
+    fn the_path_of_the_crate_is_no_expression() {
+        let tokens: TokenStream = "a :: b".parse().expect("tokens");
+        let group = proc_macro2::Group::new(Delimiter::None, tokens);
+        let map = SourceMap::new(quote!(crate = #group, lagrangian = #group));
+        assert_eq!(
+            map.text.trim_end(),
+            "crate = a :: b , lagrangian = (a :: b )"
+        );
+        let path = map.path("a::b").map(|path| path.to_string());
+        assert_eq!(path.as_deref(), Some("a :: b"));
+    }
+
+    #[test]
+    fn attributes_of_arguments_are_no_part_of_the_text() {
+        let map = SourceMap::new(quote!(
+            coordinates(x),
+            #[cfg(test)]
+            output(a) = x
+        ));
+        assert_eq!(map.text.trim_end(), "coordinates (x ), output (a )= x");
+        assert_eq!(map.attributes.len(), 1);
     }
 
     #[test]

@@ -4,12 +4,11 @@ use crate::emit::Emitter;
 use crate::indices::index;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
-use syn::Visibility;
 use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::model::declared::{Declared, TimeTransformation, names};
 
 /// `state`; with a time transformation also `state_at`, and H as declared, which both need.
-pub(crate) fn methods(declared: &Declared, vis: &Visibility, path: &TokenStream) -> TokenStream {
+pub(crate) fn methods(declared: &Declared, vis: &TokenStream, path: &TokenStream) -> TokenStream {
     let transformed = declared
         .time_transformation
         .zip(Derivation::hamiltonian(declared));

@@ -36,6 +36,8 @@ const PRELUDE: &[&str] = &[
     "INFINITY",
     "NEG_INFINITY",
     "assert",
+    "cfg",
+    "concat",
     "panic",
     "unimplemented",
     "vec",
@@ -443,6 +445,94 @@ fn names_that_nothing_can_have_are_mistakes_without_a_panic() {
             .to_string();
             assert!(expansion.contains("compile_error"), "{declaration}");
         }
+    }
+}
+
+/// Without the blanks, which depend on who prints the tokens.
+fn dense(tokens: &TokenStream) -> String {
+    tokens.to_string().split_whitespace().collect()
+}
+
+#[test]
+fn large_kernels_have_absolute_paths_too() {
+    let expansion = expand(
+        quote!(
+            coordinates(angle[20]),
+            lagrangian = sum(i in 0..20, m/2*sum(j in 0..i+1, cos(angle[j])*dot(angle[j]))^2
+                + m/2*sum(j in 0..i+1, sin(angle[j])*dot(angle[j]))^2),
+        ),
+        quote!(
+            struct Rope {
+                m: f64,
+            }
+        ),
+    );
+    let text = dense(&expansion);
+    let lanes = "constLANES:bool=::core::cfg!(not(debug_assertions))";
+    assert!(text.contains(lanes), "the kernels are not large");
+    let mut relative = Vec::new();
+    relative_paths(expansion, &mut relative);
+    assert!(relative.is_empty(), "without absolute paths: {relative:?}");
+}
+
+#[test]
+fn lints_are_inherited_and_deprecated_structs_allowed() {
+    let expansion = expand(
+        quote!(
+            coordinates(x),
+            lagrangian = dot(x) ^ 2 / 2 - k * cos(x),
+            solver(Fast, Mixed::<2>),
+            model(Small, truncated(2)),
+        ),
+        quote!(
+            #[allow(missing_docs)]
+            #[deprecated]
+            pub struct Model {
+                #[expect(missing_docs)]
+                pub k: f64,
+            }
+        ),
+    );
+    let text = dense(&expansion);
+    // On both structs, and on the field of the one that is made.
+    assert_eq!(text.matches("#[allow(missing_docs)]").count(), 3);
+    assert_eq!(text.matches("#[expect(missing_docs)]").count(), 1);
+    // Kernels, methods, the solver and its methods, `of`.
+    assert_eq!(text.matches("#[allow(deprecated)]").count(), 5);
+    assert!(!text.contains("__TfeKeep"));
+}
+
+#[test]
+fn keywords_of_the_edition_of_generated_code_are_raw() {
+    let expansion = expand(
+        quote!(
+            coordinates(x),
+            lagrangian = r#gen / 2 * dot(x) ^ 2 - x ^ 2 / 2
+        ),
+        quote!(
+            struct Model {
+                r#gen: f64,
+            }
+        ),
+    );
+    let text = dense(&expansion);
+    assert!(text.contains("self.r#gen") && !text.contains("self.gen"));
+}
+
+#[test]
+fn generated_functions_are_visible_as_the_struct_is() {
+    for vis in [
+        quote!(),
+        quote!(pub),
+        quote!(pub(crate)),
+        quote!(pub(in crate::models)),
+    ] {
+        let expansion = expand(
+            quote!(coordinates(x), lagrangian = dot(x) ^ 2 / 2 - x ^ 2 / 2),
+            quote!(#vis struct Model;),
+        );
+        let state = format!("{}fnstate(", dense(&vis));
+        assert!(dense(&expansion).contains(&state), "{vis}");
     }
 }
 

@@ -2,7 +2,8 @@
 
 use crate::docs::Docs;
 use crate::indices::identifier;
-use crate::input::plain;
+use crate::input::{self, plain};
+use crate::parameters::is_copy;
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 use syn::parse::Parser;
@@ -12,6 +13,9 @@ use tfe_symbolic::model::declared::{Projection, Variant};
 
 /// The derives that hold of the model made as they hold of the original.
 const DERIVES: [&str; 5] = ["Clone", "Copy", "Debug", "PartialEq", "Default"];
+
+/// The attributes of lints, which hold of the model made and of its fields as of the original.
+const LINTS: [&str; 4] = ["allow", "warn", "deny", "forbid"];
 
 /// The struct, and its methods beside those of any model: `of`, which copies the parameters, and `of_state`.
 pub(crate) fn expand(
@@ -43,9 +47,13 @@ pub(crate) fn renamed(
 ) -> ItemStruct {
     let mut attrs: Vec<Attribute> = vec![parse_quote!(#[doc = #title])];
     attrs.extend(derives(original));
+    attrs.extend(original.attrs.iter().filter_map(lint));
     let fields: Punctuated<Field, Token![,]> = fields.into_iter().collect();
+    let vis = input::visibility(original);
     ItemStruct {
         attrs,
+        vis: parse_quote!(#vis),
+        struct_token: <Token![struct]>::default(),
         ident: identifier(name),
         fields: Fields::Named(parse_quote!({ #fields })),
         semi_token: None,
@@ -62,16 +70,30 @@ fn fields(variant: &Variant, original: &ItemStruct) -> Vec<Field> {
     };
     let mut fields: Vec<Field> = original.fields.iter().filter(is_used).cloned().collect();
     for field in &mut fields {
-        field
-            .attrs
-            .retain(|attribute| attribute.path().is_ident("doc"));
+        let attributes = std::mem::take(&mut field.attrs).into_iter();
+        let inherited = attributes.filter_map(|one| match one.path().is_ident("doc") {
+            true => Some(one),
+            false => lint(&one),
+        });
+        field.attrs = inherited.collect();
     }
-    let vis = &original.vis;
+    let vis = input::visibility(original);
     for (name, doc) in &variant.added {
         let (name, doc) = (identifier(name), format!(" {doc}."));
         fields.push(parse_quote!(#[doc = #doc] #vis #name: f64));
     }
     fields
+}
+
+/// The attribute where it is one of a lint. What is expected of the original may be absent here: an `expect` becomes an `allow`.
+fn lint(attribute: &Attribute) -> Option<Attribute> {
+    let path = attribute.path();
+    if let (true, Meta::List(list)) = (path.is_ident("expect"), &attribute.meta) {
+        let lints = &list.tokens;
+        return Some(parse_quote!(#[allow(#lints)]));
+    }
+    let is_lint = LINTS.iter().any(|name| path.is_ident(name));
+    is_lint.then(|| attribute.clone())
 }
 
 /// `#[derive(…)]` with those of [`DERIVES`] that the original has; those above `#[dynamics]` cannot be seen from here.
@@ -101,24 +123,33 @@ fn is_inherited(path: &Path) -> bool {
 fn of(variant: &Variant, item: &ItemStruct, original: &ItemStruct) -> TokenStream {
     let (name, from, vis) = (&item.ident, &original.ident, &item.vis);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
+    let of_deprecated = input::of_deprecated(original);
     let is_added = |name: &str| variant.added.iter().any(|(own, _)| own == name);
     let added: Vec<_> = variant
         .added
         .iter()
         .map(|(name, _)| identifier(name))
         .collect();
-    let copied: Vec<_> = item
-        .fields
-        .iter()
-        .filter_map(|field| field.ident.as_ref())
-        .filter(|name| !is_added(&plain(name)))
-        .collect();
-    // A field added may have any name.
-    let argument = if is_added("original") {
-        format_ident!("__original")
+    // A field added may have any name but one with this prefix.
+    let argument = if is_added("original") || is_added("_original") {
+        format_ident!("__tfe_original")
     } else {
         format_ident!("original")
     };
+    let kept = input::context(original).fields;
+    let kept = kept.iter().filter(|field| {
+        let mut names = item.fields.iter().filter_map(|own| own.ident.as_ref());
+        names.any(|name| plain(name) == field.name) && !is_added(&field.name)
+    });
+    let copied: Vec<_> = kept
+        .map(|field| {
+            let name = identifier(&field.name);
+            match is_copy(&field.kind) {
+                true => quote!(#name: #argument.#name),
+                false => quote!(#name: ::core::clone::Clone::clone(&#argument.#name)),
+            }
+        })
+        .collect();
     let argument = if copied.is_empty() {
         format_ident!("_{argument}")
     } else {
@@ -126,13 +157,14 @@ fn of(variant: &Variant, item: &ItemStruct, original: &ItemStruct) -> TokenStrea
     };
     let doc = format!(" The model with the parameters of a [`{from}`].");
     quote! {
+        #of_deprecated
         #[automatically_derived]
         #[allow(dead_code)]
         impl #impl_generics #name #type_generics #where_clause {
             #[doc = #doc]
             #vis fn of(#argument: &#from #type_generics #(, #added: f64)*) -> Self {
                 Self {
-                    #(#copied: ::core::clone::Clone::clone(&#argument.#copied),)*
+                    #(#copied,)*
                     #(#added,)*
                 }
             }
@@ -163,7 +195,9 @@ fn of_state(
     let doc = format!(
         " The model with the parameters of a [`{from}`] and the momenta of a state of it, and what is left of the state."
     );
+    let of_deprecated = input::of_deprecated(original);
     Some(quote! {
+        #of_deprecated
         #[automatically_derived]
         #[allow(dead_code)]
         impl #impl_generics #name #type_generics #where_clause {

@@ -49,8 +49,8 @@ pub(super) fn stubs(
                     ::core::result::Result::Ok(())
                 }
 
-                fn energy_function<__R: __tfe::Real>(&self, t: __R, _: &[__R], _: &[__R]) -> __R {
-                    t
+                fn energy_function<__R: __tfe::Real>(&self, __tfe_t: __R, _: &[__R], _: &[__R]) -> __R {
+                    __tfe_t
                 }
 
                 fn first<__R: __tfe::Real>(
@@ -90,8 +90,8 @@ pub(super) fn stubs(
                 ) {
                 }
 
-                fn coordinate_name(&self, index: usize) -> __tfe::CoordinateName {
-                    __tfe::CoordinateName::element("", index)
+                fn coordinate_name(&self, _: usize) -> __tfe::CoordinateName {
+                    __tfe::CoordinateName::single("")
                 }
             }
 
@@ -103,11 +103,11 @@ pub(super) fn stubs(
                 fn energy_function_with<__R: __tfe::Real>(
                     &self,
                     _: &[__R; __tfe::MAX_INPUTS],
-                    t: __R,
+                    __tfe_t: __R,
                     _: &[__R],
                     _: &[__R],
                 ) -> __R {
-                    t
+                    __tfe_t
                 }
 
                 fn first_with<__R: __tfe::Real>(
@@ -158,10 +158,10 @@ pub(super) fn stubs(
         impl #impl_generics #name #type_generics #where_clause {
             #vis fn state(
                 &self,
-                q: impl ::core::convert::Into<#private::List>,
-                v: impl ::core::convert::Into<#private::List>,
+                __tfe_q: impl ::core::convert::Into<#private::List>,
+                __tfe_v: impl ::core::convert::Into<#private::List>,
             ) -> #private::FamilyState {
-                #private::FamilyState { q: q.into(), p: v.into() }
+                #private::FamilyState { q: __tfe_q.into(), p: __tfe_v.into() }
             }
 
             #vis fn structure() -> #private::Structure {

@@ -4,7 +4,6 @@ use super::sites::{self, Sites};
 use crate::indices;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
-use syn::Visibility;
 use tfe_symbolic::model::declared::Observable;
 
 fn by_site(observables: &[Observable]) -> bool {
@@ -60,7 +59,7 @@ pub(super) fn names(observables: &[Observable]) -> TokenStream {
 /// The method that evaluates an observable; one by site gives a list.
 pub(super) fn method(
     one: &Observable,
-    vis: &Visibility,
+    vis: &TokenStream,
     second: &TokenStream,
     second_doc: &str,
     path: &TokenStream,

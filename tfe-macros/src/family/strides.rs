@@ -151,7 +151,7 @@ impl Emitter<'_> {
             #before
             let mut __from = #start;
             while __from < __end {
-                let __to = __tfe::STRIDE.saturating_add(__from).min(__end);
+                let __to = ::core::cmp::Ord::min(__tfe::STRIDE.saturating_add(__from), __end);
                 #lend
                 for #variable in __from..__to { #body }
                 // What is left at the end belongs to whoever called.
