@@ -1,10 +1,9 @@
 //! Formulas in differences keep their digits: kernels beside closed forms at states where rewritten formulas would lose them.
 
-use tfe_symbolic::compile::declare;
-use tfe_symbolic::derive::derivation::Derivation;
+mod kernels;
+
+use kernels::results_of;
 use tfe_symbolic::program::Request;
-use tfe_symbolic::program::interpret::{Environment, Results, interpret};
-use tfe_symbolic::syntax::context::{Context, Field, FieldKind};
 
 const UP_TO_FIRST: Request = Request {
     value: true,
@@ -16,35 +15,6 @@ const UP_TO_FIRST: Request = Request {
     constraint_rows: false,
     constraint_second: false,
 };
-
-fn kernel(
-    text: &str,
-    parameters: &[(&str, f64)],
-    request: Request,
-    q: [f64; 2],
-    z: [f64; 2],
-) -> Results {
-    let field = |(name, _): &(&str, f64)| Field {
-        name: (*name).to_owned(),
-        kind: FieldKind::Scalar,
-    };
-    let context = Context {
-        fields: parameters.iter().map(field).collect(),
-        ..Context::default()
-    };
-    let declared = declare(text, &context).expect("a model of the test");
-    let program = Derivation::of(&declared).program(request);
-    let environment = Environment {
-        q: q.to_vec(),
-        z: z.to_vec(),
-        parameters: parameters
-            .iter()
-            .map(|(name, value)| ((*name).to_owned(), *value))
-            .collect(),
-        ..Environment::default()
-    };
-    interpret(&program, &environment).expect("all inputs are there")
-}
 
 #[track_caller]
 fn close(found: f64, expected: f64) {
@@ -67,12 +37,12 @@ fn powers_of_differences_are_not_multiplied_out() {
     };
     for s in [1.0, 1e3, 1e4, 1e5, 1e6, 1e9] {
         for request in [UP_TO_FIRST, second] {
-            let found = kernel(text, &parameters, request, [s, s + 0.5], [0.0; 2]);
+            let found = results_of(text, &parameters, request, &[s, s + 0.5], &[0.0; 2]);
             close(found.q[0], 0.15);
             close(found.q[1], -0.15);
             close(found.value, -0.3 / 16.0);
         }
-        let found = kernel(text, &parameters, second, [s, s + 0.5], [0.0; 2]);
+        let found = results_of(text, &parameters, second, &[s, s + 0.5], &[0.0; 2]);
         close(found.qq[0][0], -0.9);
         close(found.qq[0][1], 0.9);
     }
@@ -87,7 +57,7 @@ fn masses_that_are_squares_of_differences_keep_their_digits() {
         ..UP_TO_FIRST
     };
     for s in [1.0, 1e4, 1e8] {
-        let found = kernel(text, &[("m", 3.0)], request, [s, s + 0.25], [2.0, 1.0]);
+        let found = results_of(text, &[("m", 3.0)], request, &[s, s + 0.25], &[2.0, 1.0]);
         close(found.zz[0][0], 0.1875);
         close(found.z[0], 0.375);
         close(found.q[0], -3.0);
@@ -116,7 +86,7 @@ fn springs_agree_in_all_kernels() {
                 ..UP_TO_FIRST
             },
         ] {
-            let found = kernel(text, &parameters, request, [q, r], [0.0; 2]);
+            let found = results_of(text, &parameters, request, &[q, r], &[0.0; 2]);
             close(found.q[0], 7.0 * (l - q) - 7.0 * (q - r));
             close(found.q[1], 7.0 * (q - r));
         }
@@ -128,7 +98,13 @@ fn sums_of_large_offsets_keep_their_order() {
     // (x − y) + (l − m), both exact.
     let text = "coordinates(x, y), lagrangian = dot(x)^2/2 + dot(y)^2/2 - k*((x - y) + (l - m))^2";
     let parameters = [("k", 1.0), ("l", 1e9 + 0.25), ("m", 1e9)];
-    let found = kernel(text, &parameters, UP_TO_FIRST, [1e12 + 0.5, 1e12], [0.0; 2]);
+    let found = results_of(
+        text,
+        &parameters,
+        UP_TO_FIRST,
+        &[1e12 + 0.5, 1e12],
+        &[0.0; 2],
+    );
     close(found.q[0], -1.5);
     close(found.value, -0.5625);
 }

@@ -1,0 +1,344 @@
+//! Derivatives that are zero times infinity, or zero over zero, and have a limit: beside closed forms.
+
+mod kernels;
+
+use kernels::{derivation_of, environment_of, results_of};
+use tfe_symbolic::program::interpret::interpret;
+use tfe_symbolic::program::{By, Request};
+
+const ALL: Request = Request {
+    value: true,
+    first: true,
+    mass: true,
+    second: true,
+    observables: true,
+    constraint_values: false,
+    constraint_rows: false,
+    constraint_second: false,
+};
+
+#[track_caller]
+fn close(found: f64, expected: f64, what: &str) {
+    assert!(
+        (found - expected).abs() <= 1e-13 * expected.abs(),
+        "{what}: {found}, {expected}"
+    );
+}
+
+/// First and second derivative of a potential of one coordinate.
+#[track_caller]
+fn check_slopes(energy: &str, parameters: &[(&str, f64)], x: f64, (first, second): (f64, f64)) {
+    let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+    let found = results_of(&text, parameters, ALL, &[x], &[0.0]);
+    let what = format!("{energy} at {x}");
+    close(-found.q[0], first, &what);
+    close(-found.qq[0][0], second, &what);
+}
+
+/// A slope that is infinite times a branch that is zero is zero.
+#[test]
+fn roots_and_powers_of_choices() {
+    for (energy, x, expected) in [
+        ("max(-x, 0)^1.5", 1.0, (0.0, 0.0)),
+        ("max(-x, 0)^1.5", -4.0, (-3.0, 0.375)),
+        ("max(0, -x)^1.5", 0.0, (0.0, 0.0)),
+        ("max(-x, 0)^2.5", 0.0, (0.0, 0.0)),
+        ("max(-x, 0)^2.5", -4.0, (-20.0, 7.5)),
+        ("max(-x, 0)^1.3", 1.0, (0.0, 0.0)),
+        ("max(-x, 0)^1.3", -1.0, (-1.3, 0.39)),
+        ("sqrt(max(x, 0))", -1.0, (0.0, 0.0)),
+        ("sqrt(max(x, 0))", 4.0, (0.25, -0.03125)),
+        ("sqrt(max(x, 0)/3)", -1e300, (0.0, 0.0)),
+        ("x*sqrt(max(x, 0))", -1.0, (0.0, 0.0)),
+        ("x*sqrt(max(x, 0))", 4.0, (3.0, 0.375)),
+        ("select(x > 0, x, 0)^1.5", -1.0, (0.0, 0.0)),
+        ("select(x > 0, x, 0)^1.5", 4.0, (3.0, 0.375)),
+        ("acosh(max(x, 1))", 0.0, (0.0, 0.0)),
+        (
+            "acosh(max(x, 1))",
+            2.0,
+            (1.0 / 3_f64.sqrt(), -2.0 / 27_f64.sqrt()),
+        ),
+    ] {
+        check_slopes(energy, &[], x, expected);
+    }
+    for (x, expected) in [(1.0, (0.0, 0.0)), (-4.0, (-3.0, 0.375))] {
+        check_slopes("max(-x, 0)^c", &[("c", 1.5)], x, expected);
+    }
+    for (x, expected) in [(0.0, (0.0, 0.0)), (-4.0, (-20.0, 7.5))] {
+        check_slopes("max(-x, 0)^c", &[("c", 2.5)], x, expected);
+    }
+}
+
+/// The force of a contact that is open, and its tangent.
+#[test]
+fn forces_of_open_contacts() {
+    let text =
+        "coordinates(y), lagrangian = dot(y)^2/2, force(y) = k*max(-y, 0)^1.5*(1 - c*dot(y))";
+    let parameters = [("k", 2.0), ("c", 0.5)];
+    for y in [1.0, 0.0] {
+        let found = results_of(text, &parameters, ALL, &[y], &[-0.4]);
+        assert_eq!(found.force[0], 0.0);
+        assert_eq!((found.force_q[0][0], found.force_z[0][0]), (0.0, 0.0));
+    }
+    let found = results_of(text, &parameters, ALL, &[-4.0], &[-0.4]);
+    close(found.force[0], 16.0 * 1.2, "force");
+    close(found.force_q[0][0], -6.0 * 1.2, "by y");
+    close(found.force_z[0][0], -8.0, "by the velocity");
+}
+
+/// A rope that is slack has no force, and is slack where its ends meet.
+#[test]
+fn slack_ropes() {
+    for length in ["norm([x, y])", "hypot(x, y)"] {
+        let text = format!(
+            "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - k/2*max({length} - l, 0)^2"
+        );
+        let parameters = [("k", 3.0), ("l", 4.0)];
+        for q in [[0.0, 0.0], [1.0, -2.0]] {
+            let found = results_of(&text, &parameters, ALL, &q, &[0.0; 2]);
+            assert!(found.q.iter().all(|x| *x == 0.0), "{length}: {:?}", found.q);
+            let mut second = found.qq.iter().flatten();
+            assert!(second.all(|x| *x == 0.0), "{length}: {:?}", found.qq);
+        }
+        let found = results_of(&text, &parameters, ALL, &[3.0, 4.0], &[0.0; 2]);
+        close(found.q[0], -1.8, length);
+        close(found.qq[0][0], -3.0 * (0.36 + 0.2 * 0.64), length);
+        close(found.qq[0][1], -3.0 * (0.48 - 0.2 * 0.48), length);
+    }
+}
+
+/// Drag with the norm of the velocity: forces hᵐ v and their tangents hᵐ δ + m hᵐ⁻² v v.
+#[test]
+fn drag_at_rest() {
+    let force =
+        |factor: &str| format!("force(x) = -c*{factor}*dot(x), force(y) = -c*{factor}*dot(y)");
+    let h = "norm([dot(x), dot(y)])";
+    let power = |text: &str| text.replace('h', h);
+    for (parts, exponent, is_field) in [
+        (force(h), 1.0, false),
+        (force("hypot(dot(x), dot(y))"), 1.0, false),
+        (force(&power("h^0.5")), 0.5, false),
+        (force(&power("h^0.7")), 0.7, false),
+        (force(&power("h^3")), 3.0, false),
+        (force("hypot(dot(x), dot(y))^0.7"), 0.7, false),
+        (force("(dot(x)^2 + dot(y)^2)^0.35"), 0.7, false),
+        (force(&power("h^m")), 0.7, true),
+        (force(&power("h^m")), 1.0, true),
+        (force(&power("h^m")), 2.0, true),
+        (force("hypot(dot(x), dot(y))^m"), 0.7, true),
+        (force("(dot(x)^2 + dot(y)^2)^(m/2)"), 0.7, true),
+        (power("dissipation = c*h^3/3"), 1.0, false),
+        (power("dissipation = c*h^2.7/2.7"), 0.7, false),
+        (power("dissipation = c*h^1.5/1.5"), -0.5, false),
+    ] {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2, {parts}");
+        let mut parameters = vec![("c", 0.3)];
+        if is_field {
+            parameters.push(("m", exponent));
+        }
+        // The exponent −1/2 has a force at rest, and no tangent.
+        let found = results_of(&text, &parameters, ALL, &[0.0; 2], &[0.0; 2]);
+        assert_eq!(found.force, [0.0; 2], "{parts}");
+        if exponent > 0.0 {
+            assert_eq!(found.force_z.concat(), [0.0; 4], "{parts}");
+        }
+        for v in [[3.0, 4.0], [3e-9, -4e-9], [3e30, 4e30]] {
+            let found = results_of(&text, &parameters, ALL, &[0.0; 2], &v);
+            let h = v[0].hypot(v[1]);
+            for i in 0..2 {
+                let expected = -0.3 * h.powf(exponent) * v[i];
+                close(found.force[i], expected, &parts);
+                for j in 0..2 {
+                    let delta = f64::from(u8::from(i == j));
+                    let expected = delta + exponent * (v[i] / h) * (v[j] / h);
+                    close(
+                        found.force_z[i][j],
+                        -0.3 * h.powf(exponent) * expected,
+                        &parts,
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// What moves against a stream, and a point on an arm: norms of sums and of products.
+#[test]
+fn drag_of_relative_velocities() {
+    let text = "coordinates(x, y), let s = norm([dot(x) - w, dot(y)]), \
+        lagrangian = (dot(x)^2 + dot(y)^2)/2, \
+        force(x) = -c*s*(dot(x) - w), force(y) = -c*s*dot(y)";
+    let parameters = [("c", 0.3), ("w", 2.0)];
+    let found = results_of(text, &parameters, ALL, &[0.0; 2], &[2.0, 0.0]);
+    assert_eq!(found.force_z.concat(), [0.0; 4]);
+    let found = results_of(text, &parameters, ALL, &[0.0; 2], &[5.0, 4.0]);
+    close(found.force_z[0][0], -0.3 * 6.8, "against a stream");
+    close(found.force_z[0][1], -0.3 * 2.4, "against a stream");
+    let text = "coordinates(r, a), let s = norm([dot(r), r*dot(a)]), \
+        lagrangian = (dot(r)^2 + r^2*dot(a)^2)/2, \
+        force(r) = -c*s*dot(r), force(a) = -c*s*r^2*dot(a)";
+    let found = results_of(text, &[("c", 0.3)], ALL, &[2.0, 0.5], &[0.0; 2]);
+    assert_eq!(found.force_z.concat(), [0.0; 4]);
+    assert_eq!(found.force_q.concat(), [0.0; 4]);
+    let found = results_of(text, &[("c", 0.3)], ALL, &[2.0, 0.5], &[3.0, 2.0]);
+    // s = 5: ∂(s r² ȧ)/∂ȧ = r² (s + r² ȧ²/s)
+    close(found.force_z[1][1], -0.3 * 4.0 * (5.0 + 3.2), "on an arm");
+    close(found.force_z[1][0], -0.3 * 8.0 * 0.6, "on an arm");
+    // ∂(s r² ȧ)/∂r = ȧ (2 r s + r³ ȧ²/s)
+    close(found.force_q[1][0], -0.3 * 2.0 * (20.0 + 6.4), "on an arm");
+}
+
+/// Potentials hⁿ of a distance: −n hⁿ⁻² x and −n hⁿ⁻² (δ + (n − 2) x x/h²).
+#[test]
+fn powers_of_distances_at_zero() {
+    for (energy, n) in [
+        ("norm([x, y])^3", 3.0),
+        ("hypot(x, y)^3", 3.0),
+        ("norm([x, y])^2.5", 2.5),
+        ("hypot(x, y)^2.5", 2.5),
+        ("norm([x, y])^2.3", 2.3),
+        ("hypot(x, y)^2.3", 2.3),
+        ("norm([x, y])^1.7", 1.7),
+        ("hypot(x, y)^1.7", 1.7),
+        ("hypot(x, y)^2", 2.0),
+    ] {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
+        let found = results_of(&text, &[], ALL, &[0.0; 2], &[0.0; 2]);
+        assert_eq!(found.q, [0.0; 2], "{energy}");
+        if n > 2.0 {
+            assert!(found.qq.iter().flatten().all(|x| *x == 0.0), "{energy}");
+        }
+        let found = results_of(&text, &[], ALL, &[3.0, 4.0], &[0.0; 2]);
+        let factor = -n * 5_f64.powf(n - 2.0);
+        close(found.q[0], 3.0 * factor, energy);
+        close(found.qq[0][0], factor * (1.0 + (n - 2.0) * 0.36), energy);
+        close(
+            found.qq[1][0] + factor,
+            factor * (1.0 + (n - 2.0) * 0.48),
+            energy,
+        );
+    }
+    // With an exponent that is a field, also where the force is as large near zero as elsewhere.
+    let text = "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - norm([x, y])^c";
+    for c in [1.0, 1.5, 2.0, 3.0] {
+        let found = results_of(text, &[("c", c)], ALL, &[0.0; 2], &[0.0; 2]);
+        assert_eq!(found.q, [0.0; 2], "{c}");
+        if c > 2.0 {
+            assert_eq!(found.qq.concat(), [0.0; 4], "{c}");
+        }
+        let found = results_of(text, &[("c", c)], ALL, &[3.0, 4.0], &[0.0; 2]);
+        let factor = -c * 5_f64.powf(c - 2.0);
+        close(found.q[0], 3.0 * factor, text);
+        close(found.qq[0][0], factor * (1.0 + (c - 2.0) * 0.36), text);
+    }
+}
+
+/// Nothing is chosen where nothing has a limit: distances that never vanish cost what they did.
+#[test]
+fn distances_without_limits_choose_nothing() {
+    for parts in [
+        "+ k/norm([x, y])",
+        "+ k/norm([x, y]) + c*y^2/norm([x, y])^5",
+        "- k/2*(norm([x, y]) - c)^2",
+        "- k/4*(hypot(x, y) - c)^4",
+        "- k*norm([x, y]) - c*sqrt(1 - x^2 - y^2)",
+        "- k*sqrt(x^2 + y^2 + c^2)^3",
+        ", force(x) = -k*dot(x)/sqrt(dot(x)^2 + dot(y)^2 + c^2)",
+        ", force(x) = -k*dot(z)",
+    ] {
+        let lets = match parts.contains('z') {
+            true => "let z = norm([x, y]), ",
+            false => "",
+        };
+        let text = format!("coordinates(x, y), {lets}lagrangian = (dot(x)^2 + dot(y)^2)/2 {parts}");
+        let mut parameters = vec![("k", 1.0)];
+        if ["c*", "c)", "c^"].iter().any(|with| parts.contains(with)) {
+            parameters.push(("c", 0.5));
+        }
+        let derivation = derivation_of(&text, &parameters);
+        let program = derivation.program(ALL).to_string();
+        assert!(!program.contains("select"), "{parts}\n{program}");
+    }
+    // What is chosen in a limit is no kink of the force.
+    let text = "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2, force(x) = -c*hypot(dot(x), dot(y))*dot(x)";
+    let derivation = derivation_of(text, &[("c", 0.5)]);
+    assert!(derivation.structure().smooth);
+    assert!(!derivation.forces().to_string().contains("select"));
+    let tangent = derivation.program(ALL).to_string();
+    assert_eq!(tangent.matches("select").count(), 1, "{tangent}");
+}
+
+/// Derivatives by a parameter at rest.
+#[test]
+fn drag_by_a_parameter_at_rest() {
+    let text = "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2, \
+        force(x) = -c*norm([dot(x), m*dot(y)])*dot(x), sensitivity(m)";
+    let parameters = [("c", 0.3), ("m", 0.5)];
+    let program = derivation_of(text, &parameters).program_by(By::Parameter(0));
+    for (v, expected) in [([0.0, 0.0], 0.0), ([3.0, 8.0], -0.3 * 3.0 * 32.0 / 5.0)] {
+        let environment = environment_of(&parameters, &[0.0; 2], &v);
+        let found = interpret(&program, &environment).expect("a complete environment");
+        close(found.force[0], expected, "by m");
+    }
+}
+
+#[test]
+fn powers_of_absolute_values_at_zero() {
+    let half = 0.5_f64.sqrt();
+    for (energy, x, expected) in [
+        ("abs(x)^2.5", 0.0, (0.0, 0.0)),
+        ("abs(x)^2.5", -4.0, (-20.0, 7.5)),
+        ("abs(x)^3.5", 0.0, (0.0, 0.0)),
+        ("abs(x)^2.3", 0.0, (0.0, 0.0)),
+        ("abs(x)^3", -2.0, (-12.0, 12.0)),
+        ("abs(x)^3", 0.0, (0.0, 0.0)),
+        ("x*abs(x)", -2.0, (4.0, -2.0)),
+        ("x*abs(x)^1.5", 0.0, (0.0, 0.0)),
+        ("x*abs(x)^1.5", -4.0, (20.0, -7.5)),
+        ("abs(2*x)^2.5", 0.0, (0.0, 0.0)),
+        ("abs(-x/2)^2.5", 1.0, (1.25 * half / 2.0, 0.9375 * half)),
+        ("(abs(x)/4)^2.5", 0.0, (0.0, 0.0)),
+        ("(abs(x)/4)^2.5", -16.0, (-5.0, 0.46875)),
+        ("abs(x)*sign(x)*x", -3.0, (-6.0, 2.0)),
+        ("abs(x)^1.5", 0.0, (0.0, f64::NAN)),
+    ] {
+        match expected {
+            (first, second) if second.is_nan() => {
+                let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+                let found = results_of(&text, &[], ALL, &[x], &[0.0]);
+                close(-found.q[0], first, energy);
+            }
+            expected => check_slopes(energy, &[], x, expected),
+        }
+    }
+    for (x, expected) in [(0.0, (0.0, 0.0)), (-8.0, (-10.0, 1.875))] {
+        check_slopes("abs(x/l)^2.5", &[("l", 2.0)], x, expected);
+        check_slopes("abs(x*l)^2.5", &[("l", 0.5)], x, expected);
+    }
+}
+
+/// Numbers whose powers and products leave the range of `f64` stay beside what they multiply.
+#[test]
+fn numbers_out_of_range_are_not_folded() {
+    for (energy, x, value, slope) in [
+        ("(1e-200*x)^2", 1e200, 1.0, 2e-200),
+        ("(-1e-200*x)^4", 2e200, 16.0, 3.2e-199),
+        ("(1e200*x)^2*1e-300", 1e-100, 1e-100, 2.0),
+        ("1e-300/(1e-200*x)^2", 1e200, 1e-300, 0.0),
+        ("(1e-160*x)^2/3", 3e160, 3.0, 2e-160),
+        ("1e-200*(x*1e-200 + 1)", 1e200, 2e-200, 0.0),
+        ("sqrt((1e-200*x)^2)", 1e200, 1.0, 1e-200),
+        ("cos(1e-200*(1e-200*x)^2)", 1e200, 1.0, 0.0),
+    ] {
+        let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+        let found = results_of(&text, &[], ALL, &[x], &[0.0]);
+        close(-found.value, value, energy);
+        let apart = (-found.q[0] - slope).abs();
+        assert!(
+            apart <= 1e-13 * slope.abs() + f64::MIN_POSITIVE,
+            "{energy}: {}",
+            found.q[0]
+        );
+    }
+}
