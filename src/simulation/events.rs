@@ -332,10 +332,7 @@ where
         );
         let mut remaining = Remaining::new(found, ends);
         while let Some(root) = remaining.first() {
-            let crossed = Crossed {
-                function: root.function,
-                rises: root.rises,
-            };
+            let crossed = Crossed::from(&root);
             if !self.counts(crossed) {
                 remaining.take(root.function);
                 continue;
@@ -421,11 +418,7 @@ where
 
     /// Whether this is the event that has cut the element before: the polynomial behind it has another velocity than the node at which it begins.
     fn is_seen_again(&self, arc: &Passage<'_, N, L>, root: &search::Root, time: f64) -> bool {
-        let crossed = Crossed {
-            function: root.function,
-            rises: root.rises,
-        };
-        let last = self.last_of(crossed, time);
+        let last = self.last_of(root.into(), time);
         last.is_some_and(|last| last.is_idle || self.begins_behind(arc, root))
     }
 

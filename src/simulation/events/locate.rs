@@ -15,6 +15,8 @@ pub(super) struct Met<const N: usize, L: Length<N>> {
     pub(super) velocity: L::Vector,
     /// The values of all that is watched.
     pub(super) values: Vec<f64>,
+    /// Their derivatives by the time, on the polynomial.
+    pub(super) slopes: Vec<f64>,
     pub(super) inside: Option<L::Polynomial>,
 }
 
@@ -41,6 +43,7 @@ where
             length,
             time: arc.time(length, resolution),
             values: self.row(t + length, &state, &velocity),
+            slopes: self.slopes(arc, length),
             state,
             velocity,
             inside: None,
@@ -83,16 +86,17 @@ where
             let guess = dense.velocity_at_time(t + length);
             let velocity = self.model.velocity(t + length, &state, &guess)?;
             let values = self.row(t + length, &state, &velocity);
-            let value = values[root.function];
+            let slopes = self.slopes(arc, length);
+            let (value, along) = (values[root.function], slopes[root.function]);
             met = Some(Met {
                 length,
                 time,
                 state,
                 velocity,
                 values,
+                slopes,
                 inside,
             });
-            let along = self.slopes(arc, length)[root.function];
             let slope = self.slope(arc, root, along, (length, value), passed);
             let change = -value / slope;
             let next = (length + change) * h.signum();
@@ -142,7 +146,7 @@ where
     }
 
     /// dg/dt of all that is watched, on the polynomial.
-    pub(super) fn slopes(&self, arc: &Passage<'_, N, L>, length: f64) -> Vec<f64> {
+    fn slopes(&self, arc: &Passage<'_, N, L>, length: f64) -> Vec<f64> {
         const NEAR: f64 = 1e-4;
         let Passage { t, h, dense, .. } = *arc;
         let values = |length: f64| {

@@ -89,22 +89,16 @@ where
         let mut is_tried = vec![false; count];
         is_tried[root.function] = true;
         loop {
-            let slopes = self.slopes(arc, met.length);
             let has_passed = |function: usize| {
-                let along = arc.h.signum() * slopes[function];
+                let along = arc.h.signum() * met.slopes[function];
                 let here = (met.values[function], along);
                 let side = remaining.side(function);
                 standing(side, here, TOGETHER * resolution, false) == Standing::Passed
             };
             let untried = (0..count).filter(|function| !is_tried[*function]);
             let mut roots = untried.filter_map(|function| remaining.next(function));
-            let other = roots.find(|other| {
-                let crossed = Crossed {
-                    function: other.function,
-                    rises: other.rises,
-                };
-                self.counts(crossed) && has_passed(other.function)
-            });
+            let other =
+                roots.find(|other| self.counts(Crossed::from(other)) && has_passed(other.function));
             let Some(other) = other else {
                 return (root, met);
             };
@@ -124,10 +118,7 @@ where
         (root, met): (&Root, &Met<N, L>),
         resolution: f64,
     ) -> Meeting {
-        let own = Crossed {
-            function: root.function,
-            rises: root.rises,
-        };
+        let own = Crossed::from(root);
         let count = self.watched.len();
         let mut meeting = Meeting {
             together: Vec::with_capacity(1),
@@ -138,9 +129,8 @@ where
             meeting.together.push(own);
             return meeting;
         }
-        let slopes = self.slopes(arc, met.length);
         // What the search for the time has left.
-        let left = (met.values[root.function] / slopes[root.function]).abs();
+        let left = (met.values[root.function] / met.slopes[root.function]).abs();
         let left = if left.is_finite() { 2.0 * left } else { 0.0 };
         let usual = TOGETHER * resolution;
         for function in 0..count {
@@ -160,7 +150,7 @@ where
                 true => usual.max(left),
                 false => usual,
             };
-            let along = arc.h.signum() * slopes[function];
+            let along = arc.h.signum() * met.slopes[function];
             let here = (met.values[function], along);
             let last = self.last_of(crossed, met.time);
             let counts = self.counts(crossed) && last.is_none_or(|last| !last.is_idle);

@@ -58,6 +58,15 @@ pub(super) struct Crossed {
     pub(super) rises: bool,
 }
 
+impl From<&Root> for Crossed {
+    fn from(root: &Root) -> Self {
+        Self {
+            function: root.function,
+            rises: root.rises,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
