@@ -316,6 +316,12 @@ fn powers_of_absolute_values_at_zero() {
         check_slopes("abs(x/l)^2.5", &[("l", 2.0)], x, expected);
         check_slopes("abs(x*l)^2.5", &[("l", 0.5)], x, expected);
     }
+    // Of a coordinate that is never negative, without a choice.
+    for (x, expected) in [(0.0, (0.0, 0.0)), (8.0, (10.0, 1.875))] {
+        check_slopes("(x/2)^2.5", &[], x, expected);
+        check_slopes("(x/l)^2.5", &[("l", 2.0)], x, expected);
+        check_slopes("(x*l)^2.5", &[("l", 0.5)], x, expected);
+    }
 }
 
 /// Numbers whose powers and products leave the range of `f64` stay beside what they multiply.

@@ -3,6 +3,7 @@
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::input::Input;
 use crate::expr::ordered::SortedMap;
 
 impl Graph {
@@ -200,7 +201,12 @@ impl Graph {
             let here = collected.get(x).copied().unwrap_or_default();
             here >= i64::from(*n)
         };
-        let may_vanish = |(x, _): &(ExprId, i32)| !matches!(self.node(*x), Node::Input(_));
+        let may_vanish = |(x, _): &(ExprId, i32)| {
+            !matches!(
+                self.node(*x),
+                Node::Input(Input::Parameter(_) | Input::ParameterElement(..))
+            )
+        };
         if !above.clone().all(stands_above) || !above.any(may_vanish) {
             return None;
         }
