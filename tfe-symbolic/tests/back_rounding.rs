@@ -108,3 +108,31 @@ fn sums_of_large_offsets_keep_their_order() {
     close(found.q[0], -1.5);
     close(found.value, -0.5625);
 }
+
+#[test]
+fn second_derivatives_of_distances_do_not_cancel() {
+    let second = Request {
+        second: true,
+        ..UP_TO_FIRST
+    };
+    // ∂²h/∂x² = y²/h³, and 1/l² of it in x/l; h is x, or x/l, to the last digit.
+    let (y, l) = (1e-9, 4.0);
+    for (distance, share) in [
+        ("norm([x, y])", 1.0),
+        ("hypot(x, y)", 1.0),
+        ("hypot(y, -x)", 1.0),
+        ("norm([x/l, y])", 1.0 / l),
+        ("hypot(x/l, y)", 1.0 / l),
+        ("hypot(x/4, y)", 1.0 / l),
+    ] {
+        let text = format!(
+            "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - k*({distance} - l)"
+        );
+        let parameters = [("k", 3.0), ("l", l)];
+        let found = results_of(&text, &parameters, second, &[2.0, y], &[0.0; 2]);
+        let h = 2.0 * share;
+        close(found.qq[0][0], -3.0 * (share * y / h) * (share * y / h) / h);
+        close(found.qq[0][1], 3.0 * (share * share * 2.0) * (y / h) / h / h);
+        close(found.qq[1][1], -3.0 / h);
+    }
+}

@@ -168,7 +168,7 @@ impl Collected {
     /// a r uⁿ⁺¹ − a c r uⁿ w → a r uⁿ (u − c w), where c w is a term of u, a sum with positive coefficients, and n < 0.
     ///
     /// With u = x² + y² this is 1/√u − x²/√u³ → y²/√u³, the second derivative of a distance: nothing cancels any more where y is small. With
-    /// u = z² − x² nothing cancels in 1/√u + x²/√u³, which stays as it is.
+    /// u = z² − x² nothing cancels in 1/√u + x²/√u³, which stays as it is. For h = hypot(x, y), h² is such a sum: 1/h − x²/h³ → y²/h³.
     fn join_parts_of_denominators(&mut self, graph: &mut Graph) {
         while self.terms.len() > 1 {
             let joined = self.terms.iter().find_map(|(x, coefficient)| {
@@ -185,7 +185,10 @@ impl Collected {
             self.terms.remove(&x);
             self.terms.remove(&part.partner);
             let mut factors = part.rest;
-            factors.push((without(graph, part.sum, part.term), 1));
+            factors.push(match part.left {
+                Left::Without { sum, term } => (without(graph, sum, term), 1),
+                Left::Square(x) => (x, 2),
+            });
             let product = graph.product(Constant::ONE, &factors);
             self.push(graph, coefficient, product);
         }
@@ -194,16 +197,29 @@ impl Collected {
 
 /// A product r uⁿ w, where c w is a term of u.
 struct PartOfDenominator {
-    /// u
-    sum: ExprId,
-    /// w
-    term: ExprId,
     /// c
     coefficient: Constant,
     /// r uⁿ
     rest: Vec<(ExprId, i32)>,
     /// r uⁿ⁺¹
     partner: ExprId,
+    left: Left,
+}
+
+/// u − c w
+enum Left {
+    Without { sum: ExprId, term: ExprId },
+    Square(ExprId),
+}
+
+/// A term c w of a sum u that stands below.
+struct TermBelow {
+    coefficient: Constant,
+    /// w
+    factors: Vec<(ExprId, i32)>,
+    /// Which power of the divisor u is.
+    power: i32,
+    left: Left,
 }
 
 /// Of denominators with more terms than this some are left as they are.
@@ -215,19 +231,15 @@ fn parts_of_denominators(graph: &Graph, x: ExprId) -> Vec<PartOfDenominator> {
         return Vec::new();
     };
     let mut found = Vec::new();
-    for (sum, n) in factors.iter().filter(|(_, n)| *n < 0) {
-        for (coefficient, term) in terms_if_positive(graph, *sum) {
-            // In several of the sums within its coefficients add up.
-            if occurrences(graph, *sum, term, &mut SortedMap::new()) > 1 {
-                continue;
-            }
-            let Some(rest) = quotient(graph, factors, term) else {
+    for (divisor, n) in factors.iter().filter(|(_, n)| *n < 0) {
+        for term in terms_below(graph, *divisor) {
+            let Some(rest) = quotient(factors, &term.factors) else {
                 continue;
             };
             let mut partner = rest.clone();
             for (y, m) in &mut partner {
-                if y == sum {
-                    *m = n + 1;
+                if y == divisor {
+                    *m = n + term.power;
                 }
             }
             partner.retain(|(_, m)| *m != 0);
@@ -237,16 +249,62 @@ fn parts_of_denominators(graph: &Graph, x: ExprId) -> Vec<PartOfDenominator> {
             };
             if let Some(partner) = partner {
                 found.push(PartOfDenominator {
-                    sum: *sum,
-                    term,
-                    coefficient,
+                    coefficient: term.coefficient,
                     rest,
                     partner,
+                    left: term.left,
                 });
             }
         }
     }
     found
+}
+
+/// The terms of a divisor that is a sum, or whose square is one.
+fn terms_below(graph: &Graph, divisor: ExprId) -> Vec<TermBelow> {
+    if let Node::Call {
+        function: Function::Hypot,
+        arguments,
+    } = graph.node(divisor)
+        && let [x, y] = arguments[..]
+    {
+        return [(x, y), (y, x)]
+            .map(|(own, other)| {
+                let (coefficient, own) = graph.as_multiple(own);
+                let mut factors = factors_of(graph, own);
+                for (_, n) in &mut factors {
+                    *n = n.saturating_mul(2);
+                }
+                TermBelow {
+                    coefficient: coefficient * coefficient,
+                    factors,
+                    power: 2,
+                    left: Left::Square(other),
+                }
+            })
+            .into();
+    }
+    if graph.as_sum(divisor).is_none() {
+        return Vec::new();
+    }
+    let mut terms = terms_if_positive(graph, divisor);
+    // In several of the sums within its coefficients add up.
+    terms.retain(|(_, term)| occurrences(graph, divisor, *term, &mut SortedMap::new()) <= 1);
+    let below = |(coefficient, term): (Constant, ExprId)| TermBelow {
+        coefficient,
+        factors: factors_of(graph, term),
+        power: 1,
+        left: Left::Without { sum: divisor, term },
+    };
+    terms.into_iter().map(below).collect()
+}
+
+/// The factors of an expression with their exponents.
+fn factors_of(graph: &Graph, x: ExprId) -> Vec<(ExprId, i32)> {
+    match graph.node(x) {
+        Node::Product(factors) => factors.clone(),
+        _ => vec![(x, 1)],
+    }
 }
 
 /// The terms of a sum and of the sums in it with their coefficients, up to a few; none where a coefficient is negative.
@@ -308,17 +366,13 @@ fn without(graph: &mut Graph, sum: ExprId, term: ExprId) -> ExprId {
 }
 
 /// The factors of a product without those of one that is part of it.
-fn quotient(graph: &Graph, factors: &[(ExprId, i32)], by: ExprId) -> Option<Vec<(ExprId, i32)>> {
-    let one = [(by, 1)];
-    let by = match graph.node(by) {
-        Node::Product(by) => by.as_slice(),
-        _ => &one,
-    };
+fn quotient(factors: &[(ExprId, i32)], by: &[(ExprId, i32)]) -> Option<Vec<(ExprId, i32)>> {
     let mut rest = factors.to_vec();
+    let stands = |m: i32, n: i32| if n > 0 { m >= n } else { m <= n };
     for (x, n) in by {
         let (_, m) = rest
             .iter_mut()
-            .find(|(y, m)| y == x && *m >= *n && *n > 0)?;
+            .find(|(y, m)| y == x && stands(*m, *n))?;
         *m -= n;
     }
     rest.retain(|(_, m)| *m != 0);
