@@ -243,3 +243,23 @@ fn choices_are_not_linear() {
         assert_eq!(found, expected, "{text}");
     }
 }
+
+/// A power of a number has no kink, and nothing to choose.
+#[test]
+fn powers_of_numbers_are_smooth() {
+    for parts in [" - 2^-x", " - 0.5^(x*t)", ", force(x) = -dot(x)*3^-x"] {
+        let text = format!("coordinates(x), lagrangian = dot(x)^2/2{parts}");
+        let derivation = derivation(&text);
+        assert!(derivation.structure().smooth, "{text}");
+        let program = derivation
+            .program(Request {
+                first: true,
+                second: true,
+                ..Request::default()
+            })
+            .to_string();
+        assert!(!program.contains("select"), "{text}\n{program}");
+    }
+    let contact = derivation("coordinates(x), lagrangian = dot(x)^2/2 - max(-x, 0)^2");
+    assert!(!contact.structure().smooth);
+}

@@ -253,9 +253,13 @@ fn partial(graph: &mut Graph, id: ExprId, node: &Node, at: usize) -> (Constant, 
             graph.multiply(*exponent, power)
         }
         Node::Power { base, .. } => {
-            // Where the power vanishes its logarithm is infinite, and the slope zero: a contact `max(-x, 0)^e` that is open.
             let logarithm = graph.call(Function::Ln, &[*base]);
             let slope = graph.multiply(logarithm, id);
+            if graph.as_constant(logarithm).is_some() {
+                // A power of a positive number is smooth everywhere.
+                return (Constant::ONE, slope);
+            }
+            // Where the power vanishes its logarithm is infinite, and the slope zero: a contact `max(-x, 0)^e` that is open.
             let zero = graph.constant(Constant::ZERO);
             let size = graph.call(Function::Abs, &[id]);
             graph.select(Comparison::LessOrEqual, size, zero, zero, slope)
