@@ -301,7 +301,13 @@ fn powers_of_absolute_values_at_zero() {
         ("(abs(x)/4)^2.5", 0.0, (0.0, 0.0)),
         ("(abs(x)/4)^2.5", -16.0, (-5.0, 0.46875)),
         ("abs(x)*sign(x)*x", -3.0, (-6.0, 2.0)),
+        ("(x^2)^1.25", 0.0, (0.0, 0.0)),
+        ("(x^2)^1.25", -4.0, (-20.0, 7.5)),
+        ("(4*x^2)^1.25", 0.0, (0.0, 0.0)),
+        ("(4*x^2)^1.25", -2.0, (-40.0, 30.0)),
         ("abs(x)^1.5", 0.0, (0.0, f64::NAN)),
+        ("(x^2)^0.7", 0.0, (0.0, f64::NAN)),
+        ("(3*x^2)^0.7", 0.0, (0.0, f64::NAN)),
     ] {
         match expected {
             (first, second) if second.is_nan() => {
@@ -315,6 +321,7 @@ fn powers_of_absolute_values_at_zero() {
     for (x, expected) in [(0.0, (0.0, 0.0)), (-8.0, (-10.0, 1.875))] {
         check_slopes("abs(x/l)^2.5", &[("l", 2.0)], x, expected);
         check_slopes("abs(x*l)^2.5", &[("l", 0.5)], x, expected);
+        check_slopes("(x^2*l)^1.25", &[("l", 0.25)], x, expected);
     }
     // Of a coordinate that is never negative, without a choice.
     for (x, expected) in [(0.0, (0.0, 0.0)), (8.0, (10.0, 1.875))] {

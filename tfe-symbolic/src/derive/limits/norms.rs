@@ -20,7 +20,7 @@ const MAX_DEPTH: usize = 6;
 /// Degrees are sums of exponents, which may be rounded.
 const ROUNDING: f64 = 1e-6;
 
-/// √(Σ c xᵢ²) with c > 0, or hypot(x₁, x₂).
+/// √(Σ c xᵢ²) with c > 0, also of one square, or hypot(x₁, x₂).
 #[derive(Clone)]
 struct Norm {
     root: Option<ExprId>,
@@ -138,7 +138,7 @@ impl Norm {
                         parts: parts.collect::<Option<_>>()?,
                     });
                 }
-                Node::Sum { .. } => return Self::of_square(graph, x),
+                Node::Sum { .. } | Node::Product(_) => return Self::of_square(graph, x),
                 _ => return None,
             }
         }
