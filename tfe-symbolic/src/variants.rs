@@ -6,7 +6,7 @@
 //!
 //! A pass works on lowered expressions, so what it makes is differentiated like anything else. Coordinates are found by their names in the
 //! model at hand, which passes before may have changed; values of entries hold nothing of the state and mean the same in all of them.
-//! May import `derive` for kinds of constraints, `model`, `syntax`, `diagnostic` and `expr`.
+//! May import `derive` for kinds of constraints and what a sign decides, `model`, `syntax`, `diagnostic` and `expr`.
 
 mod as_syntax;
 mod elastic;

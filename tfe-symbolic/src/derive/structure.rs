@@ -100,7 +100,7 @@ impl Dependence {
 }
 
 /// The expressions whose sign, or whose difference, chooses the value of a node.
-fn deciding(node: &Node) -> Vec<ExprId> {
+pub(crate) fn deciding(node: &Node) -> Vec<ExprId> {
     match node {
         Node::Select { left, right, .. } => vec![*left, *right],
         Node::Call {

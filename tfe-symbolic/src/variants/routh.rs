@@ -9,6 +9,7 @@
 
 use super::target::Places;
 use super::{Ignored, Mistake, Reduction};
+use crate::derive::structure::deciding;
 use crate::diagnostic::{Kind, Span};
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::derivative;
@@ -193,6 +194,7 @@ impl Reduction {
         let velocity = Input::Velocity(Affine::constant(one.at));
         if graph.as_constant(inertia).is_some_and(Constant::is_zero)
             || graph.inputs_of(inertia).contains(&velocity)
+            || decides(graph, self.model.energy, &velocity)
         {
             let name = one.name.clone();
             return Err(Kind::CyclicNotQuadratic { name });
@@ -264,6 +266,13 @@ fn inertia(graph: &mut Graph, energy: ExprId, at: i64) -> ExprId {
     let velocity = Input::Velocity(Affine::constant(at));
     let momentum = derivative(graph, energy, &velocity);
     derivative(graph, momentum, &velocity)
+}
+
+/// Whether the sign of something that holds a velocity decides: the inertia does not show that, as |v| has none.
+fn decides(graph: &Graph, energy: ExprId, velocity: &Input) -> bool {
+    let nodes = graph.reachable(&[energy]).into_iter();
+    let mut deciding = nodes.flat_map(|id| deciding(graph.node(id)));
+    deciding.any(|id| graph.inputs_of(id).contains(velocity))
 }
 
 fn with_rate(graph: &mut Graph, id: ExprId, at: i64, rate: ExprId) -> ExprId {
