@@ -1,17 +1,19 @@
 //! Programs of the engine as Rust statements.
 
+mod results;
+mod values;
+
 use crate::balance::balance;
 use crate::headings::Headings;
 use crate::in_place::is_written_in_place;
-use crate::indices::{at, identifier, index, loop_name, number, real, signed};
+use crate::indices::{identifier, index, loop_name};
 use crate::parts::{Part, Parts};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
-use tfe_symbolic::expr::comparison::Comparison;
 use tfe_symbolic::expr::function::Function;
 use tfe_symbolic::expr::input::{Affine, Input};
 use tfe_symbolic::expr::ordered::{SortedMap, SortedSet};
-use tfe_symbolic::program::{Array, Operand, Operation, Place, Program, Statement, Temporary};
+use tfe_symbolic::program::{Array, Operand, Operation, Program, Statement, Temporary};
 
 /// The arguments and variables of kernels, beside temporaries (`t0`, `sin_x`), indices, and names that begin with two underscores.
 pub(crate) const LOCALS: [&str; 16] = [
@@ -405,7 +407,7 @@ impl<'a> Emitter<'a> {
             return None;
         };
         let array = output.array;
-        let told = array == Array::Value || (self.by_entries && block(array).is_some());
+        let told = array == Array::Value || self.is_entry(array);
         if told || (self.assigns && array == Array::ByQ) {
             return None;
         }
@@ -420,7 +422,7 @@ impl<'a> Emitter<'a> {
                 self.value = Some(value);
                 TokenStream::new()
             }
-            Statement::Store { output, .. } if self.by_entries && block(output.array).is_some() => {
+            Statement::Store { output, .. } if self.is_entry(output.array) => {
                 self.entry(output, &value)
             }
             Statement::Store {
@@ -447,204 +449,6 @@ impl<'a> Emitter<'a> {
                 quote!(#name = #value;)
             }
             _ => TokenStream::new(),
-        }
-    }
-
-    fn entry(&self, output: &Place, value: &TokenStream) -> TokenStream {
-        let Some(block) = block(output.array) else {
-            return TokenStream::new();
-        };
-        let block = format_ident!("{block}");
-        let (row, column) = (index(&output.row), index(&output.column));
-        quote!(entries.add(__tfe::Block::#block, #row, #column, #value);)
-    }
-
-    fn place(&self, output: &Place) -> TokenStream {
-        let second = &self.second;
-        let vector = |array: &TokenStream| at(array, &[&output.row]);
-        let matrix = |array: &TokenStream| at(array, &[&output.row, &output.column]);
-        match output.array {
-            Array::Value => quote!(value),
-            Array::ByZ => vector(&quote!(first.z)),
-            Array::ByQ => vector(&quote!(first.q)),
-            Array::Force => vector(&quote!(first.force)),
-            Array::ZZ => matrix(&quote!(#second zz)),
-            Array::ZQ => matrix(&quote!(#second zq)),
-            Array::QQ => matrix(&quote!(#second qq)),
-            Array::ForceZ => matrix(&quote!(#second force_z)),
-            Array::ForceQ => matrix(&quote!(#second force_q)),
-            Array::Observable(k) => {
-                let k = Literal::usize_unsuffixed(k);
-                quote!(values[#k])
-            }
-            Array::Phi(k) => one(&quote!(values), k),
-            Array::Drift(k) => one(&quote!(drift), k),
-            Array::Row(_) | Array::PsiQ(_) | Array::RowRate(_) => vector(&row(output.array)),
-            Array::Bend => matrix(&quote!(#second bend)),
-            Array::RateQ => matrix(&quote!(#second rate_q)),
-            Array::RateV => matrix(&quote!(#second rate_v)),
-            Array::SitePhi | Array::SiteObservable => vector(&quote!(values)),
-            Array::SiteDrift => vector(&quote!(drift)),
-            // Told entry by entry.
-            Array::SiteRow => TokenStream::new(),
-        }
-    }
-
-    fn clear(&self, cleared: Array) -> TokenStream {
-        let second = &self.second;
-        let vector = |array: TokenStream| quote!(#array.fill(t.like(0.0)););
-        let matrix = |array: TokenStream| quote!(for row in &mut #array { row.fill(t.like(0.0)); });
-        match cleared {
-            _ if self.onto_zeros => TokenStream::new(),
-            // They are sums of what is added from the start.
-            _ if self.by_entries && block(cleared).is_some() => TokenStream::new(),
-            Array::ByZ => vector(quote!(first.z)),
-            Array::ByQ => vector(quote!(first.q)),
-            Array::Force => vector(quote!(first.force)),
-            // The mass matrix alone is passed by reference, the blocks of all second derivatives are fields.
-            Array::ZZ if second.is_empty() => {
-                quote!(for row in zz.iter_mut() {
-                    row.fill(t.like(0.0));
-                })
-            }
-            Array::ZZ => matrix(quote!(#second zz)),
-            Array::ZQ => matrix(quote!(#second zq)),
-            Array::QQ => matrix(quote!(#second qq)),
-            Array::ForceZ => matrix(quote!(#second force_z)),
-            Array::ForceQ => matrix(quote!(#second force_q)),
-            Array::Row(_) | Array::PsiQ(_) | Array::RowRate(_) => vector(row(cleared)),
-            Array::Bend => matrix(quote!(#second bend)),
-            Array::RateQ => matrix(quote!(#second rate_q)),
-            Array::RateV => matrix(quote!(#second rate_v)),
-            Array::SitePhi | Array::SiteObservable => vector(quote!(values)),
-            Array::SiteDrift => vector(quote!(drift)),
-            Array::SiteRow => TokenStream::new(),
-            Array::Value | Array::Observable(_) | Array::Phi(_) | Array::Drift(_) => {
-                TokenStream::new()
-            }
-        }
-    }
-
-    fn operation(&mut self, operation: &Operation) -> TokenStream {
-        match operation {
-            Operation::Add(a, b) => self.binary(a, &quote!(+), b),
-            Operation::Subtract(a, b) => self.binary(a, &quote!(-), b),
-            Operation::Multiply(a, b) => self.binary(a, &quote!(*), b),
-            Operation::Divide(a, b) => self.binary(a, &quote!(/), b),
-            Operation::Negate(a) => {
-                let a = self.operand(a);
-                quote!(-#a)
-            }
-            Operation::IntegerPower(a, exponent) => {
-                let (a, exponent) = (self.operand(a), Literal::i32_unsuffixed(*exponent));
-                quote!(#a.powi(#exponent))
-            }
-            Operation::Power(a, b) => {
-                let (a, b) = (self.operand(a), self.operand(b));
-                quote!(#a.powf(#b))
-            }
-            Operation::Call(function, arguments) => {
-                let method = format_ident!("{}", function.method());
-                let mut arguments = arguments.iter();
-                let receiver = arguments.next().map(|a| self.operand(a));
-                let rest: Vec<_> = arguments.map(|a| self.operand(a)).collect();
-                quote!(#receiver.#method(#(#rest),*))
-            }
-            Operation::Select {
-                comparison,
-                left,
-                right,
-                then,
-                otherwise,
-            } => {
-                let (mut left, mut right) = (self.operand(left), self.operand(right));
-                let (then, otherwise) = (self.operand(then), self.operand(otherwise));
-                if matches!(comparison, Comparison::Greater | Comparison::GreaterOrEqual) {
-                    std::mem::swap(&mut left, &mut right);
-                }
-                let method = match comparison {
-                    Comparison::Less | Comparison::Greater => quote!(less),
-                    Comparison::LessOrEqual | Comparison::GreaterOrEqual => quote!(less_or_equal),
-                };
-                quote!(R::select(#left.#method(#right), #then, #otherwise))
-            }
-        }
-    }
-
-    fn binary(&mut self, a: &Operand, operator: &TokenStream, b: &Operand) -> TokenStream {
-        let (a, b) = (self.operand(a), self.operand(b));
-        quote!(#a #operator #b)
-    }
-
-    fn operand(&mut self, operand: &Operand) -> TokenStream {
-        match operand {
-            Operand::Temporary(temporary) => {
-                let name = self.name(*temporary);
-                quote!(#name)
-            }
-            Operand::Constant(value) => {
-                let value = number(*value);
-                quote!(t.like(#value))
-            }
-            Operand::Input(input) => self.input(input),
-        }
-    }
-
-    fn input(&mut self, input: &Input) -> TokenStream {
-        match input {
-            Input::Time => quote!(t),
-            Input::Coordinate(a) => at(&quote!(q), &[a]),
-            Input::Velocity(a) | Input::Momentum(a) => {
-                let z = &self.z;
-                at(&quote!(#z), &[a])
-            }
-            Input::Multiplier(a) => at(&quote!(mu), &[a]),
-            Input::Control(name) => {
-                let place = self.inputs.iter().position(|own| own == name);
-                let place = Literal::usize_unsuffixed(place.unwrap_or_default());
-                quote!(inputs[#place])
-            }
-            Input::Parameter(name) => {
-                let local = match self.parameters.get(name) {
-                    Some(local) => local.clone(),
-                    None => self.local_name(name),
-                };
-                self.parameters.insert(name.clone(), local.clone());
-                quote!(#local)
-            }
-            Input::ParameterElement(name, a) => {
-                let field = identifier(name);
-                let element = at(&quote!(self.#field), &[a]);
-                let first = self.places.get(name);
-                match first.and_then(|first| first.plus_scaled(a, 1)) {
-                    Some(place) => {
-                        let place = index(&place);
-                        quote!(t.parameter(#place, #element))
-                    }
-                    None => match self.run_time_places.get(name) {
-                        Some(first) => {
-                            let a = index(a);
-                            let place = match first.to_string().as_str() {
-                                "0" => quote!(#a),
-                                _ => quote!(#first + #a),
-                            };
-                            quote!(t.parameter(#place, #element))
-                        }
-                        None => quote!(t.like(#element)),
-                    },
-                }
-            }
-            // Entries of lists may be any numbers.
-            Input::Integer(a) if a.holds_entry() => {
-                let value = real(a);
-                quote!(t.like(#value))
-            }
-            Input::Integer(a) => {
-                let value = signed(a);
-                quote!(t.like((#value) as f64))
-            }
-            // Programs have none.
-            Input::Placeholder(..) => TokenStream::new(),
         }
     }
 
@@ -715,34 +519,4 @@ impl<'a> Emitter<'a> {
     fn is_parameter(&self, name: &str) -> bool {
         self.parameters.values().any(|local| local == name)
     }
-}
-
-/// The block of a second derivative.
-fn block(array: Array) -> Option<&'static str> {
-    match array {
-        Array::ZZ => Some("ZZ"),
-        Array::ZQ => Some("ZQ"),
-        Array::QQ => Some("QQ"),
-        Array::ForceZ => Some("ForceZ"),
-        Array::ForceQ => Some("ForceQ"),
-        Array::SiteRow => Some("Row"),
-        Array::Bend => Some("Bend"),
-        _ => None,
-    }
-}
-
-/// The row of a constraint.
-fn row(array: Array) -> TokenStream {
-    match array {
-        Array::PsiQ(k) => one(&quote!(psi_q), k),
-        Array::RowRate(k) => one(&quote!(row_rates), k),
-        Array::Row(k) => one(&quote!(rows), k),
-        _ => TokenStream::new(),
-    }
-}
-
-/// The element of an array that this number names.
-fn one(array: &TokenStream, number: usize) -> TokenStream {
-    let number = Literal::usize_unsuffixed(number);
-    quote!(#array[#number])
 }
