@@ -1,5 +1,8 @@
 //! From tokens to tokens: the whole expansion, read from top to bottom.
 
+mod sensitivities;
+mod without_inputs;
+
 use crate::controls::{self, Controls};
 use crate::docs::Docs;
 use crate::emit::{self, Emitter, Signature};
@@ -18,10 +21,8 @@ use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::diagnostic::Kind;
 use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::expr::ordered::SortedMap;
-use tfe_symbolic::model::declared::{Declared, Form, Observable, Parameter, names};
-use tfe_symbolic::model::notation;
-use tfe_symbolic::program::{By, Program, Request};
-use tfe_symbolic::syntax::context::{FieldKind, Length};
+use tfe_symbolic::model::declared::{Declared, Form, Observable, names};
+use tfe_symbolic::program::{Program, Request};
 
 /// Kernels of more operations are not compiled once more for several points at once: they would take longer to compile than they save.
 const LANES_LIMIT: usize = 4000;
@@ -423,92 +424,6 @@ impl<'a> Kernels<'a> {
         controls::kernel(self.declared, name)
     }
 
-    /// The kernels of `Model` where those of `Controlled` are given inputs: all of them zero. `lanes` says whether the first derivatives are there for several points at once.
-    fn without_inputs(&self, lanes: Option<TokenStream>) -> TokenStream {
-        let dof = &self.dof;
-        let trait_name = quote!(<Self as __tfe::Controlled<#dof>>);
-        let zeros = controls::zeros();
-        let observables = (!self.declared.observables.is_empty()).then(|| {
-            quote! {
-                fn observables<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], values: &mut [R]) {
-                    #trait_name::observables_with(self, #zeros, t, q, z, values);
-                }
-            }
-        });
-        let first_by = (!self.declared.sensitivities.is_empty()).then(|| {
-            quote! {
-                fn first_by<R: __tfe::Real>(
-                    &self,
-                    by: __tfe::By,
-                    t: R,
-                    q: &[R; #dof],
-                    z: &[R; #dof],
-                    first: &mut __tfe::First<R, #dof>,
-                ) {
-                    #trait_name::first_by_with(self, by, #zeros, t, q, z, first);
-                }
-            }
-        });
-        let lanes = lanes.map(|lanes| {
-            quote! {
-                const LANES: bool = #lanes;
-
-                #[inline(always)]
-                fn first_inline<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>) {
-                    #trait_name::first_with(self, #zeros, t, q, z, first);
-                }
-
-                #[inline(always)]
-                fn first_and_mass_inline<R: __tfe::Real>(
-                    &self,
-                    t: R,
-                    q: &[R; #dof],
-                    z: &[R; #dof],
-                    first: &mut __tfe::First<R, #dof>,
-                    zz: &mut [[R; #dof]; #dof],
-                ) {
-                    #trait_name::first_and_mass_with(self, #zeros, t, q, z, first, zz);
-                }
-            }
-        });
-        quote! {
-            fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
-                #trait_name::energy_function_with(self, #zeros, t, q, z)
-            }
-
-            #lanes
-
-            fn first<R: __tfe::Real>(&self, t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>) {
-                #trait_name::first_with(self, #zeros, t, q, z, first);
-            }
-
-            fn first_and_mass<R: __tfe::Real>(
-                &self,
-                t: R,
-                q: &[R; #dof],
-                z: &[R; #dof],
-                first: &mut __tfe::First<R, #dof>,
-                zz: &mut [[R; #dof]; #dof],
-            ) {
-                #trait_name::first_and_mass_with(self, #zeros, t, q, z, first, zz);
-            }
-
-            fn second<R: __tfe::Real>(
-                &self,
-                t: R,
-                q: &[R; #dof],
-                z: &[R; #dof],
-                first: &mut __tfe::First<R, #dof>,
-                second: &mut __tfe::Second<R, #dof>,
-            ) {
-                #trait_name::second_with(self, #zeros, t, q, z, first, second);
-            }
-
-            #observables
-            #first_by
-        }
-    }
-
     /// A line for each kernel: value, first derivatives, those with the mass matrix, all.
     fn docs(&self) -> [String; 4] {
         let nothing = Request::default();
@@ -614,98 +529,6 @@ impl<'a> Kernels<'a> {
             }
         };
         (names, kernel)
-    }
-
-    /// The names and values of the parameters of `sensitivity(…)`; the derivatives by them and by the time.
-    fn sensitivities(&self) -> (TokenStream, TokenStream) {
-        let parameters = &self.declared.sensitivities;
-        if parameters.is_empty() {
-            return Default::default();
-        }
-        let names = parameters.iter().map(ToString::to_string);
-        let values = parameters.iter().enumerate().map(|(k, parameter)| {
-            let (k, value) = (Literal::usize_unsuffixed(k), self.parameter(parameter));
-            quote!(#k => #value,)
-        });
-        let values = quote! {
-            const SENSITIVITIES: &'static [&'static str] = &[#(#names),*];
-
-            fn sensitivity_parameter(&self, index: usize) -> f64 {
-                match index {
-                    #(#values)*
-                    _ => ::core::primitive::f64::NAN,
-                }
-            }
-        };
-        (values, self.first_by())
-    }
-
-    /// The value of a parameter; NaN where an array of any length is too short for it.
-    fn parameter(&self, parameter: &Parameter) -> TokenStream {
-        let field = indices::identifier(&parameter.field);
-        let Some(element) = parameter.element.map(Literal::usize_unsuffixed) else {
-            return quote!(self.#field);
-        };
-        let kind = input::context(self.item)
-            .field(&parameter.field)
-            .map(|field| field.kind.clone());
-        match kind {
-            Some(FieldKind::Array(Length::Literal(_))) => quote!(self.#field[#element]),
-            _ => quote!(self.#field.get(#element).copied().unwrap_or(::core::primitive::f64::NAN)),
-        }
-    }
-
-    /// `first_by`, with an arm for the time and for each parameter that anything depends on.
-    fn first_by(&self) -> TokenStream {
-        let dof = &self.dof;
-        let arm = |by: By| {
-            let program = self.derivation.program_by(by);
-            let (pattern, name) = match by {
-                By::Time => (quote!(__tfe::By::Time), "t".to_owned()),
-                By::Parameter(k) => {
-                    let name = notation::element(&self.declared.sensitivities[k].to_string());
-                    let k = Literal::usize_unsuffixed(k);
-                    (quote!(__tfe::By::Parameter(#k)), name)
-                }
-            };
-            let doc = page::kernel(&format!("∂/∂{name}"), &program);
-            let body = self.emitted(&program, TokenStream::new()).statements;
-            (!program.statements.is_empty()).then(|| quote!(#[doc = #doc] #pattern => { #body }))
-        };
-        let parameters = 0..self.declared.sensitivities.len();
-        let arms: Vec<_> = std::iter::once(By::Time)
-            .chain(parameters.map(By::Parameter))
-            .filter_map(arm)
-            .collect();
-        if arms.is_empty() && self.declared.inputs.is_empty() {
-            return TokenStream::new();
-        }
-        let (given, kernel) = (
-            Controls::of(self.declared).parameter,
-            self.kernel("first_by"),
-        );
-        let formulas = Formulas::of(self.declared, self.derivation);
-        let doc = format!(
-            " Derivatives of {} by the time and by parameters",
-            formulas.first
-        );
-        quote! {
-            #[doc = #doc]
-            fn #kernel<R: __tfe::Real>(
-                &self,
-                by: __tfe::By,
-                #given
-                t: R,
-                q: &[R; #dof],
-                z: &[R; #dof],
-                first: &mut __tfe::First<R, #dof>,
-            ) {
-                match by {
-                    #(#arms)*
-                    _ => {}
-                }
-            }
-        }
     }
 
     /// `state`, `structure`, and one method for each observable.
