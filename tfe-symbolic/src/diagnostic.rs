@@ -4,6 +4,7 @@
 
 pub mod kind;
 mod remedies;
+mod role;
 pub mod span;
 mod wording;
 
@@ -11,7 +12,8 @@ use std::fmt::Write as _;
 
 use crate::expr::sorting::sort_by_key;
 
-pub use kind::{Kind, Role};
+pub use kind::Kind;
+pub use role::Role;
 pub use span::Span;
 
 /// One mistake.
