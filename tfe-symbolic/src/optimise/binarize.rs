@@ -4,6 +4,7 @@
 //! with the value instead of costing a negation, until a sum absorbs it.
 
 mod demand;
+mod family;
 mod fractions;
 
 use crate::expr::constant::{Constant, is_decimal};
@@ -12,132 +13,15 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
 use crate::expr::ordered::{SortedMap, SortedSet};
 use crate::expr::sorting::sort_by_key;
-use crate::optimise::cse::{self, Item, Kind, Operands, Pair};
+use crate::optimise::cse::{Item, Kind, Operands, Pair};
 use crate::optimise::plan::{Op, Plan, Value};
 use demand::{Multiple, ONE, PositiveConstant, Terms, demanded, gather, multiple};
+use family::{Family, Meaning};
 use fractions::{Factors, Fractions, LARGEST_PRODUCT_POWER};
 
 /// Arranges what the roots need.
 pub(crate) fn arrange(graph: &Graph, roots: &[ExprId]) -> Plan {
     Arranger::new(graph).run(roots)
-}
-
-/// What an operand stands for.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-enum Meaning {
-    /// A multiple of an expression (of a product in sums, of an atom, with factor 1, in products).
-    Multiple(Multiple),
-    Number(Constant),
-    /// 1 / Π x
-    Reciprocal(Vec<ExprId>),
-    /// xⁿ for large n
-    LargePower(ExprId, i32),
-    /// A fraction that several products have.
-    Fraction(usize),
-    /// A group of operands that vary in fewer loops than the whole.
-    Group(usize),
-}
-
-/// Sums, or products, with the operands they share.
-struct Family {
-    kind: Kind,
-    meanings: Vec<Meaning>,
-    items: Map<Meaning, Item>,
-    loops: Vec<u64>,
-    sets: Vec<Operands>,
-    known: Map<Vec<(Item, i32)>, usize>,
-    pairs: Vec<Pair>,
-    /// Of pairs and of sets, once they are built.
-    built_pairs: Vec<Option<Value>>,
-    built_sets: Vec<Option<Value>>,
-}
-
-impl Family {
-    fn new(kind: Kind) -> Self {
-        Self {
-            kind,
-            meanings: Vec::new(),
-            items: Map::default(),
-            loops: Vec::new(),
-            sets: Vec::new(),
-            known: Map::default(),
-            pairs: Vec::new(),
-            built_pairs: Vec::new(),
-            built_sets: Vec::new(),
-        }
-    }
-
-    fn item(&mut self, meaning: Meaning, loops: u64) -> Item {
-        if let Some(item) = self.items.get(&meaning) {
-            return *item;
-        }
-        let item = self.meanings.len() as Item;
-        self.meanings.push(meaning.clone());
-        self.loops.push(loops);
-        self.items.insert(meaning, item);
-        item
-    }
-
-    /// The set of these operands; what varies in fewer loops than the rest is grouped, so that it can be computed outside of them.
-    fn set(&mut self, operands: Operands) -> usize {
-        let whole = operands
-            .keys()
-            .fold(0, |mask, item| mask | self.loops[*item as usize]);
-        let mut classes: SortedMap<u64, Operands> = SortedMap::new();
-        for (item, power) in &operands {
-            classes
-                .get_or_default(self.loops[*item as usize])
-                .insert(*item, *power);
-        }
-        let mut grouped = Operands::new();
-        // Outer ones first: what varies in no loop goes with what varies in one.
-        let mut outer = (0, Operands::new());
-        for (loops, class) in classes {
-            if loops == whole {
-                grouped.extend(class);
-            } else if outer.0 & !loops == 0 {
-                let (inside, class_inside) = outer;
-                let mut class = class;
-                self.put_together(class_inside, inside, &mut class);
-                outer = (loops, class);
-            } else {
-                self.put_together(class, loops, &mut grouped);
-            }
-        }
-        self.put_together(outer.1, outer.0, &mut grouped);
-        self.intern(grouped)
-    }
-
-    /// Adds operands to others, several of them as one.
-    fn put_together(&mut self, class: Operands, loops: u64, whole: &mut Operands) {
-        if class.len() < 2 {
-            whole.extend(class);
-        } else {
-            let set = self.intern(class);
-            let item = self.item(Meaning::Group(set), loops);
-            whole.insert(item, 1);
-        }
-    }
-
-    fn intern(&mut self, operands: Operands) -> usize {
-        let key: Vec<_> = operands
-            .iter()
-            .map(|(item, power)| (*item, *power))
-            .collect();
-        if let Some(set) = self.known.get(&key) {
-            return *set;
-        }
-        self.sets.push(operands);
-        self.known.insert(key, self.sets.len() - 1);
-        self.sets.len() - 1
-    }
-
-    fn pair(&mut self) {
-        let first = self.meanings.len() as Item;
-        self.pairs = cse::extract(self.kind, &mut self.sets, first);
-        self.built_pairs = vec![None; self.pairs.len()];
-        self.built_sets = vec![None; self.sets.len()];
-    }
 }
 
 /// A product over another: sets of the family of products.
