@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use tfe_symbolic::compile::declare;
 use tfe_symbolic::diagnostic::{Bag, Span};
 use tfe_symbolic::expr::comparison::Comparison;
+use tfe_symbolic::model::notation::formula;
 use tfe_symbolic::syntax::ast::{
     BinaryOperator, ElementSyntax, Entry, Expr, ExprKind, Item, Pass, Range, Spanned,
 };
@@ -65,6 +66,21 @@ fn precedence() {
     check("x[1]^2", "(x[1]^2)");
     check("-x[i+1]", "(-x[(i+1)])");
     check("a - -b", "(a-(-b))");
+}
+
+#[test]
+fn formulas_are_written_as_they_are_meant() {
+    for (text, expected) in [
+        ("(x^2)^3", "(x²)³"),
+        ("(x^n)^2", "(x^n)²"),
+        ("((x + 1)^2)^n", "((x + 1)²)^n"),
+        ("x^n^2", "x^n²"),
+        ("sin(x)^2", "(sin x)²"),
+        ("3*(1/2)", "3·½"),
+        ("x*(1/2)*y", "x ½ y"),
+    ] {
+        assert_eq!(formula(&parsed(text)), expected);
+    }
 }
 
 #[test]

@@ -178,7 +178,9 @@ fn chain(expr: &Expr) -> (String, Tight) {
                 let right_text = at_least(right, Tight::Product);
                 let left = bracketed(text, own, Tight::Signed);
                 // Two numbers side by side would read as one.
-                let digits = right_text.starts_with(|c: char| c.is_ascii_digit());
+                let digit = |c: char| c.is_ascii_digit();
+                let digits = right_text.starts_with(digit)
+                    || (right_text.starts_with('½') && left.ends_with(digit));
                 let product = format!("{left}{}{right_text}", if digits { "·" } else { " " });
                 (
                     product,
@@ -211,7 +213,7 @@ fn chain(expr: &Expr) -> (String, Tight) {
                 }
             },
             BinaryOperator::Power => {
-                let left = if is_call(left) || own < Tight::Atom {
+                let left = if is_call(left) || is_power(left) || own < Tight::Atom {
                     format!("({text})")
                 } else {
                     text
@@ -232,6 +234,17 @@ fn chain(expr: &Expr) -> (String, Tight) {
 /// `cos θ` next to an exponent would be read as `cos(θ²)`.
 fn is_call(expr: &Expr) -> bool {
     matches!(&expr.node, ExprKind::Call { function, .. } if function.node != "dot")
+}
+
+/// `x²` next to an exponent would be read as `x^(23)`.
+fn is_power(expr: &Expr) -> bool {
+    matches!(
+        &expr.node,
+        ExprKind::Binary {
+            operator: BinaryOperator::Power,
+            ..
+        }
+    )
 }
 
 fn called(function: &str, arguments: &[Expr]) -> (String, Tight) {
