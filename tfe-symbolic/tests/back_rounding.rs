@@ -131,8 +131,9 @@ fn second_derivatives_of_distances_do_not_cancel() {
         let parameters = [("k", 3.0), ("l", l)];
         let found = results_of(&text, &parameters, second, &[2.0, y], &[0.0; 2]);
         let h = 2.0 * share;
-        close(found.qq[0][0], -3.0 * (share * y / h) * (share * y / h) / h);
-        close(found.qq[0][1], 3.0 * (share * share * 2.0) * (y / h) / h / h);
+        let slope = share * y / h;
+        close(found.qq[0][0], -3.0 * slope * slope / h);
+        close(found.qq[0][1], 3.0 * slope * share * 2.0 / (h * h));
         close(found.qq[1][1], -3.0 / h);
     }
 }

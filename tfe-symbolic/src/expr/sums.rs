@@ -370,9 +370,7 @@ fn quotient(factors: &[(ExprId, i32)], by: &[(ExprId, i32)]) -> Option<Vec<(Expr
     let mut rest = factors.to_vec();
     let stands = |m: i32, n: i32| if n > 0 { m >= n } else { m <= n };
     for (x, n) in by {
-        let (_, m) = rest
-            .iter_mut()
-            .find(|(y, m)| y == x && stands(*m, *n))?;
+        let (_, m) = rest.iter_mut().find(|(y, m)| y == x && stands(*m, *n))?;
         *m -= n;
     }
     rest.retain(|(_, m)| *m != 0);
