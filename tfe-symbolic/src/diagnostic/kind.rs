@@ -548,6 +548,8 @@ kinds! {
     },
     /// `x/0`
     DivisionByZero,
+    /// `(-8)^(1/3)`
+    RootOfNegative,
     /// `ln(-1)`
     OutsideDomain {
         /// The function.

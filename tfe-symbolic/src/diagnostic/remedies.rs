@@ -304,6 +304,9 @@ impl Kind {
                     .into()
             }
             Self::ProductOfVectors => "use `inner(a, b)` or `cross(a, b)`".into(),
+            Self::RootOfNegative => {
+                "put the sign in front for an odd root, as in `-8^(1/3)`".into()
+            }
             Self::PowerOfVector => "use `inner(r, r)` for the square of the length".into(),
             Self::DivisionByVector => "divide by its `norm`".into(),
             Self::WholeArray { name } => format!("write an element such as `{name}[i]`"),

@@ -244,6 +244,7 @@ impl Kind {
                 format!("exponent `{exponent}` varies while the base may become negative")
             }
             Self::DivisionByZero => "division by zero".into(),
+            Self::RootOfNegative => "a power of a negative number needs a whole exponent".into(),
             Self::OutsideDomain { function } => {
                 format!("`{function}` is defined {} only", domain_words(*function))
             }

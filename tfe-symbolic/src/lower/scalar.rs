@@ -148,6 +148,11 @@ impl Lowerer<'_> {
             self.report(base.span, Kind::DivisionByZero);
             return None;
         }
+        let is_fraction = exponent_value.is_some_and(|value| value.to_f64().fract() != 0.0);
+        if is_fraction && base_value.is_some_and(Constant::is_negative) {
+            self.report(base.span, Kind::RootOfNegative);
+            return None;
+        }
         let positive = base_value.is_some_and(|value| value.to_f64() > 0.0);
         if exponent_value.is_none() && !positive && self.varies(b) {
             let (base, text) = (base.to_string(), exponent.to_string());
