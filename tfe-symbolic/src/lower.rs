@@ -373,7 +373,11 @@ impl<'a> Lowerer<'a> {
                 then,
                 otherwise,
             } => self.select(*comparison, [left, right], [then, otherwise]),
-            ExprKind::Sum { range, body } => self.sum(range, body),
+            ExprKind::Sum { range, body } => {
+                let value = self.sum(range, body);
+                self.finite(&value, expr);
+                value
+            }
             ExprKind::Vector(components) => {
                 if components.is_empty() {
                     self.report(expr.span, Kind::EmptyVector);

@@ -184,13 +184,17 @@ impl Lowerer<'_> {
     }
 
     /// Reports numbers that overflow when they are folded.
-    fn finite(&mut self, value: &Value, expr: &Expr) {
-        if let Value::Scalar(id) = value
-            && self
-                .graph
-                .as_constant(*id)
-                .is_some_and(|value| !value.to_f64().is_finite())
-        {
+    pub(super) fn finite(&mut self, value: &Value, expr: &Expr) {
+        let parts = match value {
+            Value::Scalar(id) => std::slice::from_ref(id),
+            Value::Vector(components) => components.as_slice(),
+            Value::Error => &[],
+        };
+        let is_infinite = |id: &ExprId| {
+            let number = self.graph.as_constant(*id);
+            number.is_some_and(|number| !number.to_f64().is_finite())
+        };
+        if parts.iter().any(is_infinite) {
             self.report(
                 expr.span,
                 Kind::NumberTooLarge {
