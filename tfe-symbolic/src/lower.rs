@@ -177,6 +177,8 @@ struct Index {
     variable: LoopVariable,
     start: Affine,
     end: Affine,
+    /// What it is more than its variable, which begins at zero or above: programs have no loops below zero.
+    offset: i64,
     /// Its value, where the sum is written out turn by turn while it is lowered.
     at: Option<i64>,
 }
@@ -186,7 +188,10 @@ impl Index {
     fn value(&self) -> Affine {
         match self.at {
             Some(at) => Affine::constant(at),
-            None => Affine::symbol(IndexSymbol::Loop(self.variable)),
+            None => Affine {
+                constant: self.offset,
+                ..Affine::symbol(IndexSymbol::Loop(self.variable))
+            },
         }
     }
 }

@@ -455,3 +455,33 @@ fn chains_of_lets_with_loops() {
         assert!((slope - factor * q).abs() < 1e-13 * slope.abs());
     }
 }
+
+/// Programs have no loops below zero, wherever the index begins.
+#[test]
+fn indices_that_begin_below_zero() {
+    for (below, from_zero) in [
+        (
+            "sum(i in -2..N-2, k*q[i+2]^3*(i + 1))",
+            "sum(i in 0..N, k*q[i]^3*(i - 1))",
+        ),
+        (
+            "sum(i in 0..N-5, sum(j in i-5..i, k*q[i]*q[j+5]^2))",
+            "sum(i in 0..N-5, sum(j in 0..5, k*q[i]*q[i+j]^2))",
+        ),
+        (
+            "sum(i in -9..N-9, sum(j in -3..i-1, k*q[i+9]*q[j+3]))",
+            "sum(i in 0..N, sum(j in 0..i-7, k*q[i]*q[j]))",
+        ),
+    ] {
+        let [below, from_zero] = [below, from_zero].map(|sum| {
+            format!("coordinates(q[N]), lagrangian = sum(i in 0..N, m/2*dot(q[i])^2) - {sum}")
+        });
+        let declared = declare(&below, &context(&below)).expect("a model");
+        let program = Derivation::of(&declared).program(ALL).to_string();
+        assert!(
+            !program.contains("in -") && !program.contains("in i-"),
+            "{program}"
+        );
+        assert_same(&results(&below, 12, ALL), &results(&from_zero, 12, ALL));
+    }
+}

@@ -619,6 +619,11 @@ kinds! {
         /// The range as written.
         range: String,
     },
+    /// `output(x[i in -2..n])`
+    SitesBelowZero {
+        /// The range as written.
+        range: String,
+    },
     /// A sum inside a nonlinear expression of an energy, too long to be written out.
     NonlinearSum {
         /// The longest sum that is written out.

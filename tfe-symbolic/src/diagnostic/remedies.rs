@@ -313,6 +313,9 @@ impl Kind {
             Self::IndexNotConstant { .. } => {
                 "an index that varies needs a coordinate array or an array field".into()
             }
+            Self::SitesBelowZero { .. } => {
+                "begin at zero, and shift the index inside of the formula".into()
+            }
             Self::NonlinearSum { limit } => format!(
                 "make the length a number of at most {limit}, or rewrite the energy as a sum of \
                  local terms"

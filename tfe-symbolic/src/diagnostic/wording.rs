@@ -287,6 +287,9 @@ impl Kind {
                 format!("{reached} outside `{array}`{}", length.unwrap_or_default())
             }
             Self::EmptyRange { range } => format!("range `{range}` is empty"),
+            Self::SitesBelowZero { range } => {
+                format!("sites are counted from zero, and range `{range}` begins below")
+            }
             Self::NonlinearSum { .. } => {
                 "a sum in a loop stands inside a nonlinear expression of the energy".into()
             }

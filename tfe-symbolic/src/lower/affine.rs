@@ -270,9 +270,17 @@ impl Lowerer<'_> {
         let ranges: Vec<String> = shown
             .map(
                 |Index {
-                     name, start, end, ..
+                     name,
+                     start,
+                     end,
+                     offset,
+                     ..
                  }| {
-                    format!("{name} in {}..{}", self.in_words(start), self.in_words(end))
+                    let bound = |bound: &Affine| {
+                        let own = bound.plus_scaled(&Affine::constant(*offset), 1);
+                        self.in_words(own.as_ref().unwrap_or(bound))
+                    };
+                    format!("{name} in {}..{}", bound(start), bound(end))
                 },
             )
             .collect();
@@ -285,11 +293,15 @@ impl Lowerer<'_> {
     }
 
     fn with_names(&self, affine: &Affine) -> Affine {
+        let mut constant = affine.constant;
         let named = |(symbol, coefficient): &(IndexSymbol, i64)| {
             let index = self
                 .indices
                 .iter()
                 .find(|x| *symbol == IndexSymbol::Loop(x.variable));
+            // The variable is the index less its offset.
+            let less = index.map_or(0, |index| coefficient.saturating_mul(index.offset));
+            constant = constant.saturating_sub(less);
             let symbol = match (index, symbol) {
                 (Some(index), _) => IndexSymbol::Field(index.name.clone()),
                 (None, IndexSymbol::Entry(list, place)) => {
@@ -299,10 +311,8 @@ impl Lowerer<'_> {
             };
             (symbol, *coefficient)
         };
-        Affine {
-            constant: affine.constant,
-            terms: affine.terms.iter().map(named).collect(),
-        }
+        let terms = affine.terms.iter().map(named).collect();
+        Affine { constant, terms }
     }
 
     /// The side on which an index leaves its array whatever the generic lengths are; `None` if there may be lengths for which it

@@ -71,6 +71,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
+            offset: 0,
             at: None,
         });
         let result = self.value(value);

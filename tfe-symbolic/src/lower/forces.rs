@@ -145,6 +145,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
+            offset: 0,
             at: None,
         });
         let value = self.scalar(value);

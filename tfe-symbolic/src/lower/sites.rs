@@ -109,6 +109,11 @@ impl Lowerer<'_> {
             self.report(whole, Kind::EmptyRange { range });
             return None;
         }
+        if start.as_constant().is_some_and(|start| start < 0) {
+            let range = format!("{}..{}", range.start, range.end);
+            self.report(whole, Kind::SitesBelowZero { range });
+            return None;
+        }
         let index = &range.variable.node;
         let text = format!("{argument}({name}[{index} in {start}..{end}])");
         self.place = Some(DeclaredPlace { text, own: 1 });
@@ -123,6 +128,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
+            offset: 0,
             at: None,
         });
         self.require_turns(&sites);

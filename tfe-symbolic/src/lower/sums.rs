@@ -47,6 +47,13 @@ impl Lowerer<'_> {
         let end = bounds
             .1
             .unwrap_or(Affine::symbol(IndexSymbol::Field("…".into())));
+        let offset = self.below_zero(&start);
+        let from_zero = |bound: Affine| bound.plus_scaled(&Affine::constant(offset), -1);
+        let (Some(start), Some(end)) = (from_zero(start), from_zero(end)) else {
+            let number = range.start.to_string();
+            self.report(whole, Kind::NumberTooLarge { number });
+            return Value::Error;
+        };
         let variable = self.depth();
         let (name, range) = (
             range.variable.node.clone(),
@@ -62,6 +69,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
+            offset,
             at: None,
         });
         if known {
@@ -105,13 +113,20 @@ impl Lowerer<'_> {
         }
     }
 
+    /// The least value of a bound, where that is known and below zero; else zero.
+    fn below_zero(&self, bound: &Affine) -> i64 {
+        let least = self.extreme(bound, false);
+        let least = least.and_then(|least| least.as_constant());
+        least.map_or(0, |least| least.min(0))
+    }
+
     /// A sum over a literal range, lowered anew for each value of its index.
     fn each_turn(&mut self, (first, end): (i64, i64), index: &mut Index, body: &Expr) -> Value {
         let mut total: Option<Value> = None;
-        for at in first..end {
-            index.at = Some(at);
-            index.start = Affine::constant(at);
-            index.end = Affine::constant(at + 1);
+        for turn in first..end {
+            index.at = Some(turn.saturating_add(index.offset));
+            index.start = Affine::constant(turn);
+            index.end = Affine::constant(turn + 1);
             self.indices.push(index.clone());
             let value = self.value(body);
             self.indices.pop();
