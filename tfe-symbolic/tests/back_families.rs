@@ -201,3 +201,19 @@ fn requirements_of_lengths() {
         ]
     );
 }
+
+/// The last five of three sites: loops would begin at zero.
+#[test]
+fn indices_that_begin_below_zero_at_some_lengths() {
+    let text = "coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in n-5..n, k*q[i]^2)";
+    let mut all: Vec<String> = declared(text).requirements.iter().map(told).collect();
+    all.sort();
+    assert_eq!(
+        all,
+        [
+            "q[i] for i in n-5..n, 1 loops",
+            "q[n-5] for , 0 loops",
+            "turns of i in 0..n",
+        ]
+    );
+}

@@ -15,6 +15,14 @@ impl Lowerer<'_> {
     /// Notes that an index of which nothing can be said here has to stay inside its array.
     pub(super) fn require_index(&mut self, array: &str, place: &Affine, length: Extent) {
         let nest = self.needed(place);
+        // Loops count from zero on, and do not come to an index below it.
+        let low = self.extreme(place, false);
+        let low = low.filter(|low| low != place && !place.holds_entry() && may_be_below_zero(low));
+        if let Some(low) = low
+            && nest.iter().all(has_turns)
+        {
+            self.require_index(array, &low, length.clone());
+        }
         let requirement = Requirement::Index {
             array: array.to_owned(),
             text: self.in_words(place),
@@ -89,6 +97,18 @@ impl Lowerer<'_> {
         needed.reverse();
         needed
     }
+}
+
+/// Whether there are lengths for which an index is below zero.
+fn may_be_below_zero(index: &Affine) -> bool {
+    index.constant < 0 || index.terms.iter().any(|(_, factor)| *factor < 0)
+}
+
+/// Whether a range is known to hold something.
+fn has_turns(range: &SumRange) -> bool {
+    let length = range.end.plus_scaled(&range.start, -1);
+    let length = length.and_then(|length| length.as_constant());
+    length.is_some_and(|length| length > 0)
 }
 
 /// Whether it can be checked as soon as const parameters are known.
