@@ -129,12 +129,19 @@ impl<T: Into<String>> From<T> for Axis {
     }
 }
 
+/// The smallest positive number: ranges of the very smallest numbers are not empty either.
+const LEAST: f64 = f64::from_bits(1);
+
 /// A range around [low, high] that is not empty, within the finite numbers.
 fn widened_linear(low: f64, high: f64, margin: f64) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     // Numbers that differ by rounding only are one number.
     let room = if high - low <= 1e-12 * size {
-        if size == 0.0 { 1.0 } else { 0.1 * size }
+        if size == 0.0 {
+            1.0
+        } else {
+            (0.1 * size).max(LEAST)
+        }
     } else {
         margin * high - margin * low
     };
@@ -149,10 +156,7 @@ fn widened_logarithmic(low: f64, high: f64, margin: f64) -> (f64, f64) {
         margin * decades
     };
     let factor = 10_f64.powf(room);
-    (
-        (low / factor).max(f64::MIN_POSITIVE),
-        (high * factor).min(f64::MAX),
-    )
+    ((low / factor).max(LEAST), (high * factor).min(f64::MAX))
 }
 
 /// A mark on an axis.
@@ -442,6 +446,21 @@ mod tests {
         assert!((extent.start - 0.1).abs() < 1e-15 && (extent.end - 1e3).abs() < 1e-11);
         assert_eq!(extent.fraction(-1.0), None);
         assert!((extent.value(0.5) - 10.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn ranges_of_the_smallest_numbers_are_ascending_and_hold_them() {
+        let least = f64::from_bits(1);
+        for values in [[least, least], [least, 3.0 * least], [1e-310, 1e-305]] {
+            for scale in [Scale::Linear, Scale::Logarithmic] {
+                let axis = Axis::new("x").scale(scale);
+                for margin in [0.0, 0.05] {
+                    let extent = axis.extent(values.into_iter(), margin).unwrap();
+                    assert!(extent.start < extent.end, "{extent:?}");
+                    assert!(extent.start <= values[0] && values[1] <= extent.end);
+                }
+            }
+        }
     }
 
     #[test]
