@@ -180,20 +180,37 @@ pub(super) struct Extent {
 impl Extent {
     /// Where on the axis a value is: 0 at its start, 1 at its end; none for what has no place.
     pub(super) fn fraction(&self, value: f64) -> Option<f64> {
-        let (start, end, value) = match self.scale {
-            // Of large numbers halves, because the difference of two of them may be infinite.
-            Scale::Linear if self.start.abs().max(self.end.abs()) > 1e300 => {
-                (0.5 * self.start, 0.5 * self.end, 0.5 * value)
-            }
-            Scale::Linear => (self.start, self.end, value),
-            Scale::Logarithmic if value > 0.0 => {
-                (self.start.log10(), self.end.log10(), value.log10())
-            }
-            Scale::Logarithmic => return None,
-        };
-        let fraction = (value - start) / (end - start);
-        // Far outside it does not matter how far.
-        value.is_finite().then(|| fraction.clamp(-1e6, 1e6))
+        Some(self.fraction_at(self.position(value)?))
+    }
+
+    /// The place of a value as a finite number, also where the fraction would not be one, far outside: equal differences are equal lengths. None for what
+    /// has no place.
+    pub(super) fn position(&self, value: f64) -> Option<f64> {
+        match self.scale {
+            _ if !value.is_finite() => None,
+            Scale::Linear => Some(value),
+            Scale::Logarithmic => (value > 0.0).then(|| value.log10()),
+        }
+    }
+
+    /// The positions of the start and of the end.
+    pub(super) fn ends(&self) -> (f64, f64) {
+        match self.scale {
+            Scale::Linear => (self.start, self.end),
+            Scale::Logarithmic => (self.start.log10(), self.end.log10()),
+        }
+    }
+
+    /// The fraction of the axis at a position.
+    pub(super) fn fraction_at(&self, position: f64) -> f64 {
+        let (start, end) = self.ends();
+        let part = |scale: f64| (scale * position - scale * start) / (scale * end - scale * start);
+        // Of large numbers halves, because the difference of two of them may be infinite.
+        if start.abs().max(end.abs()) > 1e300 {
+            part(0.5)
+        } else {
+            part(1.0)
+        }
     }
 
     /// The value at a fraction of the axis.

@@ -32,34 +32,44 @@ pub(super) fn contains((x, y): Point, low: Point, high: Point) -> bool {
     (low.0..=high.0).contains(&x) && (low.1..=high.1).contains(&y)
 }
 
-/// The part of a segment inside the rectangle [Liang & Barsky]: with p(s) = from + s (to − from), the s of all four inequalities.
+/// The part of a segment inside the rectangle: cut by the upright borders, then by the level ones.
 fn inside(from: Point, to: Point, low: Point, high: Point) -> Option<(Point, Point)> {
-    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-    let (mut start, mut end) = (0.0_f64, 1.0_f64);
-    // Each inequality is step · s ≤ room.
-    for (step, room) in [
-        (-dx, from.0 - low.0),
-        (dx, high.0 - from.0),
-        (-dy, from.1 - low.1),
-        (dy, high.1 - from.1),
-    ] {
-        if step == 0.0 {
-            if room < 0.0 {
-                return None;
-            }
-        } else if step < 0.0 {
-            start = start.max(room / step);
-        } else {
-            end = end.min(room / step);
-        }
+    let (from, to) = between(from, to, low.0, high.0)?;
+    let turned = |(x, y): Point| (y, x);
+    let (from, to) = between(turned(from), turned(to), low.1, high.1)?;
+    Some((turned(from), turned(to)))
+}
+
+/// The part of a segment with x from `low` to `high`. Ends inside stay as they are, so that parts can be joined.
+fn between(from: Point, to: Point, low: f64, high: f64) -> Option<(Point, Point)> {
+    if from.0.max(to.0) < low || from.0.min(to.0) > high {
+        return None;
     }
-    // The ends themselves where they are inside: no rounding, so that parts can be joined.
-    let at = |s: f64| match s {
-        0.0 => from,
-        1.0 => to,
-        s => (from.0 + s * dx, from.1 + s * dy),
+    let cut = |end: Point, other: Point| match end.0.clamp(low, high) {
+        x if x == end.0 => end,
+        x => (x, height_at(x, end, other)),
     };
-    (start <= end).then(|| (at(start), at(end)))
+    // The second cut begins from the first, which is near however far away both ends are.
+    let from = cut(from, to);
+    Some((from, cut(to, from)))
+}
+
+/// The height of the line through two points at an x between them, from the nearer one: the height of the other may be so large that it has no digits here.
+fn height_at(x: f64, a: Point, b: Point) -> f64 {
+    let (near, far) = if (x - a.0).abs() <= (x - b.0).abs() {
+        (a, b)
+    } else {
+        (b, a)
+    };
+    let part = |scale: f64| (scale * x - scale * near.0) / (scale * far.0 - scale * near.0);
+    // Of large numbers halves, because the difference of two of them may be infinite.
+    let part = if (far.0 - near.0).is_finite() {
+        part(1.0)
+    } else {
+        part(0.5)
+    };
+    // Exactly the same height on level lines.
+    near.1 + (part * far.1 - part * near.1)
 }
 
 #[cfg(test)]
@@ -110,5 +120,32 @@ mod tests {
             &[&[(0.0, 1.0), (4.0, 1.0)]],
         );
         check(&[Some((-1.0, 1.0)), Some((1.0, 5.0))], &[]);
+    }
+
+    #[test]
+    fn ends_far_away_change_no_slope() {
+        // Up by a tenth, however far the curve goes; in both directions.
+        for far in [1e3, 1e9, 1e30, 1e300] {
+            for points in [
+                [(0.0, 1.0), (far, 1.0 + 0.1 * far)],
+                [(far, 1.0 + 0.1 * far), (0.0, 1.0)],
+            ] {
+                let part = parts(points.map(Some), (0.0, 0.0), (4.0, 2.0)).remove(0);
+                let highest = part[0].1.max(part[1].1);
+                // 1 + 0.1 · 4, with roundings of the numbers of the segment.
+                assert!((highest - 1.4).abs() < 1e-14, "{far}: {part:?}");
+            }
+        }
+        // Across, from one end of the numbers to the other.
+        for far in [1e30, f64::MAX] {
+            check(
+                &[Some((-far, 1.0)), Some((far, 1.0))],
+                &[&[(0.0, 1.0), (4.0, 1.0)]],
+            );
+            check(
+                &[Some((-far, -far)), Some((far, far))],
+                &[&[(0.0, 0.0), (2.0, 2.0)]],
+            );
+        }
     }
 }

@@ -5,7 +5,7 @@ mod image;
 use super::axis::Axis;
 use super::axis::Extent;
 use super::canvas::{self, Anchor, CHARACTER, Canvas, Frame, TEXT, picture, sides};
-use super::clip::{self, Point};
+use super::clip::Point;
 use super::colours::Colour;
 use super::error::ChartError;
 use super::file::{csv_field, csv_number, ending, write};
@@ -403,12 +403,10 @@ fn curve_key(k: usize) -> Key {
 }
 
 fn draw_curve(canvas: &Canvas<'_>, plot: &Plot, curve: &Curve, key: Key) -> Result<(), ChartError> {
-    let places = curve.points.iter().map(|point| plot.fractions(*point));
-    for part in clip::parts(places, (0.0, 0.0), (1.0, 1.0)) {
-        let line: Vec<_> = part.into_iter().map(|at| plot.frame.at(at)).collect();
-        key.draw_line(canvas, &line)?;
-    }
-    Ok(())
+    let lines = plot.lines(&curve.points);
+    lines
+        .iter()
+        .try_for_each(|line| key.draw_line(canvas, line))
 }
 
 /// The scale of the colours, to the right of the frame.

@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::canvas::{Anchor, CHARACTER, Canvas, Shape, TEXT, picture, sides};
-use super::clip::{self, Point};
+use super::clip::Point;
 use super::colours::Colour;
 use super::error::ChartError;
 use super::file::{csv_field, csv_number, ending, write};
@@ -226,16 +226,11 @@ fn draw_series(
     series: &Series,
     key: Key,
 ) -> Result<(), ChartError> {
-    let unit = ((0.0, 0.0), (1.0, 1.0));
-    let places = || series.points.iter().map(|point| plot.fractions(*point));
-    for part in clip::parts(places(), unit.0, unit.1) {
-        let line: Vec<_> = part.into_iter().map(|at| plot.frame.at(at)).collect();
+    for line in plot.lines(&series.points) {
         key.draw_line(canvas, &line)?;
     }
-    for at in places().flatten() {
-        if clip::contains(at, unit.0, unit.1) {
-            key.draw_marker(canvas, plot.frame.at(at))?;
-        }
+    for at in plot.markers(&series.points) {
+        key.draw_marker(canvas, at)?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::axis::{Extent, Tick};
 use super::canvas::{Anchor, CHARACTER, Canvas, Frame, Shape, TEXT};
-use super::clip::Point;
+use super::clip::{self, Point};
 use super::colours::Colour;
 use super::error::ChartError;
 
@@ -55,9 +55,41 @@ impl Plot {
         }
     }
 
-    /// Fractions of the frame where a point lies; none for what has no place.
-    pub(super) fn fractions(&self, (x, y): Point) -> Option<Point> {
-        Some((self.x.fraction(x)?, self.y.fraction(y)?))
+    /// The parts of a curve inside the frame, in pixels. Points without a place are gaps in it.
+    pub(super) fn lines(&self, points: &[Point]) -> Vec<Vec<Point>> {
+        let (low, high) = self.corners();
+        let positions = points.iter().map(|point| self.position(*point));
+        clip::parts(positions, low, high)
+            .into_iter()
+            .map(|part| part.into_iter().map(|at| self.pixel(at)).collect())
+            .collect()
+    }
+
+    /// The points inside the frame, in pixels.
+    pub(super) fn markers(&self, points: &[Point]) -> Vec<Point> {
+        let (low, high) = self.corners();
+        let positions = points.iter().filter_map(|point| self.position(*point));
+        positions
+            .filter(|at| clip::contains(*at, low, high))
+            .map(|at| self.pixel(at))
+            .collect()
+    }
+
+    /// Where a point lies on the axes, also outside the frame; none for what has no place.
+    fn position(&self, (x, y): Point) -> Option<Point> {
+        Some((self.x.position(x)?, self.y.position(y)?))
+    }
+
+    /// The positions of the lower left and of the upper right corner of the frame.
+    fn corners(&self) -> (Point, Point) {
+        let (x, y) = (self.x.ends(), self.y.ends());
+        ((x.0, y.0), (x.1, y.1))
+    }
+
+    /// The pixel at a position inside the frame.
+    fn pixel(&self, (x, y): Point) -> Point {
+        let fractions = (self.x.fraction_at(x), self.y.fraction_at(y));
+        self.frame.at(fractions)
     }
 
     /// Lines at the labelled ticks.

@@ -95,6 +95,23 @@ fn curves_are_cut_at_the_frame() {
 }
 
 #[test]
+fn curves_that_end_far_away_keep_their_slope() {
+    let unit = || Axis::new("").range(0.0..1.0);
+    let svg = Chart::new("")
+        .x(unit())
+        .y(unit())
+        .line("", [(0.0, 0.0), (1e9, 2e9)])
+        .to_svg()
+        .unwrap();
+    let [left, top, right, bottom] = frame(&svg);
+    let curve = &lines(&svg, Colour::of_series(0))[0];
+    assert_eq!(curve[0], (left, bottom));
+    // Out at the top, half way to the right; each of three numbers is rounded to tenths of a pixel.
+    assert!((curve[1].0 - f64::midpoint(left, right)).abs() <= 1.0);
+    assert_eq!(curve[1].1, top);
+}
+
+#[test]
 fn numbers_without_a_place_are_gaps() {
     let points = [
         (1.0, 1.0),
