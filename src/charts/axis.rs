@@ -223,7 +223,7 @@ impl Extent {
         }
     }
 
-    /// About as many labelled ticks as asked for.
+    /// About as many labelled ticks as asked for, and two at least, unless no round numbers are so near to each other.
     pub(super) fn ticks(&self, wanted: usize) -> Vec<Tick> {
         let wanted = wanted.max(2);
         match self.scale {
@@ -244,6 +244,13 @@ impl Extent {
     }
 
     fn linear_ticks(&self, wanted: usize) -> Vec<Tick> {
+        // Steps are rounded up by as much as 2.5: few of them may leave one round number, or none; of five two always remain.
+        let parts = (wanted..5).find(|&parts| self.round_ticks(parts).len() >= 2);
+        self.round_ticks(parts.unwrap_or(wanted.max(5)))
+    }
+
+    /// Ticks at multiples of a round number, which is at least this part of the axis.
+    fn round_ticks(&self, wanted: usize) -> Vec<Tick> {
         let step = round_step(self.end / wanted as f64 - self.start / wanted as f64);
         let first = (self.start / step - 1e-9).ceil();
         (0..=2 * wanted)
@@ -264,6 +271,9 @@ impl Extent {
         }
         let decades = (last - first + 1).max(0);
         let every = (decades as usize).div_ceil(wanted).max(1) as i32;
+        let multiples = last.div_euclid(every) - (first - 1).div_euclid(every);
+        // Of three powers every second one may be the middle one alone.
+        let base = if multiples < 2 { first } else { 0 };
         let is_plain = (-2..=4).contains(&first) && (-2..=4).contains(&last);
         let few = decades < 3;
         let mut ticks = Vec::new();
@@ -271,7 +281,7 @@ impl Extent {
             for mantissa in 1..10 {
                 let value = parse(mantissa, exponent);
                 let labelled = match mantissa {
-                    1 => exponent.rem_euclid(every) == 0,
+                    1 => (exponent - base).rem_euclid(every) == 0,
                     2 | 5 => few,
                     _ => false,
                 };
@@ -419,6 +429,27 @@ mod tests {
             labels(Scale::Logarithmic, 2.0..4.0, 4),
             ["2.0", "2.5", "3.0", "3.5", "4.0"]
         );
+    }
+
+    #[test]
+    fn few_ticks_are_two_at_least() {
+        assert_eq!(labels(Scale::Linear, 0.5..4.6, 2), ["2", "4"]);
+        assert_eq!(labels(Scale::Linear, 0.1..1.3, 2), ["0.5", "1.0"]);
+        assert_eq!(labels(Scale::Logarithmic, 0.05..50.0, 2), ["0.1", "10"]);
+        assert_eq!(labels(Scale::Logarithmic, 1e-8..1e-4, 2), ["10⁻⁸", "10⁻⁵"]);
+        for wanted in 2..8 {
+            for k in 0..200 {
+                let (start, end) = (0.37 * f64::from(k), 0.41 * f64::from(k) + 1.0);
+                let linear = labels(Scale::Linear, start..end, wanted);
+                assert!(linear.len() >= 2, "{start}..{end}: {linear:?}");
+                let (start, end) = (10_f64.powf(start - 40.0), 10_f64.powf(end - 40.0));
+                let logarithmic = labels(Scale::Logarithmic, start..end, wanted);
+                assert!(
+                    logarithmic.len() >= 2,
+                    "{start:e}..{end:e}: {logarithmic:?}"
+                );
+            }
+        }
     }
 
     #[test]
