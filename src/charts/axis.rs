@@ -189,7 +189,7 @@ impl Extent {
         match self.scale {
             _ if !value.is_finite() => None,
             Scale::Linear => Some(value),
-            Scale::Logarithmic => (value > 0.0).then(|| value.log10()),
+            Scale::Logarithmic => (value > 0.0).then(|| self.decades_to(value)),
         }
     }
 
@@ -197,7 +197,17 @@ impl Extent {
     pub(super) fn ends(&self) -> (f64, f64) {
         match self.scale {
             Scale::Linear => (self.start, self.end),
-            Scale::Logarithmic => (self.start.log10(), self.end.log10()),
+            Scale::Logarithmic => (0.0, self.decades_to(self.end)),
+        }
+    }
+
+    /// Decades from the start to a positive value: of their ratio, since the logarithms of nearly equal numbers may be equal.
+    fn decades_to(&self, value: f64) -> f64 {
+        let ratio = value / self.start;
+        if ratio.is_normal() {
+            ratio.log10()
+        } else {
+            value.log10() - self.start.log10()
         }
     }
 
@@ -217,9 +227,10 @@ impl Extent {
     pub(super) fn value(&self, fraction: f64) -> f64 {
         match self.scale {
             Scale::Linear => self.start * (1.0 - fraction) + self.end * fraction,
-            Scale::Logarithmic => {
-                10_f64.powf(self.start.log10() * (1.0 - fraction) + self.end.log10() * fraction)
-            }
+            Scale::Logarithmic => match self.end / self.start {
+                ratio if ratio.is_finite() => self.start * ratio.powf(fraction),
+                _ => self.start.powf(1.0 - fraction) * self.end.powf(fraction),
+            },
         }
     }
 
@@ -509,6 +520,35 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn narrow_logarithmic_axes_keep_their_digits() {
+        let axis = Axis::new("x").scale(Scale::Logarithmic);
+        for start in [1e-300_f64, 3e-5, 1e5, 1e300] {
+            for width in [f64::EPSILON, 1e-13, 1e-9, 1e-3] {
+                let range = start..start * (1.0 + 2.0 * width);
+                let extent = axis.clone().range(range.clone());
+                let extent = extent.extent(std::iter::empty(), 0.0).unwrap();
+                // So narrow an axis is linear, but for half its width; the middle is known to a rounding.
+                let slack = width + f64::EPSILON / width;
+                let middle = start * (1.0 + width);
+                let fraction = extent.fraction(middle).unwrap();
+                assert!((fraction - 0.5).abs() <= slack, "{range:?}: {fraction}");
+                let value = extent.value(0.5);
+                let difference = (value / middle - 1.0).abs();
+                assert!(
+                    difference <= width * width + 4.0 * f64::EPSILON,
+                    "{range:?}: {value:e}"
+                );
+                assert_eq!(extent.fraction(start), Some(0.0));
+                assert_eq!(extent.fraction(range.end), Some(1.0));
+            }
+        }
+        let wide = axis.range(1e-300..1e300);
+        let wide = wide.extent(std::iter::empty(), 0.0).unwrap();
+        assert!((wide.fraction(1.0).unwrap() - 0.5).abs() < 1e-15);
+        assert!((wide.value(0.5) - 1.0).abs() < 1e-13);
     }
 
     #[test]
