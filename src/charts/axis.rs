@@ -236,7 +236,6 @@ impl Extent {
 
     /// About as many labelled ticks as asked for, and two at least, unless no round numbers are so near to each other.
     pub(super) fn ticks(&self, wanted: usize) -> Vec<Tick> {
-        let wanted = wanted.max(2);
         match self.scale {
             Scale::Linear => self.linear_ticks(wanted),
             Scale::Logarithmic => self.logarithmic_ticks(wanted),
@@ -255,6 +254,7 @@ impl Extent {
     }
 
     fn linear_ticks(&self, wanted: usize) -> Vec<Tick> {
+        let wanted = wanted.max(2);
         // Steps are rounded up by as much as 2.5: few of them may leave one round number, or none; of five two always remain.
         let parts = (wanted..5).find(|&parts| self.round_ticks(parts).len() >= 2);
         self.round_ticks(parts.unwrap_or(wanted.max(5)))
@@ -281,12 +281,13 @@ impl Extent {
             return self.linear_ticks(wanted);
         }
         let decades = (last - first + 1).max(0);
-        let every = (decades as usize).div_ceil(wanted).max(1) as i32;
+        let every = (decades as usize).div_ceil(wanted.max(2)).max(1) as i32;
         let multiples = last.div_euclid(every) - (first - 1).div_euclid(every);
         // Of three powers every second one may be the middle one alone.
         let base = if multiples < 2 { first } else { 0 };
         let is_plain = (-2..=4).contains(&first) && (-2..=4).contains(&last);
-        let few = decades < 3;
+        // Where there is room for 2 and 5 between powers, or they are needed.
+        let few = decades < 2 || (decades < 3 && end - start <= wanted as f64);
         let mut ticks = Vec::new();
         for exponent in first - 1..=last {
             for mantissa in 1..10 {

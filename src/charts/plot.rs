@@ -36,11 +36,18 @@ impl Plot {
         let (width, height) = (f64::from(room.sides.0), f64::from(room.sides.1));
         let top = if title.is_empty() { 14.0 } else { 42.0 } + room.above;
         let bottom = height - 52.0;
-        // Labelled ticks about 50 pixels apart upwards, 90 to the right.
+        // About 50 pixels apart.
         let y_ticks = y.ticks(((bottom - top) / 50.0) as usize);
         let left = 40.0 + CHARACTER * longest(&y_ticks) as f64;
-        let right = (width - room.right).max(left + 40.0);
-        let x_ticks = x.ticks(((right - left) / 90.0) as usize);
+        let sides = |beside: f64| {
+            let left = left.max(beside);
+            (left, (width - room.right.max(beside)).max(left + 40.0))
+        };
+        let (left, right) = sides(0.0);
+        // Half of a label at an end of the axis stands beside the frame.
+        let beside = 0.5 * CHARACTER * longest(&ticks_across(&x, right - left)) as f64;
+        let (left, right) = sides(beside);
+        let x_ticks = ticks_across(&x, right - left);
         Self {
             frame: Frame {
                 left,
@@ -129,6 +136,40 @@ impl Plot {
         canvas.text(&self.y.label, (16.0, middle), Anchor::Upwards, TEXT + 1.0)?;
         canvas.text(title, (frame.left, 22.0), Anchor::Left, TITLE)
     }
+}
+
+/// Ticks along a frame of this width, their labels apart: about 90 pixels, or more where they are long.
+fn ticks_across(x: &Extent, width: f64) -> Vec<Tick> {
+    let mut wanted = (width / 90.0) as usize;
+    loop {
+        let mut ticks = x.ticks(wanted);
+        let were_apart = thin(&mut ticks, width);
+        if were_apart || wanted <= 1 {
+            return ticks;
+        }
+        wanted -= 1;
+    }
+}
+
+/// Takes the labels that would touch the one before from ticks in ascending order; whether there were none.
+fn thin(ticks: &mut [Tick], width: f64) -> bool {
+    let mut were_apart = true;
+    let mut end = f64::NEG_INFINITY;
+    for tick in ticks {
+        let Some(label) = &tick.label else {
+            continue;
+        };
+        // With half a character on each side.
+        let half = 0.5 * CHARACTER * (label.chars().count() + 1) as f64;
+        let middle = tick.place * width;
+        if middle - half < end {
+            tick.label = None;
+            were_apart = false;
+        } else {
+            end = middle + half;
+        }
+    }
+    were_apart
 }
 
 /// On which side of its line a tick stands.

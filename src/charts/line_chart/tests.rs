@@ -94,6 +94,64 @@ fn curves_are_cut_at_the_frame() {
     assert!(curves[3][0].0 > right, "the legend stands beside the frame");
 }
 
+/// Where the labels below the frame begin and end, at 7 pixels a character, in tenths of a pixel.
+fn labels_below(svg: &str) -> Vec<(f64, f64)> {
+    let [.., bottom] = frame(svg);
+    let document = Document::parse(svg).unwrap();
+    let number = |node: Node<'_, '_>, name: &str| -> f64 {
+        let text = node.attribute(name).unwrap();
+        text.parse().unwrap()
+    };
+    document
+        .descendants()
+        .filter(|node| node.tag_name().name() == "text")
+        .filter(|node| (number(*node, "y") - bottom - 90.0).abs() <= 1.0)
+        .map(|node| {
+            let (middle, length) = (
+                number(node, "x"),
+                node.text().unwrap().trim().chars().count(),
+            );
+            let half = 35.0 * length as f64;
+            (middle - half, middle + half)
+        })
+        .collect()
+}
+
+#[test]
+fn long_labels_stand_apart_and_inside_the_picture() {
+    let linear = |range| Axis::new("").range(range);
+    let logarithmic = |range| linear(range).scale(Scale::Logarithmic);
+    let axes = [
+        linear(1e9..1e9 + 1e-3),
+        linear(-1e9..-1e9 + 1e-3),
+        linear(0.5..0.5 + 1e-11),
+        linear(-1.0..1.0),
+        logarithmic(0.011..9.0),
+        logarithmic(1.1e-12..9e-11),
+        logarithmic(1e5..1e5 + 1e-6),
+    ];
+    for axis in axes {
+        for width in [240, 400, 720] {
+            let chart = Chart::new("").x(axis.clone()).line("", [(1.0, 1.0)]);
+            let svg = chart.size(width, 440).to_svg().unwrap();
+            let labels = labels_below(&svg);
+            // In a small picture there may be room for one.
+            let least = if width == 720 { 2 } else { 1 };
+            assert!(labels.len() >= least, "{axis:?}, {width}");
+            for pair in labels.windows(2) {
+                assert!(pair[0].1 <= pair[1].0, "{axis:?}, {width}: {labels:?}");
+            }
+            // Places are rounded to tenths of a pixel.
+            let (first, last) = (labels[0].0, labels[labels.len() - 1].1);
+            let side = 10.0 * f64::from(width);
+            assert!(
+                first >= -1.0 && last <= side + 1.0,
+                "{axis:?}, {width}: {labels:?}"
+            );
+        }
+    }
+}
+
 #[test]
 fn curves_that_end_far_away_keep_their_slope() {
     let unit = || Axis::new("").range(0.0..1.0);
