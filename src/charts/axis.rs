@@ -13,6 +13,13 @@ pub enum Scale {
     Logarithmic,
 }
 
+impl Scale {
+    /// Whether a value has a place.
+    fn holds(self, value: f64) -> bool {
+        value.is_finite() && (self == Self::Linear || value > 0.0)
+    }
+}
+
 /// An axis: its label with the unit, its scale, its range.
 ///
 /// A label alone is a linear axis whose range fits what is drawn.
@@ -80,6 +87,11 @@ impl Axis {
         }
     }
 
+    /// Whether a value has a place on this axis, inside of its range or outside.
+    pub(super) fn holds(&self, value: f64) -> bool {
+        self.scale.holds(value)
+    }
+
     fn not_positive(&self) -> ChartError {
         ChartError::NotPositive {
             axis: self.label.clone(),
@@ -110,7 +122,7 @@ impl Axis {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for value in values.filter(|value| value.is_finite()) {
             any = true;
-            if self.scale == Scale::Linear || value > 0.0 {
+            if self.holds(value) {
                 (low, high) = (low.min(value), high.max(value));
             }
         }
@@ -186,11 +198,10 @@ impl Extent {
     /// The place of a value as a finite number, also where the fraction would not be one, far outside: equal differences are equal lengths. None for what
     /// has no place.
     pub(super) fn position(&self, value: f64) -> Option<f64> {
-        match self.scale {
-            _ if !value.is_finite() => None,
-            Scale::Linear => Some(value),
-            Scale::Logarithmic => (value > 0.0).then(|| self.decades_to(value)),
-        }
+        self.scale.holds(value).then(|| match self.scale {
+            Scale::Linear => value,
+            Scale::Logarithmic => self.decades_to(value),
+        })
     }
 
     /// The positions of the start and of the end.

@@ -133,15 +133,12 @@ impl Chart {
     /// # Errors
     /// [`ChartError::NoData`] without a finite point; [`ChartError::Range`] and [`ChartError::NotPositive`] for an axis that cannot be.
     pub fn to_svg(&self) -> Result<String, ChartError> {
-        let points = || {
-            let all = self.series.iter().flat_map(|series| &series.points);
-            all.filter(|(x, y)| x.is_finite() && y.is_finite())
-        };
-        if points().next().is_none() {
+        let points = self.points_to_fit();
+        if points.is_empty() {
             return Err(ChartError::NoData);
         }
-        let x = self.x.extent(points().map(|point| point.0), 0.03)?;
-        let y = self.y.extent(points().map(|point| point.1), 0.05)?;
+        let x = self.x.extent(points.iter().map(|point| point.0), 0.03)?;
+        let y = self.y.extent(points.iter().map(|point| point.1), 0.05)?;
         let legend = self.legend();
         let room = Room {
             sides: self.size,
@@ -186,6 +183,19 @@ impl Chart {
             }
         }
         text
+    }
+
+    /// The points that have a place on both axes: what has none on one does not stretch the other. If there are none, all finite ones, so that the axis
+    /// that holds none says so.
+    fn points_to_fit(&self) -> Vec<Point> {
+        let all = self.series.iter().flat_map(|series| &series.points);
+        let finite = all.filter(|(x, y)| x.is_finite() && y.is_finite());
+        let finite: Vec<Point> = finite.copied().collect();
+        let drawn = finite
+            .iter()
+            .filter(|(x, y)| self.x.holds(*x) && self.y.holds(*y));
+        let drawn: Vec<Point> = drawn.copied().collect();
+        if drawn.is_empty() { finite } else { drawn }
     }
 
     /// How each series is drawn. Reference lines take no colour from the others.

@@ -192,6 +192,22 @@ fn numbers_without_a_place_are_gaps() {
 }
 
 #[test]
+fn points_without_a_place_do_not_stretch_the_other_axis() {
+    let logarithmic = || Axis::new("").scale(Scale::Logarithmic);
+    let chart = |far| Chart::new("").line("", [(1.0, 1.0), (2.0, 2.0), far]);
+    for svg in [
+        chart((1e6, 0.0)).y(logarithmic()).to_svg().unwrap(),
+        chart((-1.0, 1e6)).x(logarithmic()).to_svg().unwrap(),
+    ] {
+        let [left, top, right, bottom] = frame(&svg);
+        let curve = &lines(&svg, Colour::of_series(0))[0];
+        // All but margins of 0.03 and 0.05 of its size at each end.
+        assert!(curve[1].0 - curve[0].0 > 0.9 * (right - left));
+        assert!(curve[0].1 - curve[1].1 > 0.9 * (bottom - top));
+    }
+}
+
+#[test]
 fn a_straight_line_stays_straight_on_both_scales() {
     // x⁴ on logarithmic axes; a tenth of a pixel is the resolution, and each coordinate is rounded by half of it.
     let chart = Chart::new("")
