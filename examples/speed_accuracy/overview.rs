@@ -115,15 +115,8 @@ fn panel(
             ten_to(power)
         );
     }
-    // A decade has marks at 1, 2 and 5; all of them are named where there are few decades.
-    let marks = (first.floor() as i32..=last.floor() as i32)
-        .flat_map(|power| [1, 2, 5].map(|m| (m, power)));
-    for (multiple, power) in marks {
-        let log = f64::from(multiple).log10() + f64::from(power);
-        if !(first..=last).contains(&log) || (multiple > 1 && last - first > 1.2) {
-            continue;
-        }
-        let x = x(log);
+    for (multiple, power) in marks(first, last) {
+        let x = x(logarithm(multiple, power));
         let _ = writeln!(
             svg,
             "<path d=\"M{x:.1} {top}V{bottom}\" stroke=\"#e4e4e4\"/><text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
@@ -164,6 +157,29 @@ fn panel(
             path(peers)
         );
     }
+}
+
+/// Multiples of powers of ten between two logarithms: as many as there is room for, and two at least.
+fn marks(first: f64, last: f64) -> Vec<(i32, i32)> {
+    let of = |multiples: &[i32]| -> Vec<(i32, i32)> {
+        (first.floor() as i32..=last.floor() as i32)
+            .flat_map(|power| multiples.iter().map(move |multiple| (*multiple, power)))
+            .filter(|(multiple, power)| (first..=last).contains(&logarithm(*multiple, *power)))
+            .collect()
+    };
+    if last - first <= 1.2 {
+        return of(&[1, 2, 5]);
+    }
+    match of(&[1]) {
+        powers if powers.len() >= 2 => powers,
+        // Half a decade apart, where 2 and 5 would run into each other.
+        _ => of(&[1, 3]),
+    }
+}
+
+/// The logarithm of a multiple of a power of ten.
+fn logarithm(multiple: i32, power: i32) -> f64 {
+    f64::from(multiple).log10() + f64::from(power)
 }
 
 fn legend(svg: &mut String, top: f64, with_peers: bool) {
