@@ -206,10 +206,11 @@ impl Canvas<'_> {
         anchor: Anchor,
         size: f64,
     ) -> Result<(), ChartError> {
-        // Control characters are not allowed in XML, and a line is a line.
+        // Control characters and two others are not allowed in XML, and a line is a line.
+        let is_allowed = |c: char| !c.is_control() && !matches!(c, '\u{FFFE}' | '\u{FFFF}');
         let text: String = text
             .chars()
-            .map(|c| if c.is_control() { ' ' } else { c })
+            .map(|c| if is_allowed(c) { c } else { ' ' })
             .collect();
         if text.trim().is_empty() {
             return Ok(());

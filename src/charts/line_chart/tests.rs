@@ -69,7 +69,8 @@ fn text_is_escaped_and_complete() {
     assert_eq!(root.attribute("viewBox"), Some("0 0 7200 4400"));
     // Several charts in one page.
     assert!(!svg.contains("id="));
-    let odd = waves().x("bell \u{7} and zero \0").to_svg().unwrap();
+    let odd = waves().x("bell \u{7}, zero \0, none \u{FFFE}");
+    let odd = odd.y("\u{FFFF}").to_svg().unwrap();
     assert!(Document::parse(&odd).is_ok());
 }
 
