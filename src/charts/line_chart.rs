@@ -6,7 +6,7 @@ use super::clip::Point;
 use super::colours::Colour;
 use super::error::ChartError;
 use super::file::{csv_field, csv_number, ending, write};
-use super::plot::{KEY, Key, Plot, Room, shortened};
+use super::plot::{KEY, Key, Plot, Room, and_more, shortened};
 use std::path::Path;
 
 /// How a series is drawn.
@@ -140,11 +140,13 @@ impl Chart {
         let x = self.x.extent(points.iter().map(|point| point.0), 0.03)?;
         let y = self.y.extent(points.iter().map(|point| point.1), 0.05)?;
         let legend = self.legend();
-        let room = Room {
+        let mut room = Room {
             sides: self.size,
             above: 0.0,
-            right: legend.width(),
+            right: 0.0,
         };
+        let (top, bottom) = room.top_and_bottom(&self.title);
+        room.right = legend.width(bottom - top);
         let plot = Plot::new(x, y, &self.title, &room);
         picture(self.size, "", |canvas| {
             plot.draw_grid(canvas)?;
@@ -255,28 +257,41 @@ impl Legend {
     const GAP: f64 = 14.0;
     const LINE: f64 = 20.0;
 
-    fn width(&self) -> f64 {
-        let length = |(name, _): &(String, Key)| name.chars().count();
-        match self.entries.iter().map(length).max() {
-            None => 24.0,
-            Some(longest) => Self::GAP + KEY + 14.0 + CHARACTER * longest as f64,
+    /// Beside a frame of this height.
+    fn width(&self, height: f64) -> f64 {
+        let long = |text: &str| CHARACTER * text.chars().count() as f64;
+        let entries = self.entries.iter().map(|(name, _)| KEY + long(name));
+        let Some(entries) = entries.reduce(f64::max) else {
+            return 24.0;
+        };
+        let rest = match self.entries.len() - self.shown(height) {
+            0 => 0.0,
+            more => long(&and_more(more)),
+        };
+        Self::GAP + 14.0 + entries.max(rest)
+    }
+
+    /// How many entries stand beside a frame of this height, one line less if not all do.
+    fn shown(&self, height: f64) -> usize {
+        let most = (height / Self::LINE) as usize;
+        if self.entries.len() <= most {
+            self.entries.len()
+        } else {
+            most.saturating_sub(1)
         }
     }
 
     /// From its upper left corner; entries that do not fit are counted.
     fn draw(&self, canvas: &Canvas<'_>, (left, top): Point, height: f64) -> Result<(), ChartError> {
-        let most = (height / Self::LINE) as usize;
-        let fits = self.entries.len() <= most;
-        let shown = if fits { most } else { most.saturating_sub(1) };
+        let shown = self.shown(height);
         let at = |k: usize| (left + Self::GAP, top + Self::LINE * (k as f64 + 0.5));
         for (k, (name, key)) in self.entries.iter().take(shown).enumerate() {
             key.draw_entry(canvas, name, at(k))?;
         }
-        if fits {
-            return Ok(());
+        match self.entries.len() - shown {
+            0 => Ok(()),
+            more => canvas.text(&and_more(more), at(shown), Anchor::Left, TEXT),
         }
-        let more = format!("… and {} more", self.entries.len() - shown);
-        canvas.text(&more, at(shown), Anchor::Left, TEXT)
     }
 }
 

@@ -30,12 +30,20 @@ pub(super) struct Room {
     pub(super) right: f64,
 }
 
+impl Room {
+    /// The top and the bottom of the frame, in pixels.
+    pub(super) fn top_and_bottom(&self, title: &str) -> (f64, f64) {
+        let top = if title.is_empty() { 14.0 } else { 42.0 } + self.above;
+        let bottom = f64::from(self.sides.1) - 52.0;
+        (top, bottom.max(top + 40.0))
+    }
+}
+
 impl Plot {
     /// Axes that fill the picture except for their labels and the room for others.
     pub(super) fn new(x: Extent, y: Extent, title: &str, room: &Room) -> Self {
-        let (width, height) = (f64::from(room.sides.0), f64::from(room.sides.1));
-        let top = if title.is_empty() { 14.0 } else { 42.0 } + room.above;
-        let bottom = height - 52.0;
+        let width = f64::from(room.sides.0);
+        let (top, bottom) = room.top_and_bottom(title);
         // About 50 pixels apart.
         let y_ticks = y.ticks(((bottom - top) / 50.0) as usize);
         let left = 40.0 + CHARACTER * longest(&y_ticks) as f64;
@@ -53,7 +61,7 @@ impl Plot {
                 left,
                 top,
                 right,
-                bottom: bottom.max(top + 40.0),
+                bottom,
             },
             x,
             y,
@@ -222,6 +230,11 @@ pub(super) fn shortened(text: &str, most: usize) -> String {
     let mut short: String = text.chars().take(most.saturating_sub(1)).collect();
     short.push('…');
     short
+}
+
+/// What stands in a legend for entries that do not fit.
+pub(super) fn and_more(count: usize) -> String {
+    format!("… and {count} more")
 }
 
 /// How something is shown in a legend, and drawn.

@@ -263,6 +263,25 @@ fn long_legends_are_cut() {
 }
 
 #[test]
+fn the_number_of_entries_left_out_stands_inside_the_picture() {
+    let mut chart = Chart::new("");
+    for k in 0..100 {
+        chart = chart.line((k % 10).to_string(), [(0.0, 0.0), (1.0, 1.0)]);
+    }
+    let svg = chart.to_svg().unwrap();
+    let document = Document::parse(&svg).unwrap();
+    let rest = document
+        .descendants()
+        .filter(|node| node.tag_name().name() == "text")
+        .find(|node| node.text().unwrap().trim().starts_with('…'))
+        .unwrap();
+    let left: f64 = rest.attribute("x").unwrap().parse().unwrap();
+    // At 7 pixels a character.
+    let length = rest.text().unwrap().trim().chars().count();
+    assert!(left + 70.0 * length as f64 <= 7200.0, "{left}, {length}");
+}
+
+#[test]
 fn csv_holds_every_number() {
     let points = vec![(0.1, 1.0 / 3.0), (-1e-300, f64::MAX), (2.0, f64::NAN)];
     let text = Chart::new("").line("a, \"b\"", points.clone()).to_csv();
