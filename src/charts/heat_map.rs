@@ -9,7 +9,7 @@ use super::clip::Point;
 use super::colours::Colour;
 use super::error::ChartError;
 use super::file::{csv_field, csv_number, ending, write};
-use super::plot::{KEY, Key, Plot, Room, Side, draw_ticks, longest, shortened};
+use super::plot::{KEY, Key, Plot, Room, Side, and_more, draw_ticks, longest, shortened};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -83,6 +83,8 @@ const MOST_CELLS: usize = 1 << 28;
 const BAR: (f64, f64) = (16.0, 16.0);
 /// Height of a row of the legend above the frame.
 const LINE: f64 = 22.0;
+/// Of an entry of the legend beside its name: the key and gaps, in pixels.
+const AROUND_NAME: f64 = KEY + 20.0;
 
 impl HeatMap {
     /// The `endings` that [`HeatMap::save`] knows.
@@ -211,8 +213,12 @@ impl HeatMap {
             let top = plot.frame.top - LINE * strip.len() as f64;
             for (k, line) in strip.iter().enumerate() {
                 let y = top + LINE * (k as f64 + 0.5) - 4.0;
-                for (x, name, key) in line {
-                    key.draw_entry(canvas, name, (plot.frame.left + x, y))?;
+                for (x, (name, key)) in line {
+                    let at = (plot.frame.left + x, y);
+                    match key {
+                        Some(key) => key.draw_entry(canvas, name, at)?,
+                        None => canvas.text(name, at, Anchor::Left, TEXT)?,
+                    }
                 }
             }
             bar.iter().try_for_each(|bar| bar.draw(canvas, &plot.frame))
@@ -328,8 +334,37 @@ impl HeatMap {
         Ok(Some(ColourBar { extent, ticks }))
     }
 
-    /// The legend above the frame, in lines: from where, what, how.
-    fn strip(&self) -> Vec<Vec<(f64, String, Key)>> {
+    /// The legend above the frame, in lines. Entries that do not fit are counted.
+    fn strip(&self) -> Vec<Vec<Placed>> {
+        let width = f64::from(self.size.0) - 120.0;
+        // More would leave no map.
+        let most = (f64::from(self.size.1) / 4.0 / LINE) as usize;
+        let longest = (((width - AROUND_NAME) / CHARACTER) as usize).min(40);
+        let entries: Vec<Entry> = self
+            .entries()
+            .into_iter()
+            .filter(|(name, _)| !name.is_empty())
+            .map(|(name, key)| (shortened(&name, longest), Some(key)))
+            .collect();
+        let lines = in_lines(&entries, width);
+        if lines.len() <= most {
+            return lines;
+        }
+        // Of names without a letter no more would fit.
+        let room = most * (width / AROUND_NAME).ceil() as usize;
+        (0..entries.len().min(room))
+            .rev()
+            .map(|shown| {
+                let mut fewer = entries[..shown].to_vec();
+                fewer.push((and_more(entries.len() - shown), None));
+                in_lines(&fewer, width)
+            })
+            .find(|lines| lines.len() <= most)
+            .unwrap_or_default()
+    }
+
+    /// What the legend names: classes, cells without a value, curves.
+    fn entries(&self) -> Vec<(String, Key)> {
         let mut entries = Vec::new();
         if let Cells::Classes(_, classes) = &self.cells {
             let entry = |class: &Class| (class.name.clone(), Key::Area(class.colour));
@@ -341,24 +376,7 @@ impl HeatMap {
         for (k, curve) in self.curves.iter().enumerate() {
             entries.push((curve.name.clone(), curve_key(k)));
         }
-        let most = f64::from(self.size.0) - 120.0;
-        let mut lines: Vec<Vec<_>> = Vec::new();
-        let mut used = f64::INFINITY;
-        for (name, key) in entries.into_iter().filter(|(name, _)| !name.is_empty()) {
-            let name = shortened(&name, 40);
-            let width = KEY + 20.0 + CHARACTER * name.chars().count() as f64;
-            if used + width > most {
-                lines.push(Vec::new());
-                used = 0.0;
-            }
-            if let Some(line) = lines.last_mut() {
-                line.push((used, name, key));
-            }
-            used += width;
-        }
-        // More would leave no map.
-        lines.truncate((f64::from(self.size.1) / 4.0 / LINE) as usize);
-        lines
+        entries
     }
 
     fn has_missing(&self) -> bool {
@@ -367,6 +385,29 @@ impl HeatMap {
             Cells::Classes(indices, _) => indices.iter().any(Option::is_none),
         }
     }
+}
+
+/// A name of the legend with its key; the count of those left out has none.
+type Entry = (String, Option<Key>);
+/// An entry, after how far to the right it begins, in pixels.
+type Placed = (f64, Entry);
+
+/// Entries one after the other in lines of this width.
+fn in_lines(entries: &[Entry], width: f64) -> Vec<Vec<Placed>> {
+    let mut lines: Vec<Vec<Placed>> = Vec::new();
+    let mut used = f64::INFINITY;
+    for entry in entries {
+        let own = AROUND_NAME + CHARACTER * entry.0.chars().count() as f64;
+        if used + own > width {
+            lines.push(Vec::new());
+            used = 0.0;
+        }
+        if let Some(line) = lines.last_mut() {
+            line.push((used, entry.clone()));
+        }
+        used += own;
+    }
+    lines
 }
 
 fn is_too_large((columns, rows): (usize, usize)) -> bool {

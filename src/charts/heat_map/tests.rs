@@ -102,6 +102,35 @@ fn classes_have_their_colours() {
 }
 
 #[test]
+fn classes_that_the_legend_leaves_out_are_counted() {
+    let classes = (0..60).map(|k| Class::new(format!("class number {k}"), Colour::WHITE));
+    let map = HeatMap::classes("", (1, 1), classes.collect(), |_, _| Some(0));
+    for width in [240, 720] {
+        let svg = map.clone().size(width, 440).to_svg().unwrap();
+        let document = Document::parse(&svg).unwrap();
+        let texts = document
+            .descendants()
+            .filter(|node| node.tag_name().name() == "text");
+        let (mut shown, mut left_out) = (0_usize, 0_usize);
+        for node in texts {
+            let text = node.text().unwrap().trim();
+            if let Some(count) = text.strip_prefix("… and ") {
+                left_out = count.strip_suffix(" more").unwrap().parse().unwrap();
+            } else if text.starts_with("class") {
+                shown += 1;
+            } else {
+                continue;
+            }
+            // Inside the picture, at 7 pixels a character.
+            let left: f64 = node.attribute("x").unwrap().parse().unwrap();
+            let end = left + 70.0 * text.chars().count() as f64;
+            assert!(end <= 10.0 * f64::from(width), "{text} of {width}: {end}");
+        }
+        assert_eq!(shown + left_out, 60, "{shown} of {width}");
+    }
+}
+
+#[test]
 fn csv_holds_centres_and_values() {
     let text = ramp().to_csv().unwrap();
     let rows: Vec<Vec<f64>> = text
