@@ -19,7 +19,7 @@ pub(crate) use time::{breaks_within, direction_of, is_same_time, sort_times};
 pub use arcs::{MotionArc, Setting};
 
 use crate::constraints::{ConstraintResidual, Reactions};
-use crate::csv;
+use crate::csv::{self, Column};
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length, Polynomial};
 use crate::numbers::larger;
@@ -577,24 +577,25 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     }
 
     /// Writes the recorded nodes as CSV: time, coordinates, velocities, momenta, energy, observables, reactions, with a header line. Numbers are
-    /// written so that they read back exactly. With a time transformation the first column is `tau`, and `t` is among the coordinates.
+    /// written so that they read back exactly. With a time transformation the first column is `tau`, and `t` is among the coordinates. Where the model
+    /// has an output `energy`, that is the column `energy`, and the energy is `energy_`; likewise for other names that coordinates or outputs have.
     ///
     /// # Errors
     /// Those of the file system.
     pub fn write_csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
         let is_coordinate = self.names.iter().any(|name| name.to_string() == "t");
         let time = if is_coordinate { "tau" } else { "t" };
-        let mut header = vec![time.to_owned()];
-        header.extend(self.names.iter().map(ToString::to_string));
-        header.extend(self.names.iter().map(|name| format!("{name}_dot")));
-        header.extend(self.names.iter().map(|name| format!("p_{name}")));
-        header.push("energy".to_owned());
-        header.extend(self.outputs.names.iter().map(ToString::to_string));
+        let (q, outputs, constraints) = (&self.names, &self.outputs.names, &self.reactions.names);
+        let mut header = vec![Column::Table(time.to_owned())];
+        header.extend(q.iter().map(|name| Column::Model(name.to_string())));
+        header.extend(q.iter().map(|name| Column::Table(format!("{name}_dot"))));
+        header.extend(q.iter().map(|name| Column::Table(format!("p_{name}"))));
+        header.push(Column::Table("energy".to_owned()));
+        header.extend(outputs.iter().map(|name| Column::Model(name.to_string())));
         header.extend(
-            self.reactions
-                .names
+            constraints
                 .iter()
-                .map(|name| format!("lambda_{name}")),
+                .map(|name| Column::Table(format!("lambda_{name}"))),
         );
         let rows = self.nodes.iter().enumerate().map(|(k, node)| {
             let mut row = vec![node.t];

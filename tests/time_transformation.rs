@@ -306,6 +306,29 @@ fn solvers_and_columns_know_the_time() {
 }
 
 #[test]
+fn an_output_called_energy_has_the_column_of_that_name() {
+    let kepler = Kepler { k: 1.0 };
+    let simulation = Simulation::new(&kepler).element(Mixed::<5>).step(0.1);
+    let motion = simulation.run(ellipse(&kepler, 0.3), 0.0..0.2);
+    let motion = motion.expect("a motion");
+    let path = std::env::temp_dir().join(format!("tfe_energies_{}.csv", std::process::id()));
+    motion.write_csv(&path).expect("a writable folder");
+    let text = std::fs::read_to_string(&path).expect("the file");
+    std::fs::remove_file(&path).expect("the file");
+    let mut lines = text.lines();
+    let header = "tau,x,y,t,x_dot,y_dot,t_dot,p_x,p_y,p_t,energy_,energy";
+    assert_eq!(lines.next(), Some(header));
+    let outputs = motion.outputs().column("energy").expect("declared");
+    for ((line, energy), output) in lines.zip(motion.energies()).zip(outputs) {
+        let row: Vec<f64> = line
+            .split(',')
+            .map(|cell| cell.parse().expect("a number"))
+            .collect();
+        assert_eq!(row[10..], [*energy, output]);
+    }
+}
+
+#[test]
 fn elements_with_velocities_as_unknowns_say_that_p_t_has_none() {
     let kepler = Kepler { k: 1.0 };
     let simulation = Simulation::new(&kepler)

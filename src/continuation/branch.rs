@@ -2,14 +2,14 @@
 
 use super::events::EventKind;
 use crate::assembly::{Iterate, Mesh, Solution};
-use crate::csv;
+use crate::csv::{self, Column};
 use crate::periodic::{Orbit, Verdict};
 use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
 use std::fmt;
 use std::io;
 use std::path::Path;
-use tfe_runtime::{CoordinateName, Element, Model, State, Statistics};
+use tfe_runtime::{Element, Model, State, Statistics};
 
 /// An orbit of a branch, in numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -227,20 +227,21 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
     }
 
     /// Writes the points as CSV with a header line: parameter, period, amplitudes, multipliers (real and imaginary parts), and 1 where stable,
-    /// else 0. Numbers read back exactly.
+    /// else 0. Numbers read back exactly. A parameter called `period` keeps its name, and the period is `period_`.
     ///
     /// # Errors
     /// Those of the file system.
     pub fn write_csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
-        let mut header = vec![self.parameter.to_owned(), "period".to_owned()];
-        let names: Vec<CoordinateName> = (0..N).map(M::coordinate_name).collect();
-        header.extend(names.iter().map(|name| format!("amplitude_{name}")));
+        let mut names = vec!["period".to_owned()];
+        names.extend((0..N).map(|a| format!("amplitude_{}", M::coordinate_name(a))));
         // Constraints leave fewer.
         let multipliers = self.points.first().map(|point| point.multipliers.len());
         for k in 1..=multipliers.unwrap_or(2 * N) {
-            header.extend([format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
+            names.extend([format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
         }
-        header.push("stable".to_owned());
+        names.push("stable".to_owned());
+        let mut header = vec![Column::Model(self.parameter.to_owned())];
+        header.extend(names.into_iter().map(Column::Table));
         let rows = self.points.iter().map(|point| {
             let mut row = vec![point.parameter, point.period];
             row.extend(point.amplitudes);
