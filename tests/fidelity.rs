@@ -396,6 +396,26 @@ fn outputs_that_are_no_numbers_are_never_chosen() {
 }
 
 #[test]
+fn lines_of_the_table_name_the_accuracies_asked_for() {
+    let (linear, full) = (Linear { w: W }, Full { w: W });
+    let found = ladder(0.0..2.0)
+        .rung("linear", &linear, linear.state([0.1], [0.0]))
+        .rung("full", &full, full.state([0.1], [0.0]))
+        .elements([Mixed::<5>.into()])
+        .accuracies([1.25e-2, 1.2e-2, 1e-3])
+        .run()
+        .unwrap();
+    let text = found.to_string();
+    let asked: Vec<&str> = text
+        .lines()
+        .skip(1)
+        .take(3)
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert_eq!(asked, ["1.25e-2", "1.2e-2", "1e-3"]);
+}
+
+#[test]
 fn what_is_no_ladder() {
     let (linear, bob, full) = (Linear { w: W }, Bob { w: W }, Full { w: W });
     let start = || State { q: [0.1], p: [0.0] };

@@ -40,7 +40,7 @@ impl Ladder {
 
     /// What is chosen for an accuracy: rung, element, step, error, time; or why nothing is.
     fn row(&self, accuracy: f64) -> [String; 6] {
-        let asked = format!("{accuracy:.1e}").replace(".0e", "e");
+        let asked = format!("{:e}", rounded(accuracy));
         match self.cheapest(accuracy) {
             Some(one) => [
                 asked,
@@ -103,9 +103,14 @@ fn time(seconds: f64) -> String {
     }
 }
 
+/// To four digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
 /// Four digits, in the shorter notation.
 fn shortened(value: f64) -> String {
-    let rounded = format!("{value:.3e}").parse().unwrap_or(value);
+    let rounded = rounded(value);
     if (1e-4..1e5).contains(&rounded) {
         rounded.to_string()
     } else {
