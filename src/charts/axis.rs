@@ -578,6 +578,12 @@ mod tests {
                 Err(ChartError::Range { .. })
             ));
         }
+        let far = axis.clone().range(Range {
+            start: 1e300,
+            end: -1e-200,
+        });
+        let error = far.extent(none(), 0.0).unwrap_err().to_string();
+        assert!(error.contains("from 1e300 to -1e-200:"), "{error}");
         let logarithmic = axis.scale(Scale::Logarithmic);
         assert!(matches!(
             logarithmic.extent([-1.0, 0.0].into_iter(), 0.0),

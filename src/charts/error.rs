@@ -1,5 +1,6 @@
 //! Why there is no picture.
 
+use crate::numbers::Short;
 use std::error::Error;
 use std::fmt;
 use std::io;
@@ -71,10 +72,13 @@ impl fmt::Display for ChartError {
                 )
             }
             Self::NoData => f.write_str("there is nothing to draw: no finite numbers were given"),
-            Self::Range { axis, start, end } => write!(
-                f,
-                "the axis “{axis}” cannot go from {start} to {end}: both must be finite, the end above the start"
-            ),
+            Self::Range { axis, start, end } => {
+                let (start, end) = (Short(*start), Short(*end));
+                write!(
+                    f,
+                    "the axis “{axis}” cannot go from {start} to {end}: both must be finite, the end above the start"
+                )
+            }
             Self::NotPositive { axis } => write!(
                 f,
                 "the axis “{axis}” is logarithmic, but there are no positive numbers on it or its range begins at or below zero"

@@ -1,5 +1,6 @@
 //! What can go wrong with a map, and at a point of it.
 
+use crate::numbers::Short;
 use crate::stability::eigenvalues::EigenvalueError;
 use std::error::Error;
 use std::fmt;
@@ -70,15 +71,21 @@ impl fmt::Display for MapError {
                 f,
                 "a map cannot have {columns} × {rows} cells: at least one, at most 2²⁸"
             ),
-            Self::Range { label, start, end } => write!(
-                f,
-                "`{label}` cannot go from {start} to {end}: both must be finite, the end above the start"
-            ),
+            Self::Range { label, start, end } => {
+                let (start, end) = (Short(*start), Short(*end));
+                write!(
+                    f,
+                    "`{label}` cannot go from {start} to {end}: both must be finite, the end above the start"
+                )
+            }
             Self::Element(error) => error.fmt(f),
-            Self::Period { period, elements } => write!(
-                f,
-                "a period of {period} in {elements} elements: the period must be positive and finite, the elements at least one"
-            ),
+            Self::Period { period, elements } => {
+                let period = Short(*period);
+                write!(
+                    f,
+                    "a period of {period} in {elements} elements: the period must be positive and finite, the elements at least one"
+                )
+            }
             Self::Io { path, source } => write!(f, "cannot write {}: {source}", path.display()),
             Self::UnknownEnding { path, known } => {
                 let known = known.join(" or ");
@@ -153,7 +160,8 @@ impl<E: Error + 'static> Error for PointError<E> {
 
 impl<E: fmt::Display> fmt::Display for PointFailure<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "at ({}, {}): {}", self.x, self.y, self.error)
+        let (x, y) = (Short(self.x), Short(self.y));
+        write!(f, "at ({x}, {y}): {}", self.error)
     }
 }
 
