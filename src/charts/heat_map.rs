@@ -444,10 +444,13 @@ fn curve_key(k: usize) -> Key {
 }
 
 fn draw_curve(canvas: &Canvas<'_>, plot: &Plot, curve: &Curve, key: Key) -> Result<(), ChartError> {
-    let lines = plot.lines(&curve.points);
-    lines
-        .iter()
-        .try_for_each(|line| key.draw_line(canvas, line))
+    for line in plot.lines(&curve.points) {
+        key.draw_line(canvas, &line)?;
+    }
+    for at in plot.alone(&curve.points) {
+        key.draw_dot(canvas, at)?;
+    }
+    Ok(())
 }
 
 /// The scale of the colours, to the right of the frame.

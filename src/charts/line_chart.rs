@@ -32,8 +32,8 @@ struct Series {
 
 /// Curves in a frame with two axes.
 ///
-/// A point with a coordinate that is not finite, or not positive on a logarithmic axis, is a gap in its curve; what lies outside a range is cut off at
-/// the frame. The legend stands beside the frame. Colours are told apart by the colour-blind, markers without colours.
+/// A point with a coordinate that is not finite, or not positive on a logarithmic axis, is a gap in its curve, a point between two gaps a dot; what lies
+/// outside a range is cut off at the frame. The legend stands beside the frame. Colours are told apart by the colour-blind, markers without colours.
 ///
 /// ```
 /// use tfe::charts::{Axis, Chart, Style};
@@ -240,6 +240,9 @@ fn draw_series(
 ) -> Result<(), ChartError> {
     for line in plot.lines(&series.points) {
         key.draw_line(canvas, &line)?;
+    }
+    for at in plot.alone(&series.points) {
+        key.draw_dot(canvas, at)?;
     }
     for at in plot.markers(&series.points) {
         key.draw_marker(canvas, at)?;

@@ -90,6 +90,19 @@ impl Plot {
             .collect()
     }
 
+    /// The points inside the frame that no line reaches, because their neighbours have no place, in pixels.
+    pub(super) fn alone(&self, points: &[Point]) -> Vec<Point> {
+        let (low, high) = self.corners();
+        let positions: Vec<_> = points.iter().map(|point| self.position(*point)).collect();
+        let is_gap = |k: usize| positions.get(k).is_none_or(Option::is_none);
+        (0..positions.len())
+            .filter(|k| is_gap(k.wrapping_sub(1)) && is_gap(k + 1))
+            .filter_map(|k| positions[k])
+            .filter(|at| clip::contains(*at, low, high))
+            .map(|at| self.pixel(at))
+            .collect()
+    }
+
     /// Where a point lies on the axes, also outside the frame; none for what has no place.
     fn position(&self, (x, y): Point) -> Option<Point> {
         Some((self.x.position(x)?, self.y.position(y)?))
@@ -267,6 +280,16 @@ impl Key {
                 canvas.line(line, colour, STROKE)
             }
             Self::Markers(..) | Self::Area(_) => Ok(()),
+        }
+    }
+
+    /// Draws a point of a line that has no neighbours, if no marker shows it.
+    pub(super) fn draw_dot(self, canvas: &Canvas<'_>, at: Point) -> Result<(), ChartError> {
+        match self {
+            Self::Line(colour) | Self::Dashes(colour) | Self::Outlined(colour) => {
+                canvas.marker(at, Shape::Circle, colour)
+            }
+            Self::LineWithMarkers(..) | Self::Markers(..) | Self::Area(_) => Ok(()),
         }
     }
 

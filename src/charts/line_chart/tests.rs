@@ -193,6 +193,28 @@ fn numbers_without_a_place_are_gaps() {
 }
 
 #[test]
+fn points_without_neighbours_are_dots() {
+    let dots = |style, points: &[Point]| {
+        let chart = Chart::new("").series("", style, points.iter().copied());
+        let svg = chart.to_svg().unwrap();
+        svg.matches("<circle").count()
+    };
+    let gaps = [
+        (1.0, 1.0),
+        (2.0, f64::NAN),
+        (3.0, 1.0),
+        (4.0, 2.0),
+        (5.0, f64::NAN),
+        (6.0, 2.0),
+    ];
+    assert_eq!(dots(Style::Line, &gaps), 2);
+    assert_eq!(dots(Style::Line, &gaps[2..4]), 0);
+    for style in [Style::Line, Style::LineWithMarkers, Style::Reference] {
+        assert_eq!(dots(style, &gaps[..1]), 1, "{style:?}");
+    }
+}
+
+#[test]
 fn points_without_a_place_do_not_stretch_the_other_axis() {
     let logarithmic = || Axis::new("").scale(Scale::Logarithmic);
     let chart = |far| Chart::new("").line("", [(1.0, 1.0), (2.0, 2.0), far]);
