@@ -85,8 +85,8 @@ where
 /// B₁ᵀ A B₀                                                                (theory.md (T-78))
 /// ```
 ///
-/// No direction violates a constraint and no eigenvalue is zero because of one. About an equilibrium, and wherever B₁ = B₀, its eigenvalues are those of
-/// the motion itself; elsewhere multiply matrices along the motion, as [`Linearised::multipliers`](crate::Linearised::multipliers) does.
+/// No direction violates a constraint and no eigenvalue is zero because of one. Where the same motions are allowed at both ends (to √ε, as beside an equilibrium
+/// that is known to roundings), B₁ is B₀, and the eigenvalues are those of the motion itself; elsewhere multiply matrices along the motion, as [`Linearised::multipliers`](crate::Linearised::multipliers) does.
 ///
 /// # Shapes
 /// 2N − 2h − n rows and columns with h independent holonomic constraints and n others.
@@ -119,11 +119,21 @@ where
     M: Declared<N, Length: Transitions<M, N>>,
 {
     let (matrix, end) = M::Length::step(model, element.into(), state, t, h)?;
-    let (before, after) = (
-        M::Length::basis(model, t, state)?,
-        M::Length::basis(model, t + h, &end)?,
-    );
-    Ok(after.tr_mul(&(matrix * before)))
+    let before = M::Length::basis(model, t, state)?;
+    let after = M::Length::basis(model, t + h, &end)?;
+    let after = if spans_the_same(&before, &after) {
+        &before
+    } else {
+        &after
+    };
+    Ok(after.tr_mul(&(matrix * &before)))
+}
+
+/// Whether two orthonormal bases span one space: roundings of a state may give another basis of it, whose matrix has other eigenvalues.
+///
+/// To √ε, which changes a matrix by ε where one takes the place of the other.
+fn spans_the_same(one: &DMatrix<f64>, other: &DMatrix<f64>) -> bool {
+    one.shape() == other.shape() && (other - one * one.tr_mul(other)).amax() <= f64::EPSILON.sqrt()
 }
 
 /// Every interval of step size in which a motion about an equilibrium grows, however right the model: ascending, apart from each other.

@@ -48,6 +48,41 @@ fn the_hanging_rod() {
     }
 }
 
+/// An equilibrium is known to roundings, behind which coordinates and velocities have any sign: the basis at the end does not turn with them.
+#[test]
+fn a_little_beside_the_equilibrium() {
+    let rod = RodPendulum {
+        m: 0.8,
+        l: 1.3,
+        g: 9.81,
+    };
+    let swing = Oscillator {
+        omega2: rod.g / rod.l,
+    };
+    let zero = State { q: [0.0], p: [0.0] };
+    let element = Element::mixed(5);
+    for x in [1e-12, -1e-12] {
+        let beside = rod.state([x, -rod.l], [0.0, 0.0]);
+        for h in [0.2, 0.8] {
+            let a = stability::on_constraints(&rod, element, &beside, 0.0, h)
+                .unwrap_or_else(|error| panic!("x = {x}, h = {h}: {error}"));
+            let oscillator = stability::transition_matrix(&swing, element, &zero, 0.0, h);
+            let expected = oscillator.expect("an oscillator").trace();
+            // The matrix changes with x, by some 1e-12.
+            assert!(
+                (a.trace() - expected).abs() < 1e-10,
+                "x = {x}, h = {h}: trace {}, expected {expected}",
+                a.trace()
+            );
+            assert!(
+                (a.determinant() - 1.0).abs() < 1e-10,
+                "x = {x}, h = {h}: determinant {}",
+                a.determinant()
+            );
+        }
+    }
+}
+
 /// The steps at which an element fails are those of the oscillator: zeros of directions that are no motions do not count.
 #[test]
 fn unstable_steps_of_the_hanging_rod() {
