@@ -212,6 +212,21 @@ mod tests {
     }
 
     #[test]
+    fn a_light_free_body_hides_no_bubble() {
+        let mut both = LinearModel::<2> {
+            second: Second::ZERO,
+        };
+        both.second.qq = [[0.0, 0.0], [0.0, 1.0]];
+        for mass in [1.0, 1e-12, 1e-30] {
+            both.second.zz = [[1.0 / mass, 0.0], [0.0, 1.0]];
+            let growth = both
+                .growth(Element::primal(3), 3.3)
+                .unwrap_or_else(|| panic!("the oscillator is in its bubble, mass {mass}"));
+            assert!(growth.radius > 1.12 && growth.radius < 1.13, "{growth:?}");
+        }
+    }
+
+    #[test]
     fn free_coordinates_are_no_growth() {
         // Four eigenvalues in one Jordan block, H = ½ p₁² + q₁ p₂: round-off spreads them by its fourth root.
         let mut chain = LinearModel::<2> {

@@ -105,6 +105,21 @@ mod tests {
     }
 
     #[test]
+    fn free_coordinates_of_light_bodies_have_no_time_scale() {
+        let mut model = LinearModel::<2> {
+            second: Second::ZERO,
+        };
+        // An electron that a trap holds along one axis.
+        let mass = 9.1e-31;
+        model.second.zz = [[1.0 / mass, 0.0], [0.0, 1.0 / mass]];
+        model.second.qq = [[4.0 * mass, 0.0], [0.0, 0.0]];
+        let scales = model.time_scales().expect("eigenvalues");
+        // Only roundings of the balanced matrix, whose entries are some 2.
+        assert!((scales.fastest() - 2.0).abs() < 1e-12, "{scales}");
+        assert!((scales.slowest() - 2.0).abs() < 1e-12, "{scales}");
+    }
+
+    #[test]
     fn rates_far_apart_are_stiff() {
         let mut model = LinearModel::<2> {
             second: Second::ZERO,
