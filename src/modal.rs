@@ -1,5 +1,6 @@
 //! Modal reduction: a large linear model by its lowest modes.
 
+mod diagonal;
 mod eigen;
 mod error;
 mod full;

@@ -39,6 +39,15 @@ struct Drifting {
     u: f64,
 }
 
+/// A cart on a spring and a body on a spring to it, whose masses the place of the body in the cart couples.
+#[dynamics(coordinates(cart, body), lagrangian = m/2*dot(cart)^2 + m/2*(dot(cart) + dot(body))^2 - k/2*cart^2 - c/2*body^2 + f*(cart + body))]
+struct Riding {
+    m: f64,
+    k: f64,
+    c: f64,
+    f: f64,
+}
+
 fn row(n: usize, g: f64) -> Row {
     let (m, k) = (0.7, 3.1);
     Row { n, m, k, g }
@@ -186,6 +195,50 @@ fn what_nothing_holds_falls() {
         assert!((one - all).abs() < 1e-10, "{one} {all}");
     }
     assert!((motion.energies()[0] - full.energies()[0]).abs() < 1e-12);
+}
+
+#[test]
+fn slow_modes_beside_stiff_springs() {
+    let (m, f) = (0.7, 1.3);
+    let springs = [1e-150, 1e-20, 1.0, 1e20, 1e60, 1e150];
+    for k in springs {
+        for c in springs {
+            let riding = Riding { m, k, c, f };
+            let modal: Modal<'_, Riding, 2, State<2>> = Modal::of(&riding).unwrap();
+            // m²ω⁴ − m (k + 2c) ω² + k c = 0
+            let sum = k + 2.0 * c + k.hypot(2.0 * c);
+            let exact = [(2.0 * (k / sum) * (c / m)).sqrt(), (sum / 2.0 / m).sqrt()];
+            for (found, exact) in modal.frequencies().iter().zip(exact) {
+                let error = (found / exact - 1.0).abs();
+                assert!(error < 1e-14, "k = {k}, c = {c}: {found} {exact}");
+            }
+            // Pulled until the softer spring holds; what the stiffer one gives way may be less than a rounding of that.
+            let (softer, spring) = if k <= c { (0, k) } else { (1, c) };
+            let found = modal.equilibrium()[softer];
+            let error = (found * spring / f - 1.0).abs();
+            assert!(error < 1e-14, "k = {k}, c = {c}: {found}");
+        }
+    }
+}
+
+#[test]
+fn rigid_and_growing_modes_beside_stiff_springs() {
+    let (m, f) = (0.7, 0.0);
+    for stiff in [1.0, 1e20, 1e150] {
+        for (k, c) in [(0.0, stiff), (stiff, 0.0)] {
+            let riding = Riding { m, k, c, f };
+            let modal: Modal<'_, Riding, 2, State<2>> = Modal::of(&riding).unwrap();
+            assert_eq!(modal.frequencies()[0], 0.0, "k = {k}, c = {c}");
+        }
+    }
+    for (k, c, mass) in [(-1.0, 1e20, 2.0 * m), (1e20, -1.0, m)] {
+        let riding = Riding { m, k, c, f };
+        let modal: Modal<'_, Riding, 2, State<2>> = Modal::of(&riding).unwrap();
+        // The stiff spring is a rod.
+        let exact = -(1.0 / mass).sqrt();
+        let error = (modal.frequencies()[0] / exact - 1.0).abs();
+        assert!(error < 1e-14, "k = {k}, c = {c}");
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The modes of ½ q̇ᵀ M q̇ − ½ qᵀ K q + f·q.
 
+use super::diagonal::diagonal;
 use super::error::ModalError;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 use tfe_runtime::Form;
@@ -75,7 +76,7 @@ impl Quadratic {
         })
     }
 
-    /// With M = L Lᵀ: the eigenvectors u of L⁻¹ K L⁻ᵀ give φ = L⁻ᵀ u.
+    /// With M = L Lᵀ: the eigenvectors u of L⁻¹ K L⁻ᵀ give φ = L⁻ᵀ u, to roundings of the largest ω².
     pub(super) fn modes(&self) -> Result<Modes, ModalError> {
         let n = self.slope_q.len();
         let lower = factors(self.mass.clone())?.unpack();
@@ -86,9 +87,10 @@ impl Quadratic {
         let most = 100 * (n + 10);
         let eigen = SymmetricEigen::try_new(symmetric, f64::EPSILON, most);
         let eigen = eigen.ok_or(ModalError::NoEigenvalues)?;
-        let largest = eigen.eigenvalues.amax();
+        let shapes = lower.tr_solve_lower_triangular(&eigen.eigenvectors);
+        let shapes = shapes.ok_or(ModalError::MassNotPositive)?;
+        let (squares, shapes) = diagonal(&self.stiffness, shapes);
         let mut order: Vec<usize> = (0..n).collect();
-        let squares = &eigen.eigenvalues;
         order.sort_by(|a, b| squares[*a].total_cmp(&squares[*b]));
         let mut modes = Modes {
             squares: Vec::with_capacity(n),
@@ -98,13 +100,7 @@ impl Quadratic {
             rest: vec![0.0; n],
         };
         for k in order {
-            let vector = eigen.eigenvectors.column(k).into_owned();
-            let shape = lower.tr_solve_lower_triangular(&vector);
-            let shape = shape.ok_or(ModalError::MassNotPositive)?;
-            // Below the roundings of the largest there is none.
-            let is_rigid = squares[k].abs() <= n as f64 * f64::EPSILON * largest;
-            let square = if is_rigid { 0.0 } else { squares[k] };
-            modes.push(square, positive(shape), self);
+            modes.push(squares[k], positive(shapes.column(k).into_owned()), self);
         }
         Ok(modes)
     }
