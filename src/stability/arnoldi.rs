@@ -1,6 +1,7 @@
 //! The eigenvalue of largest modulus of an operator that is known by its products alone.
 
 use super::schur_order::Ordered;
+use crate::numbers::norm;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::error::Error;
 use std::fmt;
@@ -210,7 +211,7 @@ impl Krylov {
             start.copy_from(&self.basis.column(column));
             apply(start.as_slice(), image.as_mut_slice());
             *products += 1;
-            let whole = image.norm();
+            let whole = norm(image.as_slice());
             if !whole.is_finite() {
                 return Err(DominantError::NotFinite);
             }
@@ -224,7 +225,7 @@ impl Krylov {
                     self.projected[(row, column)] += part;
                 }
             }
-            let rest = image.norm();
+            let rest = norm(image.as_slice());
             self.projected[(self.count, column)] = rest;
             if rest <= 1e2 * f64::EPSILON * whole {
                 self.basis.column_mut(self.count).fill(0.0);
@@ -304,6 +305,18 @@ mod tests {
         let same = dominant_of(50, |x, y| y.copy_from_slice(x), Iteration::default());
         let same = same.expect("one product shows it");
         assert!((same.radius() - 1.0).abs() < 1e-14 && same.products == 1);
+    }
+
+    #[test]
+    fn operators_of_any_size() {
+        // A pair outside of the crowd, of steps that grow or decay by much.
+        for size in [1e-200, 1e200] {
+            let mut moduli = vec![size; 40];
+            moduli[12] = 1.5 * size;
+            let found = dominant_of(80, turns(&moduli), Iteration::default()).expect("a pair");
+            assert!((found.radius() / size - 1.5).abs() < 1e-10, "{found:?}");
+            assert!((found.eigenvalue.arg() - 0.42).abs() < 1e-10, "{found:?}");
+        }
     }
 
     #[test]

@@ -47,6 +47,9 @@ impl fmt::Display for EigenvalueError {
 
 impl Error for EigenvalueError {}
 
+/// Products of three entries between this and its inverse neither over- nor underflow.
+const MODERATE: f64 = 1e100;
+
 /// The eigenvalues of a square matrix: every λ with det(A − λ) = 0, as often as its multiplicity.
 ///
 /// A matrix of two rows has a closed form,
@@ -78,8 +81,6 @@ impl Error for EigenvalueError {}
 /// # Ok::<(), stability::EigenvalueError>(())
 /// ```
 pub fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, EigenvalueError> {
-    /// Products of three entries between this and its inverse neither over- nor underflow.
-    const MODERATE: f64 = 1e100;
     let (rows, columns) = matrix.shape();
     if rows != columns {
         return Err(EigenvalueError::NotSquare { rows, columns });
@@ -237,7 +238,23 @@ fn reflection(x: &[f64]) -> Option<([f64; 3], f64)> {
     Some((v, 2.0 / v.iter().map(|entry| entry * entry).sum::<f64>()))
 }
 
+/// Of entries of any size; the off-diagonal ones matter by their product alone.
 pub(super) fn eigenvalues_of_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
+    let is_moderate = |x: f64| x == 0.0 || (1.0 / MODERATE..=MODERATE).contains(&x.abs());
+    if [a, b, c, d].into_iter().all(is_moderate) {
+        return of_moderate_two([[a, b], [c, d]]);
+    }
+    let coupling = b.abs().sqrt() * c.abs().sqrt();
+    let unit = a.abs().max(d.abs()).max(coupling);
+    if unit == 0.0 {
+        return [Complex::new(0.0, 0.0); 2];
+    }
+    let part = coupling / unit;
+    let scaled = [[a / unit, part.copysign(b)], [part.copysign(c), d / unit]];
+    of_moderate_two(scaled).map(|value| value * unit)
+}
+
+fn of_moderate_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
     let (mean, half_difference) = (f64::midpoint(a, d), 0.5 * (a - d));
     let discriminant = half_difference * half_difference + b * c;
     if discriminant < 0.0 {
@@ -457,6 +474,9 @@ mod tests {
         assert_eq!(of([[1.0, 0.0], [0.0, 1e-17]]), [1.0, 1e-17]);
         assert_eq!(of([[-1e8, 3.0], [0.0, 1e-8]]), [1e-8, -1e8]);
         assert_eq!(of([[0.0, 0.0], [0.0, 0.0]]), [0.0, 0.0]);
+        assert_eq!(of([[2e200, 3e200], [0.0, -1e200]]), [2e200, -1e200]);
+        assert_eq!(of([[1e-200, 1.0], [0.0, 2e-200]]), [2e-200, 1e-200]);
+        assert_eq!(of([[0.0, 1e-300], [0.0, 0.0]]), [0.0, 0.0]);
         let [large, small] = of([[1e9, 1.0], [1.0, 1.0]]);
         assert!((large * small - (1e9 - 1.0)).abs() < 1e-6 && small < 1.0);
     }
