@@ -49,7 +49,7 @@ mod tests;
 
 pub use error::PeriodicSchurError;
 
-pub(crate) use arithmetic::{exponent, power_of_two, reflection};
+pub(crate) use arithmetic::{exponent, power_of_two, reflection, size_in_all_units};
 pub(crate) use chain::balancing;
 
 use arithmetic::Scaled;

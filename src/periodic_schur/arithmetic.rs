@@ -36,6 +36,15 @@ pub(super) fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
     values.into_iter().fold(0.0, |most, x| x.abs().max(most))
 }
 
+/// max √|a_ij a_ji| of a square matrix of n rows, the diagonal included: a size that is the same in all units of the coordinates.
+pub(crate) fn size_in_all_units(a: &[f64], n: usize) -> f64 {
+    let root = |row: usize, column: usize| a[row + column * n].abs().sqrt();
+    let pairs = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    pairs
+        .map(|(i, j)| root(i, j) * root(j, i))
+        .fold(0.0, f64::max)
+}
+
 /// The complex number mantissa · 2^exponent.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scaled {

@@ -2,7 +2,7 @@
 
 use super::arithmetic::{
     Rotation, Scaled, exponent, largest, reflect_columns, reflect_rows, reflection,
-    times_power_of_two,
+    size_in_all_units, times_power_of_two,
 };
 use super::error::PeriodicSchurError;
 use nalgebra::{Complex, DMatrix};
@@ -312,9 +312,11 @@ fn balance_by(factors: &mut [DMatrix<f64>], n: usize, size_of: impl Fn(&DMatrix<
 ///
 /// `most` holds moduli, n × n by columns; for one by rows the exponents come with the opposite sign. Balanced are the
 /// sums of each row and of the column of the same number, without the diagonal and with `floor` added: entries that are
-/// small beside a positive `floor` are left as they are.
+/// small beside a positive `floor` are left as they are. Without one, a row or a column that has no counterpart, as those of free
+/// coordinates and of conserved momenta, is made no larger than [`size_in_all_units`].
 pub(crate) fn balancing(most: &mut [f64], floor: f64, exponents: &mut [i64]) {
     let n = exponents.len();
+    let size = size_in_all_units(most, n);
     exponents.fill(0);
     // Each pass at least halves what is left to do; a dozen reach every scale of an f64.
     for _ in 0..24 {
@@ -323,10 +325,13 @@ pub(crate) fn balancing(most: &mut [f64], floor: f64, exponents: &mut [i64]) {
             let others = || (0..n).filter(|&j| j != i);
             let column = floor + others().map(|j| most[j + i * n]).sum::<f64>();
             let row = floor + others().map(|j| most[i + j * n]).sum::<f64>();
-            if column == 0.0 || row == 0.0 {
-                continue;
-            }
-            let e = (exponent(row) - exponent(column)) / 2;
+            let beyond = |sum: f64| (exponent(sum) - exponent(size)).max(0);
+            let e = match (row > 0.0, column > 0.0) {
+                (true, true) => (exponent(row) - exponent(column)) / 2,
+                (true, false) if size > 0.0 => beyond(row),
+                (false, true) if size > 0.0 => -beyond(column),
+                _ => continue,
+            };
             let after = times_power_of_two(column, e) + times_power_of_two(row, -e);
             if e == 0 || after >= 0.95 * (column + row) {
                 continue;

@@ -1,6 +1,7 @@
 //! Eigenvalues of a real matrix by QR sweeps that are counted.
 
 use crate::numbers::larger;
+use crate::periodic_schur::size_in_all_units;
 use nalgebra::linalg::Hessenberg;
 use nalgebra::{Complex, DMatrix};
 use std::error::Error;
@@ -281,7 +282,7 @@ fn of_moderate_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
 /// momentum depends on nothing: where only the row or only the column has entries, these are made no larger than [`size_in_all_units`].
 pub(super) fn balanced(a: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
     const SWEEPS: usize = 8;
-    let size = size_in_all_units(a);
+    let size = size_in_all_units(a.as_slice(), a.nrows());
     let mut a = a.clone();
     let mut diagonal = vec![1.0; a.nrows()];
     for _ in 0..SWEEPS {
@@ -319,15 +320,6 @@ pub(super) fn balanced(a: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
         }
     }
     (a, diagonal)
-}
-
-/// max √|a_ij a_ji|, the diagonal included: a size that is the same in all units of the coordinates.
-fn size_in_all_units(a: &DMatrix<f64>) -> f64 {
-    let root = |row: usize, column: usize| a[(row, column)].abs().sqrt();
-    let pairs = (0..a.nrows()).flat_map(|i| (0..=i).map(move |j| (i, j)));
-    pairs
-        .map(|(i, j)| root(i, j) * root(j, i))
-        .fold(0.0, f64::max)
 }
 
 /// max |λ|; NaN if one is.

@@ -82,6 +82,38 @@ fn badly_scaled_coordinates_are_balanced() {
 }
 
 #[test]
+fn free_coordinates_of_any_mass() {
+    // p₁ and q₁ turn by 0.3 and are damped; p₂ is conserved, nothing depends on q₂.
+    let (sin, cos) = 0.3f64.sin_cos();
+    for mass in [1e-150, 1e-20, 1e-10, 1.0, 1e20, 1e150] {
+        let mut factor = DMatrix::identity(4, 4);
+        for (row, column, x) in [
+            (0, 0, 0.9 * cos),
+            (0, 1, 0.1),
+            (0, 2, -0.9 * mass * sin),
+            (2, 0, 0.9 * sin / mass),
+            (2, 1, 0.4 / mass),
+            (2, 2, 0.9 * cos),
+            (3, 0, 0.3 / mass),
+            (3, 1, 1.0 / mass),
+            (3, 2, 0.2),
+        ] {
+            factor[(row, column)] = x;
+        }
+        let found = multipliers(&vec![factor; 5]).expect("converges");
+        for (x, argument) in found[2..].iter().zip([1.5, -1.5]) {
+            assert!((x.log_modulus - 5.0 * 0.9f64.ln()).abs() < 1e-12, "{x:?}");
+            assert!((x.argument - argument).abs() < 1e-12, "{x:?}");
+        }
+        // The two ones are in one Jordan block, known to the root of round-off.
+        for x in &found[..2] {
+            let error = x.log_modulus.hypot(x.argument);
+            assert!(error < 1e-6, "mass {mass}: {x:?}");
+        }
+    }
+}
+
+#[test]
 fn a_singular_factor_gives_the_eigenvalue_zero() {
     let mut random = Random(17);
     for n in [1, 2, 3, 6, 20] {
