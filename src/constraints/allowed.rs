@@ -1,5 +1,6 @@
 //! The motions that constraints allow, as columns: what is the same for models of either kind of length, and those of run-time length (T-78).
 
+use crate::numbers::norm;
 use nalgebra::{DMatrix, DVector};
 use tfe_runtime::{ConstraintError, StepError};
 #[cfg(feature = "sparse")]
@@ -21,15 +22,99 @@ pub(super) struct Held {
 
 impl Held {
     /// An orthonormal basis of what is left, ordered (p, q).
+    ///
+    /// Momenta of light bodies are small beside coordinates, those of heavy ones large. Reflections keep the digits of small rows where the larger rows and
+    /// the columns that have entries there come first.
     pub(super) fn basis(&self) -> DMatrix<f64> {
-        let (size, rank) = (self.to_momenta.nrows(), self.gradients.len());
-        let mut square = DMatrix::zeros(size, size);
-        for (k, gradient) in self.gradients.iter().enumerate() {
-            square.set_column(k, &gradient.normalize());
+        let n = self.to_momenta.nrows() / 2;
+        let [moved, at_rest] = self.motions().map(|motions| &self.to_momenta * motions);
+        if moved.rows(0, n).amax() < moved.rows(n, n).amax() {
+            let columns = side_by_side(&moved, &at_rest);
+            halves_exchanged(&halves_exchanged(&columns).qr().q())
+        } else {
+            side_by_side(&at_rest, &moved).qr().q()
         }
-        let complement = square.qr().q().columns(rank, size - rank).into_owned();
-        (&self.to_momenta * complement).qr().q()
     }
+
+    /// Independent motions (δq, δv): those of coordinates, with the least velocities that they need, and those of velocities alone.
+    ///
+    /// ```text
+    /// A_V δq = 0 ,   δv = −A⁺ Ψ_q δq        and        A δv = 0
+    /// ```
+    fn motions(&self) -> [DMatrix<f64>; 2] {
+        let n = self.to_momenta.nrows() / 2;
+        let (mut holonomic, mut rows, mut rates) = (Vec::new(), Vec::new(), Vec::new());
+        for gradient in &self.gradients {
+            let by_q = gradient.rows(0, n).into_owned();
+            let by_v = gradient.rows(n, n).into_owned();
+            if by_v.iter().all(|entry| *entry == 0.0) {
+                let length = norm(by_q.as_slice());
+                holonomic.push(by_q / length);
+            } else {
+                let length = norm(by_v.as_slice());
+                rates.push(by_q / length);
+                rows.push(by_v / length);
+            }
+        }
+        let [_, coordinates] = split(n, &holonomic);
+        let [across, along] = split(n, &rows);
+        let by_rows = |of: &[DVector<f64>]| DMatrix::from_fn(of.len(), n, |i, j| of[i][j]);
+        let needed = by_rows(&rates) * &coordinates;
+        let least = (by_rows(&rows) * &across).lu().solve(&needed);
+        // Rows that depend on one another leave nothing that is finite.
+        let least = least.unwrap_or_else(|| needed.map(|_| f64::NAN));
+        let velocities = across * -least;
+        [
+            stacked(&coordinates, &velocities),
+            stacked(&DMatrix::zeros(n, along.ncols()), &along),
+        ]
+    }
+}
+
+/// Orthonormal bases of the span of independent unit vectors, and of what is perpendicular to it.
+fn split(size: usize, vectors: &[DVector<f64>]) -> [DMatrix<f64>; 2] {
+    let rank = vectors.len();
+    let mut square = DMatrix::zeros(size, size);
+    for (k, vector) in vectors.iter().enumerate() {
+        square.set_column(k, vector);
+    }
+    let all = square.qr().q();
+    [
+        all.columns(0, rank).into_owned(),
+        all.columns(rank, size - rank).into_owned(),
+    ]
+}
+
+/// One matrix above another.
+fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let middle = above.nrows();
+    DMatrix::from_fn(middle + below.nrows(), above.ncols(), |row, column| {
+        if row < middle {
+            above[(row, column)]
+        } else {
+            below[(row - middle, column)]
+        }
+    })
+}
+
+/// One matrix beside another.
+fn side_by_side(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let middle = left.ncols();
+    DMatrix::from_fn(left.nrows(), middle + right.ncols(), |row, column| {
+        if column < middle {
+            left[(row, column)]
+        } else {
+            right[(row, column - middle)]
+        }
+    })
+}
+
+/// The lower half of the rows above the upper one.
+fn halves_exchanged(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let (rows, columns) = matrix.shape();
+    DMatrix::from_fn(rows, columns, |row, column| {
+        matrix[((row + rows / 2) % rows, column)]
+    })
 }
 
 /// The matrices of a chain in the bases at its nodes; the last one leads back to the basis of the start, which is that of the end of a periodic motion.

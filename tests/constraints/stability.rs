@@ -195,6 +195,21 @@ fn the_rolling_disk() {
     }
 }
 
+/// The mass has no part in how it rolls, neither where momenta are small beside coordinates nor where they are large.
+#[test]
+fn disks_of_any_mass_roll_alike() {
+    let trace = |m: f64| {
+        let disk = Disk { m, r: 0.4, g: 9.81 };
+        disk.rolling(2.0, Element::mixed(4), 0.1).trace()
+    };
+    let expected = trace(1.0);
+    for m in [1e-12, 1e-6, 1e3] {
+        let error = (trace(m) - expected).abs();
+        // Roundings of an element and of two bases.
+        assert!(error < 1e-8, "m = {m}: {error:e}");
+    }
+}
+
 /// The matrix of e → e ∘ g.
 fn followed_by([a, b, c, d]: [f64; 4]) -> DMatrix<f64> {
     DMatrix::from_row_slice(
