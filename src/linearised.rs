@@ -1,6 +1,6 @@
 //! A motion with its linearisation: the transition matrix of every element.
 
-use crate::constraints::reduced;
+use crate::constraints::{allowed, reduced, tangent_basis};
 use crate::length::{FixedLength, Length};
 use crate::motion::Motion;
 use crate::periodic_schur::{self, Multiplier, PeriodicSchurError};
@@ -44,19 +44,23 @@ use tfe_runtime::{Model, State, StepError};
 pub struct Linearised<const N: usize, L: Length<N> = FixedLength> {
     motion: Motion<N, L>,
     transitions: Vec<DMatrix<f64>>,
-    /// The same on the motions that constraints allow, for models that have any.
+    /// The same on the motions that constraints allow, for models that have any; of an empty span the identity.
     reduced: Option<Result<Vec<DMatrix<f64>>, StepError>>,
 }
 
 impl<const N: usize> Linearised<N> {
-    /// With the start of every element if the model has constraints.
+    /// With the start of every matrix if the model has constraints.
     pub(crate) fn new<M: Model<N>>(
         model: &M,
         motion: Motion<N>,
         transitions: Vec<DMatrix<f64>>,
         starts: &[(f64, State<N>)],
     ) -> Self {
-        let reduced = (!starts.is_empty()).then(|| {
+        let reduced = const { !M::CONSTRAINTS.is_empty() }.then(|| {
+            if transitions.is_empty() {
+                let start = motion.last();
+                return allowed::identity(tangent_basis(model, start.t, &start.state()));
+            }
             let starts = starts.iter().copied();
             reduced(model, starts, &transitions)
         });
@@ -100,7 +104,8 @@ impl<const N: usize, L: Length<N>> Linearised<N, L> {
     /// motion ends): no direction that violates a constraint, and no zero eigenvalue for it. `None` for models without constraints, and where there is
     /// no basis.
     pub fn on_constraints(&self) -> Option<&[DMatrix<f64>]> {
-        self.reduced.as_ref()?.as_deref().ok()
+        let reduced = self.reduced.as_ref()?.as_deref().ok()?;
+        reduced.get(..self.transitions.len())
     }
 
     /// The motion and the transition matrices, by value.

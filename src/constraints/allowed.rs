@@ -134,6 +134,14 @@ pub(crate) fn reduced<'a>(
     reduced.collect()
 }
 
+/// What takes the place of the matrices where a motion has no element: the identity on what is allowed at its start.
+pub(crate) fn identity(
+    start: Result<DMatrix<f64>, StepError>,
+) -> Result<Vec<DMatrix<f64>>, StepError> {
+    let size = start?.ncols();
+    Ok(vec![DMatrix::identity(size, size)])
+}
+
 /// The basis of a model of run-time length at a state.
 ///
 /// # Errors

@@ -83,6 +83,24 @@ fn a_little_beside_the_equilibrium() {
     }
 }
 
+/// An empty span is the identity on the two motions that the rod allows, without an element.
+#[test]
+fn nothing_moves_in_an_empty_span() {
+    let rod = RodPendulum {
+        m: 0.8,
+        l: 1.3,
+        g: 9.81,
+    };
+    let down = rod.state([0.0, -rod.l], [0.0, 0.0]);
+    let simulation = Simulation::new(&rod).element(Mixed::<3>).step(0.1);
+    let still = simulation.run_linearised(down, 1.0..1.0);
+    let still = still.expect("an empty span");
+    let multipliers = still.multipliers().expect("the identity");
+    assert_eq!(multipliers.len(), 2);
+    assert!(multipliers.iter().all(|one| one.modulus() == 1.0));
+    assert_eq!(still.on_constraints().map(<[_]>::len), Some(0));
+}
+
 /// The steps at which an element fails are those of the oscillator: zeros of directions that are no motions do not count.
 #[test]
 fn unstable_steps_of_the_hanging_rod() {

@@ -589,4 +589,8 @@ fn conservative_orbits_are_those_of_fixed_size() {
     let multipliers: Vec<_> = multipliers.iter().map(Multiplier::to_complex).collect();
     assert!((angles(&multipliers) - angles(one.multipliers())).abs() < 1e-8);
     assert_eq!(run.on_constraints().expect("bases")[0].shape(), (4, 4));
+    let still = Simulation::new(&long).step(0.1);
+    let still = still.run_linearised(one.start(), 0.0..0.0);
+    let identity = still.expect("an empty span").multipliers();
+    assert_eq!(identity.expect("multipliers").len(), 4);
 }

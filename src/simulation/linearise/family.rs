@@ -70,6 +70,11 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             family::TransitionOperator::of_steps_by(&*self.model, element, asked, steps, each);
         let Err((number, error)) = found else {
             let reduced = M::CONSTRAINED.then(|| {
+                if elements.is_empty() {
+                    let start = motion.last();
+                    let basis = basis_of(&*self.model, start.t, &start.state());
+                    return allowed::identity(basis);
+                }
                 let starts = elements.iter();
                 let bases = starts.map(|element| basis_of(&*self.model, element.t, element.node()));
                 let bases = bases.collect::<Result<Vec<_>, _>>()?;
