@@ -40,8 +40,9 @@ struct Drifting {
 }
 
 /// A cart on a spring and a body on a spring to it, whose masses the place of the body in the cart couples.
-#[dynamics(coordinates(cart, body), lagrangian = m/2*dot(cart)^2 + m/2*(dot(cart) + dot(body))^2 - k/2*cart^2 - c/2*body^2 + f*(cart + body))]
+#[dynamics(coordinates(cart, body), lagrangian = frame/2*dot(cart)^2 + m/2*(dot(cart) + dot(body))^2 - k/2*cart^2 - c/2*body^2 + f*(cart + body))]
 struct Riding {
+    frame: f64,
     m: f64,
     k: f64,
     c: f64,
@@ -203,7 +204,13 @@ fn slow_modes_beside_stiff_springs() {
     let springs = [1e-150, 1e-20, 1.0, 1e20, 1e60, 1e150];
     for k in springs {
         for c in springs {
-            let riding = Riding { m, k, c, f };
+            let riding = Riding {
+                frame: m,
+                m,
+                k,
+                c,
+                f,
+            };
             let modal: Modal<'_, Riding, 2, State<2>> = Modal::of(&riding).unwrap();
             // m²ω⁴ − m (k + 2c) ω² + k c = 0
             let sum = k + 2.0 * c + k.hypot(2.0 * c);
@@ -226,13 +233,25 @@ fn rigid_and_growing_modes_beside_stiff_springs() {
     let (m, f) = (0.7, 0.0);
     for stiff in [1.0, 1e20, 1e150] {
         for (k, c) in [(0.0, stiff), (stiff, 0.0)] {
-            let riding = Riding { m, k, c, f };
+            let riding = Riding {
+                frame: m,
+                m,
+                k,
+                c,
+                f,
+            };
             let modal: Modal<'_, Riding, 2, State<2>> = Modal::of(&riding).unwrap();
             assert_eq!(modal.frequencies()[0], 0.0, "k = {k}, c = {c}");
         }
     }
     for (k, c, mass) in [(-1.0, 1e20, 2.0 * m), (1e20, -1.0, m)] {
-        let riding = Riding { m, k, c, f };
+        let riding = Riding {
+            frame: m,
+            m,
+            k,
+            c,
+            f,
+        };
         let modal: Modal<'_, Riding, 2, State<2>> = Modal::of(&riding).unwrap();
         // The stiff spring is a rod.
         let exact = -(1.0 / mass).sqrt();
@@ -335,6 +354,11 @@ fn what_has_no_modes() {
         },
         &ModalError::NotFinite,
     );
+    // The mass matrix is singular; the last pivot is zero, or a rounding of either sign.
+    for m in [0.3, 0.5, 0.7, 1.0, 2.0, 7.0] {
+        let (frame, c, f) = (0.0, 1.0, 0.0);
+        check(&Riding { frame, m, k, c, f }, &ModalError::MassNotPositive);
+    }
     let none = Row { n: 0, m, k, g };
     let error = Modal::<'_, Row, 1>::of(&none).unwrap_err();
     assert!(matches!(error, ModalError::Family(_)), "{error}");

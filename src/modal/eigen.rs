@@ -130,6 +130,15 @@ fn positive(shape: DVector<f64>) -> DVector<f64> {
     }
 }
 
+/// Of a matrix that is positive by more than its roundings, in whatever units.
 fn factors(matrix: DMatrix<f64>) -> Result<Cholesky<f64, Dyn>, ModalError> {
-    Cholesky::new(matrix).ok_or(ModalError::MassNotPositive)
+    let roundings = matrix.diagonal() * (matrix.nrows() as f64 * f64::EPSILON);
+    let factors = Cholesky::new(matrix).ok_or(ModalError::MassNotPositive)?;
+    let roots = factors.l_dirty().diagonal();
+    let mut pivots = roots.iter().zip(&roundings);
+    if pivots.all(|(root, rounding)| root * root > *rounding) {
+        Ok(factors)
+    } else {
+        Err(ModalError::MassNotPositive)
+    }
 }
