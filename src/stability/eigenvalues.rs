@@ -322,6 +322,15 @@ pub(super) fn balanced(a: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
     (a, diagonal)
 }
 
+/// The size that the round-off of QR is relative to: in balanced units the largest entry, at each place, zeros included.
+pub(super) fn backward_error(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let (balanced, units) = balanced(a);
+    let largest = balanced.amax();
+    DMatrix::from_fn(a.nrows(), a.ncols(), |row, column| {
+        largest * units[row] / units[column]
+    })
+}
+
 /// max |λ|; NaN if one is.
 pub(super) fn largest_modulus(eigenvalues: &[Complex<f64>]) -> f64 {
     eigenvalues

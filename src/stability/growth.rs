@@ -1,6 +1,6 @@
 //! Whether an element moves a linear model faster than it moves itself: the unstable intervals of steps, seen from a run.
 
-use super::eigenvalues::{balanced, eigenvalues_of_finite};
+use super::eigenvalues::{backward_error, balanced, eigenvalues_of_finite};
 use super::linear_model::LinearModel;
 use super::sign_functions::Measure;
 use nalgebra::DMatrix;
@@ -74,15 +74,6 @@ fn logarithms(matrix: &DMatrix<f64>) -> Option<Vec<f64>> {
 fn row_sum_norm(a: &DMatrix<f64>) -> f64 {
     a.row_iter().fold(0.0, |most: f64, row| {
         most.max(row.iter().map(|entry| entry.abs()).sum())
-    })
-}
-
-/// The size that the round-off of QR is relative to: in balanced units the largest entry, at each place, zeros included.
-fn backward_error(a: &DMatrix<f64>) -> DMatrix<f64> {
-    let (balanced, units) = balanced(a);
-    let largest = balanced.amax();
-    DMatrix::from_fn(a.nrows(), a.ncols(), |row, column| {
-        largest * units[row] / units[column]
     })
 }
 

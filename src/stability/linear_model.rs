@@ -4,7 +4,7 @@
 //! linear with constant coefficients. Its exact flow over a time h has the eigenvalues e^{λh}; those of an element should be close to them.
 //! Where one is larger, and the model does not account for it, the step lies in an unstable interval of the linearised model.
 
-use super::eigenvalues::{EigenvalueError, eigenvalues};
+use super::eigenvalues::EigenvalueError;
 use super::time_scales::TimeScales;
 use nalgebra::DMatrix;
 use std::error::Error;
@@ -115,8 +115,7 @@ impl<const N: usize> LinearModel<N> {
     /// # Errors
     /// [`EigenvalueError`]
     pub fn time_scales(&self) -> Result<TimeScales, EigenvalueError> {
-        let rates = eigenvalues(&self.generator())?;
-        Ok(TimeScales { rates })
+        TimeScales::of(&self.generator())
     }
 
     /// The matrix S of ẏ = S y, y = (p, q):

@@ -1,21 +1,43 @@
 //! How fast a linear model moves.
 
+use super::eigenvalues::{EigenvalueError, backward_error, eigenvalues};
+use super::sign_functions::Measure;
 use crate::numbers::larger;
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 use std::fmt;
 
 /// The rates λ of a linear model, whose motions are sums of e^{λt}: whether it is stiff, and what steps see of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeScales {
-    pub(super) rates: Vec<Complex<f64>>,
+    rates: Vec<Complex<f64>>,
+    /// Rates that are not larger are those of free coordinates.
+    free: f64,
 }
 
 impl TimeScales {
-    /// Rates that are smaller, relative to the largest, are those of free coordinates and rounding, which moves double zeros by its square root.
+    /// Rates that are smaller, relative to the largest, may be those of free coordinates and rounding, which moves double zeros by its square root.
     const FREE: f64 = 1e-7;
+    /// They are where perturbations move them by as much as their size over this: four random ones may miss the worst direction.
+    const TRUST: f64 = 4.0;
     /// Beyond such a ratio of rates a model is called stiff.
     const STIFF: f64 = 100.0;
+
+    /// Of ẏ = S y.
+    pub(super) fn of(generator: &DMatrix<f64>) -> Result<Self, EigenvalueError> {
+        let rates = eigenvalues(generator)?;
+        let sizes = ascending(&rates);
+        let fastest = sizes.last().copied().unwrap_or(0.0);
+        let scale = backward_error(generator);
+        let is_rounding = |k: &usize| {
+            let one = |s: &DMatrix<f64>| Some(ascending(&eigenvalues(s).ok()?)[*k]);
+            sizes[*k] <= Self::TRUST * Measure::noise(generator, &scale, one)
+        };
+        let small = sizes.partition_point(|size| *size <= Self::FREE * fastest);
+        let free = (0..small).rev().find(is_rounding);
+        let free = free.map_or(0.0, |k| sizes[k]);
+        Ok(Self { rates, free })
+    }
 
     /// All λ.
     pub fn rates(&self) -> &[Complex<f64>] {
@@ -27,11 +49,11 @@ impl TimeScales {
         self.rates.iter().map(|rate| rate.norm()).fold(0.0, larger)
     }
 
-    /// The smallest |λ| that is not zero; zero if all are. Rates below 10⁻⁷ of the largest count as zero: by rounding, those of free coordinates are some 10⁻⁸.
+    /// The smallest |λ| that is not zero; zero if all are. By rounding those of free coordinates are some 10⁻⁸ of the largest: rates below 10⁻⁷ of it count as zero, unless
+    /// perturbations of the size of roundings leave them as they are.
     pub fn slowest(&self) -> f64 {
-        let least = Self::FREE * self.fastest();
         let sizes = self.rates.iter().map(|rate| rate.norm());
-        let moving = sizes.filter(|size| *size > least);
+        let moving = sizes.filter(|size| *size > self.free);
         moving.reduce(f64::min).unwrap_or(0.0)
     }
 
@@ -48,6 +70,13 @@ impl TimeScales {
     pub fn newton_from(&self) -> f64 {
         2.0 / self.fastest()
     }
+}
+
+/// The moduli, the smallest first.
+fn ascending(rates: &[Complex<f64>]) -> Vec<f64> {
+    let mut sizes: Vec<f64> = rates.iter().map(|rate| rate.norm()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes
 }
 
 /// What it means for steps, in one sentence.
@@ -125,9 +154,25 @@ mod tests {
             second: Second::ZERO,
         };
         model.second.zz = [[1.0, 0.0], [0.0, 1.0]];
-        model.second.qq = [[9.0, 0.0], [0.0, 1e14]];
+        for fastest in [1e7, 1e10, 1e12] {
+            model.second.qq = [[9.0, 0.0], [0.0, fastest * fastest]];
+            let scales = model.time_scales().expect("eigenvalues");
+            assert!((scales.slowest() / 3.0 - 1.0).abs() < 1e-6, "{scales}");
+            let ratio = scales.stiffness() * 3.0 / fastest;
+            assert!((ratio - 1.0).abs() < 1e-6, "{scales}");
+        }
+    }
+
+    #[test]
+    fn slow_motions_are_told_from_free_ones() {
+        let mut model = LinearModel::<3> {
+            second: Second::ZERO,
+        };
+        for (a, square) in [0.0, 9.0, 1e20].into_iter().enumerate() {
+            (model.second.zz[a][a], model.second.qq[a][a]) = (1.0, square);
+        }
         let scales = model.time_scales().expect("eigenvalues");
         assert!((scales.slowest() / 3.0 - 1.0).abs() < 1e-6, "{scales}");
-        assert!((scales.stiffness() * 3e-7 - 1.0).abs() < 1e-6, "{scales}");
+        assert!((scales.fastest() / 1e10 - 1.0).abs() < 1e-6, "{scales}");
     }
 }
