@@ -220,6 +220,50 @@ fn motion_is_not_rest() {
     ));
 }
 
+/// A body that a spring carries, from where it hangs.
+#[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*(x - sag)^2 - m*g*x)]
+struct Hanging {
+    m: f64,
+    k: f64,
+    sag: f64,
+    g: f64,
+}
+
+#[test]
+fn heavy_bodies_are_at_rest_up_to_roundings_of_their_weight() {
+    let (g, k) = (9.81, 7e7);
+    // How many of seven are refused as moving, and how many have failed.
+    let refused = |part: f64| {
+        let (mut moving, mut failed) = (0, 0);
+        for mass in 0..7 {
+            let hanging = |m: f64, _: f64| Hanging {
+                m,
+                k,
+                sag: m * g / k * (1.0 + part),
+                g,
+            };
+            let mass = 2e6 + 3e5 * f64::from(mass);
+            let map = StabilityMap::over(mass..mass + 1e5, 0.0..1.0)
+                .resolution(1, 1)
+                .floquet(hanging, 1.0, Mixed::<3>, 4)
+                .unwrap();
+            let largest = map.largest().unwrap_or(1.0);
+            assert!(largest < 1.0 + 1e-12, "{largest}");
+            let error = map.first_failure().map(|failure| &failure.error);
+            moving += u32::from(matches!(
+                error,
+                Some(PointError::Failed(FloquetError::NotAtRest { .. }))
+            ));
+            failed += u32::from(error.is_some());
+        }
+        (moving, failed)
+    };
+    // A rounding of the weight, 4e-9 N, gives a momentum of 1e-9 and moves 1e-16. Of such numbers Newton's method may make nothing, which is told as it is.
+    assert_eq!(refused(f64::EPSILON).0, 0);
+    // A billionth of the sag, some 4e-10, is none.
+    assert_eq!(refused(1e-9).1, 7);
+}
+
 #[test]
 fn models_that_break_are_failures() {
     let map = StabilityMap::over(0.0..2.0, 0.0..1.0)

@@ -82,7 +82,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             });
             return Ok(Linearised::with(motion, transitions, reduced));
         };
-        let kind = operator_failed(error, Some((number, &elements[number])), "run_linearised");
+        let at = elements.get(number).map(|element| (number, element));
+        let kind = operator_failed(error, at, "run_linearised");
         Err(RunError::new(kind, motion))
     }
 }

@@ -1,6 +1,7 @@
 //! Maps of the largest Floquet multiplier about rest.
 
 use super::{FloquetError, MapError, MapPlan, StabilityMap};
+use crate::numbers::{larger, largest};
 use crate::stability::{eigenvalues, largest_modulus};
 use nalgebra::DMatrix;
 use tfe_runtime::scheme::{SchemeTable, Tables};
@@ -137,7 +138,6 @@ impl<'a, const N: usize> Monodromy<'a, N> {
             method
                 .advance(&mut memory, self.workspace(), interval, &mut state)
                 .map_err(|source| FloquetError::Step { element, source })?;
-            check_rest(element, &state)?;
             let workspace = Workspace {
                 numbers: &mut self.numbers,
                 pivots: &mut self.pivots,
@@ -151,6 +151,7 @@ impl<'a, const N: usize> Monodromy<'a, N> {
                     &mut self.factor,
                 )
                 .map_err(|source| FloquetError::Transition { element, source })?;
+            check_rest(element, &state, &self.factor)?;
             self.multiply();
         }
         Ok(())
@@ -185,13 +186,24 @@ impl<'a, const N: usize> Monodromy<'a, N> {
 }
 
 /// Refuses an element that moved what was at rest by more than rounding does to coordinates of order one.
-fn check_rest<const N: usize>(element: usize, state: &State<N>) -> Result<(), FloquetError> {
+///
+/// Momenta have units of their own: of them counts what they move in one more element, by its transition matrix.
+fn check_rest<const N: usize>(
+    element: usize,
+    state: &State<N>,
+    transition: &[f64],
+) -> Result<(), FloquetError> {
     const ROUNDING: f64 = 1e-12;
-    let all = state.q.iter().chain(&state.p);
-    let distance = all.fold(0.0, |most: f64, value| most.max(value.abs()));
-    if distance <= ROUNDING {
-        Ok(())
-    } else {
-        Err(FloquetError::NotAtRest { element, distance })
+    let to_coordinates = transition.chunks_exact(2 * N).skip(N);
+    let by_momenta = to_coordinates.map(|row| {
+        let products = row.iter().zip(&state.p).map(|(entry, p)| entry * p);
+        products.sum::<f64>()
+    });
+    let all = state.q.iter().copied().chain(by_momenta);
+    let moved = all.fold(0.0, |most, x| larger(most, x.abs()));
+    if moved <= ROUNDING {
+        return Ok(());
     }
+    let distance = larger(largest(&state.q), largest(&state.p));
+    Err(FloquetError::NotAtRest { element, distance })
 }
