@@ -39,6 +39,11 @@ struct Way<const N: usize> {
     distance: f64,
 }
 
+/// A size to measure changes by.
+fn scale(size: f64) -> f64 {
+    if size > 0.0 { size } else { 1.0 }
+}
+
 impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
     /// The derivatives after the act; `parameter` tells which one a column is by.
     pub(super) fn after(
@@ -48,22 +53,21 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         let by = (&self.severed.watched.on, &self.severed.watched.value);
         let mut after = self.at.clone();
         for column in 0..self.times.len() {
-            let Some(way) = self.way(column, parameter(column)) else {
-                continue;
-            };
-            let moved = |s: f64| {
-                let near = self.near(&way, s);
-                let found = state_after(self.model, by, self.severed.event, &near);
-                let found = found.filter(|found| check_start(found).is_ok());
-                found.ok_or(TransitionError::from(StepError::NonFinite))
-            };
             after.column_mut(column).fill(0.0);
-            for (k, weight) in (1..).zip(SIXTH) {
-                let s = f64::from(k) * way.distance;
-                let (high, low) = (moved(s)?, moved(-s)?);
-                for a in 0..N {
-                    after[(a, column)] += weight * (high.p[a] - low.p[a]) / way.distance;
-                    after[(N + a, column)] += weight * (high.q[a] - low.q[a]) / way.distance;
+            for way in self.ways(column, parameter(column)) {
+                let moved = |s: f64| {
+                    let near = self.near(&way, s);
+                    let found = state_after(self.model, by, self.severed.event, &near);
+                    let found = found.filter(|found| check_start(found).is_ok());
+                    found.ok_or(TransitionError::from(StepError::NonFinite))
+                };
+                for (k, weight) in (1..).zip(SIXTH) {
+                    let s = f64::from(k) * way.distance;
+                    let (high, low) = (moved(s)?, moved(-s)?);
+                    for a in 0..N {
+                        after[(a, column)] += weight * (high.p[a] - low.p[a]) / way.distance;
+                        after[(N + a, column)] += weight * (high.q[a] - low.q[a]) / way.distance;
+                    }
                 }
             }
         }
@@ -96,7 +100,7 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
             let _ = state_after(self.model, (&on, value), self.severed.event, &near);
             seen.lock().unwrap_or_else(PoisonError::into_inner).take()
         };
-        for way in (0..self.times.len()).filter_map(|column| self.way(column, None)) {
+        for way in (0..self.times.len()).filter_map(|column| self.motion(column)) {
             for (place, (name, value)) in set(&way, 0.0)?.into_iter().enumerate() {
                 // Not a number where nearby it sets something else.
                 let nearby = |s: f64| {
@@ -120,31 +124,54 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         None
     }
 
-    /// How the event moves along a column; none where it stays.
-    fn way(&self, column: usize, parameter: Option<usize>) -> Option<Way<N>> {
+    /// How the event moves along a column: motion and parameter together where one distance serves both, so that constraints which hold the parameter are kept, else one after the other.
+    fn ways(&self, column: usize, parameter: Option<usize>) -> Vec<Way<N>> {
+        /// A distance that is shorter than it need be by this loses two digits; in one of a tiny parameter states change by roundings alone.
+        const TOGETHER: f64 = 100.0;
+
+        let motion = self.motion(column);
+        let Some(index) = parameter else {
+            return motion.into_iter().collect();
+        };
+        let own = Way {
+            change: Change::ZERO,
+            time: 0.0,
+            parameter,
+            velocity: self.along.velocity(&Change {
+                parameter,
+                ..Change::ZERO
+            }),
+            distance: DISTANCE * scale(self.model.parameter(index).abs()),
+        };
+        match motion {
+            None => vec![own],
+            Some(motion) if motion.distance > TOGETHER * own.distance => vec![motion, own],
+            Some(motion) => vec![Way {
+                change: motion.change,
+                time: motion.time,
+                distance: motion.distance.min(own.distance),
+                ..own
+            }],
+        }
+    }
+
+    /// How the event moves along a column with the parameters as they are; none where it stays.
+    fn motion(&self, column: usize) -> Option<Way<N>> {
         let event = self.severed.event;
         let largest = |values: &[f64; N]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let scale = |size: f64| if size > 0.0 { size } else { 1.0 };
         // An event is where something vanishes, and be it the only coordinate: what it does in a step tells more.
         let rate = Change::<N>::of_column(self.rate, 0);
         let step = self.severed.step.abs();
         let q = scale(largest(&event.q).max(step * largest(&rate.q)));
         let p = scale(largest(&event.p).max(step * largest(&rate.p)));
         let change = Change::<N>::of_column(self.at, column);
-        let mut size = (largest(&change.q) / q).max(largest(&change.p) / p);
-        if let Some(index) = parameter {
-            let value = self.model.parameter(index);
-            size = size.max(1.0 / scale(value.abs()));
-        }
+        let size = (largest(&change.q) / q).max(largest(&change.p) / p);
         let time = self.times[column];
         (size != 0.0 || time != 0.0).then(|| Way {
             change,
             time,
-            parameter,
-            velocity: self.along.velocity(&Change {
-                parameter,
-                ..Change::ZERO
-            }),
+            parameter: None,
+            velocity: [0.0; N],
             distance: DISTANCE / scale(size),
         })
     }
