@@ -19,7 +19,33 @@ pub(crate) const NEARER: [f64; 3] = [1.0, 0.25, 0.0625];
 const FOURTH: [f64; 2] = [8.0 / 12.0, -1.0 / 12.0];
 
 /// A derivative at zero by differences of sixth order over a distance; a shorter one where fourth order gives something else, as of a function that changes much within it.
-pub(crate) fn derivative(distance: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
+pub(crate) fn derivative(distance: f64, f: impl FnMut(f64) -> f64) -> f64 {
+    estimated(distance, f).1
+}
+
+/// The same over a long distance, which serves functions that hold numbers of the size of one beside a small value, or over a short one, a part of that value, where roundings leave less of it.
+pub(crate) fn derivative_of_either([long, short]: [f64; 2], mut f: impl FnMut(f64) -> f64) -> f64 {
+    /// What an error is less than, as a part of the derivative, where that is more than roundings.
+    const KNOWN: f64 = 1e-3;
+
+    let (error, slope) = estimated(long, &mut f);
+    let is_shorter = short > 0.0 && short < long;
+    if error <= WELL_KNOWN * slope.abs() || !is_shorter {
+        return slope;
+    }
+    let (nearer_error, nearer) = estimated(short, f);
+    // As parts: a function that goes up and down within the long distance has small differences there.
+    let (part, nearer_part) = (error / slope.abs(), nearer_error / nearer.abs());
+    let is_better = nearer_part < KNOWN && nearer_part < part;
+    if is_better || !slope.is_finite() {
+        nearer
+    } else {
+        slope
+    }
+}
+
+/// An estimate of the error of a derivative, and the derivative.
+fn estimated(distance: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
     /// Distances that are tried, each a quarter of the one before: down to 1e-12 of the first.
     const SHORTER: i32 = 20;
     /// Roundings of a function, of which the differences of both orders are made.
@@ -44,14 +70,15 @@ pub(crate) fn derivative(distance: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
         };
         let (sixth, fourth) = (of(&SIXTH), of(&FOURTH));
         let off = (sixth - fourth).abs();
-        if off <= (WELL_KNOWN * sixth.abs()).max(ROUNDINGS * largest / distance) {
-            return sixth;
+        let roundings = ROUNDINGS * largest / distance;
+        if off <= (WELL_KNOWN * sixth.abs()).max(roundings) {
+            return (off.max(roundings), sixth);
         }
         if off < best.0 || best.1.is_nan() {
             best = (off, sixth);
         }
     }
-    best.1
+    best
 }
 
 /// Where a function is evaluated, and what the value there counts in the derivative of eighth order and in that of sixth.
@@ -92,6 +119,20 @@ mod tests {
         ] {
             let roundings = 1e-9 * expected.abs().max(1e-3);
             assert!((found - expected).abs() < roundings, "{found} {expected}");
+        }
+        for size in [1e-6, 1e-15, 1e-150] {
+            let near =
+                |f: &dyn Fn(f64) -> f64| derivative_of_either([2e-3, 2e-3 * size], |s| f(size + s));
+            for (found, expected) in [
+                (near(&|x| 0.5 * x * x), size),
+                (near(&|x| (x / size).sin()), 1.0_f64.cos() / size),
+                (near(&|x| 0.5 * (x - 1.0).powi(2)), size - 1.0),
+                (near(&|x| (x + 1e6).powi(2) * 1e-6), 2.0),
+            ] {
+                let roundings = 1e-7 * expected.abs();
+                assert!((found - expected).abs() < roundings, "{found} {expected}");
+            }
+            assert_eq!(near(&|_| 1.0), 0.0);
         }
         assert_eq!(derivative(2e-3, |_| 1.0), 0.0);
         assert!(derivative(2e-3, |_| f64::NAN).is_nan());

@@ -1,6 +1,6 @@
 //! Losses: numbers of a motion that are to be small, and their gradients.
 
-use crate::differences::derivative;
+use crate::differences::{derivative, derivative_of_either};
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
@@ -346,7 +346,8 @@ fn partial<const N: usize, L: Length<N>>(
                 *part(&mut moved) = L::from_fn(&still, with);
                 function(&moved)
             };
-            factor * derivative(DISTANCE * value.abs().max(1.0), at)
+            let sizes = [value.abs().max(1.0), value.abs()];
+            factor * derivative_of_either(sizes.map(|size| DISTANCE * size), at)
         };
         still.as_ref().iter().enumerate().map(slope).collect()
     };

@@ -268,4 +268,23 @@ fn losses_of_small_numbers_have_their_gradients() {
         let q = gradient.by_start().q[0];
         assert!((q - expected).abs() < 1e-8 * expected.abs(), "{size}: {q}");
     }
+    // Squares vanish beside those of longer distances; a number beside a larger one vanishes within shorter ones.
+    for size in [1e-10, 1e-24, 1e-100] {
+        let run = Simulation::new(&Free).step(0.1);
+        let start = Free.state([size], [size]);
+        let by_momentum = |loss: Loss<'_, 1>| {
+            let found = run.gradient(start, 0.0..1.0, &loss);
+            found.expect("a gradient").1.by_start().p[0]
+        };
+        let energy = by_momentum(Loss::at_end(|node: &tfe::Node<1>| {
+            0.5 * node.p[0] * node.p[0] + 0.5 * node.q[0] * node.q[0]
+        }));
+        // p + q, q = x₀ + p
+        let error = (energy - 3.0 * size).abs();
+        assert!(error < 1e-8 * size, "{size:e}: {energy:e}");
+        let far = by_momentum(Loss::at_end(|node: &tfe::Node<1>| {
+            0.5 * (node.q[0] - 1.0).powi(2)
+        }));
+        assert!((far + 1.0).abs() < 1e-8, "{size:e}: {far}");
+    }
 }
