@@ -68,6 +68,37 @@ fn derivatives_by_small_parameters_go_through_bounces() {
     }
 }
 
+/// A function that vanishes where the only coordinate does, beside numbers that do not.
+#[test]
+fn functions_of_a_coordinate_that_vanishes_have_their_derivatives() {
+    let ball = Ball {
+        m: 1.0,
+        g: 9.81,
+        floor: 0.0,
+    };
+    let start = ball.state([1.0], [0.0]);
+    let expected = bouncing(&ball).run_sensitive(start, 0.0..1.5);
+    let expected = expected.expect("derivatives").by("g").last();
+    let acts: [fn(&tfe::simulation::Occurrence<'_, 1>) -> Act<1>; 2] = [
+        |event| Act::Restart(event.state_with_velocity([-0.8 * event.v[0]])),
+        |event| Act::Restart(event.after_impact(0.8)),
+    ];
+    for act in acts {
+        let run = Simulation::new(&ball).step(0.1).on_function(
+            "above",
+            Crossing::Falling,
+            |_, q, _| (q[0] + 2.0) - 2.0,
+            act,
+        );
+        let found = run.run_sensitive(start, 0.0..1.5).expect("derivatives");
+        assert_eq!(found.motion().events().len(), 2);
+        let found = found.by("g").last();
+        // The function has roundings of 4e-16.
+        assert!((found.q[0] - expected.q[0]).abs() < 1e-9, "{found:?}");
+        assert!((found.p[0] - expected.p[0]).abs() < 1e-9, "{found:?}");
+    }
+}
+
 /// The same ball with an input, whose model belongs to the run; and in velocities of a Hamiltonian, whose mass the momentum after the bounce depends on.
 #[test]
 fn derivatives_go_through_events_of_other_models() {

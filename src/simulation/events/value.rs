@@ -1,6 +1,6 @@
 //! What changes its sign at an event.
 
-use crate::differences::derivative;
+use crate::differences::{derivative, derivative_of_either};
 use crate::length::Length;
 use crate::motion::Event;
 use crate::numbers::largest;
@@ -66,11 +66,13 @@ fn normal_of<L: Length<N>, const N: usize>(
         let part = |b: usize| from.as_ref()[b] + if a == b { s } else { 0.0 };
         L::from_fn(from, part)
     };
-    let at_q = DISTANCE * size(largest(q.as_ref()));
+    let sizes = [1.0, 0.0].map(|least| largest(q.as_ref()).max(least));
+    let at_q = sizes.map(|size| DISTANCE * size);
     let at_v = DISTANCE * size(largest(v.as_ref()));
     let here = function(t, q, v);
     let of_velocity = (0..q.as_ref().len()).any(|a| function(t, q, &moved(v, a, at_v)) != here);
-    let normal = L::from_fn(q, |a| derivative(at_q, |s| function(t, &moved(q, a, s), v)));
+    let slope = |a| derivative_of_either(at_q, |s| function(t, &moved(q, a, s), v));
+    let normal = L::from_fn(q, slope);
     let drift = derivative(DISTANCE, |s| function(t + s, q, v));
     (!of_velocity).then_some((normal, drift))
 }
@@ -88,19 +90,23 @@ impl<const N: usize> Value<'_, [f64; N]> {
             Self::Column(column) => along.outputs(change, velocity)[*column],
             Self::Function(function) => {
                 let Event { t, q, v, .. } = event;
-                let part = |change: &[f64; N], of: &[f64; N]| {
-                    largest(change) / if largest(of) > 0.0 { largest(of) } else { 1.0 }
+                // An event is where something vanishes, and be it the only coordinate: roundings of what stands beside it do not.
+                let part = |change: &[f64; N], of: &[f64; N], least: f64| {
+                    let size = largest(of).max(least);
+                    largest(change) / if size > 0.0 { size } else { 1.0 }
                 };
-                let size = part(&change.q, q)
-                    .max(part(velocity, v))
-                    .max(change.t.abs());
-                if size == 0.0 {
+                let size = |least: f64| {
+                    let of_state = part(&change.q, q, least).max(part(velocity, v, least));
+                    of_state.max(change.t.abs())
+                };
+                if size(0.0) == 0.0 {
                     return 0.0;
                 }
+                let distances = [1.0, 0.0].map(|least| DISTANCE / size(least));
                 let moved = |from: &[f64; N], by: &[f64; N], s: f64| {
                     std::array::from_fn(|a| from[a] + s * by[a])
                 };
-                derivative(DISTANCE / size, |s| {
+                derivative_of_either(distances, |s| {
                     function(
                         t + s * change.t,
                         &moved(q, &change.q, s),
