@@ -324,12 +324,15 @@ fn runs_that_fail_nearby_are_no_end() {
     let start = guess.state([0.6, -0.8], [0.0, 0.0]);
     let times: Vec<f64> = (1..=20).map(|k| 0.1 * f64::from(k)).collect();
     let measured: Vec<f64> = times.iter().map(|t| 0.5 * (2.8 * t).cos()).collect();
-    let fit = Fit::new(&guess).start(start, 0.0).step(0.02);
-    let fit = fit.parameters(["l"]).output("x", &times, &measured);
-    let told = fit.solve().map(|fit| fit.to_string()).expect_err("no fit");
-    let is_told =
-        matches!(&told, FitError::NotConverged { why, .. } if why.contains("runs nearby fail"));
-    assert!(is_told, "{told}");
+    for deviation in [1.0, 1e200, 1e-200] {
+        let fit = Fit::new(&guess).start(start, 0.0).step(0.02);
+        let fit = fit.parameters(["l"]);
+        let fit = fit.output_within("x", &times, &measured, deviation);
+        let told = fit.solve().map(|fit| fit.to_string()).expect_err("no fit");
+        let is_told =
+            matches!(&told, FitError::NotConverged { why, .. } if why.contains("runs nearby fail"));
+        assert!(is_told, "{deviation:e}: {told}");
+    }
 }
 
 #[test]

@@ -29,10 +29,19 @@ impl Compared {
         /// Of the cosine, far above what noise leaves at a least sum.
         const PERPENDICULAR: f64 = 1e-4;
 
-        let residuals = DVector::from_column_slice(&self.residuals);
-        let size = residuals.norm();
+        let unit = |numbers: &[f64]| {
+            let size = norm(numbers);
+            // Products of numbers of any size vanish or overflow, of their parts they do not.
+            DVector::from_iterator(
+                numbers.len(),
+                numbers
+                    .iter()
+                    .map(|x| if size > 0.0 { x / size } else { 0.0 }),
+            )
+        };
+        let residuals = unit(&self.residuals);
         let mut columns = self.slopes.column_iter();
-        columns.all(|column| column.dot(&residuals).abs() <= PERPENDICULAR * column.norm() * size)
+        columns.all(|column| unit(column.as_slice()).dot(&residuals).abs() <= PERPENDICULAR)
     }
 
     /// s² (JᵀJ)⁻¹ (T-126), and the roots of its diagonal, whose squares may be less than any number.
