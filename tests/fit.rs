@@ -297,6 +297,13 @@ fn wide_bounds_do_not_move_the_first_values() {
         (10.0, 1e3),
         (9.999_999, 1e9),
         (f64::NEG_INFINITY, 1e5),
+        // Beside bounds so wide 10 has three digits, or none.
+        (-1e12, 1e12),
+        (-3e12, 1e12),
+        (-1e12, f64::INFINITY),
+        (f64::NEG_INFINITY, 1e12),
+        (0.0, f64::MAX),
+        (f64::MIN, f64::MAX),
     ] {
         let fit = fit(low, high);
         let first = fit.trials()[0].values[0];

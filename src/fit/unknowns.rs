@@ -15,75 +15,121 @@ pub(super) struct Unknowns {
     pub(super) first: Vec<f64>,
 }
 
-/// How a value with bounds x follows from a number without, u.
+/// How a value with bounds x follows from a number without, u: x = ±X, whose lower bound is the nearer one to zero. It is counted from zero where that is between the bounds, so that small values
+/// keep their digits between wide ones.
 #[derive(Clone, Copy, Debug)]
-enum Way {
-    /// x = u
+struct Way {
+    /// One, or minus one where the upper bound is nearer to zero.
+    sign: f64,
+    low: f64,
+    high: f64,
+    /// X where u is zero: the lower bound, or zero.
+    origin: f64,
+    shape: Shape,
+}
+
+/// X as a function of u.
+#[derive(Clone, Copy, Debug)]
+enum Shape {
+    /// X = u
     Free,
-    /// x = end ± unit (√(u² + 1) − 1)
-    Beyond { end: f64, unit: f64 },
-    /// x = low + width sin² u
-    Between { low: f64, width: f64 },
+    /// X = origin + unit (√((u + shift)² + 1) − √(shift² + 1))
+    Beyond { unit: f64, shift: f64 },
+    /// X = origin + width (sin² (u + shift) − sin² shift)
+    Between { width: f64, shift: f64 },
 }
 
 impl Way {
+    /// That of a value without bounds.
+    const FREE: Self = Self {
+        sign: 1.0,
+        low: f64::NEG_INFINITY,
+        high: f64::INFINITY,
+        origin: 0.0,
+        shape: Shape::Free,
+    };
+
     fn new(low: f64, high: f64, value: f64) -> Self {
-        let unit = |end: f64| match (value - end).abs().max(end.abs()) {
-            0.0 => 1.0,
-            size => size,
+        // No number is beyond the largest.
+        let bounds = [-low, high].map(|end| if end < f64::MAX { end } else { f64::INFINITY });
+        let [low, high] = [-bounds[0], bounds[1]];
+        if low.is_infinite() && high.is_infinite() {
+            return Self::FREE;
+        }
+        let (sign, low, high, value) = match high.abs() < low.abs() {
+            true => (-1.0, -high, -low, -value),
+            false => (1.0, low, high, value),
         };
-        match (low.is_finite(), high.is_finite()) {
-            (false, false) => Self::Free,
-            (true, false) => Self::Beyond {
-                end: low,
-                unit: unit(low),
-            },
-            (false, true) => Self::Beyond {
-                end: high,
-                unit: -unit(high),
-            },
-            (true, true) => Self::Between {
-                low,
+        let origin = low.max(0.0);
+        let shape = match high.is_finite() {
+            true => Shape::Between {
                 width: high - low,
+                // Zero is a part sin² of the way, where it is between the bounds.
+                shift: (origin - low).sqrt().atan2((high - origin).sqrt()),
             },
+            false => {
+                let unit = match (value - low).abs().max(low.abs()) {
+                    0.0 => 1.0,
+                    size => size,
+                };
+                let beyond = (origin - low) / unit;
+                Shape::Beyond {
+                    unit,
+                    shift: (beyond * (beyond + 2.0)).sqrt(),
+                }
+            }
+        };
+        Self {
+            sign,
+            low,
+            high,
+            origin,
+            shape,
         }
     }
 
     /// x and dx/du.
     fn value(self, u: f64) -> (f64, f64) {
-        match self {
-            Self::Free => (u, 1.0),
-            Self::Beyond { end, unit } => {
-                let root = u.hypot(1.0);
-                // √(u² + 1) − 1, with all digits where u is small.
-                (end + unit * (u * (u / (root + 1.0))), unit * u / root)
+        let (more, rate) = match self.shape {
+            Shape::Free => return (u, 1.0),
+            Shape::Beyond { unit, shift } => {
+                let (root, first) = ((u + shift).hypot(1.0), shift.hypot(1.0));
+                // The difference of the roots, with all digits where u is small.
+                let difference = u * ((u + 2.0 * shift) / (root + first));
+                (unit * difference, unit * (u + shift) / root)
             }
-            Self::Between { low, width } => {
-                let (sin, cos) = u.sin_cos();
-                (low + width * (sin * sin), 2.0 * width * sin * cos)
+            Shape::Between { width, shift } => {
+                let difference = u.sin() * (u + 2.0 * shift).sin();
+                (width * difference, width * (2.0 * (u + shift)).sin())
             }
-        }
+        };
+        let value = (self.origin + more).clamp(self.low, self.high);
+        (self.sign * value, self.sign * rate)
     }
 
     /// u of x; where x is a bound it does not move with u, which is then a little inside.
     fn number(self, x: f64) -> f64 {
         const INSIDE: f64 = 1e-2;
-        match self {
-            Self::Free => x,
-            Self::Beyond { end, unit } => {
-                let beyond = (x - end) / unit;
-                let u = (beyond * (beyond + 2.0)).sqrt();
-                if u > 0.0 { u } else { INSIDE }
+
+        let value = self.sign * x;
+        let more = value - self.origin;
+        match self.shape {
+            Shape::Free => x,
+            Shape::Beyond { shift, .. } if value <= self.low => INSIDE - shift,
+            Shape::Beyond { unit, shift } => {
+                let part = more / unit;
+                let change = part * (2.0 * shift.hypot(1.0) + part);
+                change / ((shift * shift + change).max(0.0).sqrt() + shift)
             }
-            Self::Between { low, width } => {
-                let part = (x - low) / width;
-                if part <= 0.0 {
-                    INSIDE
-                } else if part >= 1.0 {
-                    FRAC_PI_2 - INSIDE
-                } else {
-                    part.sqrt().asin()
-                }
+            Shape::Between { shift, .. } if value <= self.low => INSIDE - shift,
+            Shape::Between { shift, .. } if value >= self.high => FRAC_PI_2 - INSIDE - shift,
+            Shape::Between { width, .. } => {
+                // The sine of the difference of two angles, from their sines and cosines.
+                let [from, to] = [self.origin, value].map(|at| {
+                    let parts = [at - self.low, self.high - at];
+                    parts.map(|part| (part / width).sqrt())
+                });
+                (more / width / (to[0] * from[1] + from[0] * to[1])).asin()
             }
         }
     }
@@ -141,11 +187,11 @@ impl Unknowns {
         if !start_is_known {
             for a in 0..N {
                 let name = format!("momentum of {} at the start", M::coordinate_name(a));
-                unknowns.push(name, Way::Free, start.p[a]);
+                unknowns.push(name, Way::FREE, start.p[a]);
             }
             for a in 0..N {
                 let name = format!("{} at the start", M::coordinate_name(a));
-                unknowns.push(name, Way::Free, start.q[a]);
+                unknowns.push(name, Way::FREE, start.q[a]);
             }
         }
         if unknowns.names.is_empty() {
