@@ -66,7 +66,8 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
                 let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
                 model.first_and_mass(t, &state.q, v, &mut first, &mut zz);
                 let mass = DMatrix::from_fn(N, N, |a, b| zz[a][b]);
-                Some(mass.try_inverse().unwrap_or_else(unknown))
+                // By factors: for two to four coordinates nalgebra divides by the determinant, which is a product of as many masses.
+                Some(mass.lu().try_inverse().unwrap_or_else(unknown))
             }
         };
         Self {

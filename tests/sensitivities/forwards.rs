@@ -2,6 +2,37 @@
 
 use super::*;
 
+/// Products of three masses are no numbers, the masses are.
+#[test]
+fn velocities_of_masses_of_any_size_have_their_derivatives() {
+    #[dynamics(
+        coordinates(x, y, z),
+        lagrangian = m/2*(dot(x)^2 + dot(y)^2 + dot(z)^2) - m*k/2*(x^2 + 2*y^2 + 3*z^2),
+        output(climb) = dot(z),
+    )]
+    struct Springs {
+        m: f64,
+        k: f64,
+    }
+    let found = |m: f64| {
+        let model = Springs { m, k: 1.3 };
+        let start = model.state([1.0, 0.7, -0.4], [0.0, 0.0, 0.0]);
+        let s = Simulation::new(&model).step(0.1);
+        let s = s.run_sensitive(start, 0.0..1.0).expect("derivatives");
+        let climb = s.by("k").output("climb").expect("declared");
+        let [x, y, z] = s.by("k").last().v;
+        let by_momentum = s.by_start().output("climb").expect("declared")[10].p[2] * m;
+        [x, y, z, climb[10], by_momentum]
+    };
+    let expected = found(1.0);
+    for m in [1e-120, 1e120] {
+        for (found, expected) in found(m).into_iter().zip(expected) {
+            let error = (found - expected).abs() / expected.abs();
+            assert!(error < 1e-11, "{m:e}: {found} instead of {expected}");
+        }
+    }
+}
+
 #[test]
 fn parameters_are_numbered_as_they_stand() {
     let names = (0..PENDULUMS.parameters()).map(|k| PENDULUMS.parameter_name(k).to_string());
