@@ -255,6 +255,18 @@ impl<const N: usize, L: Length<N>> RunError<N, L> {
         }
     }
 
+    /// The same where a call was made `by` another one, which is the one to name.
+    pub(crate) fn of_call(mut self, made: &str, by: &'static str) -> Self {
+        if let RunErrorKind::SetUnsupported { call }
+        | RunErrorKind::KinksUnsupported { call }
+        | RunErrorKind::Unsupported { call, .. } = &mut self.kind
+            && *call == made
+        {
+            *call = by;
+        }
+        self
+    }
+
     /// Why the run stopped.
     pub fn kind(&self) -> &RunErrorKind {
         &self.kind

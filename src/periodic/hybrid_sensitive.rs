@@ -26,7 +26,10 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
         let run = self.simulation.clone().record_every(1);
         let run = run.step(period / self.elements as f64);
         let s = run.run_sensitive(start, self.start..end);
-        let s = s.map_err(|error| OrbitError::Run(error.kind().clone()))?;
+        let s = s.map_err(|error| {
+            let error = error.of_call("run_sensitive", "solve_sensitive");
+            OrbitError::Run(error.kind().clone())
+        })?;
         let scales = scales(orbit.motion());
         let is_free = matches!(self.period, Period::Guess(_));
         let by_length = self.by_length(start, period)?;

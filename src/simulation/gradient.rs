@@ -142,9 +142,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         loss: &Loss<'_, N>,
     ) -> Result<(f64, LossGradient<N>), RunError<N>> {
         let sensitive = match loss.has_integrals() {
-            true => self.run_sensitive(start, span)?,
-            false => self.run_sensitive_at_nodes(start, span)?,
+            true => self.run_sensitive(start, span),
+            false => self.run_sensitive_at_nodes(start, span),
         };
+        let sensitive = sensitive.map_err(|error| error.of_call("run_sensitive", "gradient"))?;
         let motion = sensitive.motion().clone();
         let found = loss.seen(&motion, &*self.model);
         let summed = found.and_then(|(value, seen)| Ok((value, self.summed(&sensitive, &seen)?)));

@@ -45,7 +45,7 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
         loss: &Loss<'_, N>,
         parameters: impl IntoIterator<Item = S>,
     ) -> Result<LossHessian<N>, RunError<N>> {
-        let own = self.gradient(start, span.clone(), loss)?;
+        let own = self.gradient(start, span.clone(), loss).map_err(named)?;
         let own = Own::new(own, |index| self.model.parameter(index));
         own.differentiated(parameters, |index, value| {
             let other = self.with_parameter(index, value)?;
@@ -66,13 +66,19 @@ impl<'m, M: family::Model + Send + Sync + 'm> Simulation<'m, M, 0, RunTimeLength
         loss: &Loss<'_, 0, RunTimeLength>,
         parameters: impl IntoIterator<Item = S>,
     ) -> Result<LossHessian<0, RunTimeLength>, RunError<0, RunTimeLength>> {
-        let own = self.gradient(start.clone(), span.clone(), loss)?;
+        let own = self.gradient(start.clone(), span.clone(), loss);
+        let own = own.map_err(named)?;
         let own = Own::new(own, |index| self.model.parameter(index));
         own.differentiated(parameters, |index, value| {
             let other = self.with_parameter(index, value)?;
             Some(other.gradient(start.clone(), span.clone(), loss))
         })
     }
+}
+
+/// An error of a gradient is one of the call that was made.
+fn named<const N: usize, L: Length<N>>(error: RunError<N, L>) -> RunError<N, L> {
+    error.of_call("gradient", "hessian")
 }
 
 /// A loss with its gradient.
@@ -122,7 +128,7 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
             for nearer in NEARER {
                 let gradient = |shift: f64| match at(*index, self.values[*index] + shift) {
                     Some(found) => {
-                        let (_, gradient) = found?;
+                        let (_, gradient) = found.map_err(named)?;
                         let all = gradient.by_parameters();
                         Ok(DVector::from_fn(size, |i, _| all[indices[i]]))
                     }

@@ -2,6 +2,7 @@
 
 use super::*;
 use tfe::periodic::OrbitError;
+use tfe::sensitivity::Loss;
 
 type Sets = fn(&tfe::Occurrence<'_, 1>) -> Settings<1>;
 
@@ -124,6 +125,28 @@ fn matrices_refuse_settings_by_the_state() {
         let error = simulation.run_sensitive(start, 0.0..3.0);
         let error = error.expect_err("it depends on parameters");
         assert!(matches!(error.kind(), RunErrorKind::SetUnsupported { .. }));
+    }
+}
+
+/// A refusal names the call that was made, not one that this makes.
+#[test]
+fn refused_derivatives_name_their_call() {
+    let (start, span) = (SPRINGS.state([1.0], [0.0]), 0.0..3.0);
+    let simulation = setting(|_| Settings::new("k", 3.0));
+    let told = |error: &tfe::RunError<1>, call: &str| {
+        let text = error.kind().to_string();
+        assert!(text.starts_with(&format!("`{call}`")), "{text}");
+    };
+    let error = simulation.run_sensitive(start, span.clone());
+    told(&error.expect_err("it sets"), "run_sensitive");
+    for loss in [
+        Loss::output_at_end("potential"),
+        Loss::integral("potential"),
+    ] {
+        let error = simulation.gradient(start, span.clone(), &loss);
+        told(&error.expect_err("it sets"), "gradient");
+        let error = simulation.hessian(start, span.clone(), &loss, ["k"]);
+        told(&error.expect_err("it sets"), "hessian");
     }
 }
 
