@@ -67,7 +67,7 @@ impl<const N: usize, L: Length<N>> LossHessian<N, L> {
         &self.matrix
     }
 
-    /// Estimates of their errors: how far differences of eighth and of sixth order are apart, and ∂²ℓ/∂a∂b and ∂²ℓ/∂b∂a.
+    /// Estimates of their errors: how far differences of eighth and of sixth order are apart, with what roundings of the gradient are of them, and ∂²ℓ/∂a∂b and ∂²ℓ/∂b∂a.
     pub fn errors(&self) -> &DMatrix<f64> {
         &self.errors
     }

@@ -14,7 +14,7 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
     /// A loss of a run with its [gradient](Self::gradient) and its second derivatives by some parameters.
     ///
     /// They are differences of eighth order of gradients that are exact for the run: to some 1e-11 of what the gradient itself changes by. Each parameter takes eight gradients, sixteen or twenty-four where the loss
-    /// bends so much that the places move nearer. [`LossHessian::errors`] says what is known of them. (For least squares [`Fit`](crate::Fit) needs first derivatives only.)
+    /// bends so much that the places move nearer, and as many again where it does not see the size of the parameter, which is next to zero. [`LossHessian::errors`] says what is known of them. (For least squares [`Fit`](crate::Fit) needs first derivatives only.)
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -90,11 +90,28 @@ struct Own<const N: usize, L: Length<N>> {
     values: Vec<f64>,
 }
 
-/// Derivatives of a gradient by one parameter, and how far two orders are apart, each and the largest as a part.
+/// Derivatives of a gradient by one parameter, and how far two orders are apart, with roundings of the gradient: each and the largest as a part.
 struct Column {
     slopes: DVector<f64>,
     errors: DVector<f64>,
     off: f64,
+}
+
+impl Column {
+    /// Entry by entry what is known better.
+    fn take_better(&mut self, other: &Self) {
+        for (i, error) in other.errors.iter().enumerate() {
+            if *error < self.errors[i] {
+                (self.slopes[i], self.errors[i]) = (other.slopes[i], *error);
+            }
+        }
+    }
+}
+
+/// A part of a scale, or of one where that is none.
+fn part_of(scale: f64) -> f64 {
+    let is_scale = scale.is_finite() && scale > 0.0;
+    PART * if is_scale { scale } else { 1.0 }
 }
 
 impl<const N: usize, L: Length<N>> Own<N, L> {
@@ -124,50 +141,78 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
         let size = names.len();
         let (mut columns, mut errors) = (DMatrix::zeros(size, size), DMatrix::zeros(size, size));
         for (j, index) in indices.iter().enumerate() {
-            let mut best: Option<Column> = None;
-            for nearer in NEARER {
-                let gradient = |shift: f64| match at(*index, self.values[*index] + shift) {
-                    Some(found) => {
-                        let (_, gradient) = found.map_err(named)?;
-                        let all = gradient.by_parameters();
-                        Ok(DVector::from_fn(size, |i, _| all[indices[i]]))
-                    }
-                    None => Err(refused(RunErrorKind::ParametersFixed)),
-                };
-                let distance = self.distance(*index);
-                let found = self.column(&indices, (distance, nearer), gradient)?;
-                let is_enough = found.off < WELL_KNOWN;
-                let is_better = |best: &Column| found.off < best.off || best.off.is_nan();
-                if best.as_ref().is_none_or(is_better) {
-                    best = Some(found);
+            let gradient = |shift: f64| match at(*index, self.values[*index] + shift) {
+                Some(found) => {
+                    let (_, gradient) = found.map_err(named)?;
+                    let all = gradient.by_parameters();
+                    Ok(DVector::from_fn(size, |i, _| all[indices[i]]))
                 }
-                if is_enough {
-                    break;
+                None => Err(refused(RunErrorKind::ParametersFixed)),
+            };
+            let mut best = self.known_column(&indices, self.distance(*index), &gradient)?;
+            if !best.slopes.iter().all(|slope| slope.is_finite()) {
+                return Err(refused(RunErrorKind::Loss {
+                    name: names[j].clone(),
+                    why: "second derivatives by this parameter are not finite",
+                }));
+            }
+            if self.is_next_to_zero(*index) {
+                let distance = self.distance_of_loss(*index);
+                // Where the run fails so far away, what there is stays.
+                if let Ok(other) = self.known_column(&indices, distance, &gradient) {
+                    best.take_better(&other);
                 }
             }
-            if let Some(best) = best {
-                if !best.slopes.iter().all(|slope| slope.is_finite()) {
-                    return Err(refused(RunErrorKind::Loss {
-                        name: names[j].clone(),
-                        why: "second derivatives by this parameter are not finite",
-                    }));
-                }
-                columns.set_column(j, &best.slopes);
-                errors.set_column(j, &best.errors);
-            }
+            columns.set_column(j, &best.slopes);
+            errors.set_column(j, &best.errors);
         }
         Ok(LossHessian::new(self.found, names, &columns, &errors))
     }
 
     /// The first distance of differences: a part of the parameter, or of what would change the loss by as much as it is.
     fn distance(&self, index: usize) -> f64 {
-        let (value, slope) = (self.values[index], self.found.1.by_parameters()[index]);
-        let scale = match value == 0.0 {
-            true => (self.found.0 / slope).abs(),
-            false => value.abs(),
-        };
-        let is_scale = scale.is_finite() && scale > 0.0;
-        PART * if is_scale { scale } else { 1.0 }
+        match self.values[index] == 0.0 {
+            true => self.distance_of_loss(index),
+            false => part_of(self.values[index].abs()),
+        }
+    }
+
+    /// A part of what would change the loss by as much as it is.
+    fn distance_of_loss(&self, index: usize) -> f64 {
+        part_of((self.found.0 / self.slope(index)).abs())
+    }
+
+    /// Whether the loss does not see the size of a parameter, as of a drag of 1e-20: in parts of it the gradient changes by roundings.
+    fn is_next_to_zero(&self, index: usize) -> bool {
+        const SEEN: f64 = 1e-4;
+
+        let value = self.values[index];
+        value != 0.0 && (value * self.slope(index)).abs() <= SEEN * self.found.0.abs()
+    }
+
+    fn slope(&self, index: usize) -> f64 {
+        self.found.1.by_parameters()[index]
+    }
+
+    /// The column over a distance, or a shorter one where that does not tell it.
+    fn known_column(
+        &self,
+        indices: &[usize],
+        distance: f64,
+        gradient: &impl Fn(f64) -> Result<DVector<f64>, RunError<N, L>>,
+    ) -> Result<Column, RunError<N, L>> {
+        let [first, others @ ..] = NEARER;
+        let mut best = self.column(indices, (distance, first), gradient)?;
+        for nearer in others {
+            if best.off < WELL_KNOWN {
+                break;
+            }
+            let found = self.column(indices, (distance, nearer), gradient)?;
+            if found.off < best.off || best.off.is_nan() {
+                best = found;
+            }
+        }
+        Ok(best)
     }
 
     fn column(
@@ -177,15 +222,18 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
         gradient: impl Fn(f64) -> Result<DVector<f64>, RunError<N, L>>,
     ) -> Result<Column, RunError<N, L>> {
         let size = indices.len();
-        let (mut eighth, mut sixth) = (DVector::zeros(size), DVector::zeros(size));
+        let (mut eighth, mut sixth) = (DVector::<f64>::zeros(size), DVector::<f64>::zeros(size));
         for place in places(nearer * distance) {
             let at = gradient(place.shift)?;
             eighth += &at * place.eighth;
             sixth += at * place.sixth;
         }
-        let errors = (&eighth - &sixth).abs();
-        // Beside what the parameter changes and what there is: by the first distance, so that nearer ones are not judged more mildly.
         let own = self.found.1.by_parameters();
+        let errors = DVector::from_fn(size, |i, _| {
+            let roundings = f64::EPSILON * own[indices[i]].abs() / (nearer * distance);
+            (eighth[i] - sixth[i]).abs() + roundings
+        });
+        // Beside what the parameter changes and what there is: by the first distance, so that nearer ones are not judged more mildly.
         let part = distance / PART;
         let off = (0..size).map(|i| {
             let sizes = (eighth[i] * part).abs().max(own[indices[i]].abs());

@@ -59,6 +59,31 @@ fn second_derivatives_are_those_of_a_closed_form() {
     }
 }
 
+/// A drag that is next to zero has the second derivatives of none, or an estimate that says so.
+#[test]
+fn second_derivatives_by_parameters_next_to_zero() {
+    let found = |c: f64| {
+        let model = Oscillator { m: 1.3, k: 2.1, c };
+        let loss = Loss::at_end(|node: &Node<1>| 0.5 * node.q[0] * node.q[0]);
+        let run = Simulation::new(&model).element(Mixed::<8>).step(0.1);
+        let hessian = run.hessian(model.state([1.0], [0.0]), 0.0..2.0, &loss, ["k", "c"]);
+        let hessian = hessian.expect("second derivatives");
+        assert!(
+            hessian.errors().amax() < 1e-8,
+            "{c:e}: {}",
+            hessian.errors()
+        );
+        [("k", "k"), ("k", "c"), ("c", "c")].map(|(a, b)| hessian.by(a, b))
+    };
+    let expected = found(0.0);
+    for c in [1e-9, 1e-12, -1e-15, 1e-20, 1e-200] {
+        for (found, expected) in found(c).into_iter().zip(expected) {
+            let error = (found - expected).abs();
+            assert!(error < 1e-8, "{c:e}: {found} instead of {expected}");
+        }
+    }
+}
+
 /// Through bounces and with a loss over time.
 #[test]
 fn second_derivatives_go_through_bounces() {
