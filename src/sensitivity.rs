@@ -175,6 +175,15 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
     /// The derivatives of (p, q) and of velocities at a time of the motion, those before it at an event.
     fn between(&self, time: f64) -> Result<Between, AtError> {
         self.motion.at(time)?;
+        if self.moves(time) {
+            // Those of the node are of the event, wherever it is.
+            let mut inside = self.inside.iter();
+            match inside.find(|inside| inside.times.1 == time) {
+                Some(before) => return Ok(before.at(time)),
+                None if self.inside.is_empty() => return Err(AtError::NotRecorded { time }),
+                None => {}
+            }
+        }
         let number = self.motion.nodes_before(time);
         if (self.motion.states().get(number)).is_some_and(|node| node.t == time) {
             let Slopes {
@@ -189,6 +198,13 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         inside
             .map(|inside| inside.at(time))
             .ok_or(AtError::NotRecorded { time })
+    }
+
+    /// Whether this is the time of an event, which moves.
+    fn moves(&self, time: f64) -> bool {
+        let events = self.motion.events();
+        let mut own = self.events.iter().filter_map(|(at, _)| events.get(*at));
+        own.any(|event| event.t == time)
     }
 
     /// The derivatives at the last node.
@@ -233,7 +249,8 @@ impl<const N: usize, L: Length<N>> ByParameter<'_, N, L> {
             .collect()
     }
 
-    /// ∂q/∂a, ∂p/∂a and ∂v/∂a at any time of the motion: the derivatives of what [`Motion::at`] gives there, of its polynomials.
+    /// ∂q/∂a, ∂p/∂a and ∂v/∂a at any time of the motion: the derivatives of what [`Motion::at`] gives there, of its polynomials. At the time of an event they are those before it at that time, while those of
+    /// [`states`](Self::states) and [`last`](Self::last) are of the event, which moves.
     ///
     /// ```
     /// use tfe::prelude::*;

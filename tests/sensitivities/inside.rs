@@ -245,6 +245,38 @@ fn of_motions_with_events() {
     check_inside(&ball, start, bouncing, "velocity", true);
 }
 
+/// At the time of an event, as beside it, the time stays: y = y₀ + v₀ t − g t²/2 up to there.
+#[test]
+fn at_the_time_of_an_event_it_stays() {
+    let ball = Ball {
+        m: 1.0,
+        g: 9.81,
+        floor: 0.0,
+    };
+    let start = ball.state([0.6], [0.2]);
+    let stopped = Simulation::new(&ball)
+        .step(0.1)
+        .on("impact", Crossing::Falling, |_| Act::Stop);
+    for run in [bouncing(&ball), stopped] {
+        let s = run.run_sensitive(start, 0.0..SPAN).expect("derivatives");
+        let t = s.motion().events()[0].t;
+        for t in [t - 1e-9, t] {
+            let node = s.by("g").at(t).expect("in the span");
+            let expected = [[-t * t / 2.0], [-t], [-t]];
+            compare(&format!("{t}"), [node.q, node.p, node.v], expected, 1e-12);
+            let by_start = s.by_start().at(t).expect("in the span");
+            assert!((by_start.q_by_p()[(0, 0)] - t).abs() < 1e-12, "{by_start}");
+        }
+        // Nodes are of the event, where the ball is on the floor.
+        let nodes = s.motion().states();
+        let node = nodes.iter().position(|node| node.t == t).expect("an event");
+        let of_event = s.by("g").states()[node].q[0];
+        assert!(of_event.abs() < 1e-12, "{of_event}");
+        let sparse = run.record_every(3).run_sensitive(start, 0.0..SPAN);
+        assert!(sparse.expect("derivatives").by("g").at(t).is_err());
+    }
+}
+
 #[test]
 fn derivatives_between_nodes_that_were_not_kept_are_told() {
     let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
