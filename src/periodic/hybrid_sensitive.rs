@@ -119,7 +119,7 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
             sort(&mut found);
             Some(found)
         };
-        let distance = moving::distance(value, parts);
-        moving::derivatives(orbit.floquet(), &orbit.trivial(), distance, at)
+        let distances = moving::distances(value, parts);
+        moving::derivatives(orbit.floquet(), &orbit.trivial(), &distances, at)
     }
 }

@@ -19,6 +19,18 @@ pub(super) fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 
     }
 }
 
+/// The distances that are tried: that by a parameter, after that by one that is zero where nothing sees the size of the parameter, in parts of which multipliers change by roundings.
+pub(super) fn distances(value: f64, parts: [f64; 3]) -> Vec<f64> {
+    const SEEN: f64 = 1e-4;
+
+    let own = distance(value, parts);
+    let largest = parts.into_iter().fold(0.0, f64::max);
+    match value != 0.0 && largest * value.abs() <= SEEN {
+        true => vec![distance(0.0, parts), own],
+        false => vec![own],
+    }
+}
+
 /// The largest of some changes, in parts of the largest of what changes; zero where that is.
 pub(super) fn part(changes: &[f64], of: &[f64]) -> f64 {
     let largest = |all: &[f64]| all.iter().fold(0.0, |most, x| larger(most, x.abs()));
@@ -30,12 +42,12 @@ pub(super) fn part(changes: &[f64], of: &[f64]) -> f64 {
     }
 }
 
-/// The derivatives of multipliers, from those at places near by, at first `distance` apart, then nearer where that does not tell them; none where it never does, as where multipliers meet.
-/// Trivial ones stay.
+/// The derivatives of multipliers, from those at places near by, at first as far apart as the first distance says, then nearer where that does not tell them; none where it never does, as where
+/// multipliers meet. Trivial ones stay.
 pub(super) fn derivatives(
     multipliers: &[Multiplier],
     trivial: &[usize],
-    distance: f64,
+    distances: &[f64],
     at: impl Fn(f64) -> Option<Vec<Multiplier>>,
 ) -> Vec<Option<Complex<f64>>> {
     let none = Known {
@@ -46,10 +58,11 @@ pub(super) fn derivatives(
     for place in trivial {
         best[*place].off = 0.0;
     }
-    for nearer in NEARER {
-        // By the first distance, so that nearer ones are not judged more mildly.
-        let unit = PART / distance;
-        let found = differences(multipliers, (nearer * distance, unit), &at);
+    // By the first distance, so that nearer ones are not judged more mildly.
+    let unit = PART / distances.first().copied().unwrap_or(PART);
+    let tried = distances.iter();
+    for distance in tried.flat_map(|distance| NEARER.map(|nearer| nearer * distance)) {
+        let found = differences(multipliers, (distance, unit), &at);
         for (best, found) in best.iter_mut().zip(found) {
             if found.off < best.off {
                 *best = found;
@@ -64,7 +77,7 @@ pub(super) fn derivatives(
         .collect()
 }
 
-/// A derivative of a logarithm, and what two orders of differences are apart, as a part of it or of one that moves it by as much as whatever moves most.
+/// A derivative of a logarithm, and what two orders of differences are apart, with roundings of the logarithms, as a part of it or of one that moves it by as much as whatever moves most.
 #[derive(Clone, Copy)]
 struct Known {
     logarithm: Complex<f64>,
@@ -88,7 +101,7 @@ fn differences(
     }
     let known = |[eighth, sixth]: [Complex<f64>; 2]| Known {
         logarithm: eighth,
-        off: (eighth - sixth).norm() / eighth.norm().max(unit),
+        off: ((eighth - sixth).norm() + f64::EPSILON / distance) / eighth.norm().max(unit),
     };
     sums.into_iter().map(known).collect()
 }

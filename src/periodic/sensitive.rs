@@ -109,9 +109,9 @@ impl<'m, M: Model<N>, const N: usize> Moving<'_, 'm, M, N> {
             By::Parameter(index) => model.parameter(index),
             By::Length | By::Row(_) => self.problem.period,
         };
-        let distance = moving::distance(value, self.parts());
+        let distances = moving::distances(value, self.parts());
         let (own, trivial) = (orbit.floquet(), orbit.trivial());
-        moving::derivatives(own, &trivial, distance, |shift| match by {
+        moving::derivatives(own, &trivial, &distances, |shift| match by {
             By::Parameter(index) => {
                 let model = model.with_parameter(index, value + shift)?;
                 self.multipliers(&model, shift)

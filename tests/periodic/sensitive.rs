@@ -119,6 +119,29 @@ fn a_forced_oscillation_by_all_parameters() {
     );
 }
 
+/// A drag that is next to zero moves multipliers as one that is zero does.
+#[test]
+fn multipliers_by_a_parameter_next_to_zero() {
+    let found = |delta: f64| {
+        let model = Duffing {
+            alpha: 1.0,
+            beta: 0.7,
+            delta,
+            f: 0.4,
+            omega: 1.6,
+        };
+        let orbit = tight(&model, model.state([-0.25], [0.0])).period(TAU / model.omega);
+        let s = orbit.solve_sensitive().expect("an orbit");
+        let mut multipliers = s.orbit().multipliers().iter();
+        let place = multipliers.position(|one| one.im > 0.0).expect("a pair");
+        of_slopes(s.by("delta"), place)
+    };
+    let expected = found(0.0);
+    for delta in [1e-10, 1e-14, -1e-20, 1e-200] {
+        compare(found(delta), expected, 1e-8);
+    }
+}
+
 #[dynamics(coordinates(theta), lagrangian = m*dot(theta)^2/2 + k*cos(theta))]
 #[derive(Clone)]
 struct Swing {

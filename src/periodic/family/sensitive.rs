@@ -230,7 +230,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             let period = self.period + shift * change.period;
             self.floquet_of(&transitions, (&nodes, period), model).ok()
         };
-        let distance = moving::distance(value, parts);
-        moving::derivatives(orbit.floquet(), &orbit.trivial(), distance, at)
+        let distances = moving::distances(value, parts);
+        moving::derivatives(orbit.floquet(), &orbit.trivial(), &distances, at)
     }
 }
