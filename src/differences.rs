@@ -44,6 +44,16 @@ pub(crate) fn derivative_of_either([long, short]: [f64; 2], mut f: impl FnMut(f6
     }
 }
 
+/// The nearest distance from a time to one that there is, and at least to the next: beside large times distances are rounded, and with them differences.
+pub(crate) fn resolved(distance: f64, time: f64) -> f64 {
+    let moved = (time + distance) - time;
+    if moved == 0.0 {
+        time.next_up() - time
+    } else {
+        moved
+    }
+}
+
 /// An estimate of the error of a derivative, and the derivative.
 fn estimated(distance: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
     /// Distances that are tried, each a quarter of the one before: down to 1e-12 of the first.

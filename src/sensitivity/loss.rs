@@ -1,6 +1,6 @@
 //! Losses: numbers of a motion that are to be small, and their gradients.
 
-use crate::differences::{derivative, derivative_of_either};
+use crate::differences::{derivative, derivative_of_either, resolved};
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
@@ -357,7 +357,7 @@ fn partial<const N: usize, L: Length<N>>(
             moved.t = node.t + step;
             function(&moved)
         };
-        factor * derivative(DISTANCE_IN_TIME * span, at)
+        factor * derivative(resolved(DISTANCE_IN_TIME * span, node.t), at)
     };
     By::Node {
         t: span.map_or(0.0, by_time),

@@ -242,6 +242,13 @@ fn losses_of_the_time_of_an_event_move_with_it() {
         assert!((by_start.p[0] - 0.1).abs() < 1e-9, "{by_start:?}");
         assert!((gradient.by("g") + end / 20.0).abs() < 1e-9);
     }
+    // Counted from long ago, where the time has 22 bits behind the point.
+    let ago = 1.7e9;
+    let loss = Loss::at_end(|node: &tfe::Node<1>| (node.t - ago).powi(2));
+    let found = run.gradient(start, ago..ago + 2.0, &loss);
+    let (_, gradient) = found.expect("a gradient");
+    let by_start = gradient.by_start().q[0];
+    assert!((by_start - 0.2).abs() < 1e-5, "{by_start}");
     // t v = −2 y₀ at the end.
     let loss = Loss::at_end(|node: &tfe::Node<1>| node.t * node.v[0]);
     let found = run.gradient(start, 0.0..2.0, &loss);

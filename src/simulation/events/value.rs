@@ -1,6 +1,6 @@
 //! What changes its sign at an event.
 
-use crate::differences::{derivative, derivative_of_either};
+use crate::differences::{derivative, derivative_of_either, resolved};
 use crate::length::Length;
 use crate::motion::Event;
 use crate::numbers::largest;
@@ -73,7 +73,7 @@ fn normal_of<L: Length<N>, const N: usize>(
     let of_velocity = (0..q.as_ref().len()).any(|a| function(t, q, &moved(v, a, at_v)) != here);
     let slope = |a| derivative_of_either(at_q, |s| function(t, &moved(q, a, s), v));
     let normal = L::from_fn(q, slope);
-    let drift = derivative(DISTANCE, |s| function(t + s, q, v));
+    let drift = derivative(resolved(DISTANCE, t), |s| function(t + s, q, v));
     (!of_velocity).then_some((normal, drift))
 }
 
@@ -102,7 +102,14 @@ impl<const N: usize> Value<'_, [f64; N]> {
                 if size(0.0) == 0.0 {
                     return 0.0;
                 }
-                let distances = [1.0, 0.0].map(|least| DISTANCE / size(least));
+                let distances = [1.0, 0.0].map(|least| {
+                    let distance = DISTANCE / size(least);
+                    let rate = change.t.abs();
+                    match rate == 0.0 {
+                        true => distance,
+                        false => resolved(distance * rate, *t) / rate,
+                    }
+                });
                 let moved = |from: &[f64; N], by: &[f64; N], s: f64| {
                     std::array::from_fn(|a| from[a] + s * by[a])
                 };
