@@ -414,6 +414,13 @@ fn what_cannot_be_fitted_is_told() {
         matches!(told, FitError::Undetermined { .. }),
         "{told:?} {told}"
     );
+    // Nothing but the start is looked for, of a model that cannot be copied for want of a parameter.
+    #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - 9.81*y)]
+    struct Falling;
+    let told = Fit::new(&Falling).output("y", &times, &measured).solve();
+    let told = told.map(|fit| fit.to_string()).expect_err("no fit");
+    assert_eq!(told, FitError::NotCopied);
+    assert!(told.to_string().contains("no parameter"), "{told}");
     // The first run fails.
     let broken = Fit::new(&TRUE)
         .start(start, 0.0)

@@ -19,7 +19,7 @@ pub enum FitError {
         /// Those that there are.
         known: Vec<String>,
     },
-    /// The model has a field of a type that cannot be copied: it cannot be made with other parameters.
+    /// The model cannot be made with other parameters, nor copied: it has no parameter, or a field of a type that cannot be copied.
     NotCopied,
     /// The model has neither an output nor a coordinate of a name.
     NoOutput {
@@ -97,7 +97,7 @@ impl fmt::Display for FitError {
                 known.join("`, `")
             ),
             Self::NotCopied => f.write_str(
-                "the model has a field that is neither a number nor an array of numbers, so that it cannot be made with other parameters",
+                "the model cannot be made with other parameters, nor copied: it has no parameter, or a field that is neither a number nor an array of numbers",
             ),
             Self::NoOutput { name, known } => write!(
                 f,
