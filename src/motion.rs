@@ -14,7 +14,10 @@ pub use event::Event;
 pub use warning::Warning;
 
 pub(crate) use checkpoint::{LastCut, Reached, Seen};
-pub(crate) use time::{breaks_within, direction_of, is_same_time, sort_times};
+pub(crate) use time::{
+    LEAST_ROUNDINGS, breaks_within, direction_of, is_same_time, is_unresolved, looked_at,
+    sort_times,
+};
 
 pub use arcs::{MotionArc, Setting};
 

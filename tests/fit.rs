@@ -79,6 +79,28 @@ fn exact_measurements_give_exact_parameters() {
     assert!(fit.to_string().contains("g") && fit.to_string().contains("runs"));
 }
 
+/// Times of two clocks, as products and as sums have them, and a break of a third one.
+#[test]
+fn times_a_few_roundings_apart_are_one() {
+    let guess = Ball { g: 8.0, ..TRUE };
+    let apart = |roundings: f64| {
+        times()
+            .into_iter()
+            .map(move |t| t * (1.0 + roundings * f64::EPSILON))
+    };
+    for (first, second) in [(20.0, -20.0), (-20.0, 20.0), (0.0, 40.0)] {
+        let (one, two): (Vec<f64>, Vec<f64>) = (apart(first).collect(), apart(second).collect());
+        for at in [1.0, 2.0] {
+            let fit = Fit::new(&guess).start(guess.state([1.0], [4.0]), 0.0);
+            let fit = fit.step(0.05).parameters(["g"]).break_at(at);
+            let fit = fit.output("height", &one, heights());
+            let fit = fit.output("height", &two, heights()).solve();
+            let g = fit.expect("a fit").values()[0];
+            assert!((g - 9.81).abs() < 1e-11, "{first} {second} {at}: {g}");
+        }
+    }
+}
+
 /// As short as it can be: the start is found, too.
 /// Units make no difference: of masses, of what is measured, of its deviation.
 #[test]

@@ -5,7 +5,7 @@ use super::error::FitError;
 use super::problem::{Compare, Compared};
 use super::setup::Fit;
 use super::unknowns::Unknowns;
-use crate::motion::Motion;
+use crate::motion::{Motion, is_unresolved, looked_at};
 use crate::sensitivity::Sensitive;
 use nalgebra::DMatrix;
 use std::ops::Range;
@@ -31,10 +31,13 @@ impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
         unknowns: &'f Unknowns,
         (t0, start): (f64, Option<State<N>>),
     ) -> Self {
-        let mut times: Vec<f64> = columns.iter().flat_map(|one| one.times).copied().collect();
-        times.sort_by(f64::total_cmp);
-        times.dedup();
-        let last = times.last().copied().unwrap_or(t0);
+        let measured = || columns.iter().flat_map(|one| one.times).copied();
+        let known = [&fit.breaks[..], &[t0]].concat();
+        let times = looked_at(measured(), &known);
+        // Of a last one that can be no node the one beside it.
+        let latest = measured().fold(t0, f64::max);
+        let last = known.into_iter().find(|one| is_unresolved(*one, latest));
+        let last = last.or(times.last().copied()).unwrap_or(t0);
         Self {
             fit,
             columns,

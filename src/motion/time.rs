@@ -8,6 +8,31 @@ pub(crate) fn is_same_time(a: f64, b: f64) -> bool {
     size < f64::INFINITY && (a - b).abs() <= 8.0 * f64::EPSILON * size
 }
 
+/// A step of fewer roundings of the time has points that share times.
+pub(crate) const LEAST_ROUNDINGS: f64 = 64.0;
+
+/// Whether no step leads from one time to the other: they are one but for rounding, or so near that it would not be resolved.
+pub(crate) fn is_unresolved(a: f64, b: f64) -> bool {
+    let size = a.abs().max(b.abs());
+    size < f64::INFINITY && (a - b).abs() <= LEAST_ROUNDINGS * f64::EPSILON * size
+}
+
+/// Of times at which a run is looked at those that can be nodes beside what is `known` of its nodes, in their order. The others are as near to one of these as roundings of sums of times are.
+pub(crate) fn looked_at(times: impl IntoIterator<Item = f64>, known: &[f64]) -> Vec<f64> {
+    let mut known = known.to_vec();
+    known.sort_by(f64::total_cmp);
+    let is_beside = |time: f64| {
+        let after = known.partition_point(|one| *one < time);
+        let near = &known[after.saturating_sub(1)..known.len().min(after + 1)];
+        let mut near = near.iter();
+        near.any(|one| is_unresolved(*one, time) && !is_same_time(*one, time))
+    };
+    let mut times: Vec<f64> = times.into_iter().filter(|time| !is_beside(*time)).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|a, b| is_unresolved(*a, *b));
+    times
+}
+
 /// One, or minus one where a run goes back in time.
 pub(crate) fn direction_of(span: &Range<f64>) -> f64 {
     if span.end < span.start { -1.0 } else { 1.0 }

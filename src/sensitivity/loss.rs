@@ -4,7 +4,7 @@ use crate::differences::{derivative, derivative_of_either, resolved};
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
-use crate::motion::{Motion, Node, is_same_time};
+use crate::motion::{Motion, Node, is_unresolved, looked_at};
 use crate::sensitivity::names::place_of;
 use std::fmt;
 use std::sync::Arc;
@@ -157,16 +157,17 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         terms.any(|(_, term)| matches!(term, Term::Integral(_)))
     }
 
-    /// Where it looks at the motion besides the end.
-    pub(crate) fn nodes(&self) -> impl Iterator<Item = f64> {
-        self.terms.iter().flat_map(|(_, term)| {
+    /// Where it looks at the motion besides the end, for nodes beside what is `known` of those of the run.
+    pub(crate) fn nodes(&self, known: &[f64]) -> Vec<f64> {
+        let times = self.terms.iter().flat_map(|(_, term)| {
             match term {
                 Term::Squares(_, times, _) => times.as_slice(),
                 Term::End(_) | Term::Output(_) | Term::Integral(_) => &[],
             }
             .iter()
             .copied()
-        })
+        });
+        looked_at(times, known)
     }
 
     /// What is wrong with it for a model with these outputs and a span.
@@ -251,7 +252,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
                     let Some(column) = column(name) else { continue };
                     for (t, measured) in times.iter().zip(values) {
                         let node = motion.nearest(*t);
-                        if !is_same_time(nodes[node].t, *t) {
+                        if !is_unresolved(nodes[node].t, *t) {
                             return Err(RunErrorKind::Loss {
                                 name: name.clone(),
                                 why: "an event has stopped the run before all of its times",

@@ -75,7 +75,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             return Err(RunError::new(kind, motion));
         }
         let mut run = self.clone();
-        run.breaks.extend(loss.nodes());
+        run.look_at(loss, &span);
         if !run.events.is_empty() {
             return run.record_every(1).forwards(start, span, loss);
         }

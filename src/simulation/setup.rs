@@ -7,6 +7,8 @@ use super::mesh::Grid;
 use super::resolution::Again;
 use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
+use crate::sensitivity::Loss;
+use std::ops::Range;
 use tfe_runtime::Share;
 use tfe_runtime::step::{Control, Impulse};
 use tfe_runtime::{Element, Mixed, Model, Solve};
@@ -262,6 +264,13 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
             model: self.model.clone(),
             chosen: self.chosen(),
         }
+    }
+
+    /// Lets elements end where a loss looks at the motion.
+    pub(super) fn look_at(&mut self, loss: &Loss<'_, N, L>, span: &Range<f64>) {
+        let nodes = self.nodes.as_deref().unwrap_or_default();
+        let known = [nodes, &self.breaks[..], &[span.start, span.end]].concat();
+        self.breaks.extend(loss.nodes(&known));
     }
 
     /// What was asked of the elements.

@@ -1,7 +1,7 @@
 //! When elements begin and end: equal steps between breaks, or between given nodes.
 
 use crate::error::RunErrorKind;
-use crate::motion::{breaks_within, direction_of, is_same_time, sort_times};
+use crate::motion::{LEAST_ROUNDINGS, breaks_within, direction_of, is_same_time, sort_times};
 use std::ops::Range;
 
 /// Times between two breaks, cut into equal steps; the last one may be shorter.
@@ -305,9 +305,6 @@ fn check_nodes(span: &Range<f64>, nodes: &[f64], direction: f64) -> Result<(), R
 
 /// Refuses steps that are roundings of the time: nodes would share times, and points of an element, too.
 fn check_resolution(time: f64, step: f64) -> Result<(), RunErrorKind> {
-    /// A step of fewer roundings of the time has points that share times.
-    const LEAST_ROUNDINGS: f64 = 64.0;
-
     let least = LEAST_ROUNDINGS * f64::EPSILON * time.abs();
     if step.abs() < least {
         return Err(RunErrorKind::StepUnresolved { time, step, least });

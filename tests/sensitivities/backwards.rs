@@ -115,6 +115,22 @@ fn gradients_backwards_are_derivatives_forwards() {
     check_gradient(&Simulation::new(&ROD).step(0.02), start, "height");
 }
 
+/// Times that are one but for the roundings of a sum of many share a node, also with a break and with a node that was given.
+#[test]
+fn squares_at_times_a_few_roundings_apart() {
+    let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
+    let near = |roundings: f64| 0.5 * (1.0 + roundings * f64::EPSILON);
+    let twice = Loss::squares("height", [near(20.0), near(40.0)], [0.3, 0.3]);
+    let once = Loss::squares("height", [0.5], [0.3]).times(2.0);
+    let run = Simulation::new(&PENDULUMS).step(0.05);
+    let nodes: Vec<f64> = (0..=20).map(|k| 0.05 * f64::from(k)).collect();
+    let with_nodes = run.clone().nodes(nodes);
+    for run in [run.clone(), run.break_at(0.5), with_nodes] {
+        let [twice, once] = [&twice, &once].map(|loss| gradient_of(&run, start, 0.0..1.0, loss));
+        compare_rows(&twice, &once, "twice");
+    }
+}
+
 /// A function of slices, of models of any length, is that of nodes.
 #[test]
 fn losses_of_slices_are_those_of_nodes() {

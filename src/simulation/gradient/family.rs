@@ -66,7 +66,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             }
         }
         let mut run = self.clone();
-        run.breaks.extend(loss.nodes());
+        run.look_at(loss, &span);
         #[cfg(feature = "sparse")]
         if self.record_every > 1 && self.events.is_empty() {
             let found = run.by_checkpoints(&start, &span, loss)?;
