@@ -1,6 +1,6 @@
 //! What acts of events make of states near those of their events: differences (T-124).
 
-use crate::differences::{SIXTH, derivative};
+use crate::differences::{SIXTH, derivative, derivative_of_either};
 use crate::error::RunErrorKind;
 use crate::sensitivity::slopes::{Along, Change};
 use crate::simulation::checks::check_start;
@@ -37,6 +37,8 @@ struct Way<const N: usize> {
     velocity: [f64; N],
     /// That of differences, in parts of the change.
     distance: f64,
+    /// One that is tried before, of a parameter alone: acts may have numbers of the size of one beside it.
+    longer: Option<f64>,
 }
 
 /// A size to measure changes by.
@@ -50,20 +52,19 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         &self,
         parameter: impl Fn(usize) -> Option<usize>,
     ) -> Result<DMatrix<f64>, TransitionError> {
-        let by = (&self.severed.watched.on, &self.severed.watched.value);
         let mut after = self.at.clone();
         for column in 0..self.times.len() {
             after.column_mut(column).fill(0.0);
             for way in self.ways(column, parameter(column)) {
-                let moved = |s: f64| {
-                    let near = self.near(&way, s);
-                    let found = state_after(self.model, by, self.severed.event, &near);
-                    let found = found.filter(|found| check_start(found).is_ok());
-                    found.ok_or(TransitionError::from(StepError::NonFinite))
-                };
+                if let Some(longer) = way.longer {
+                    for row in 0..2 * N {
+                        after[(row, column)] += self.alone(&way, longer, row)?;
+                    }
+                    continue;
+                }
                 for (k, weight) in (1..).zip(SIXTH) {
                     let s = f64::from(k) * way.distance;
-                    let (high, low) = (moved(s)?, moved(-s)?);
+                    let (high, low) = (self.moved(&way, s)?, self.moved(&way, -s)?);
                     for a in 0..N {
                         after[(a, column)] += weight * (high.p[a] - low.p[a]) / way.distance;
                         after[(N + a, column)] += weight * (high.q[a] - low.q[a]) / way.distance;
@@ -72,6 +73,26 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
             }
         }
         Ok(after)
+    }
+
+    /// The state after the act at a part of the change.
+    fn moved(&self, way: &Way<N>, s: f64) -> Result<State<N>, TransitionError> {
+        let by = (&self.severed.watched.on, &self.severed.watched.value);
+        let found = state_after(self.model, by, self.severed.event, &self.near(way, s));
+        let found = found.filter(|found| check_start(found).is_ok());
+        found.ok_or(TransitionError::from(StepError::NonFinite))
+    }
+
+    /// A number of the state after the act, ordered (p, q), by a parameter alone.
+    fn alone(&self, way: &Way<N>, longer: f64, row: usize) -> Result<f64, TransitionError> {
+        let slope = derivative_of_either([longer, way.distance], |s| {
+            let numbers = self.moved(way, s).map(|state| [state.p, state.q]);
+            numbers.map_or(f64::NAN, |numbers| numbers.as_flattened()[row])
+        });
+        match slope.is_finite() {
+            true => Ok(slope),
+            false => Err(StepError::NonFinite.into()),
+        }
     }
 
     /// Why a run is refused whose act sets a parameter to a value that depends on the state: the motion behind it is a function of that value, too, and matrices from state to state do not hold it.
@@ -133,6 +154,7 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         let Some(index) = parameter else {
             return motion.into_iter().collect();
         };
+        let size = scale(self.model.parameter(index).abs());
         let own = Way {
             change: Change::ZERO,
             time: 0.0,
@@ -141,11 +163,15 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
                 parameter,
                 ..Change::ZERO
             }),
-            distance: DISTANCE * scale(self.model.parameter(index).abs()),
+            distance: DISTANCE * size,
+            longer: None,
         };
         match motion {
             None => vec![own],
-            Some(motion) if motion.distance > TOGETHER * own.distance => vec![motion, own],
+            Some(motion) if motion.distance > TOGETHER * own.distance => {
+                let longer = Some(DISTANCE * size.max(1.0));
+                vec![motion, Way { longer, ..own }]
+            }
             Some(motion) => vec![Way {
                 change: motion.change,
                 time: motion.time,
@@ -173,6 +199,7 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
             parameter: None,
             velocity: [0.0; N],
             distance: DISTANCE / scale(size),
+            longer: None,
         })
     }
 
