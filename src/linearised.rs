@@ -1,11 +1,10 @@
 //! A motion with its linearisation: the transition matrix of every element.
 
-use crate::constraints::{allowed, reduced, tangent_basis};
 use crate::length::{FixedLength, Length};
 use crate::motion::Motion;
 use crate::periodic_schur::{self, Multiplier, PeriodicSchurError};
 use nalgebra::DMatrix;
-use tfe_runtime::{Model, State, StepError};
+use tfe_runtime::StepError;
 
 /// A motion together with the transition matrices of its elements, from
 /// [`Simulation::run_linearised`](crate::Simulation::run_linearised).
@@ -46,26 +45,6 @@ pub struct Linearised<const N: usize, L: Length<N> = FixedLength> {
     transitions: Vec<DMatrix<f64>>,
     /// The same on the motions that constraints allow, for models that have any; of an empty span the identity.
     reduced: Option<Result<Vec<DMatrix<f64>>, StepError>>,
-}
-
-impl<const N: usize> Linearised<N> {
-    /// With the start of every matrix if the model has constraints.
-    pub(crate) fn new<M: Model<N>>(
-        model: &M,
-        motion: Motion<N>,
-        transitions: Vec<DMatrix<f64>>,
-        starts: &[(f64, State<N>)],
-    ) -> Self {
-        let reduced = const { !M::CONSTRAINTS.is_empty() }.then(|| {
-            if transitions.is_empty() {
-                let start = motion.last();
-                return allowed::identity(tangent_basis(model, start.t, &start.state()));
-            }
-            let starts = starts.iter().copied();
-            reduced(model, starts, &transitions)
-        });
-        Self::with(motion, transitions, reduced)
-    }
 }
 
 impl<const N: usize, L: Length<N>> Linearised<N, L> {

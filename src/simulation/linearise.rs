@@ -7,6 +7,7 @@ use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::sensitive::Tangents;
 use super::setup::Simulation;
+use crate::constraints::allowed;
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
 use crate::motion::Motion;
@@ -15,7 +16,7 @@ use std::convert::identity;
 use std::ops::Range;
 use tfe_runtime::step::Stepper;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Model, Share, State};
+use tfe_runtime::{Model, Share, State, StepError};
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion.
@@ -45,16 +46,25 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             is_across: false,
             entries: vec![0.0; 4 * N * N],
             transitions: Vec::new(),
-            starts: Vec::new(),
+            bases: Vec::new(),
         };
         let motion = self.drive(start, &span, identity, Some(&mut matrices))?;
         matrices.close();
         let Matrices {
+            tangents,
             transitions,
-            starts,
+            bases,
             ..
         } = matrices;
-        Ok(Linearised::new(&*self.model, motion, transitions, &starts))
+        let reduced = const { !M::CONSTRAINTS.is_empty() }.then(|| {
+            if transitions.is_empty() {
+                let start = motion.last();
+                return allowed::identity(tangents.basis(start.t, &start.state()));
+            }
+            let bases = bases.into_iter().collect::<Result<Vec<_>, _>>()?;
+            allowed::reduced(&bases, transitions.iter())
+        });
+        Ok(Linearised::with(motion, transitions, reduced))
     }
 }
 
@@ -66,14 +76,14 @@ struct Matrices<'m, M, const N: usize> {
     is_across: bool,
     entries: Vec<f64>,
     transitions: Vec<DMatrix<f64>>,
-    /// Of every matrix, for models with constraints.
-    starts: Vec<(f64, State<N>)>,
+    /// Where every matrix starts, the motions that constraints allow, for models that have any.
+    bases: Vec<Result<DMatrix<f64>, StepError>>,
 }
 
 impl<M: Model<N>, const N: usize> Matrices<'_, M, N> {
     fn begin(&mut self, t: f64, state: &State<N>) {
         if const { !M::CONSTRAINTS.is_empty() } && !self.is_across {
-            self.starts.push((t, *state));
+            self.bases.push(self.tangents.basis(t, state));
         }
     }
 

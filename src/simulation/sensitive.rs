@@ -108,8 +108,8 @@ pub struct Tangents<'m, M, const N: usize> {
     events: Vec<(usize, Vec<f64>)>,
     /// Solves elements that events have cut.
     probe: Option<Stepper<'m, M, N>>,
-    /// Where derivatives are counted from, of models with constraints: `None` before the first element.
-    counted_from: Option<(f64, State<N>)>,
+    /// The motions that constraints allow where derivatives are counted from, of models with constraints: `None` before the first element.
+    counted_from: Option<Result<DMatrix<f64>, StepError>>,
 }
 
 /// The derivatives of an element.
@@ -204,8 +204,13 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
     /// Derivatives are counted from here, if they are not yet from anywhere.
     fn count_from(&mut self, t: f64, state: &State<N>) {
         if const { !M::CONSTRAINTS.is_empty() } && self.counted_from.is_none() {
-            self.counted_from = Some((t, *state));
+            self.counted_from = Some(self.basis(t, state));
         }
+    }
+
+    /// The motions that constraints allow at a state, with the parameters that hold now.
+    pub(super) fn basis(&self, t: f64, state: &State<N>) -> Result<DMatrix<f64>, StepError> {
+        tangent_basis(&*self.model, t, state)
     }
 
     /// The inverse of the derivative of an event's state by that at the point before; with constraints on the motions that these allow (T-78): of other directions nothing is left
@@ -223,11 +228,9 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             return inverted(at.clone());
         }
         let event = severed.event;
-        let here = (event.t, event.state());
-        let before = self.counted_from.replace(here);
-        let before = before.unwrap_or((severed.start, *severed.before));
-        let [before, here] =
-            [before, here].map(|(t, state)| tangent_basis(&*self.model, t, &state));
+        let here = self.basis(event.t, &event.state());
+        let before = self.counted_from.replace(here.clone());
+        let before = before.unwrap_or_else(|| self.basis(severed.start, severed.before));
         let (before, here) = (before?, here?);
         if before.ncols() != here.ncols() {
             return Err(StepError::from(ConstraintError::RankChanged).into());

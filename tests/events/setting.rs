@@ -224,3 +224,76 @@ fn a_coordinate_takes_the_place_of_a_parameter() {
         }
     }
 }
+
+/// A pendulum on a rod whose bob drags a carriage along x, which is loaded as it passes the bottom: with another mass constraints allow other momenta.
+#[test]
+fn what_constraints_allow_is_that_of_parameters_set() {
+    #[dynamics(
+        coordinates(x, y),
+        lagrangian = ((1 + m)*dot(x)^2 + dot(y)^2)/2 - y,
+        constraint(rod) = x^2 + y^2 - 1,
+        event(bottom) = x,
+        event(turn) = dot(x),
+    )]
+    struct Carriage {
+        m: f64,
+    }
+
+    let model = Carriage { m: 0.5 };
+    let simulation = Simulation::new(&model)
+        .element(Mixed::<8>)
+        .step(0.04)
+        .on("bottom", Crossing::Either, |_| {
+            Act::Set(Settings::new("m", 4.0))
+        });
+    let moved = |s: f64| {
+        let (sin, cos) = (0.9 + s).sin_cos();
+        model.state([sin, -cos], [0.2 * cos, 0.2 * sin])
+    };
+    let start = moved(0.0);
+    let run = simulation.run_linearised(start, 0.0..4.0).expect("a run");
+    assert!(!run.motion().events().is_empty());
+    // Between the elements nothing is lost of what the constraint allows.
+    let basis = tfe::constraints::tangent_basis(&model, 0.0, &start).expect("a basis");
+    let whole = basis.tr_mul(&(run.product() * &basis));
+    let mut product = nalgebra::DMatrix::identity(2, 2);
+    for matrix in run.on_constraints().expect("bases") {
+        product = matrix * product;
+    }
+    for (found, expected) in product.iter().zip(whole.iter()) {
+        // Acts are differentiated by differences.
+        let off = (found - expected).abs();
+        assert!(off < 1e-8 * whole.amax(), "{product} for {whole}");
+    }
+
+    // Turning points before the carriage is loaded and after.
+    let third = |s: f64| {
+        let mut section = simulation.section("turn", Crossing::Either, moved(s), 0.0);
+        let point = section.nth(2).expect("endless").expect("a point");
+        numbers(&point.state())
+    };
+    let difference = |of: &dyn Fn(f64) -> Vec<f64>| -> Vec<f64> {
+        let pair = |h: f64| {
+            let pairs = of(h).into_iter().zip(of(-h));
+            let slopes = pairs.map(|(high, low)| (high - low) / (2.0 * h));
+            slopes.collect::<Vec<_>>()
+        };
+        let pairs = pair(1e-3).into_iter().zip(pair(2e-3));
+        pairs.map(|(near, far)| (4.0 * near - far) / 3.0).collect()
+    };
+    let section = simulation.section("turn", Crossing::Either, start, 0.0);
+    let mut product = nalgebra::DMatrix::identity(4, 4);
+    for point in section.linearised().take(3) {
+        let point = point.expect("a point");
+        product = point.transition().expect("linearised") * product;
+    }
+    let begun = difference(&|s| numbers(&moved(s)));
+    let found = product * nalgebra::DVector::from_vec(begun);
+    let expected = difference(&third);
+    let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+    for (found, expected) in found.iter().zip(&expected) {
+        // Differences of fourth order.
+        let off = (found - expected).abs();
+        assert!(off < 1e-7 * size, "{found} for {expected}");
+    }
+}
