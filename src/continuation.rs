@@ -47,7 +47,7 @@ use tfe_runtime::{Element, Model, State};
 /// A branch of periodic orbits to be followed in one parameter of its model.
 ///
 /// It begins at the model as given and goes towards the end of the range; through folds it may come back. It ends where it leaves the range,
-/// with a point exactly there.
+/// with a point exactly there, or where its orbits shrink to an equilibrium, [`End::Rest`].
 ///
 /// - *Forced*: the [`period`](Self::period) is a function of the model.
 /// - *Autonomous with damping or forces*: the period is unknown ([`unknown_period`](Self::unknown_period)).

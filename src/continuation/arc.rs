@@ -93,6 +93,16 @@ impl Metric {
         pair(&nodes, &globals, b)
     }
 
+    /// Whether hardly anything is left of the way that an orbit goes, or that leads the other way round.
+    pub(super) fn withers<const N: usize>(&self, from: &Iterate<N>, to: &Iterate<N>) -> bool {
+        /// A step that leaves less leads to rest or beyond it.
+        const LEFT: f64 = 0.1;
+        let (from, to) = (way(from), way(to));
+        let whole = self.product(&from, &from);
+        // A single element has no way from node to node.
+        whole > 0.0 && self.product(&from, &to) < LEFT * whole
+    }
+
     /// a / √⟨a, a⟩.
     pub(super) fn unit<const N: usize>(&self, mut a: Iterate<N>) -> Iterate<N> {
         let norm = self.product(&a, &a).sqrt();
@@ -114,6 +124,21 @@ impl Metric {
             globals,
             value,
         }
+    }
+}
+
+/// The way of an orbit from node to node.
+fn way<const N: usize>(iterate: &Iterate<N>) -> Iterate<N> {
+    let difference = |from: &[f64; N], to: &[f64; N]| std::array::from_fn(|a| to[a] - from[a]);
+    let pairs = iterate.nodes.windows(2);
+    let nodes = pairs.map(|pair| State {
+        q: difference(&pair[0].q, &pair[1].q),
+        p: difference(&pair[0].p, &pair[1].p),
+    });
+    Iterate {
+        nodes: nodes.collect(),
+        interiors: Vec::new(),
+        globals: Vec::new(),
     }
 }
 

@@ -82,6 +82,9 @@ pub enum End {
     Range,
     /// After as many points as were asked for.
     Points,
+    /// Where the orbits of an autonomous model shrink to an equilibrium (Hopf). The parameter of the last point is that of the equilibrium up to the order of the square of the
+    /// [smallest step](super::Continuation::smallest_step), beside the range.
+    Rest,
 }
 
 /// What an orbit needs to be one again.

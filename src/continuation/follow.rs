@@ -167,6 +167,10 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
                     step = (0.5 * step).max(smallest);
                     continue;
                 }
+                Err(_) if self.comes_to_rest(&self.ahead(NEAR_REST * smallest)) => {
+                    branch.end = Some(End::Rest);
+                    break;
+                }
                 Err(source) => {
                     branch.statistics = self.assembly.statistics();
                     return Err(ContinuationErrorKind::Step {
@@ -239,13 +243,29 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         self.last.tangent = self.metric.unit(self.last.tangent.clone());
     }
 
-    /// The orbit at an arc length from the last one, or at the end of the range before it. Without an error the branch turned too much.
+    /// The place at an arc length from the last orbit along its tangent.
+    fn ahead(&self, length: f64) -> Iterate<N> {
+        let last = &self.last;
+        last.member.iterate.plus(length, &last.tangent)
+    }
+
+    /// Whether a place ahead is one of rest, or beyond one: from there the branch would go back over the same orbits, half a period later. Where time decides on the phase, rest is a
+    /// motion as any other.
+    fn comes_to_rest(&self, ahead: &Iterate<N>) -> bool {
+        let last = &self.last.member.iterate;
+        self.problem.orbit.phase.is_some() && self.metric.withers(last, ahead)
+    }
+
+    /// The orbit at an arc length from the last one, or at the end of the range before it. Without an error the branch turned too much, or came to rest.
     fn step(&mut self, length: f64) -> Result<Step<M, N>, Option<OrbitError>> {
         let last = &self.last;
-        let guess = last.member.iterate.plus(length, &last.tangent);
+        let guess = self.ahead(length);
+        if self.comes_to_rest(&guess) {
+            return Err(None);
+        }
         let row = self.metric.row(&last.member.iterate, &last.tangent, length);
         let (next, turn) = self.correct(guess, row)?;
-        if turn < MOST_TURN {
+        if turn < MOST_TURN || self.comes_to_rest(&next.member.iterate) {
             return Err(None);
         }
         let Some(bound) = self.course.left(next.parameter()) else {
@@ -510,6 +530,9 @@ fn adapted(step: f64, iterations: u32, turn: f64) -> f64 {
 
 /// A corrector that takes more says that the step was too long.
 const MOST_ITERATIONS: u32 = 8;
+
+/// Where the smallest step fails, a branch has come to rest if that lies within so many of these: the equations lose digits near it.
+const NEAR_REST: f64 = 10.0;
 
 /// The cosine of 25°: a branch does not turn by more in a step.
 const MOST_TURN: f64 = 0.906;

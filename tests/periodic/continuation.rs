@@ -36,8 +36,8 @@ struct ForcedVanDerPol {
 /// The plane pendulum.
 #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + k*cos(theta), sensitivity(k))]
 #[derive(Clone)]
-struct Pendulum {
-    k: f64,
+pub(crate) struct Pendulum {
+    pub(crate) k: f64,
 }
 
 #[dynamics(coordinates(x, y), momenta(px, py),
@@ -67,12 +67,12 @@ fn response(elements: usize) -> Branch<Duffing, 1> {
         .expect("a branch")
 }
 
-fn kinds<M: Model<N>, const N: usize>(branch: &Branch<M, N>) -> Vec<EventKind> {
+pub(crate) fn kinds<M: Model<N>, const N: usize>(branch: &Branch<M, N>) -> Vec<EventKind> {
     branch.events().iter().map(|event| event.kind).collect()
 }
 
 #[track_caller]
-fn close(value: f64, expected: f64, tolerance: f64) {
+pub(crate) fn close(value: f64, expected: f64, tolerance: f64) {
     assert!(
         (value - expected).abs() <= tolerance,
         "{value:e} instead of {expected:e}"

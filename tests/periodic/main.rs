@@ -1,6 +1,7 @@
 //! Periodic orbits, their multipliers, and boundary-value problems against reference values and closed forms.
 
 mod boundary;
+mod branches;
 #[path = "../common/mod.rs"]
 mod common;
 mod constrained;
