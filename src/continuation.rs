@@ -9,7 +9,7 @@
 //! with u all unknowns, u_0 the last orbit, τ the unit tangent of the branch there and s the step in arc length: regular also where the
 //! branch turns back in λ. The predictor is u_0 + s τ, interiors of elements included; the corrector is Newton's method on the assembled elements.
 //! The next tangent comes from the same matrix with the right side (0, …, 0, 1), which also orients it. Arc length is measured in
-//! units of the parameter: ds² is dλ² plus w² times the mean square of the change of the orbit beside its size, w the length of the range.
+//! units of the parameter: ds² is dλ² plus w² times the mean square of the change of the orbit, each coordinate and momentum beside its own range, w the length of the range of the parameter.
 //!
 //! # Events
 //! Between two orbits a test function changes sign: dλ/ds at a fold, ∏ (μ + 1) at a period doubling, ∏ (μ_i μ_j − 1) where a pair goes

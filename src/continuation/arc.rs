@@ -7,37 +7,48 @@ use tfe_runtime::State;
 /// The scalar product in which arc length is measured, in units of the parameter:
 ///
 /// ```text
-/// ⟨a, b⟩ = λ_a λ_b + w² [ Σ_e h_e/T (q_a·q_b / Q² + p_a·p_b / P²)_e + T_a T_b / T² ]
+/// ⟨a, b⟩ = λ_a λ_b + w² [ Σ_e h_e/T Σ_k (y_k,a y_k,b / Y_k²)_e + T_a T_b / T² ]
 /// ```
 ///
-/// with w the length of the range of λ and Q, P the largest coordinate and momentum so far. Where the branch starts at rest they say nothing, so
-/// they are at least a hundredth of |∂q/∂λ| w and |∂p/∂λ| w there. The part h_e/T of an element makes it a mean over time, whatever the mesh.
+/// with w the length of the range of λ and Y_k half the range of each coordinate and momentum y_k so far: an angle counts as much as a distance beside it, wherever that is counted from. Where
+/// the branch starts at rest ranges say nothing, so they are at least a hundredth of |∂y_k/∂λ| w there. The part h_e/T of an element makes it a mean over time, whatever the mesh.
 #[derive(Clone, Debug)]
-pub(super) struct Metric {
+pub(super) struct Metric<const N: usize> {
     /// The part of each node; none for the last, which is the first.
     shares: Vec<f64>,
     width: f64,
-    largest_p: f64,
-    largest_q: f64,
+    /// The lowest value of each component so far, and the highest.
+    bounds: [State<N>; 2],
+    /// What each component is measured by at least.
+    least: State<N>,
     /// T, unless it is no unknown.
     period: Option<f64>,
 }
 
-impl Metric {
+/// Ranges below this part of the largest component of their kind are roundings of it, as in one that is zero by symmetry.
+const ROUNDINGS: f64 = 1e-9;
+
+/// Ranges are this part of the values at least: arc length is to have some ten digits, whatever components are counted from.
+const OFFSET: f64 = 1e-5;
+
+impl<const N: usize> Metric<N> {
     /// From the first orbit and its derivative by the parameter.
-    pub(super) fn new<M, const N: usize>(
+    pub(super) fn new<M>(
         orbit: &Periodic<'_, M, N>,
         width: f64,
         start: &Iterate<N>,
         derivative: &Iterate<N>,
     ) -> Self {
         let shares = (0..orbit.mesh.elements()).map(|e| orbit.mesh.share(e));
-        let [p, q] = largest(derivative);
+        let largest = largest(derivative);
         let mut metric = Self {
             shares: shares.chain([0.0]).collect(),
             width,
-            largest_p: 1e-2 * width * p,
-            largest_q: 1e-2 * width * q,
+            bounds: [start.nodes[0]; 2],
+            least: State {
+                q: largest.q.map(|q| 1e-2 * width * q),
+                p: largest.p.map(|p| 1e-2 * width * p),
+            },
             period: (orbit.globals.first() == Some(&Global::Period)).then_some(orbit.period),
         };
         metric.grow(start);
@@ -45,56 +56,62 @@ impl Metric {
     }
 
     /// Takes one more orbit into account.
-    pub(super) fn grow<const N: usize>(&mut self, iterate: &Iterate<N>) {
-        let [p, q] = largest(iterate);
-        self.largest_p = self.largest_p.max(p);
-        self.largest_q = self.largest_q.max(q);
-    }
-
-    /// The weights of momenta and coordinates.
-    fn weights(&self) -> [f64; 2] {
-        [self.largest_p, self.largest_q].map(|largest| {
-            if largest > 0.0 {
-                (self.width / largest).powi(2)
-            } else {
-                0.0
+    pub(super) fn grow(&mut self, iterate: &Iterate<N>) {
+        let [low, high] = &mut self.bounds;
+        for node in &iterate.nodes {
+            for a in 0..N {
+                low.q[a] = low.q[a].min(node.q[a]);
+                low.p[a] = low.p[a].min(node.p[a]);
+                high.q[a] = high.q[a].max(node.q[a]);
+                high.p[a] = high.p[a].max(node.p[a]);
             }
-        })
+        }
     }
 
-    /// The weight of the k-th of `globals` unknowns: a period, an unfolding, the parameter.
+    /// w / Y_k of all components. Their squares may be no numbers.
+    fn weights(&self) -> State<N> {
+        let [low, high] = &self.bounds;
+        let least = &self.least;
+        State {
+            q: weights(self.width, [&low.q, &high.q], &least.q),
+            p: weights(self.width, [&low.p, &high.p], &least.p),
+        }
+    }
+
+    /// The root of the weight of the k-th of `globals` unknowns: a period, an unfolding, the parameter.
     fn global(&self, k: usize, globals: usize) -> f64 {
         if k + 1 == globals {
             1.0
         } else if k == 0 {
-            self.period
-                .map_or(0.0, |period| (self.width / period).powi(2))
+            self.period.map_or(0.0, |period| self.width / period)
         } else {
             0.0
         }
     }
 
     /// b ↦ ⟨a, b⟩ as numbers to multiply b with.
-    fn dual<const N: usize>(&self, a: &Iterate<N>) -> (Vec<State<N>>, Vec<f64>) {
-        let [by_p, by_q] = self.weights();
+    fn dual(&self, a: &Iterate<N>) -> (Vec<State<N>>, Vec<f64>) {
+        let by = self.weights();
         let nodes = a.nodes.iter().zip(&self.shares);
         let nodes = nodes.map(|(state, share)| State {
-            q: state.q.map(|q| share * by_q * q),
-            p: state.p.map(|p| share * by_p * p),
+            q: std::array::from_fn(|a| share * by.q[a] * (by.q[a] * state.q[a])),
+            p: std::array::from_fn(|a| share * by.p[a] * (by.p[a] * state.p[a])),
         });
-        let globals = a.globals.iter().enumerate();
-        let globals = globals.map(|(k, value)| self.global(k, a.globals.len()) * value);
+        let globals = a.globals.iter().enumerate().map(|(k, value)| {
+            let by = self.global(k, a.globals.len());
+            by * (by * value)
+        });
         (nodes.collect(), globals.collect())
     }
 
     /// ⟨a, b⟩.
-    pub(super) fn product<const N: usize>(&self, a: &Iterate<N>, b: &Iterate<N>) -> f64 {
+    pub(super) fn product(&self, a: &Iterate<N>, b: &Iterate<N>) -> f64 {
         let (nodes, globals) = self.dual(a);
         pair(&nodes, &globals, b)
     }
 
     /// Whether hardly anything is left of the way that an orbit goes, or that leads the other way round.
-    pub(super) fn withers<const N: usize>(&self, from: &Iterate<N>, to: &Iterate<N>) -> bool {
+    pub(super) fn withers(&self, from: &Iterate<N>, to: &Iterate<N>) -> bool {
         /// A step that leaves less leads to rest or beyond it.
         const LEFT: f64 = 0.1;
         let (from, to) = (way(from), way(to));
@@ -104,19 +121,14 @@ impl Metric {
     }
 
     /// a / √⟨a, a⟩.
-    pub(super) fn unit<const N: usize>(&self, mut a: Iterate<N>) -> Iterate<N> {
+    pub(super) fn unit(&self, mut a: Iterate<N>) -> Iterate<N> {
         let norm = self.product(&a, &a).sqrt();
         a.scale(1.0 / norm);
         a
     }
 
     /// The place at an arc length from `base`, measured along the unit vector `tangent`.
-    pub(super) fn row<const N: usize>(
-        &self,
-        base: &Iterate<N>,
-        tangent: &Iterate<N>,
-        length: f64,
-    ) -> Row<N> {
+    pub(super) fn row(&self, base: &Iterate<N>, tangent: &Iterate<N>, length: f64) -> Row<N> {
         let (nodes, globals) = self.dual(tangent);
         let value = pair(&nodes, &globals, base) + length;
         Row::Arc {
@@ -142,13 +154,30 @@ fn way<const N: usize>(iterate: &Iterate<N>) -> Iterate<N> {
     }
 }
 
-/// The largest momentum and the largest coordinate.
-fn largest<const N: usize>(iterate: &Iterate<N>) -> [f64; 2] {
-    let largest = |values: &dyn Fn(&State<N>) -> [f64; N]| {
-        let values = iterate.nodes.iter().flat_map(values);
-        values.fold(0.0_f64, |largest, value| largest.max(value.abs()))
+/// The largest magnitude of each component.
+fn largest<const N: usize>(iterate: &Iterate<N>) -> State<N> {
+    let largest = |value: &dyn Fn(&State<N>, usize) -> f64| {
+        std::array::from_fn(|a| {
+            let values = iterate.nodes.iter().map(|node| value(node, a).abs());
+            values.fold(0.0_f64, f64::max)
+        })
     };
-    [largest(&|state| state.p), largest(&|state| state.q)]
+    State {
+        q: largest(&|node, a| node.q[a]),
+        p: largest(&|node, a| node.p[a]),
+    }
+}
+
+/// w over the half ranges of components of one kind, which are `least` at least; zero where a component is zero and stays so.
+fn weights<const N: usize>(width: f64, [low, high]: [&[f64; N]; 2], least: &[f64; N]) -> [f64; N] {
+    let largest = low.iter().chain(high);
+    let largest = largest.fold(0.0_f64, |most, value| most.max(value.abs()));
+    std::array::from_fn(|a| {
+        let range = 0.5 * (high[a] - low[a]);
+        let own = OFFSET * low[a].abs().max(high[a].abs());
+        let scale = range.max(least[a]).max(own).max(ROUNDINGS * largest);
+        if scale > 0.0 { width / scale } else { 0.0 }
+    })
 }
 
 fn pair<const N: usize>(nodes: &[State<N>], globals: &[f64], b: &Iterate<N>) -> f64 {
@@ -176,7 +205,11 @@ pub(super) struct Between<const N: usize> {
 
 impl<const N: usize> Between<N> {
     /// Between two orbits with their unit tangents.
-    pub(super) fn new(metric: &Metric, ends: [&Iterate<N>; 2], tangents: [&Iterate<N>; 2]) -> Self {
+    pub(super) fn new(
+        metric: &Metric<N>,
+        ends: [&Iterate<N>; 2],
+        tangents: [&Iterate<N>; 2],
+    ) -> Self {
         let change = ends[1].plus(-1.0, ends[0]);
         let length = metric.product(tangents[0], &change);
         let mut slopes = tangents.map(Clone::clone);
@@ -201,7 +234,7 @@ impl<const N: usize> Between<N> {
     }
 
     /// The equation of a place.
-    pub(super) fn row(&self, metric: &Metric, x: f64) -> Row<N> {
+    pub(super) fn row(&self, metric: &Metric<N>, x: f64) -> Row<N> {
         metric.row(&self.ends[0], &self.tangent, x * self.length)
     }
 }

@@ -91,7 +91,7 @@ pub(super) struct Follower<'c, M, const N: usize> {
     assembly: Assembly<N>,
     control: Control,
     course: Course,
-    metric: Metric,
+    metric: Metric<N>,
     frame: Frame<N>,
     last: Solved<M, N>,
 }

@@ -1,9 +1,23 @@
 //! Branches of periodic orbits that come to rest, and in units of any size.
 
-use crate::continuation::{Pendulum, close};
+use crate::continuation::{Pendulum, close, kinds};
 use std::f64::consts::TAU;
-use tfe::continuation::End;
+use tfe::continuation::{Branch, End, EventKind};
 use tfe::prelude::*;
+
+/// An oscillator that hardens, and beside it a linear one, damped, whose force is in other units.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - x^2/2 - x^4/4 - 20*y^2,
+    force(x) = cos(omega*t)/2 - dot(x)/10,
+    force(y) = large*cos(omega*t) - dot(y)/2,
+    sensitivity(omega),
+)]
+#[derive(Clone)]
+struct Beside {
+    large: f64,
+    omega: f64,
+}
 
 /// Orbits of one energy, or of one period, shrink to the pendulum that hangs still. Beyond it there are none.
 #[test]
@@ -33,5 +47,37 @@ fn branches_end_where_their_orbits_come_to_rest() {
         close(last.period, TAU / rest.sqrt(), 1e-8);
         let mut pairs = branch.points().windows(2);
         assert!(pairs.all(|pair| pair[1].amplitudes[0] < pair[0].amplitudes[0]));
+    }
+}
+
+/// Folds are where they are whatever moves beside the oscillator: in arc length both count by their own sizes.
+#[test]
+fn folds_of_small_coordinates_are_found_beside_large_ones() {
+    let response = |large: f64| -> Branch<Beside, 2> {
+        let model = Beside { large, omega: 0.8 };
+        Continuation::of(&model)
+            .parameter(|model| &mut model.omega)
+            .range(0.8..3.5)
+            .element(Mixed::<5>)
+            .elements(40)
+            .period(|model| TAU / model.omega)
+            .guess(move |t| {
+                let (sin, cos) = (0.8 * t).sin_cos();
+                let y = large / (40.0 - 0.64);
+                ([cos, y * cos], [-0.8 * sin, -0.8 * y * sin])
+            })
+            .run()
+            .unwrap_or_else(|error| panic!("{large:e}: {error}"))
+    };
+    let alone = response(0.0);
+    assert_eq!(kinds(&alone), [EventKind::Fold, EventKind::Fold]);
+    for large in [1e-9, 1e9] {
+        let branch = response(large);
+        assert_eq!(kinds(&branch), [EventKind::Fold, EventKind::Fold]);
+        assert_eq!(branch.end(), Some(End::Range));
+        for (fold, expected) in branch.events().iter().zip(alone.events()) {
+            // Both are found to roundings, times the condition of the equations at folds.
+            close(fold.point.parameter, expected.point.parameter, 1e-9);
+        }
     }
 }
