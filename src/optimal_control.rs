@@ -452,10 +452,9 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         iterate: &Iterate,
         history: Vec<Iteration>,
     ) -> Optimum<N> {
-        let length = self.span.end - self.span.start;
-        let times = mesh.times(self.span.start, length).collect();
+        let Range { start, end } = self.span;
         let pieces = optimum::Pieces {
-            times,
+            times: mesh.times_to(end, start, end - start),
             inputs: problem.sizes.inputs,
             coefficients: iterate
                 .steering

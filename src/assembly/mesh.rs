@@ -64,6 +64,15 @@ impl Mesh {
             .map(move |fraction| start + fraction * length)
     }
 
+    /// The same, the last one as it was given: start and length may miss it by roundings.
+    pub(crate) fn times_to(&self, end: f64, start: f64, length: f64) -> Vec<f64> {
+        let mut times: Vec<f64> = self.times(start, length).collect();
+        if let Some(last) = times.last_mut() {
+            *last = end;
+        }
+        times
+    }
+
     /// What a unit of the length of the span changes in an element.
     pub(crate) fn stretched(&self, element: usize) -> Direction {
         Direction {

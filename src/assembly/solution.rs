@@ -17,6 +17,8 @@ pub struct Solution<'m, M, const N: usize> {
     pub(crate) start: f64,
     /// Length of the span.
     pub(crate) length: f64,
+    /// Time at the end, where start and length lead up to roundings.
+    pub(crate) end: f64,
     /// γ of an additional force γ v.
     pub(crate) damping: f64,
     pub(crate) iterate: Iterate<N>,
@@ -34,9 +36,13 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
         self.iterate.nodes[self.iterate.nodes.len() - 1]
     }
 
+    /// The times of all nodes.
+    fn times(&self) -> Vec<f64> {
+        self.mesh.times_to(self.end, self.start, self.length)
+    }
+
     pub(crate) fn nodes(&self) -> Vec<Node<N>> {
-        let times = self.mesh.times(self.start, self.length);
-        let nodes = times.zip(&self.iterate.nodes);
+        let nodes = self.times().into_iter().zip(&self.iterate.nodes);
         nodes
             .map(|(t, state)| Node::new(self.model, t, state, &[0.0; N]))
             .collect()
@@ -62,7 +68,7 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
         let m = condenser.interior();
         let columns = 2 * N + 1;
         let (mut ends, mut response) = (vec![0.0; 2 * N * columns], vec![0.0; m * columns]);
-        let times: Vec<f64> = self.mesh.times(self.start, self.length).collect();
+        let times = self.times();
         for (element, pair) in self.iterate.nodes.windows(2).enumerate() {
             tell(element);
             let (time, length) = self.mesh.place(element, self.start, self.length);

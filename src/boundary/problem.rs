@@ -284,6 +284,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
                 mesh: problem.mesh,
                 start: self.span.start,
                 length: self.span.end - self.span.start,
+                end: self.span.end,
                 damping: 0.0,
                 transitions: assembly.transitions().to_vec(),
                 statistics: assembly.statistics(),

@@ -124,6 +124,7 @@ impl<const N: usize> Frame<N> {
             mesh: self.mesh.clone(),
             start: self.start,
             length: member.period,
+            end: self.start + member.period,
             damping: member.unfolding,
             iterate: member.iterate.clone(),
             transitions: member.transitions.clone(),

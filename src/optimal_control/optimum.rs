@@ -199,6 +199,7 @@ impl<M> Found<'_, M> {
             mesh: self.mesh.clone(),
             start: self.span.start,
             length: self.span.end - self.span.start,
+            end: self.span.end,
             damping: 0.0,
             iterate: ChainIterate {
                 nodes: iterate.nodes.iter().map(state).collect(),

@@ -103,6 +103,7 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
             mesh: problem.mesh.clone(),
             start: problem.start,
             length: problem.period,
+            end: problem.start + problem.period,
             damping: problem.unfolding,
             iterate,
             transitions,

@@ -300,6 +300,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             mesh: problem.mesh.clone(),
             start: problem.start,
             length: problem.period,
+            end: problem.start + problem.period,
             damping: problem.unfolding,
             iterate: iterate.clone(),
             transitions: Vec::new(),

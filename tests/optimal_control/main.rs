@@ -461,3 +461,22 @@ fn graded_meshes_and_guesses_are_taken() {
     );
     assert_eq!(best.motion().states().len(), 41);
 }
+
+/// The end of the span is a node, where 0.2 + (0.9 − 0.2) is below it.
+#[test]
+fn motions_end_where_they_were_asked_to() {
+    let best = OptimalControl::of(&Sled)
+        .elements(4)
+        .from_to(
+            Sled.state([0.0], [0.0]),
+            Sled.state([1.0], [0.0]),
+            0.2..0.9,
+        )
+        .running_cost("effort")
+        .solve()
+        .expect("a minimum");
+    let last = best.motion().at(0.9).expect("inside");
+    assert!((last.q[0] - 1.0).abs() < 1e-13);
+    let costates = best.multipliers();
+    assert_eq!(costates[costates.len() - 1].t, 0.9);
+}

@@ -209,3 +209,22 @@ fn a_number_of_elements_takes_the_place_of_weights() {
         assert_eq!(rest.transitions().len(), elements);
     }
 }
+
+/// The motion reaches the end of its span to the last bit, forwards and backwards, where 0.2 + (0.9 − 0.2) does not.
+#[test]
+fn motions_end_where_they_were_asked_to() {
+    let projectile = Projectile { g: 9.81 };
+    for (start, end) in [(0.2, 0.9), (0.9, 0.2), (0.8, 2.9), (-2.0, -0.6)] {
+        let arc = BoundaryValue::of(&projectile)
+            .elements(3)
+            .from_to([0.0, 0.0], [1.0, 2.0], start..end)
+            .solve()
+            .expect("an arc");
+        let (nodes, motion) = (arc.nodes(), arc.motion());
+        assert_eq!((nodes[0].t, nodes[3].t), (start, end));
+        let last = motion.at(end).expect("inside");
+        assert_eq!((last.t, last.q), (end, arc.end().q));
+        let free = 1.0 / (end - start);
+        assert!((last.p[0] - free).abs() < 1e-13 * free.abs());
+    }
+}
