@@ -233,6 +233,34 @@ impl<const N: usize> Between<N> {
             .plus(-x * x * y, &self.slopes[1])
     }
 
+    /// Where the parameter leaves a range for the first time, and through which bound, which `left` tells. Behind a fold it may have come back, through a bound where it began, too.
+    pub(super) fn exit(&self, left: impl Fn(f64) -> Option<f64>) -> Option<(f64, f64)> {
+        /// So many places are looked at.
+        const PLACES: u32 = 64;
+        let place = |k: u32| f64::from(k) / f64::from(PLACES);
+        let bound_at = |x: f64| left(self.parameter(x));
+        let (k, bound) = (1..=PLACES).find_map(|k| Some((k, bound_at(place(k))?)))?;
+        let (mut inside, mut outside) = (place(k - 1), place(k));
+        for _ in 0..f64::MANTISSA_DIGITS {
+            let middle = 0.5 * (inside + outside);
+            if bound_at(middle).is_some() {
+                outside = middle;
+            } else {
+                inside = middle;
+            }
+        }
+        Some((outside, bound))
+    }
+
+    /// The parameter of the cubic.
+    fn parameter(&self, x: f64) -> f64 {
+        let of = |iterate: &Iterate<N>| iterate.globals.last().copied().unwrap_or(f64::NAN);
+        let y = 1.0 - x;
+        of(&self.ends[0])
+            + x * x * (3.0 - 2.0 * x) * of(&self.change)
+            + x * y * (y * of(&self.slopes[0]) - x * of(&self.slopes[1]))
+    }
+
     /// The equation of a place.
     pub(super) fn row(&self, metric: &Metric<N>, x: f64) -> Row<N> {
         metric.row(&self.ends[0], &self.tangent, x * self.length)

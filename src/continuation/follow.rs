@@ -268,17 +268,15 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         if turn < MOST_TURN || self.comes_to_rest(&next.member.iterate) {
             return Err(None);
         }
-        let Some(bound) = self.course.left(next.parameter()) else {
+        let between = self.between(&next);
+        let Some((part, bound)) = between.exit(|parameter| self.course.left(parameter)) else {
             return Ok(Step {
                 next,
                 turn,
                 ended: false,
             });
         };
-        let last = &self.last.member.iterate;
-        let part = (bound - self.last.parameter()) / (next.parameter() - self.last.parameter());
-        let change = next.member.iterate.plus(-1.0, last);
-        let (next, turn) = self.correct(last.plus(part, &change), Row::Parameter(bound))?;
+        let (next, turn) = self.correct(between.guess(part), Row::Parameter(bound))?;
         if turn < MOST_TURN {
             return Err(None);
         }
@@ -344,13 +342,8 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
 
     /// The orbit where a test function vanishes, between the last one and the next.
     fn locate(&mut self, next: &Solved<M, N>, kind: EventKind) -> Located<M, N> {
-        let ends = [&self.last, next];
-        let between = Between::new(
-            &self.metric,
-            ends.map(|end| &end.member.iterate),
-            ends.map(|end| &end.tangent),
-        );
-        let values = ends.map(|end| end.tests.value(kind));
+        let between = self.between(next);
+        let values = [&self.last, next].map(|end| end.tests.value(kind));
         // The nearest orbit on either side of the root.
         let mut low = (0.0, self.last.clone());
         let mut high = (1.0, next.clone());
@@ -392,6 +385,16 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             solved,
             width,
         }
+    }
+
+    /// The branch between the last orbit and the next.
+    fn between(&self, next: &Solved<M, N>) -> Between<N> {
+        let ends = [&self.last, next];
+        Between::new(
+            &self.metric,
+            ends.map(|end| &end.member.iterate),
+            ends.map(|end| &end.tangent),
+        )
     }
 
     /// An orbit between the last one and the next.

@@ -50,29 +50,31 @@ fn branches_end_where_their_orbits_come_to_rest() {
     }
 }
 
+/// The response of both over ω, from one side of the resonance of the first towards the other.
+fn response(large: f64, end: f64) -> Branch<Beside, 2> {
+    let model = Beside { large, omega: 0.8 };
+    Continuation::of(&model)
+        .parameter(|model| &mut model.omega)
+        .range(0.8..end)
+        .element(Mixed::<5>)
+        .elements(40)
+        .period(|model| TAU / model.omega)
+        .guess(move |t| {
+            let (sin, cos) = (0.8 * t).sin_cos();
+            let y = large / (40.0 - 0.64);
+            ([cos, y * cos], [-0.8 * sin, -0.8 * y * sin])
+        })
+        .run()
+        .unwrap_or_else(|error| panic!("{large:e}, {end}: {error}"))
+}
+
 /// Folds are where they are whatever moves beside the oscillator: in arc length both count by their own sizes.
 #[test]
 fn folds_of_small_coordinates_are_found_beside_large_ones() {
-    let response = |large: f64| -> Branch<Beside, 2> {
-        let model = Beside { large, omega: 0.8 };
-        Continuation::of(&model)
-            .parameter(|model| &mut model.omega)
-            .range(0.8..3.5)
-            .element(Mixed::<5>)
-            .elements(40)
-            .period(|model| TAU / model.omega)
-            .guess(move |t| {
-                let (sin, cos) = (0.8 * t).sin_cos();
-                let y = large / (40.0 - 0.64);
-                ([cos, y * cos], [-0.8 * sin, -0.8 * y * sin])
-            })
-            .run()
-            .unwrap_or_else(|error| panic!("{large:e}: {error}"))
-    };
-    let alone = response(0.0);
+    let alone = response(0.0, 3.5);
     assert_eq!(kinds(&alone), [EventKind::Fold, EventKind::Fold]);
     for large in [1e-9, 1e9] {
-        let branch = response(large);
+        let branch = response(large, 3.5);
         assert_eq!(kinds(&branch), [EventKind::Fold, EventKind::Fold]);
         assert_eq!(branch.end(), Some(End::Range));
         for (fold, expected) in branch.events().iter().zip(alone.events()) {
@@ -80,4 +82,36 @@ fn folds_of_small_coordinates_are_found_beside_large_ones() {
             close(fold.point.parameter, expected.point.parameter, 1e-9);
         }
     }
+}
+
+/// A branch that leaves the range just before a fold, and one that begins there and comes back: within a step both are inside again.
+#[test]
+fn branches_end_at_bounds_beside_folds() {
+    let whole = response(0.0, 3.5);
+    let fold = whole.events()[0].point.parameter;
+    let bound = fold - 1e-4;
+    let before = response(0.0, bound);
+    assert_eq!((before.end(), kinds(&before)), (Some(End::Range), vec![]));
+    let last = before.points().len() - 1;
+    let start = &before.points()[last];
+    assert_eq!(start.parameter, bound);
+    let round = Continuation::of(before.model(last).expect("a model"))
+        .parameter(|model| &mut model.omega)
+        .range(bound..3.5)
+        .element(Mixed::<5>)
+        .elements(40)
+        .period(|model| TAU / model.omega)
+        .guess_from(start.start)
+        .run()
+        .expect("a branch");
+    assert_eq!(
+        (round.end(), kinds(&round)),
+        (Some(End::Range), vec![EventKind::Fold])
+    );
+    close(round.events()[0].point.parameter, fold, 1e-9);
+    let end = &round.points()[round.points().len() - 1];
+    assert_eq!(end.parameter, bound);
+    // The other orbit of this frequency: some root of 1e-4 away.
+    close(round.points()[0].amplitudes[0], start.amplitudes[0], 1e-9);
+    assert!((end.amplitudes[0] - start.amplitudes[0]).abs() > 1e-4);
 }
