@@ -287,8 +287,9 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         field: &Field<'m, M>,
     ) -> Result<(usize, &'static str), ContinuationErrorKind> {
         let mut moved = self.model.clone();
-        let value = *field(&mut moved);
-        *field(&mut moved) = value + value.abs().max(1.0);
+        let value = field(&mut moved);
+        // Another number whatever it is.
+        *value = if *value == 1.0 { 2.0 } else { 1.0 };
         let changes = |index: &usize| {
             self.model.sensitivity_parameter(*index).to_bits()
                 != moved.sensitivity_parameter(*index).to_bits()

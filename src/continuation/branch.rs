@@ -321,7 +321,7 @@ fn largest(values: &[(f64, f64)], period: f64) -> f64 {
     let curvature = (fall / right - rise / left) / (left + right);
     let slope = rise / left + curvature * left;
     if curvature < 0.0 {
-        value - slope * slope / (4.0 * curvature)
+        value - slope / (4.0 * curvature) * slope
     } else {
         value
     }
@@ -343,5 +343,10 @@ mod tests {
         ];
         assert!((largest(&values, 1.0) - 1.0).abs() < 1e-15);
         assert_eq!(largest(&[(0.0, 2.0), (0.5, 2.0)], 1.0), 2.0);
+        // In units whose squares are no numbers.
+        for (size, time) in [(1e100, 1e-100), (1e-100, 1e100)] {
+            let values = values.map(|(t, value)| (t * time, value * size));
+            assert!((largest(&values, time) / size - 1.0).abs() < 1e-14);
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::arc::Row;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Problem};
+use crate::differences::derivative;
 use crate::periodic::problem::{Periodic, energy_slopes};
 use tfe_runtime::condenser::{Direction, Parameter};
 use tfe_runtime::{LegendreError, Model};
@@ -43,12 +44,11 @@ impl<'c, M: Model<N> + Clone, const N: usize> Continued<'c, M, N> {
         model
     }
 
-    /// A central difference by λ. It enters Newton's matrix and the tangent, not the equations: six digits are plenty.
+    /// The derivative of a number by λ, which may change much within a small part of a wide range.
     fn difference(&self, value: impl Fn(&M) -> f64) -> f64 {
         let parameter = self.parameter();
-        let step = 1e-5 * parameter.abs().max(1e-2 * self.width);
-        let (low, high) = (parameter - step, parameter + step);
-        (value(&self.at(high)) - value(&self.at(low))) / (high - low)
+        let distance = 1e-3 * parameter.abs().max(1e-2 * self.width);
+        derivative(distance, |shift| value(&self.at(parameter + shift)))
     }
 }
 

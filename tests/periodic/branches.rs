@@ -2,7 +2,7 @@
 
 use crate::continuation::{Pendulum, close, kinds};
 use std::f64::consts::TAU;
-use tfe::continuation::{Branch, End, EventKind};
+use tfe::continuation::{Branch, ContinuationErrorKind, End, EventKind};
 use tfe::prelude::*;
 
 /// An oscillator that hardens, and beside it a linear one, damped, whose force is in other units.
@@ -114,4 +114,43 @@ fn branches_end_at_bounds_beside_folds() {
     // The other orbit of this frequency: some root of 1e-4 away.
     close(round.points()[0].amplitudes[0], start.amplitudes[0], 1e-9);
     assert!((end.amplitudes[0] - start.amplitudes[0]).abs() > 1e-4);
+}
+
+/// The period by the parameter, where a small part of the range reaches beyond a pole.
+#[test]
+fn periods_change_as_they_do_beside_poles() {
+    let omega = 0.5;
+    let model = Beside { large: 1.0, omega };
+    let branch = Continuation::of(&model)
+        .parameter(|model| &mut model.omega)
+        .range(omega..1e6)
+        .period(|model| TAU / model.omega)
+        .guess(move |t| {
+            let (sin, cos) = (omega * t).sin_cos();
+            ([0.6 * cos, 0.0], [-0.6 * omega * sin, 0.0])
+        })
+        .max_points(1)
+        .run()
+        .expect("a branch");
+    let tangent = branch.points()[0].tangent;
+    let slope = tangent.period / tangent.parameter;
+    // Differences of two orders agree to 1e-9.
+    close(slope * omega * omega / TAU, -1.0, 1e-8);
+}
+
+#[test]
+fn parameters_that_are_no_numbers_are_told() {
+    for omega in [f64::NAN, f64::INFINITY] {
+        let model = Beside { large: 1.0, omega };
+        let error = Continuation::of(&model)
+            .parameter(|model| &mut model.omega)
+            .range(0.5..2.0)
+            .period(|_| 1.0)
+            .run()
+            .expect_err("no branch");
+        assert!(
+            matches!(error.kind(), ContinuationErrorKind::Range { .. }),
+            "{error}"
+        );
+    }
 }
