@@ -23,6 +23,12 @@ const ROUNDINGS: f64 = 1e-12;
 /// The most iterations for the sake of small components, once the large ones have arrived.
 const MAX_MORE: u32 = 6;
 
+/// Components above this part of the largest of their kind are large: what corrects them still says what roundings are.
+const LARGE: f64 = 0.1;
+
+/// What corrects a small component by more than so many times what corrects large ones is no rounding of these.
+const AMPLIFIED: f64 = 16.0;
+
 /// How large a correction is beside the iterate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Size {
@@ -30,12 +36,15 @@ pub(crate) struct Size {
     whole: f64,
     /// The largest part that it is of one coordinate or momentum beside the size of this one alone.
     own: f64,
+    /// The same of those whose corrections are more than roundings of what corrects the large ones.
+    unsolved: f64,
 }
 
 impl Size {
     const UNKNOWN: Self = Self {
         whole: f64::INFINITY,
         own: f64::INFINITY,
+        unsolved: f64::INFINITY,
     };
 
     /// The same with a correction of something else, beside the size of that. What is not a number stays so.
@@ -80,11 +89,11 @@ impl Convergence {
         self.has_arrived() && !self.is_unsettled()
     }
 
-    /// Whether the correction is small beside the whole iterate, or round-off.
+    /// Whether the correction is small beside the whole iterate, or round-off, which that of a small component need not be that is not yet known at all.
     fn has_arrived(&self) -> bool {
         let (size, last) = (self.size.whole, self.last.whole);
         let stagnates = last < ROUND_OFF && size >= 0.25 * last;
-        size <= self.control.tolerance || stagnates
+        size <= self.control.tolerance || (stagnates && self.size.unsolved < SETTLED)
     }
 
     /// Whether a component is still made better that is small beside the others, while iterations are left.
@@ -221,10 +230,12 @@ pub(crate) fn sizes<'a>(
         size = size.max(correction.abs());
         sum += 0.0 * correction;
     }
+    let [own, unsolved] = own_sizes(&components, &largest);
     Size {
         // Maxima ignore what is not a number; the sum does not.
         whole: size + sum,
-        own: own_size(&components, &largest),
+        own,
+        unsolved,
     }
 }
 
@@ -239,8 +250,8 @@ fn largest_entries(width: usize, matrices: &[f64]) -> Vec<f64> {
     largest
 }
 
-/// The largest correction of a component beside the size of it alone, of those that are more than roundings of others.
-fn own_size(components: &[Largest], matrix: &[f64]) -> f64 {
+/// The largest correction of a component beside the size of it alone, of those that are more than roundings of others, and of those whose corrections are.
+fn own_sizes(components: &[Largest], matrix: &[f64]) -> [f64; 2] {
     let width = components.len();
     let n = width / 2;
     let scales: Vec<f64> = (matrix.chunks_exact(width.max(1)))
@@ -254,15 +265,27 @@ fn own_size(components: &[Largest], matrix: &[f64]) -> f64 {
         .collect();
     let largest = |kind: &[f64]| kind.iter().fold(0.0_f64, |most, scale| most.max(*scale));
     let kinds = [largest(&scales[..n]), largest(&scales[n..])];
-    let parts = components.iter().zip(&scales).enumerate();
-    parts.fold(0.0, |most, (place, (component, scale))| {
-        let kind = kinds[usize::from(place >= n)];
-        if *scale > ROUNDINGS * kind {
-            most.max(component.beside(*scale))
-        } else {
-            most
+    let parts = || {
+        let parts = components.iter().zip(&scales).enumerate();
+        parts.map(move |(place, (component, scale))| (usize::from(place >= n), component, *scale))
+    };
+    let mut of_large = [0.0_f64; 2];
+    for (kind, component, scale) in parts() {
+        if scale >= LARGE * kinds[kind] {
+            of_large[kind] = of_large[kind].max(component.correction);
         }
-    })
+    }
+    let (mut own, mut unsolved) = (0.0_f64, 0.0_f64);
+    for (kind, component, scale) in parts() {
+        if scale > ROUNDINGS * kinds[kind] {
+            let size = component.beside(scale);
+            own = own.max(size);
+            if component.correction > AMPLIFIED * of_large[kind] {
+                unsolved = unsolved.max(size);
+            }
+        }
+    }
+    [own, unsolved]
 }
 
 #[cfg(test)]
@@ -302,5 +325,12 @@ mod tests {
         check(beside, [5e-3; 10], 6);
         // Zero by symmetry.
         check([1.0, 1e-17], [1e-17], 0);
+    }
+
+    #[test]
+    fn a_small_coordinate_that_is_not_known_at_all_is_no_round_off() {
+        let wild = [0.9, 0.8, 0.7, 0.9, 0.8, 0.7, 0.9, 0.8, 0.7];
+        let solved = [5e-3, 1e-4, 1e-9];
+        check([1e11, 1.0], wild.into_iter().chain(solved), 11);
     }
 }

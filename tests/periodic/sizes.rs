@@ -2,6 +2,8 @@
 
 use crate::models::Pendulum;
 use std::f64::consts::{PI, TAU};
+use tfe::AssemblyError;
+use tfe::boundary::BoundaryError;
 use tfe::periodic::OrbitError;
 use tfe::prelude::*;
 
@@ -154,6 +156,37 @@ fn small_coordinates_are_right_beside_large_ones() {
             iterations <= alone.statistics().newton_iterations,
             "{m:e}: {iterations}"
         );
+    }
+}
+
+/// Where the iteration for an angle goes to and fro the distance beside it says nothing: what is returned is a motion.
+#[test]
+fn small_coordinates_that_are_not_found_are_no_solution() {
+    let (carried, pendulum) = (Carried { m: 1.0 }, Pendulum {});
+    for (time, angle) in [(7.0, PI), (7.0, 4.0), (10.0, 0.5), (10.0, 1.0)] {
+        let far = BoundaryValue::of(&carried)
+            .element(Mixed::<8>)
+            .from_to([0.0, 0.0], [1.5e11, angle], 0.0..time)
+            .solve();
+        match far {
+            Ok(far) => {
+                let State { q, p } = far.start();
+                let start = State {
+                    q: [q[1]],
+                    p: [p[1]],
+                };
+                let run = Simulation::new(&pendulum)
+                    .element(Mixed::<8>)
+                    .step(time / 40.0)
+                    .run(start, 0.0..time)
+                    .expect("a run");
+                // Ten units of time multiply roundings by some 1e4.
+                let off = (run.last().q[0] - angle).abs();
+                assert!(off < 1e-7, "{time}, {angle}: {off:e}");
+            }
+            Err(BoundaryError::Assembly(AssemblyError::Stalled { .. })) => {}
+            Err(error) => panic!("{time}, {angle}: {error}"),
+        }
     }
 }
 
