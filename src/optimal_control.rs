@@ -216,9 +216,10 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         self
     }
 
-    /// Where to begin with an input.
+    /// Where to begin with an input: of several calls for one the last counts.
     #[must_use]
     pub fn guess_input(mut self, input: &str, function: impl Fn(f64) -> f64 + 'm) -> Self {
+        self.inputs.retain(|(own, _)| own != input);
         self.inputs.push((input.to_owned(), Box::new(function)));
         self
     }

@@ -480,3 +480,19 @@ fn motions_end_where_they_were_asked_to() {
     let costates = best.multipliers();
     assert_eq!(costates[costates.len() - 1].t, 0.9);
 }
+
+#[test]
+fn of_guesses_for_an_input_the_last_one_counts() {
+    let best = OptimalControl::of(&Sled)
+        .elements(4)
+        .from(Sled.state([0.0], [0.0]))
+        .to(Sled.state([1.0], [0.0]))
+        .span(0.0..1.0)
+        .running_cost("effort")
+        .guess_input("u", |_| 1.0)
+        .guess_input("u", |_| 2.0)
+        .solve()
+        .expect("a minimum");
+    // ∫ 2² dt.
+    assert!((best.history()[0].cost - 4.0).abs() < 1e-12);
+}
