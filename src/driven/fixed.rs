@@ -111,6 +111,10 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         }
     }
 
+    fn unnumbered<F: FnMut(u64)>(&self, values: &mut F) {
+        self.model.unnumbered(values);
+    }
+
     fn parameters(&self) -> usize {
         self.model.parameters()
     }

@@ -106,6 +106,10 @@ impl<M: Controlled> Model for Driven<'_, M, RunTimeLength> {
         self.model.constraint_second(t, q, mu, entries);
     }
 
+    fn unnumbered<F: FnMut(u64)>(&self, values: &mut F) {
+        self.model.unnumbered(values);
+    }
+
     fn parameters(&self) -> usize {
         self.model.parameters()
     }

@@ -192,7 +192,7 @@ impl<'m, M: Model<N> + Sync, const N: usize, T> Stepped<'m, M, N, T> {
         starts: &[State<N>],
     ) -> Self {
         let models = &ensemble.models;
-        if ensemble.width() == WIDTH {
+        if plan.width == WIDTH {
             return match models.bundle(plan.element, plan.control) {
                 Ok(mut bundle) => {
                     models.place(&mut bundle, first, starts);

@@ -122,10 +122,12 @@ impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for OneModel<'m, 
 impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for ManyModels<'m, M> {
     type Lanes = Varied<'m, M>;
 
-    /// Kernels written by hand that do not number their parameters read them from one model, which no two lanes share; the functions that inputs come from are those of one model, too.
+    /// Kernels written by hand that do not number their parameters read them from one model, which no two lanes share; what has no number, and the functions that inputs come from, are those of one
+    /// model, too.
     fn share_kernels(&self) -> bool {
         self.0.first().is_some_and(|first| {
-            let share = |model| first.shares_inputs(model);
+            let beside = unnumbered(first);
+            let share = |model: &M| first.shares_inputs(model) && unnumbered(model) == beside;
             first.parameters() > 0 && self.0.iter().all(share)
         })
     }
@@ -146,6 +148,13 @@ impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for ManyModels<'m
     ) {
         bundle.start_with(&self.0[first..], starts);
     }
+}
+
+/// What kernels of a model read beside its numbered parameters.
+fn unnumbered<M: Model<N>, const N: usize>(model: &M) -> Vec<u64> {
+    let mut all = Vec::new();
+    model.unnumbered(&mut |value| all.push(value));
+    all
 }
 
 /// The starts of up to eight runs from `first` on.

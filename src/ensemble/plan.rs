@@ -25,6 +25,8 @@ pub(super) struct Plan<const N: usize> {
     pub(super) mesh: Mesh<N>,
     /// Elements of the mesh that are behind.
     pub(super) done: usize,
+    /// How many runs are stepped side by side: [`WIDTH`] or one.
+    pub(super) width: usize,
 }
 
 /// Why trajectories in lanes have stopped.

@@ -43,7 +43,8 @@ use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 /// With the feature `parallel` trajectories are shared among all processors. With one model, on each of them eight run side by side
 /// in vector instructions ([`Bundle`]), if the model has no constraints and the element no more than sixteen points, and of a Hamiltonian that is not M q̈ = f if it is a
 /// two-field element; all others run one after the other. Parameter sets ([`of_models`](Self::of_models)) go side by side, too: each lane computes with the parameters of its own model.
-/// Those of hand-written models that do not number their [parameters](Model::parameters) run one after the other.
+/// Those of hand-written models that do not number their [parameters](Model::parameters) run one after the other, and so do those that differ in a `usize` or in the numbers of a `Vec`, which have
+/// no number in models of fixed size.
 ///
 /// Runs of models of run-time length go one by one, on all processors.
 ///
@@ -282,6 +283,7 @@ where
             step,
             mesh,
             done: 0,
+            width: self.width(),
         };
         let progress = Progress::new(self.progress, count, "runs");
         if count == 0 {
@@ -300,7 +302,7 @@ where
                     statistics
                 },
             )
-        } else if self.width() == WIDTH {
+        } else if plan.width == WIDTH {
             // Made once, and one batch after the other runs in a copy.
             let empty = self.models.bundle(self.element, self.control);
             let empty = empty.map_err(RunErrorKind::Element)?;

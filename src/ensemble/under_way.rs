@@ -238,6 +238,7 @@ where
             step,
             mesh,
             done,
+            width: *width,
         };
         let places: Vec<_> = std::mem::take(batches)
             .into_iter()

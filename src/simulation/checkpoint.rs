@@ -65,7 +65,8 @@ where
     /// Goes on where a run ended, up to the time `end`.
     ///
     /// Where that run ended on the grid of this one (its start, and the same steps and breaks), the motion is to the last bit what one run would have been from there on; else the grid
-    /// begins at the checkpoint. Impulses at the very time of the checkpoint have acted already. Another element begins anew.
+    /// begins at the checkpoint. Impulses at the very time of the checkpoint have acted already. Another element, or a model
+    /// with other parameters, lengths or lists, begins anew.
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -1,5 +1,6 @@
 //! Runs of families that go on where others ended.
 
+use crate::common::distance;
 use tfe::error::RunErrorKind;
 use tfe::family::{self, FamilyState};
 use tfe::prelude::*;
@@ -107,6 +108,36 @@ fn halves_of_constrained_runs() {
         let simulation = Simulation::new(&rods).element(element).step(h);
         check(&simulation, &start, (20, h));
     }
+}
+
+/// A model whose lists are others has other masses, and nothing of those before is carried on.
+#[test]
+fn other_lists_go_on_from_a_checkpoint() {
+    #[dynamics(
+        coordinates(q[n]),
+        lagrangian = sum(i in 0..n, m[kind[i]]/2*dot(q[i])^2 - q[i]^2/2 - q[i]^4/4),
+    )]
+    struct Kinds {
+        n: usize,
+        m: Vec<f64>,
+        kind: Vec<usize>,
+    }
+    let kinds = |kind: [usize; 3]| Kinds {
+        n: 3,
+        m: vec![1.0, 5.0],
+        kind: kind.to_vec(),
+    };
+    let (light, heavy) = (kinds([0, 0, 1]), kinds([1, 0, 0]));
+    let first = Simulation::new(&light).step(0.1);
+    let first = first.run(wave(3), 0.0..2.0).expect("a run");
+    let checkpoint = first.checkpoint().expect("complete");
+    let second = Simulation::new(&heavy).step(0.1);
+    let resumed = second.resume(checkpoint, 4.0).expect("a run");
+    let anew = second.run(checkpoint.state().clone(), 2.0..4.0);
+    let (one, other) = (resumed.last().state(), anew.expect("a run").last().state());
+    // Twenty steps whose times are off by roundings.
+    assert!(distance(&one.q, &other.q) < 1e-13, "{one:?} {other:?}");
+    assert!(distance(&one.p, &other.p) < 1e-13, "{one:?} {other:?}");
 }
 
 /// A checkpoint beside the grid begins a new one; another element and another length are no obstacle and an error.

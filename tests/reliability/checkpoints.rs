@@ -119,6 +119,44 @@ fn runs_that_go_on_are_watched() {
     assert!(told.iter().any(is_unstable), "{told:?}");
 }
 
+/// The run of a model that goes on where another one has got to, beside one that begins there.
+fn check_handing_over<M: tfe::Model<N>, const N: usize>(
+    first: &Simulation<'_, M, N>,
+    second: &Simulation<'_, M, N>,
+    start: State<N>,
+) {
+    let first = first.run(start, 0.0..5.0).expect("a run");
+    let checkpoint = first.checkpoint().expect("complete");
+    let resumed = second.resume(checkpoint, 10.0).expect("a run");
+    let anew = second.run(*checkpoint.state(), 5.0..10.0).expect("a run");
+    let (one, other) = (resumed.last(), anew.last());
+    for a in 0..N {
+        assert!((one.q[a] - other.q[a]).abs() < 1e-13);
+        assert!((one.p[a] - other.p[a]).abs() < 1e-13);
+    }
+}
+
+/// The numbers of a vector are no numbered parameters.
+#[test]
+fn other_vectors_go_on_from_a_checkpoint() {
+    #[dynamics(coordinates(q[2]), lagrangian = sum(i in 0..2, m/2*dot(q[i])^2 - k[i]/2*q[i]^2))]
+    struct Springs {
+        m: f64,
+        k: Vec<f64>,
+    }
+    let springs = |k: [f64; 2]| Springs {
+        m: 1.0,
+        k: k.to_vec(),
+    };
+    let (soft, stiff) = (springs([1.0, 2.0]), springs([4.0, 2.5]));
+    let run = |model| {
+        let run = Simulation::new(model).element(Element::mixed(6)).step(0.1);
+        run.record_every(10)
+    };
+    let start = soft.state([1.0, 0.5], [0.0, 0.2]);
+    check_handing_over(&run(&soft), &run(&stiff), start);
+}
+
 /// A checkpoint of a model with other parameters: nothing that belongs to these is carried on.
 #[test]
 fn other_parameters_go_on_from_a_checkpoint() {
@@ -132,19 +170,10 @@ fn other_parameters_go_on_from_a_checkpoint() {
         let run = Simulation::new(model).element(Element::mixed(6)).step(0.1);
         run.record_every(10)
     };
-    let first = run(&soft).run(soft.state([1.0, 0.5], [0.0, 0.2]), 0.0..5.0);
-    let first = first.expect("a run");
-    let checkpoint = first.checkpoint().expect("complete");
-    let second = run(&stiff).resume(checkpoint, 10.0).expect("a run");
-    let anew = run(&stiff).run(*checkpoint.state(), 5.0..10.0);
-    let (one, other) = (second.last(), anew.expect("a run").last().state());
-    for a in 0..2 {
-        assert!((one.q[a] - other.q[a]).abs() < 1e-13);
-        assert!((one.p[a] - other.p[a]).abs() < 1e-13);
-    }
+    let start = soft.state([1.0, 0.5], [0.0, 0.2]);
+    check_handing_over(&run(&soft), &run(&stiff), start);
     // A span that is empty does not begin a grid.
     let run = Simulation::new(&soft).step(0.1).element(Element::mixed(4));
-    let start = soft.state([1.0, 0.5], [0.0, 0.2]);
     let whole = run.run(start, 0.0..2.0).expect("a run");
     let first = run.run(start, 0.0..1.0).expect("a run");
     let same = run.resume(first.checkpoint().expect("complete"), 1.0);

@@ -149,6 +149,9 @@ const _: () = {
             __tfe::CoordinateName::element("", index)
         }
         const OBSERVABLES: &'static [&'static str] = &["power"];
+        fn unnumbered<__F: ::core::ops::FnMut(u64)>(&self, values: &mut __F) {
+            values(self.n as u64);
+        }
     }
     #[automatically_derived]
     #[allow(unused, non_snake_case, clippy::too_many_arguments)]

@@ -328,6 +328,11 @@ const _: () = {
             let index = index - 1;
             ::core::option::Option::None
         }
+        fn unnumbered<__F: ::core::ops::FnMut(u64)>(&self, values: &mut __F) {
+            values(self.n as u64);
+            values(self.w as u64);
+            values(self.m.len() as u64);
+        }
     }
 };
 #[automatically_derived]

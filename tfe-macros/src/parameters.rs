@@ -88,10 +88,11 @@ impl Parameters {
         self.fields.iter().map(place).collect()
     }
 
-    /// `parameters`, `parameter_name`, `parameter` and `with_parameter` of an implementation of `Model`.
+    /// `parameters`, `parameter_name`, `parameter`, `with_parameter` and `unnumbered` of an implementation of `Model`.
     pub(crate) fn members(&self, item: &ItemStruct) -> TokenStream {
+        let unnumbered = unnumbered(item, false);
         let Some(last) = self.fields.last() else {
-            return TokenStream::new();
+            return unnumbered;
         };
         let count = index(&last.end);
         let arms = |of: &dyn Fn(&Place) -> TokenStream| -> TokenStream {
@@ -156,6 +157,36 @@ impl Parameters {
         quote! {
             #numbered
             #with_parameter
+            #unnumbered
+        }
+    }
+}
+
+/// `unnumbered`: what kernels read beside the numbered parameters, which of models of run-time length are the elements of vectors, too; nothing where there is nothing.
+fn unnumbered(item: &ItemStruct, of_run_time: bool) -> TokenStream {
+    let read = |Field { name, kind }: &Field| {
+        let name = identifier(name);
+        let count = quote!(values(self.#name.len() as u64););
+        match kind {
+            FieldKind::Length => Some(quote!(values(self.#name as u64);)),
+            FieldKind::Vector if of_run_time => Some(count),
+            FieldKind::Vector => {
+                Some(quote!(#count for row in &self.#name { values(row.to_bits()); }))
+            }
+            FieldKind::Indices if of_run_time => {
+                Some(quote!(#count for row in &self.#name { values(*row as u64); }))
+            }
+            _ => None,
+        }
+    };
+    let context = input::context(item);
+    let all: Vec<TokenStream> = context.fields.iter().filter_map(read).collect();
+    if all.is_empty() {
+        return TokenStream::new();
+    }
+    quote! {
+        fn unnumbered<__F: ::core::ops::FnMut(u64)>(&self, values: &mut __F) {
+            #(#all)*
         }
     }
 }
@@ -185,6 +216,8 @@ pub(crate) struct RunTimeParameters {
     fields: Vec<(String, Option<TokenStream>)>,
     /// Copies of all fields of the struct, unless one is of a type that may not be `Clone`.
     copies: Option<TokenStream>,
+    /// The member of that name.
+    unnumbered: TokenStream,
 }
 
 impl RunTimeParameters {
@@ -210,6 +243,7 @@ impl RunTimeParameters {
         Self {
             fields: context.fields.into_iter().filter_map(size).collect(),
             copies: copies(item, &quote!(self)),
+            unnumbered: unnumbered(item, true),
         }
     }
 
@@ -233,10 +267,11 @@ impl RunTimeParameters {
         places
     }
 
-    /// `parameters`, `parameter_name`, `parameter` and `with_parameter` of an implementation of `FamilyModel`.
+    /// `parameters`, `parameter_name`, `parameter`, `with_parameter` and `unnumbered` of an implementation of `FamilyModel`.
     pub(crate) fn members(&self) -> TokenStream {
+        let unnumbered = &self.unnumbered;
         if self.fields.is_empty() {
-            return TokenStream::new();
+            return unnumbered.clone();
         }
         let one = quote!(1);
         let sizes = (self.fields.iter()).map(|(_, size)| size.as_ref().unwrap_or(&one));
@@ -273,6 +308,7 @@ impl RunTimeParameters {
         quote! {
             #numbered
             #with_parameter
+            #unnumbered
         }
     }
 }

@@ -176,7 +176,7 @@ impl<'m, M, const N: usize> Bundle<'m, M, N, LANES, Varied<'m, M>>
 where
     M: Model<N>,
 {
-    /// An empty bundle of models that differ in their parameters, all of them this one at first.
+    /// An empty bundle of models that differ in their [parameters](Model::parameters) and in nothing [beside them](Model::unnumbered), all of them this one at first.
     ///
     /// # Errors
     /// [`ElementError`] if the element is none.

@@ -272,6 +272,10 @@ pub trait Model<const N: usize> {
         true
     }
 
+    /// What kernels read beside the [parameters](Self::parameters), to the bit and in the order of the struct: fields that are lengths, and the elements of vectors of numbers, with how many there are.
+    /// Models that differ in it do not go side by side, and none goes on where one was suspended that differs in it. Nothing for models of hand-written kernels that do not say.
+    fn unnumbered<F: FnMut(u64)>(&self, _values: &mut F) {}
+
     /// The number of parameters: fields that are numbers, and the elements of fields that are arrays of numbers, in the order of the struct. Zero for models of hand-written
     /// kernels that do not say. Kernels of those that do make each parameter by [`Real::parameter`], so that numbers may carry derivatives by it, or the values of other models.
     fn parameters(&self) -> usize {

@@ -170,6 +170,10 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
     ) {
     }
 
+    /// What kernels read beside the [parameters](Self::parameters), in the order of the struct: fields that are lengths, lists of indices, and how many entries lists and vectors have. No model goes on
+    /// where one was suspended that differs in it. Nothing for models of hand-written kernels that do not say.
+    fn unnumbered<F: FnMut(u64)>(&self, _values: &mut F) {}
+
     /// The number of parameters: fields that are numbers, and the elements of fields that are arrays or vectors of numbers, in the order of the struct. Zero for models of
     /// hand-written kernels that do not say. [`first`](Self::first) and [`observables`](Self::observables) of those that do make each parameter by [`Real::parameter`], so that
     /// numbers may carry derivatives by it.

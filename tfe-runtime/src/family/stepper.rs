@@ -81,14 +81,16 @@ impl<M> Way<M> {
 pub struct Suspended {
     element: Element,
     length: usize,
-    /// Those of the model, to the bit.
+    /// Those of the model, and what it has beside them, to the bit.
     parameters: Vec<u64>,
     way: Way<()>,
 }
 
 fn parameters<M: Model>(model: &M) -> Vec<u64> {
     let bits = |index| model.parameter(index).to_bits();
-    (0..model.parameters()).map(bits).collect()
+    let mut all: Vec<u64> = (0..model.parameters()).map(bits).collect();
+    model.unnumbered(&mut |value| all.push(value));
+    all
 }
 
 impl Suspended {
@@ -155,7 +157,7 @@ impl<'m, M: Model> Stepper<'m, M> {
     }
 
     /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where that had another element, length or way to
-    /// solve, or other parameters.
+    /// solve, or other parameters or lists of indices.
     ///
     /// # Errors
     /// As [`new`](Self::new).

@@ -15,14 +15,16 @@ use alloc::vec::Vec;
 #[derive(Clone, Debug)]
 pub struct Suspended<const N: usize> {
     element: Element,
-    /// Those of the model, to the bit.
+    /// Those of the model, and what it has beside them, to the bit.
     parameters: Vec<u64>,
     carried: Carried<N>,
 }
 
 fn parameters<M: Model<N>, const N: usize>(model: &M) -> Vec<u64> {
     let bits = |index| model.parameter(index).to_bits();
-    (0..model.parameters()).map(bits).collect()
+    let mut all: Vec<u64> = (0..model.parameters()).map(bits).collect();
+    model.unnumbered(&mut |value| all.push(value));
+    all
 }
 
 impl<const N: usize> Suspended<N> {
@@ -47,7 +49,8 @@ where
         }
     }
 
-    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where the model had other parameters.
+    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where the model had other parameters, lengths or vectors of
+    /// numbers.
     ///
     /// # Errors
     /// As [`new`](Self::new).
