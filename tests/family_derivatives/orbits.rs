@@ -218,6 +218,15 @@ fn linear_chains_have_a_closed_form() {
     assert!(orbit.statistics().newton_iterations <= 3);
 }
 
+/// T = 2π / agm(√(1 + b a²), √(1 + b a²/2)) of a'' = −a − b a³ with an amplitude.
+fn duffing_period(b: f64, a: f64) -> f64 {
+    let (mut mean, mut geometric) = ((1.0 + b * a * a).sqrt(), (1.0 + b * a * a / 2.0).sqrt());
+    for _ in 0..6 {
+        (mean, geometric) = (f64::midpoint(mean, geometric), (mean * geometric).sqrt());
+    }
+    TAU / mean
+}
+
 /// Of 20 masses the seventh mode is exact: (a, a, 0, −a, −a, 0, …) moves as a Duffing oscillator, a'' = −a − b a³.
 #[test]
 fn a_mode_of_twenty_masses_has_a_closed_form() {
@@ -236,12 +245,7 @@ fn a_mode_of_twenty_masses_has_a_closed_form() {
         })
         .solve()
         .expect("an orbit");
-    // T = 2π / agm(√(1 + b a²), √(1 + b a²/2)).
-    let (mut mean, mut geometric) = ((1.0 + b * a * a).sqrt(), (1.0 + b * a * a / 2.0).sqrt());
-    for _ in 0..6 {
-        (mean, geometric) = (f64::midpoint(mean, geometric), (mean * geometric).sqrt());
-    }
-    let off = orbit.period() - TAU / mean;
+    let off = orbit.period() - duffing_period(b, a);
     assert!(off.abs() < 1e-10, "{off:e}");
     for (found, given) in orbit.start().q.iter().zip(&start.q) {
         assert!((found - given).abs() < 1e-8, "{found} {given}");
@@ -314,6 +318,101 @@ fn isolated_orbits_of_unknown_period() {
     assert!((orbit.period() - fixed.period()).abs() < 1e-11);
     let off = apart(orbit.multipliers(), fixed.multipliers());
     assert!(off < 1e-10, "{off:e}");
+}
+
+/// One element or two of high degree: the phase stays that of the guess here too.
+#[test]
+fn one_element_or_two_over_a_period() {
+    let model = VanDerPol {
+        n: 2,
+        k: 0.3,
+        mu: 0.2,
+    };
+    let turning = Phase::Momentum {
+        index: 0,
+        value: 0.0,
+    };
+    // Of 11 Gauss points each: the periods are 6.300093 and 6.298876885.
+    let period = 6.298_876_714;
+    for (elements, tolerance) in [(1, 4e-4), (2, 1e-7)] {
+        for phase in [Phase::Orthogonal, turning] {
+            let few = PeriodicOrbit::of(&model)
+                .element(Mixed::<12>)
+                .elements(elements)
+                .unknown_period(6.3)
+                .phase(phase)
+                .guess(|t| (vec![2.0 * t.cos(); 2], vec![-2.0 * t.sin(); 2]))
+                .solve()
+                .expect("a limit cycle");
+            let off = few.period() / period - 1.0;
+            assert!(off.abs() < tolerance, "{elements} {phase:?}: {off:e}");
+            assert_eq!(few.trivial().len(), 1);
+        }
+    }
+    // Both masses move alike, as a Duffing oscillator: 0.59993 where one element has its turning point, with the period off by 1.4e-5.
+    let (chain, a) = (Chain { n: 2, b: 0.5 }, 0.6);
+    let period = duffing_period(chain.b, a);
+    let energy = a * a + chain.b * a.powi(4) / 2.0;
+    for (elements, tolerance) in [(1, 5e-4), (2, 1e-8)] {
+        let few = || {
+            PeriodicOrbit::of(&chain)
+                .element(Mixed::<12>)
+                .elements(elements)
+                .guess(move |t| {
+                    let (sine, cosine) = (TAU / period * t).sin_cos();
+                    (vec![a * cosine; 2], vec![-a * sine * TAU / period; 2])
+                })
+        };
+        let by_period = few().period(period).solve().expect("a mode");
+        let off = by_period.start().q[0] / a - 1.0;
+        assert!(off.abs() < tolerance, "{elements}: {off:e}");
+        let by_energy = few().unknown_period(0.99 * period).energy(energy);
+        let off = by_energy.solve().expect("a mode").period() / period - 1.0;
+        assert!(off.abs() < tolerance, "{elements}: {off:e}");
+    }
+}
+
+/// As for models of fixed size: where one is found it is the limit cycle, whose amplitude is 2.
+#[test]
+fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
+    let chain = Chain { n: 3, b: 0.1 };
+    let model = VanDerPol {
+        n: 2,
+        k: 0.3,
+        mu: 1.0,
+    };
+    let turning = Phase::Momentum {
+        index: 0,
+        value: 0.0,
+    };
+    for elements in [1, 2, 40] {
+        for phase in [Phase::Orthogonal, turning] {
+            let rest = PeriodicOrbit::of(&chain)
+                .elements(elements)
+                .unknown_period(6.0)
+                .phase(phase);
+            let rest = rest.solve().map(|_| ());
+            assert_eq!(rest, Err(OrbitError::AtRest), "{elements} {phase:?}");
+            let rest = PeriodicOrbit::of(&model)
+                .elements(elements)
+                .unknown_period(6.0)
+                .phase(phase);
+            let rest = rest.solve().map(|_| ());
+            assert_eq!(rest, Err(OrbitError::AtRest), "{elements} {phase:?}");
+        }
+    }
+    for (amplitude, period) in [(1e-100, 6.3), (1e-6, 6.3), (1e-3, 9.0), (0.1, 3.0)] {
+        let orbit = PeriodicOrbit::of(&model)
+            .unknown_period(period)
+            .guess_from(model.state([amplitude; 2], [0.0; 2]))
+            .solve();
+        if let Ok(orbit) = orbit {
+            let nodes = orbit.nodes();
+            let largest = nodes.iter().map(|node| node.q[0].abs());
+            let largest = largest.fold(0.0, larger);
+            assert!(largest > 1.9, "{amplitude:e}: {largest:e}");
+        }
+    }
 }
 
 /// The derivatives of two orbits, one of run-time length, by a parameter or by the period; multipliers in the same order.
@@ -395,18 +494,11 @@ fn a_period_changes_at_one_energy_as_its_closed_form() {
         })
         .solve_sensitive()
         .expect("an orbit");
-    let period = |b: f64, a: f64| {
-        let (mut mean, mut geometric) = ((1.0 + b * a * a).sqrt(), (1.0 + b * a * a / 2.0).sqrt());
-        for _ in 0..6 {
-            (mean, geometric) = (f64::midpoint(mean, geometric), (mean * geometric).sqrt());
-        }
-        TAU / mean
-    };
     // The energy of one oscillator, a²/2 + b a⁴/4, stays: a² = (√(1 + 4 b E) − 1)/b.
     let energy = 0.18 + 0.36 * 0.36 / 4.0;
     let at_energy = |b: f64| {
         let square = ((1.0 + 4.0 * b * energy).sqrt() - 1.0) / b;
-        period(b, square.sqrt())
+        duffing_period(b, square.sqrt())
     };
     let [expected] = difference(|b| [at_energy(b)], 1.0);
     let off = orbit.by("b").period() - expected;
