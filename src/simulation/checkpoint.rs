@@ -65,8 +65,8 @@ where
     /// Goes on where a run ended, up to the time `end`.
     ///
     /// Where that run ended on the grid of this one (its start, and the same steps and breaks), the motion is to the last bit what one run would have been from there on; else the grid
-    /// begins at the checkpoint. Impulses at the very time of the checkpoint have acted already. Another element, or a model
-    /// with other parameters, lengths or lists, begins anew.
+    /// begins at the checkpoint. Impulses at the very time of the checkpoint have acted already, unless this is where the run began; those on models of run-time
+    /// length act now. Another element, or a model with other parameters, lengths or lists, begins anew.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -98,7 +98,10 @@ where
             self.check_start(state)?;
             let mut run = self.clone();
             run.step = run.step.or(checkpoint.reached.step);
-            M::leave_behind(&mut run.impulses, time);
+            // Before the first element nothing has acted.
+            if checkpoint.reached.elements > 0 {
+                M::leave_behind(&mut run.impulses, time);
+            }
             let suspended = checkpoint.stepper.clone();
             let mut stepper = M::resumed(self.model.clone(), self.chosen(), suspended)?;
             M::check_velocity(&mut stepper, (time, state))?;
@@ -119,7 +122,7 @@ where
         let prepared = self.model.guarded(prepare);
         match prepared.unwrap_or_else(|| Err(RunErrorKind::panicked(time))) {
             Ok(((mesh, done, origin), stepper, motion)) => {
-                let place = (&mesh, done, origin, Some(&checkpoint.seen));
+                let place = (&mesh, done, origin, Some(checkpoint));
                 self.drive_on(motion, state, place, stepper, None)
             }
             Err(kind) => Err(self.refused(kind, (time, state))),

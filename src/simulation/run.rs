@@ -85,11 +85,11 @@ where
         &self,
         motion: Motion<N, L>,
         start: &L::State,
-        (mesh, done, origin, seen): (&Mesh<N>, usize, f64, Option<&Seen>),
+        (mesh, done, origin, before): (&Mesh<N>, usize, f64, Option<&Checkpoint<N, L>>),
         mut stepper: L::Stepper<'m, M>,
         follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
-        let mut seen = seen.cloned().unwrap_or_default();
+        let mut seen = before.map_or_else(Seen::default, |one| one.seen.clone());
         let place = (mesh, done, &mut seen);
         let mut motion = self.drive_from(motion, start, place, &mut stepper, follower)?;
         if seen.has_stopped {
@@ -100,8 +100,13 @@ where
             return Ok(motion);
         }
         let last = motion.last();
+        // Where nothing was to be done the grid is that of before.
+        let same = before.filter(|_| mesh.steps() == done);
         let checkpoint = Checkpoint {
-            reached: Reached::new(origin, self.step, mesh, last.t),
+            reached: match same {
+                Some(before) => before.reached.clone(),
+                None => Reached::new(origin, self.step, mesh, last.t),
+            },
             state: last.state(),
             velocity: last.v.clone(),
             stepper: M::suspended(stepper),

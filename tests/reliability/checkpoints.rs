@@ -119,6 +119,23 @@ fn runs_that_go_on_are_watched() {
     assert!(told.iter().any(is_unstable), "{told:?}");
 }
 
+/// Before the first element no impulse has acted, and then it acts once.
+#[test]
+fn an_impulse_where_a_run_begins_waits_for_its_first_element() {
+    let run = Simulation::new(&Oscillator).step(0.1).impulse(0.0, [1.5]);
+    let start = Oscillator.state([0.0], [0.0]);
+    let resumed = |motion: &Motion<1>, end: f64| {
+        let checkpoint = motion.checkpoint().expect("complete");
+        run.resume(checkpoint, end).expect("a run")
+    };
+    let whole = run.run(start, 0.0..2.0).expect("a run");
+    let empty = run.run(start, 0.0..0.0).expect("nothing to do");
+    let first = resumed(&resumed(&empty, 0.0), 1.0);
+    let second = resumed(&resumed(&first, 1.0), 2.0);
+    assert_eq!(first.states(), &whole.states()[..=10]);
+    assert_eq!(second.states(), &whole.states()[10..]);
+}
+
 /// The run of a model that goes on where another one has got to, beside one that begins there.
 fn check_handing_over<M: tfe::Model<N>, const N: usize>(
     first: &Simulation<'_, M, N>,
