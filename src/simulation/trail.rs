@@ -1,11 +1,11 @@
 //! What a run of a model of run-time length leaves behind for its derivatives.
 
+use super::acting;
 use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::{Length, RunTimeLength};
-use crate::motion::is_same_time;
 use crate::motion::{Motion, Node};
 use std::convert::identity;
 use std::ops::Range;
@@ -95,17 +95,9 @@ impl Trail {
     /// The impulses at the node where an element begins.
     fn kicked(&mut self, passed: &Passed<'_, 0, RunTimeLength>) -> Option<Kicked> {
         let before = std::mem::replace(&mut self.last, passed.after.clone());
-        let mut acting = (self.impulses.iter())
-            .filter(|(time, _)| is_same_time(*time, passed.start))
-            .peekable();
-        acting.peek()?;
         let mut with = before.clone();
-        for (_, impulse) in acting {
-            for (p, change) in with.p.iter_mut().zip(impulse) {
-                *p += change;
-            }
-        }
-        Some(Kicked { before, with })
+        let at = (passed.start, passed.h);
+        acting::kick(&self.impulses, at, &mut with.p).then_some(Kicked { before, with })
     }
 
     /// Why a call has no derivatives of this motion: its elements are not those that are solved once more.

@@ -1,7 +1,9 @@
 //! The derivative of a step of a family.
 
+use crate::differences;
 use crate::largest::larger;
 use tfe::family::{self, FamilyState};
+use tfe::length::RunTimeLength;
 use tfe::prelude::*;
 use tfe::runtime::step::Control;
 use tfe::stability::{
@@ -324,4 +326,43 @@ fn what_is_impossible_is_told() {
     };
     let error = transition(&chain, Primal::<3>, &chain.state(Q, V), 0.0, 0.1).expect_err("phase");
     assert!(matches!(error, OperatorError::Family(_)), "{error}");
+}
+
+/// An impulse is taken away where time goes back, and constraints take up what is against them of that.
+#[test]
+fn derivatives_go_back_across_impulses() {
+    #[dynamics(
+        coordinates(x[n], y[n]),
+        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - g*y[i]),
+        constraint(rod[i in 0..n]) = x[i]^2 + y[i]^2 - 1,
+    )]
+    struct Rods {
+        n: usize,
+        g: f64,
+    }
+    fn run(rods: &Rods) -> Simulation<'_, Rods, 0, RunTimeLength> {
+        let run = Simulation::new(rods).element(Mixed::<6>).step(0.05);
+        run.impulse(-0.3, [0.7, 0.5])
+    }
+    let start = FamilyState {
+        q: vec![0.6, -0.8],
+        p: vec![0.4, 0.3],
+    };
+    let span = 0.0..-0.6;
+    let g = 9.81;
+    let end = |g: f64| {
+        let rods = Rods { n: 1, g };
+        let motion = run(&rods).run(start.clone(), span.clone()).expect("a run");
+        let last = motion.last();
+        [last.q[0], last.q[1], last.p[0], last.p[1]]
+    };
+    let expected = differences::difference(end, g);
+    let rods = Rods { n: 1, g };
+    let sensitive = run(&rods).run_sensitive(start.clone(), span.clone());
+    let found = sensitive.expect("a run").by("g").last();
+    let found = [found.q[0], found.q[1], found.p[0], found.p[1]];
+    let apart = |(a, b): (&f64, &f64)| (a - b).abs();
+    let off = found.iter().zip(&expected).map(apart).fold(0.0, larger);
+    // Differences leave some 1e-13 of the largest derivative, which is about one.
+    assert!(off < 1e-10, "{found:?} {expected:?}");
 }

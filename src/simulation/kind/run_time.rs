@@ -1,5 +1,6 @@
 //! Models of run-time length.
 
+use super::super::acting;
 use super::super::checks::{check_finite, conserves_energies};
 use super::super::mesh::{Grid, Mesh};
 use super::super::watch::Watch;
@@ -7,7 +8,7 @@ use super::{Chosen, Simulated, second};
 use crate::error::RunErrorKind;
 use crate::evaluate::names;
 use crate::length::RunTimeLength;
-use crate::motion::{Motion, Node, Warning, is_same_time};
+use crate::motion::{Motion, Node, Warning};
 use std::ops::Range;
 use tfe_runtime::constrained::Trail;
 use tfe_runtime::dual::Dual;
@@ -231,13 +232,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         (t, h): (f64, f64),
         state: &mut FamilyState,
     ) -> bool {
-        let mut is_kicked = false;
-        for (_, impulse) in impulses.iter().filter(|(time, _)| is_same_time(*time, t)) {
-            for (p, change) in state.p.iter_mut().zip(impulse) {
-                *p += h.signum() * change;
-            }
-            is_kicked = true;
-        }
+        let is_kicked = acting::kick(impulses, (t, h), &mut state.p);
         if is_kicked && const { M::CONSTRAINED } {
             // What is against the constraints these take up at once.
             let velocity = self.allowed_velocity(t, state, &state.p);
