@@ -258,7 +258,8 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
             motion.record(self.model, next, &state);
             element += 1;
         }
-        let is_same = is_same::<N, FixedLength>(&state, &after.state());
+        let ends = (&before.state(), &after.state());
+        let is_same = is_same::<N, FixedLength>(&state, ends);
         Ok(is_same.then_some(motion))
     }
 
@@ -277,14 +278,15 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
                 (motion, number + 1),
                 &mut self.lambda,
             )?;
-            let (element, mut state) = (first + number, motion.states()[number].state());
+            let (element, before) = (first + number, motion.states()[number].state());
+            let mut state = before;
             self.solve(element, &mut state)?;
             let inside = view.of_element(&mut self.pull, inner)?;
             let (time, next, step) = self.elements[element];
             let pieces = self.stepper.dense(time, next).pieces().len();
             let is_cut_alike = inside.is_empty() || inside.len() == pieces;
             let after = motion.states()[number + 1].state();
-            if !(is_same::<N, FixedLength>(&state, &after) && is_cut_alike) {
+            if !(is_same::<N, FixedLength>(&state, (&before, &after)) && is_cut_alike) {
                 return Ok(false);
             }
             let (lambda, by_parameters) = (&mut self.lambda, &mut self.by_parameters);

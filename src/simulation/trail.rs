@@ -49,24 +49,29 @@ impl Element {
     /// Whether it ends where it did, now that it is solved once more.
     #[cfg(feature = "sparse")]
     pub(super) fn check(&self, again: &FamilyState) -> Result<(), family::OperatorError> {
-        match is_same::<0, RunTimeLength>(again, &self.after) {
+        match is_same::<0, RunTimeLength>(again, (&self.before, &self.after)) {
             true => Ok(()),
             false => Err(family::OperatorError::Cut),
         }
     }
 }
 
-/// Whether an element that is solved once more ends where it did, to many more digits than two roots of its equations have in common.
-pub(super) fn is_same<const N: usize, L: Length<N>>(again: &L::State, before: &L::State) -> bool {
+/// Whether elements that are solved once more, from the first state, end in the second as they did, to many more digits than two roots of their equations have in common. The first one tells, too, of what
+/// roundings are a part: a motion may come to rest at the end, or pass its origin.
+pub(super) fn is_same<const N: usize, L: Length<N>>(
+    again: &L::State,
+    (start, end): (&L::State, &L::State),
+) -> bool {
     const SAME: f64 = 1e-9;
-    let near = |again: &L::Vector, before: &L::Vector| {
-        let (again, before) = (again.as_ref(), before.as_ref());
-        let largest = before.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let mut pairs = again.iter().zip(before);
+    let near = |again: &L::Vector, start: &L::Vector, end: &L::Vector| {
+        let (again, start, end) = (again.as_ref(), start.as_ref(), end.as_ref());
+        let both = start.iter().chain(end);
+        let largest = both.fold(0.0_f64, |m, x| m.max(x.abs()));
+        let mut pairs = again.iter().zip(end);
         pairs.all(|(a, b)| (a - b).abs() <= SAME * largest.max(1e-6))
     };
-    let (again, before) = (L::parts(again), L::parts(before));
-    near(again.0, before.0) && near(again.1, before.1)
+    let (again, start, end) = (L::parts(again), L::parts(start), L::parts(end));
+    near(again.0, start.0, end.0) && near(again.1, start.1, end.1)
 }
 
 /// The elements passed so far, and the recorded nodes.

@@ -366,3 +366,40 @@ fn derivatives_go_back_across_impulses() {
     // Differences leave some 1e-13 of the largest derivative, which is about one.
     assert!(off < 1e-10, "{found:?} {expected:?}");
 }
+
+/// Where a motion comes to rest its momentum is roundings, which are no other root, in whatever units.
+#[test]
+fn derivatives_end_where_a_motion_comes_to_rest() {
+    use std::f64::consts::PI;
+
+    #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2 - k/2*q[i]^2))]
+    struct Springs {
+        n: usize,
+        k: f64,
+    }
+    let springs = Springs { n: 1, k: 1.0 };
+    let run = Simulation::new(&springs);
+    let run = run.element(Mixed::<6>).step(PI / 50.0);
+    for size in [1.0, 1e3, 1e6, 1e9] {
+        let start = FamilyState {
+            q: vec![size],
+            p: vec![0.0],
+        };
+        // Over half a period (p, q) becomes (−p, −q): roundings of fifty steps are left.
+        let linearised = run.run_linearised(start.clone(), 0.0..PI);
+        let product = linearised.expect("a run").product();
+        let off = [
+            product[(0, 0)] + 1.0,
+            product[(0, 1)],
+            product[(1, 0)],
+            product[(1, 1)] + 1.0,
+        ];
+        let off = off.iter().map(|entry| entry.abs()).fold(0.0, larger);
+        assert!(off < 1e-12, "{size:e}: {off:e}");
+        // p = −a √k sin √k t, of which ∂p/∂k = a π/2 is there.
+        let sensitive = run.run_sensitive(start, 0.0..PI).expect("a run");
+        let by = sensitive.by("k").last();
+        let off = by.p[0] / size - PI / 2.0;
+        assert!(off.abs() < 1e-12, "{size:e}: {off:e}");
+    }
+}

@@ -165,7 +165,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             let Ok((again, trail)) = again else {
                 return Ok(None);
             };
-            if !is_same::<0, RunTimeLength>(&again.last().state(), &after.state()) {
+            let ends = (&before.state(), &after.state());
+            if !is_same::<0, RunTimeLength>(&again.last().state(), ends) {
                 return Ok(None);
             }
             let (value, seen) = part.seen(&again, &*self.model)?;
