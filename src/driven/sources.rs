@@ -86,9 +86,11 @@ impl Sources<'_> {
             *value = match (held, source) {
                 (Some(held), _) => t.like(held),
                 (None, Source::Zero) => continue,
-                (None, Source::Function(function)) => {
-                    t.map(&mut |t| self.checked(input, t, function(t)))
-                }
+                (None, Source::Function(function)) => t.map(&mut |t| match t.is_nan() {
+                    // What is asked for then has no inputs.
+                    true => 0.0,
+                    false => self.checked(input, t, function(t)),
+                }),
                 (None, Source::Table(table)) => {
                     t.map_with_derivatives(&mut |order, t| table.derivative(order, t))
                 }

@@ -456,3 +456,26 @@ mod sparse {
         assert_alike(at(&a).as_slice(), at(&b).as_slice(), 1e-10);
     }
 }
+
+/// Functions are asked within the span of a run and nowhere else, where they may be defined no more.
+#[test]
+fn functions_are_not_asked_beyond_the_span() {
+    let wind = |t: f64| {
+        assert!((2.0..=3.0).contains(&t), "no wind at {t}");
+        t
+    };
+    let chain = Chain {
+        n: 3,
+        m: 1.0,
+        k: 1.0,
+        a: 0.1,
+        c: 0.1,
+    };
+    let start = chain.state([0.1, 0.0, -0.1], [0.0; 3]);
+    let run = Simulation::new(&chain).step(0.1).input("u", wind);
+    let by_newton = cfg!(feature = "sparse").then_some(Solve::Newton);
+    for solve in [Some(Solve::Auto), by_newton].into_iter().flatten() {
+        let run = run.clone().solver(solve).run(start.clone(), 2.0..3.0);
+        run.expect("a run");
+    }
+}

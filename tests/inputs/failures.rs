@@ -171,3 +171,21 @@ fn functions_that_panic_at_once_are_told() {
     let resumed = broken.resume(good.checkpoint().expect("complete"), 5.0);
     check(resumed.expect_err("a panic").kind());
 }
+
+/// Functions are asked within the span of a run and nowhere else, where they may be defined no more.
+#[test]
+fn functions_are_not_asked_beyond_the_span() {
+    #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u)]
+    struct Oscillator;
+
+    let wind = |t: f64| {
+        assert!((2.0..=3.0).contains(&t), "no wind at {t}");
+        t
+    };
+    let start = Oscillator.state([1.0], [0.0]);
+    let run = Simulation::new(&Oscillator).step(0.1).input("u", wind);
+    run.run(start, 2.0..3.0).expect("a run");
+    for step in run.steps(start, 2.0).take(10) {
+        step.expect("a step");
+    }
+}

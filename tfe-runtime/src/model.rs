@@ -366,6 +366,9 @@ pub trait Model<const N: usize> {
     fn observables<R: Real>(&self, _t: R, _q: &[R; N], _z: &[R; N], _values: &mut [R]) {}
 }
 
+/// When kernels are asked for what no time changes, as a constant mass matrix, or the places of second derivatives: at a time that is none, for which functions given for inputs are not asked.
+pub(crate) const NO_TIME: f64 = f64::NAN;
+
 /// By what the first derivatives of a model are differentiated once more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum By {

@@ -5,7 +5,7 @@ use super::model::{Block, Entries, FamilyState, Model, slope};
 #[cfg(feature = "sparse")]
 use super::{instant::Instant, node::Node, rows::Rows};
 use crate::double_double::DoubleDouble;
-use crate::model::Form;
+use crate::model::{Form, NO_TIME};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -29,10 +29,10 @@ impl Inertia {
         }
         let zero = vec![0.0; model.len()];
         // Momenta have to be multiples of velocities.
-        if slope(model, 0.0, &zero, &zero).iter().any(|p| *p != 0.0) {
+        if slope(model, NO_TIME, &zero, &zero).iter().any(|p| *p != 0.0) {
             return Err(ModelError::NotSecondOrder);
         }
-        let second = diagonal(model, 0.0, &zero, &zero)?;
+        let second = diagonal(model, NO_TIME, &zero, &zero)?;
         let over = |x: f64| DoubleDouble::ONE.over(DoubleDouble::new(x));
         let (mass, inverse): (Vec<f64>, Vec<f64>) = match M::FORM {
             Form::Lagrangian => second.iter().map(|m| (*m, 1.0 / m)).unzip(),

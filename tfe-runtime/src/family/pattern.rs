@@ -1,6 +1,7 @@
 //! Second derivatives of families: places found once, values each time.
 
 use super::model::{Block, Entries, Gradient, Model};
+use crate::model::NO_TIME;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::AddAssign;
@@ -60,14 +61,14 @@ impl Pattern {
             force: &mut force,
         };
         let zero = vec![0.0; n];
-        Self::recorded(|recorder| model.second(0.0, &zero, &zero, first, recorder))
+        Self::recorded(|recorder| model.second(NO_TIME, &zero, &zero, first, recorder))
     }
 
     /// Of ∂²/∂z∂z alone.
     #[cfg(feature = "sparse")]
     pub(super) fn of_mass<M: Model>(model: &M) -> Self {
         let zero = vec![0.0; model.len()];
-        Self::recorded(|recorder| model.mass(0.0, &zero, &zero, recorder))
+        Self::recorded(|recorder| model.mass(NO_TIME, &zero, &zero, recorder))
     }
 
     /// Of the rows of constraints.

@@ -3,7 +3,7 @@
 use super::forms::is_second_order;
 use crate::double_double::DoubleDouble;
 use crate::lu::Block;
-use crate::model::{First, Form, Model};
+use crate::model::{First, Form, Model, NO_TIME};
 use crate::precise::Precise;
 use crate::registers::four::{Four, block, put};
 use crate::registers::side::Side;
@@ -48,7 +48,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
             });
         }
         let (mut first, mut mass) = (First::ZERO, [[0.0; N]; N]);
-        model.first_and_mass(0.0, &[0.0; N], &[0.0; N], &mut first, &mut mass);
+        model.first_and_mass(NO_TIME, &[0.0; N], &[0.0; N], &mut first, &mut mass);
         if is_second_order::<M, N>() && first.z != [0.0; N] {
             return None;
         }
