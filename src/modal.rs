@@ -235,6 +235,12 @@ impl<M: Reducible<S>, S: PhasePoint, const R: usize> Model<R> for Modal<'_, M, R
         }
     }
 
+    fn unnumbered<F: FnMut(u64)>(&self, values: &mut F) {
+        for number in self.squares.iter().chain(&self.load) {
+            values(number.to_bits());
+        }
+    }
+
     fn coordinate_name(index: usize) -> CoordinateName {
         CoordinateName::element("mode", index)
     }

@@ -88,6 +88,30 @@ fn frequencies_are_those_of_the_closed_form() {
     assert_eq!(few.shape(3), None);
 }
 
+/// A run of one model that goes on with another one, of other frequencies, is that from its checkpoint on.
+#[test]
+fn modes_go_on_from_a_checkpoint_of_others() {
+    let (soft, stiff) = (row(8, 0.4), Row { k: 5.0, ..row(8, 0.4) });
+    let soft: Modal<'_, Row, 3> = Modal::of(&soft).unwrap();
+    let stiff: Modal<'_, Row, 3> = Modal::of(&stiff).unwrap();
+    let start = State {
+        q: [1.0, 0.5, -0.3],
+        p: [0.0, 0.2, 0.1],
+    };
+    let first = Simulation::new(&soft).element(Mixed::<6>).step(0.1);
+    let first = first.record_every(10).run(start, 0.0..5.0).unwrap();
+    let checkpoint = first.checkpoint().unwrap();
+    let second = Simulation::new(&stiff).element(Mixed::<6>).step(0.1);
+    let second = second.record_every(10);
+    let resumed = second.resume(checkpoint, 10.0).unwrap();
+    let anew = second.run(*checkpoint.state(), 5.0..10.0).unwrap();
+    for k in 0..3 {
+        // Roundings of fifty steps.
+        assert!((resumed.last().q[k] - anew.last().q[k]).abs() < 1e-13);
+        assert!((resumed.last().p[k] - anew.last().p[k]).abs() < 1e-13);
+    }
+}
+
 #[test]
 fn all_modes_together_move_as_the_full_model() {
     let row = row(8, 0.4);
