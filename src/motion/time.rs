@@ -33,6 +33,23 @@ pub(crate) fn looked_at(times: impl IntoIterator<Item = f64>, known: &[f64]) -> 
     times
 }
 
+/// How many steps there are in a span, whose sign the step has, and whether the last one is as long as the others: but for a rounding of the quotient, as 10 / 0.01 may be
+/// 1000.0000000000001, or of the times, which far from zero is more. Such a rounding is no step of its own: it may be no time at all.
+pub(crate) fn count_steps(span: &Range<f64>, step: f64) -> (f64, bool) {
+    let ratio = (span.end - span.start) / step;
+    let nearest = ratio.round();
+    let is_whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0)
+        || (nearest >= 1.0 && leads_to_end(span, step, nearest));
+    let steps = if is_whole { nearest } else { ratio.ceil() };
+    (steps.max(1.0), is_whole)
+}
+
+/// Whether so many steps lead from the start of a span to its end but for rounding.
+pub(crate) fn leads_to_end(span: &Range<f64>, step: f64, steps: f64) -> bool {
+    let rounding = 4.0 * f64::EPSILON * span.start.abs().max(span.end.abs());
+    ((span.end - span.start) - steps * step).abs() <= rounding
+}
+
 /// One, or minus one where a run goes back in time.
 pub(crate) fn direction_of(span: &Range<f64>) -> f64 {
     if span.end < span.start { -1.0 } else { 1.0 }

@@ -216,6 +216,22 @@ mod tests {
         assert_eq!((many.len(), many[1000]), (1001, 10.0));
     }
 
+    /// A rounding of the times is no step: 9 steps end a rounding behind 1e9 + 0.009, where a tenth one would have no length.
+    #[test]
+    fn roundings_of_the_times_are_no_steps() {
+        for (start, step) in [(1e9, 1e-3), (-1e9, 1e-3), (1.7e9, 0.01)] {
+            for count in 1..100_u32 {
+                let end = start + f64::from(count) * step;
+                for span in [start..end, end..start] {
+                    let mesh = Mesh::<1>::new(&span, step, &[], &[]).expect("a good mesh");
+                    assert_eq!(mesh.steps(), count as usize, "{span:?}");
+                    let mut lengths = mesh.elements().map(|(.., h)| h.abs());
+                    assert!(lengths.all(|length| length == step), "{span:?}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn backward_and_empty_spans() {
         assert_eq!(nodes(1.0..0.0, 0.5, &[]), [1.0, 0.5, 0.0]);

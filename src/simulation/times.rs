@@ -1,7 +1,10 @@
 //! When elements begin and end: equal steps between breaks, or between given nodes.
 
 use crate::error::RunErrorKind;
-use crate::motion::{LEAST_ROUNDINGS, breaks_within, direction_of, is_same_time, sort_times};
+use crate::motion::{
+    LEAST_ROUNDINGS, breaks_within, count_steps, direction_of, is_same_time, leads_to_end,
+    sort_times,
+};
 use std::ops::Range;
 
 /// Times between two breaks, cut into equal steps; the last one may be shorter.
@@ -349,14 +352,10 @@ impl Segment {
                 step,
             });
         }
-        // 10 / 0.01 is 1000 steps although the quotient may be 1000.0000000000001.
-        let nearest = ratio.round();
-        let whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0);
-        let steps = if whole { nearest } else { ratio.ceil() }.max(1.0);
+        let span = start..end;
+        let (steps, whole) = count_steps(&span, step);
         // A step that leads to the end but for rounding stays as it was given, so that runs to different ends have the same nodes.
-        let rounding = 4.0 * f64::EPSILON * start.abs().max(end.abs());
-        let is_exact = ((end - start) - steps * step).abs() <= rounding;
-        let step = if whole && !is_exact {
+        let step = if whole && !leads_to_end(&span, step, steps) {
             (end - start) / steps
         } else {
             step

@@ -1,6 +1,7 @@
 //! The nodes of one run.
 
 use super::error::WorkPrecisionError;
+use crate::motion::count_steps;
 use std::ops::Range;
 
 /// A span in equal steps; the last one may be shorter.
@@ -48,14 +49,12 @@ impl Grid {
                 step,
             });
         }
-        // 10 / 0.01 is 1000 steps although the quotient may be 1000.0000000000001.
-        let nearest = ratio.round();
-        let whole = (ratio - nearest).abs() <= 1e-9 * nearest.max(1.0);
-        let steps = if whole { nearest } else { ratio.ceil() }.max(1.0);
+        let signed = step.abs().copysign(end - start);
+        let (steps, whole) = count_steps(span, signed);
         let length = if whole || steps == 1.0 {
             (end - start) / steps
         } else {
-            step.abs().copysign(end - start)
+            signed
         };
         Ok(Self {
             start,
@@ -160,6 +159,22 @@ mod tests {
             // A rounding for each of at most five additions.
             assert!((sum - (span.end - span.start)).abs() < 5.0 * 3.0 * f64::EPSILON);
             assert_eq!(grid.node(grid.steps()), span.end);
+        }
+    }
+
+    /// A rounding of the times is no step: 9 steps end a rounding behind 1e9 + 0.009, where a tenth one would have no length.
+    #[test]
+    fn roundings_of_the_times_are_no_steps() {
+        for (start, step) in [(1e9, 1e-3), (-1e9, 1e-3), (1.7e9, 0.01)] {
+            for count in 1..100_u32 {
+                let end = start + f64::from(count) * step;
+                for span in [start..end, end..start] {
+                    let grid = Grid::new(&span, step).unwrap();
+                    let lengths = (0..grid.steps()).map(|k| grid.element(k).2.abs());
+                    assert!(lengths.fold(f64::INFINITY, f64::min) > 0.9 * step);
+                    assert_eq!(grid.steps(), count as usize, "{span:?}");
+                }
+            }
         }
     }
 

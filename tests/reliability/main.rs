@@ -505,6 +505,14 @@ fn steps_below_the_resolution_of_the_time_are_refused() {
     let far = simulation.run(start, 1e9..1e9 + 10.0).expect("a run");
     let near = simulation.run(start, 0.0..10.0).expect("a run");
     assert!((far.last().q[0] - near.last().q[0]).abs() < 1e-12);
+    // An end that is a rounding behind the last node is that node.
+    for steps in 1..40 {
+        let length = f64::from(steps) * 0.01;
+        let far = simulation.run(start, 1.7e9..1.7e9 + length).expect("a run");
+        assert_eq!(far.states().len(), steps as usize + 1);
+        let near = simulation.run(start, 0.0..length).expect("a run");
+        assert!((far.last().q[0] - near.last().q[0]).abs() < 1e-12);
+    }
 }
 
 /// A bead in a bowl drives a mass by its own one, and has almost no inertia left at the bottom, which it passes in a thousandth of a second. A step that has to be cut there is looked at, whatever its
