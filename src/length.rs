@@ -109,6 +109,9 @@ pub trait Polynomial: Clone + Debug {
     /// Time at the end.
     fn end(&self) -> f64;
 
+    /// How long it is, to the digits of the step.
+    fn length(&self) -> f64;
+
     /// The degree of the coordinates.
     fn degree(&self) -> usize;
 
@@ -139,6 +142,10 @@ macro_rules! polynomial {
 
             fn end(&self) -> f64 {
                 self.end()
+            }
+
+            fn length(&self) -> f64 {
+                self.length()
             }
 
             fn degree(&self) -> usize {

@@ -43,7 +43,7 @@ impl<const N: usize, L: Length<N>> Points<N, L> {
         if self.rule.len() != degree {
             self.rule = Quadrature::gauss(degree);
         }
-        let (from, length) = (piece.start(), piece.end() - piece.start());
+        let (from, length) = (piece.start(), piece.length());
         for number in 0..self.rule.len() {
             let tau = self.rule.node(number);
             let (t, state) = (from + tau * length, piece.at(tau));

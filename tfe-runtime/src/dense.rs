@@ -20,6 +20,8 @@ use crate::scheme::{MAX_RATES, SchemeRef};
 #[derive(Clone, Debug, PartialEq)]
 pub struct DenseElement<const N: usize> {
     times: (f64, f64),
+    /// Between the times: the step, whose digits their difference does not have far from zero.
+    length: f64,
     start: State<N>,
     end: State<N>,
     /// Legendre coefficients of h dq/dt, then those of h dp/dt.
@@ -33,6 +35,7 @@ impl<const N: usize> DenseElement<N> {
     pub(crate) fn constant(start: f64, end: f64, state: State<N>) -> Self {
         Self {
             times: (start, end),
+            length: end - start,
             start: state,
             end: state,
             rates: Box::new([]),
@@ -44,6 +47,7 @@ impl<const N: usize> DenseElement<N> {
     pub(crate) fn unknown(scheme: &SchemeRef<'_>, times: (f64, f64), last: &Last<N>) -> Self {
         Self {
             times,
+            length: length(times, last.h),
             start: last.start,
             end: last.end,
             rates: vec![[f64::NAN; N]; 2 * scheme.rates()].into_boxed_slice(),
@@ -61,6 +65,7 @@ impl<const N: usize> DenseElement<N> {
         pieces[0].times.0 = start;
         Some(Self {
             times: (start, end),
+            length: end - start,
             start: before,
             end: after,
             rates: Box::new([]),
@@ -113,6 +118,7 @@ impl<const N: usize> DenseElement<N> {
         }
         Self {
             times,
+            length: length(times, last.h),
             start: last.start,
             end: last.end,
             rates: coefficients,
@@ -166,6 +172,7 @@ impl<const N: usize> DenseElement<N> {
         }
         Self {
             times,
+            length: length(times, h),
             start: *start,
             end: *end,
             rates: coefficients,
@@ -195,18 +202,18 @@ impl<const N: usize> DenseElement<N> {
         times: (f64, f64),
         (start, end): (State<N>, State<N>),
     ) -> Self {
-        let (count, length) = (self.degree(), to - from);
+        let (count, part) = (self.degree(), to - from);
         let rule = Quadrature::gauss(count.max(1));
         let mut rates = vec![[0.0; N]; 2 * count].into_boxed_slice();
         for point in 0..rule.len() {
             let (mut here, mut whole) = ([0.0; MAX_NODES], [0.0; MAX_NODES]);
             legendre(rule.node(point), &mut here);
-            legendre(from + length * rule.node(point), &mut whole);
+            legendre(from + part * rule.node(point), &mut whole);
             for (new, old) in [(0..count, 0), (count..2 * count, count)] {
                 let mut value = [0.0; N];
                 for (m, weight) in whole.iter().take(count).enumerate() {
                     for a in 0..N {
-                        value[a] += length * weight * self.rates[old + m][a];
+                        value[a] += part * weight * self.rates[old + m][a];
                     }
                 }
                 for (m, row) in rates[new].iter_mut().enumerate() {
@@ -219,6 +226,7 @@ impl<const N: usize> DenseElement<N> {
         }
         Self {
             times,
+            length: part * self.length,
             start,
             end,
             rates,
@@ -242,6 +250,12 @@ impl<const N: usize> DenseElement<N> {
     #[must_use]
     pub fn end(&self) -> f64 {
         self.times.1
+    }
+
+    /// How long it is: the difference of both times, and where the step has more digits, as far from zero, the step.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.length
     }
 
     /// The state at τ ∈ [0, 1]: exactly that of the nodes at both ends.
@@ -272,13 +286,13 @@ impl<const N: usize> DenseElement<N> {
         if let Some(piece) = self.piece_at(time) {
             return piece.velocity_at_time(time);
         }
-        let length = self.times.1 - self.times.0;
         let mut values = [0.0; MAX_NODES];
-        legendre((time - self.times.0) / length, &mut values);
+        let tau = (time - self.times.0) / (self.times.1 - self.times.0);
+        legendre(tau, &mut values);
         let mut velocity = [0.0; N];
         for (rate, value) in self.rates[..self.rates.len() / 2].iter().zip(values) {
             for a in 0..N {
-                velocity[a] += value / length * rate[a];
+                velocity[a] += value / self.length * rate[a];
             }
         }
         velocity
@@ -299,6 +313,18 @@ impl<const N: usize> DenseElement<N> {
     /// The piece of an element that was cut.
     fn piece_at(&self, time: f64) -> Option<&Self> {
         piece_at(&self.pieces, |piece| piece.times.0, self.times, time)
+    }
+}
+
+/// The length of an element between two times that was made by the step `h`: the step if the times are as far apart but for rounding, which is a large part of a short step far
+/// from zero.
+pub(crate) fn length((start, end): (f64, f64), h: f64) -> f64 {
+    let rounding = 8.0 * f64::EPSILON * start.abs().max(end.abs()).max(h.abs());
+    let between = end - start;
+    if (between - h).abs() <= rounding {
+        h
+    } else {
+        between
     }
 }
 

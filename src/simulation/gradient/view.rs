@@ -207,7 +207,7 @@ impl<M: Model<N>, const N: usize> View<'_, M, N> {
                 *sum += own;
             }
             if let Some(moved) = &inside.moved {
-                let length = piece.end() - piece.start();
+                let length = piece.length();
                 let (model, outputs) = (self.model, &self.running.outputs);
                 self.points.of(model, piece, |point| {
                     add_moving((model, outputs), &point, (moved, length), all);

@@ -211,7 +211,7 @@ impl<const N: usize> DenseElement<N> {
             v: [Enclosure::ZERO; N],
             p: [Enclosure::ZERO; N],
         };
-        let by_time = 1.0 / (to - from);
+        let by_time = 1.0 / self.length;
         for a in 0..N {
             let others = rates.iter().skip(1).map(|rate| rate[a]);
             bounds.q[a] = along(others.clone(), (self.start.q[a], self.end.q[a]));
@@ -234,7 +234,6 @@ impl<const N: usize> DenseElement<N> {
     /// falls with that of the part.
     #[must_use]
     pub fn bounds_over(&self, part: (f64, f64)) -> Arguments<Dual<Enclosure>, N> {
-        let length = self.times.1 - self.times.0;
         let (rates, forces) = self.rates.split_at(self.rates.len() / 2);
         let expansions = Expansions::over(part, rates.len());
         let centre = self.at(expansions.middle);
@@ -250,7 +249,7 @@ impl<const N: usize> DenseElement<N> {
             let force = expansions.powers(|k| forces[k][a]);
             bounds.q[a] = over(&rate, centre.q[a], self.start.q[a]);
             bounds.p[a] = over(&force, centre.p[a], self.start.p[a]);
-            bounds.v[a] = velocity_over(&rate, length);
+            bounds.v[a] = velocity_over(&rate, self.length);
         }
         bounds
     }
@@ -272,6 +271,7 @@ pub struct LongArguments<R> {
 /// The polynomials of an element of many coordinates: Legendre coefficients of the rates of coordinates and momenta, a row of n each, and its ends.
 pub(crate) struct Rows<'a> {
     pub(crate) times: (f64, f64),
+    pub(crate) length: f64,
     pub(crate) rates: &'a [f64],
     pub(crate) forces: &'a [f64],
     pub(crate) start: [&'a [f64]; 2],
@@ -289,7 +289,7 @@ impl Rows<'_> {
     pub(crate) fn bounds(&self, form: Form) -> LongArguments<Enclosure> {
         let [q, p] = self.start;
         let n = q.len();
-        let by_time = 1.0 / (self.times.1 - self.times.0);
+        let by_time = 1.0 / self.length;
         let velocity = |a: usize| match self.rates.get(a) {
             Some(mean) => velocity_along(*mean, others(self.rates, n, a), by_time),
             None => Enclosure::ZERO,
@@ -320,7 +320,6 @@ impl Rows<'_> {
     ) -> LongArguments<Dual<Enclosure>> {
         let [q, p] = self.start;
         let n = q.len();
-        let length = self.times.1 - self.times.0;
         let expansions = Expansions::over(part, self.rates.len() / n.max(1));
         let powers = |rates: &[f64], a: usize| expansions.powers(|k| rates[k * n + a]);
         let mut bounds = LongArguments {
@@ -333,7 +332,7 @@ impl Rows<'_> {
             let rate = powers(self.rates, a);
             bounds.q.push(over(&rate, centre[0][a], q[a]));
             match form {
-                Form::Lagrangian => bounds.v.push(velocity_over(&rate, length)),
+                Form::Lagrangian => bounds.v.push(velocity_over(&rate, self.length)),
                 Form::Hamiltonian => {
                     let force = powers(self.forces, a);
                     bounds.p.push(over(&force, centre[1][a], p[a]));

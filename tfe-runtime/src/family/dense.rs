@@ -4,7 +4,7 @@ use super::model::FamilyState;
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
 #[cfg(feature = "std")]
 use crate::dense::bounds::{LongArguments, Rows};
-use crate::dense::piece_at;
+use crate::dense::{length, piece_at};
 #[cfg(feature = "std")]
 use crate::dual::Dual;
 #[cfg(feature = "std")]
@@ -21,6 +21,8 @@ use alloc::vec::Vec;
 #[derive(Clone, Debug, PartialEq)]
 pub struct DenseElement {
     times: (f64, f64),
+    /// Between the times: the step, whose digits their difference does not have far from zero.
+    length: f64,
     start: FamilyState,
     end: FamilyState,
     /// Legendre coefficients of h dq/dt, a row of n each.
@@ -45,6 +47,7 @@ impl DenseElement {
     pub(super) fn constant(times: (f64, f64), state: FamilyState) -> Self {
         Self {
             times,
+            length: times.1 - times.0,
             start: state.clone(),
             end: state,
             rates: Vec::new(),
@@ -61,6 +64,7 @@ impl DenseElement {
         let after = pieces.last()?.end.clone();
         Some(Self {
             times: (start, end),
+            length: end - start,
             start: before,
             end: after,
             rates: Vec::new(),
@@ -82,6 +86,7 @@ impl DenseElement {
         let force_rates = coefficients(scheme.force_rate, scheme.points(), (h, n), force);
         Self {
             times,
+            length: length(times, h),
             start,
             end,
             rates: coefficients(scheme.rate, scheme.unknowns(), (h, n), rate),
@@ -115,6 +120,7 @@ impl DenseElement {
         values.extend(last);
         Self {
             times,
+            length: length(times, h),
             start,
             end,
             rates: coefficients(scheme.rate, scheme.unknowns(), (h, n), rate),
@@ -166,6 +172,7 @@ impl DenseElement {
         };
         Rows {
             times: self.times,
+            length: self.length,
             rates: &self.rates,
             forces,
             start: [&self.start.q, &self.start.p],
@@ -183,6 +190,12 @@ impl DenseElement {
     #[must_use]
     pub fn end(&self) -> f64 {
         self.times.1
+    }
+
+    /// How long it is, as [`DenseElement::length`](crate::step::DenseElement::length).
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.length
     }
 
     /// The state at a time between start and end.
@@ -244,13 +257,13 @@ impl DenseElement {
         if let Some(piece) = self.piece_at(time) {
             return piece.velocity_at_time(time);
         }
-        let length = self.times.1 - self.times.0;
         let mut values = [0.0; MAX_NODES];
-        legendre((time - self.times.0) / length, &mut values);
+        let tau = (time - self.times.0) / (self.times.1 - self.times.0);
+        legendre(tau, &mut values);
         let mut velocity = vec![0.0; self.start.q.len()];
         add(&self.rates, &values, &mut velocity);
         for rate in &mut velocity {
-            *rate /= length;
+            *rate /= self.length;
         }
         velocity
     }
