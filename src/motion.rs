@@ -73,8 +73,7 @@ impl<const N: usize, L: Length<N>> Node<N, L> {
 
     /// p·v
     pub(crate) fn action(&self) -> f64 {
-        let products = self.v.as_ref().iter().zip(self.p.as_ref());
-        products.map(|(v, p)| v * p).sum()
+        action(self.v.as_ref(), self.p.as_ref())
     }
 }
 
@@ -504,7 +503,8 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         let Some(&start) = self.energies.first() else {
             return 0.0;
         };
-        let scale = energy_scale(start, self.nodes.iter().map(Node::action));
+        let actions = self.nodes.iter().map(|node| node.action().abs());
+        let scale = energy_scale(start, actions.fold(0.0, larger));
         let of_arc = |nodes: Range<usize>| {
             let energies = self.energies.get(nodes).unwrap_or_default();
             let start = energies.first().copied().unwrap_or_default();
@@ -614,11 +614,16 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     }
 }
 
+/// p·v
+pub(crate) fn action(velocities: &[f64], momenta: &[f64]) -> f64 {
+    let products = velocities.iter().zip(momenta);
+    products.map(|(v, p)| v * p).sum()
+}
+
 /// With what changes of the energy are compared: its value at the start, or one where that is zero, or a rounding beside the largest product of momenta and velocities.
-fn energy_scale(start: f64, actions: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn energy_scale(start: f64, largest_action: f64) -> f64 {
     const ROUNDING: f64 = 1e-12;
-    let largest = actions.map(f64::abs).fold(0.0, larger);
-    if start == 0.0 || start.abs() <= ROUNDING * largest {
+    if start == 0.0 || start.abs() <= ROUNDING * largest_action {
         1.0
     } else {
         start.abs()

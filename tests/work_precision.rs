@@ -262,6 +262,29 @@ fn points_at_the_floor_of_the_reference_are_marked() {
     assert!(curve.fastest(1e-5).is_some());
 }
 
+/// A pendulum that begins level and at rest has an energy of 6e-17 by rounding, beside which changes of 1e-9 would be enormous.
+#[test]
+fn changes_beside_an_energy_that_is_a_rounding_are_absolute() {
+    let model = Pendulum {};
+    let start = State {
+        q: [std::f64::consts::FRAC_PI_2],
+        p: [0.0],
+    };
+    let measured = WorkPrecision::new(&model, start, 0.0..10.0)
+        .element(Mixed::<4>)
+        .steps([0.1])
+        .repeat_for(Duration::ZERO)
+        .run()
+        .unwrap();
+    let run = Simulation::new(&model).element(Mixed::<4>).step(0.1);
+    let motion = run.run(start, 0.0..10.0).unwrap();
+    assert!(motion.energies()[0] != 0.0 && motion.energy_error() < 1e-6);
+    // All nodes are looked at: roundings of a hundred steps, of energies of one.
+    let told = measured.curves()[0].points()[0].measured().unwrap();
+    let off = (told.energy_error - motion.energy_error()).abs();
+    assert!(off < 1e-13, "{off:e}");
+}
+
 #[test]
 fn constrained_models_have_their_residual() {
     let model = RodPendulum {

@@ -5,6 +5,7 @@ use super::point::Measured;
 use super::reference::Known;
 use super::subject::{PhasePoint, Subject};
 use crate::error::RunErrorKind;
+use crate::motion::{action, energy_scale};
 use crate::numbers::raise;
 use std::hint::black_box;
 use std::ops::Range;
@@ -45,7 +46,7 @@ impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
             from = look.node;
             observer.look(&mut stepper, grid.node(look.node), &state, look.compare);
         }
-        let mut measured = observer.measured;
+        let mut measured = observer.into_measured();
         measured.seconds = time.as_secs_f64();
         measured.repetitions = 1;
         measured.statistics = M::statistics(&stepper);
@@ -144,6 +145,10 @@ struct Observer<'a, M: Subject<S>, S: PhasePoint> {
     model: &'a M,
     reference: &'a Known<S>,
     start_energy: f64,
+    /// The largest change of it.
+    change: f64,
+    /// The largest |p·v|.
+    action: f64,
     velocity: M::Velocity,
     measured: Measured,
 }
@@ -154,6 +159,8 @@ impl<'a, M: Subject<S>, S: PhasePoint> Observer<'a, M, S> {
             model: measure.model,
             reference: measure.reference,
             start_energy: 0.0,
+            change: 0.0,
+            action: 0.0,
             velocity: measure.model.rest(),
             measured: Measured {
                 error_q: 0.0,
@@ -176,13 +183,7 @@ impl<'a, M: Subject<S>, S: PhasePoint> Observer<'a, M, S> {
 
     fn look(&mut self, stepper: &mut M::Stepper<'_>, time: f64, state: &S, compare: bool) {
         let energy = self.energy(stepper, time, state);
-        let scale = if self.start_energy == 0.0 {
-            1.0
-        } else {
-            self.start_energy.abs()
-        };
-        let change = (energy - self.start_energy).abs() / scale;
-        raise(&mut self.measured.energy_error, change);
+        raise(&mut self.change, (energy - self.start_energy).abs());
         self.look_at_constraints(time, state);
         if compare && let Some((q, p)) = self.reference.errors(time, state) {
             (self.measured.error_q, self.measured.error_p) = (q, p);
@@ -192,7 +193,20 @@ impl<'a, M: Subject<S>, S: PhasePoint> Observer<'a, M, S> {
     }
 
     fn energy(&mut self, stepper: &mut M::Stepper<'_>, time: f64, state: &S) -> f64 {
-        self.model.energy(stepper, time, state, &mut self.velocity)
+        let energy = self.model.energy(stepper, time, state, &mut self.velocity);
+        raise(
+            &mut self.action,
+            action(self.velocity.as_ref(), state.p()).abs(),
+        );
+        energy
+    }
+
+    fn into_measured(self) -> Measured {
+        let scale = energy_scale(self.start_energy, self.action);
+        Measured {
+            energy_error: self.change / scale,
+            ..self.measured
+        }
     }
 
     fn look_at_constraints(&mut self, time: f64, state: &S) {

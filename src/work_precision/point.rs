@@ -56,8 +56,8 @@ pub struct Measured {
     pub max_error_q: f64,
     /// The same of the momenta.
     pub max_error_p: f64,
-    /// The largest change of the energy H = p·v − L, relative to that at the start (absolute where that is zero), at no more than about a
-    /// thousand nodes. Of a model that is forced, damped or depends on time it measures physics, not error.
+    /// The largest change of the energy H = p·v − L, relative to that at the start (absolute where that is zero, or not more than a rounding beside p·v), at no
+    /// more than about a thousand nodes, as [`Motion::energy_error`](crate::Motion::energy_error) tells it. Of a model that is forced, damped or depends on time it measures physics, not error.
     pub energy_error: f64,
     /// max |φ| of the holonomic constraints at the same nodes; zero without any.
     pub constraint_position: f64,

@@ -81,7 +81,7 @@ pub trait Steppable<S> {
         Self: 'm;
 
     /// The velocities of the last look.
-    type Velocity;
+    type Velocity: AsRef<[f64]>;
 
     /// Whether there are constraints.
     const CONSTRAINED: bool;
