@@ -5,7 +5,7 @@ use super::mesh::Mesh;
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::Length;
-use crate::motion::{Checkpoint, Motion, Node, Reached};
+use crate::motion::{Checkpoint, Motion, Node, Reached, Seen};
 use std::ops::Range;
 
 impl Reached {
@@ -66,7 +66,7 @@ where
     ///
     /// Where that run ended on the grid of this one (its start, and the same steps and breaks), the motion is to the last bit what one run would have been from there on; else the grid
     /// begins at the checkpoint. Impulses at the very time of the checkpoint have acted already, unless this is where the run began; those on models of run-time
-    /// length act now. Another element, or a model with other parameters, lengths or lists, begins anew.
+    /// length act now. Another element begins anew, and so does a model with other parameters, lengths or lists, from the coordinates and momenta.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -103,6 +103,7 @@ where
                 M::leave_behind(&mut run.impulses, time);
             }
             let suspended = checkpoint.stepper.clone();
+            let is_same = self.model.is_that_of(&suspended);
             let mut stepper = M::resumed(self.model.clone(), self.chosen(), suspended)?;
             M::check_velocity(&mut stepper, (time, state))?;
             let place = checkpoint
@@ -116,16 +117,40 @@ where
                     run.impulses.retain(|one| !is_behind(M::time_of(one)));
                     run.mesh(span)
                 })?;
-            let node = Node::of(time, state, checkpoint.velocity.clone());
-            Ok((place, stepper, Motion::starting(&*self.model, node)))
+            let node = match is_same {
+                true => Node::of(time, state, checkpoint.velocity.clone()),
+                false => {
+                    self.check_other((&place.0, place.1), (time, state))?;
+                    let at = (time, state);
+                    M::node(&mut stepper, &*self.model, at, &checkpoint.velocity)
+                }
+            };
+            let mut before = checkpoint.clone();
+            if !is_same {
+                // Another model may see events on other sides.
+                before.seen = Seen::default();
+            }
+            Ok((place, before, stepper, Motion::starting(&*self.model, node)))
         };
         let prepared = self.model.guarded(prepare);
         match prepared.unwrap_or_else(|| Err(RunErrorKind::panicked(time))) {
-            Ok(((mesh, done, origin), stepper, motion)) => {
-                let place = (&mesh, done, origin, Some(checkpoint));
+            Ok(((mesh, done, origin), before, stepper, motion)) => {
+                let place = (&mesh, done, origin, Some(&before));
                 self.drive_on(motion, state, place, stepper, None)
             }
             Err(kind) => Err(self.refused(kind, (time, state))),
+        }
+    }
+
+    /// Refuses a state that another model had reached, where it is not on the constraints of this one.
+    fn check_other(
+        &self,
+        (mesh, done): (&Mesh<N>, usize),
+        (time, state): (f64, &L::State),
+    ) -> Result<(), RunErrorKind> {
+        match mesh.elements().nth(done) {
+            Some((.., h)) => self.model.check_first((time, h), state),
+            None => Ok(()),
         }
     }
 }

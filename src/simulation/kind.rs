@@ -116,6 +116,9 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// Leaves the model.
     fn suspended(stepper: L::Stepper<'_, Self>) -> L::Suspended;
 
+    /// Whether a stepper that was suspended had this model, as far as can be told.
+    fn is_that_of(&self, suspended: &L::Suspended) -> bool;
+
     /// A stepper whose elements are not looked into.
     fn ends_only<'m>(stepper: L::Stepper<'m, Self>) -> L::Stepper<'m, Self>
     where

@@ -1,13 +1,14 @@
 //! Runs that go on from a checkpoint are those that were never cut.
 
-use tfe::Warning;
 use tfe::prelude::*;
+use tfe::{RunErrorKind, Warning};
 
 use super::{Kepler, Oscillator, PENDULUM};
 
-#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - 1)]
+#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - l^2)]
 struct Rod {
     g: f64,
+    l: f64,
 }
 
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = -0.1*dot(x))]
@@ -91,7 +92,7 @@ fn two_halves_are_one_run_to_the_bit() {
             &mut seed,
         );
     }
-    let rod = Rod { g: 9.81 };
+    let rod = Rod { g: 9.81, l: 1.0 };
     for nodes in [2, 3, 4, 5] {
         let simulation = Simulation::new(&rod)
             .element(Element::mixed(nodes))
@@ -189,6 +190,34 @@ fn other_parameters_go_on_from_a_checkpoint() {
     };
     let start = soft.state([1.0, 0.5], [0.0, 0.2]);
     check_handing_over(&run(&soft), &run(&stiff), start);
+    let first = run(&soft).run(start, 0.0..5.0);
+    let first = first.expect("a run");
+    let checkpoint = first.checkpoint().expect("complete");
+    let second = run(&stiff).resume(checkpoint, 10.0).expect("a run");
+    let anew = run(&stiff).run(*checkpoint.state(), 5.0..10.0);
+    let anew = anew.expect("a run");
+    // What is said of the start is so with these parameters, too: all is of one.
+    for a in 0..2 {
+        let (v, right) = (second.states()[0].v[a], anew.states()[0].v[a]);
+        assert!((v - right).abs() < 1e-14);
+    }
+    assert!((second.energies()[0] - anew.energies()[0]).abs() < 1e-14);
+    // Elements of collocation keep a quadratic energy.
+    let change = second.energy_error();
+    assert!(change < 1e-12, "{change:e}");
+    // A state that is not on the constraints of the other model is refused, as by a run.
+    let (short, long) = (Rod { g: 9.81, l: 1.0 }, Rod { g: 9.81, l: 2.0 });
+    let hanging = short.state([1.0, 0.0], [0.0, 0.0]);
+    let first = Simulation::new(&short).step(0.02).run(hanging, 0.0..1.0);
+    let first = first.expect("a run");
+    let checkpoint = first.checkpoint().expect("complete");
+    let refused = Simulation::new(&long).step(0.02).resume(checkpoint, 2.0);
+    let refused = refused.expect_err("a rod of another length");
+    let kind = refused.kind();
+    assert!(
+        matches!(kind, RunErrorKind::Inconsistent { .. }),
+        "{refused}"
+    );
     // A span that is empty does not begin a grid.
     let run = Simulation::new(&soft).step(0.1).element(Element::mixed(4));
     let whole = run.run(start, 0.0..2.0).expect("a run");

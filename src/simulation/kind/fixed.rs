@@ -129,6 +129,10 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         stepper.suspend()
     }
 
+    fn is_that_of(&self, suspended: &Suspended<N>) -> bool {
+        suspended.is_of(self)
+    }
+
     fn ends_only<'m>(stepper: Stepper<'m, M, N>) -> Stepper<'m, M, N>
     where
         M: 'm,

@@ -131,6 +131,10 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         stepper.suspend()
     }
 
+    fn is_that_of(&self, suspended: &family::Suspended) -> bool {
+        suspended.is_of(self)
+    }
+
     fn ends_only<'m>(stepper: family::Stepper<'m, M>) -> family::Stepper<'m, M>
     where
         M: 'm,

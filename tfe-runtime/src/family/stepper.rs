@@ -99,6 +99,12 @@ impl Suspended {
     pub fn element(&self) -> Element {
         self.element
     }
+
+    /// Whether the stepper had this model: one of the same length and parameters.
+    #[must_use]
+    pub fn is_of<M: Model>(&self, model: &M) -> bool {
+        self.length == model.len() && self.parameters == parameters(model)
+    }
 }
 
 impl<'m, M: Model> Stepper<'m, M> {
@@ -168,10 +174,8 @@ impl<'m, M: Model> Stepper<'m, M> {
         suspended: Suspended,
     ) -> Result<Self, ModelError> {
         model.check()?;
+        let is_same = suspended.element == element && suspended.is_of(&*model);
         let mut way = suspended.way.hand_over(model.clone());
-        let is_same = suspended.element == element
-            && suspended.length == model.len()
-            && suspended.parameters == parameters(&*model);
         if !is_same || way.control_mut().solve != control.solve {
             return Self::sharing(model, element, control);
         }

@@ -4,7 +4,7 @@ use super::carried::Carried;
 use super::setup::Stepper;
 use crate::constrained::Foreseen;
 use crate::element::{Element, ElementError};
-use crate::model::Model;
+use crate::model::{First, Model, Second, State};
 use crate::newton::Control;
 use crate::scheme::{SchemeTable, Tables};
 use crate::share::Share;
@@ -15,16 +15,44 @@ use alloc::vec::Vec;
 #[derive(Clone, Debug)]
 pub struct Suspended<const N: usize> {
     element: Element,
-    /// Those of the model, and what it has beside them, to the bit.
-    parameters: Vec<u64>,
+    /// Time and state of the last end.
+    place: (f64, State<N>),
+    /// What tells the model from others.
+    tokens: Vec<u64>,
     carried: Carried<N>,
 }
 
-fn parameters<M: Model<N>, const N: usize>(model: &M) -> Vec<u64> {
+/// What tells a model from others of its type: its parameters, and what it has beside them, to the bit. Where there are none, as of kernels written by hand, its derivatives at a place: of a linear model
+/// they say all.
+fn tokens<M, const N: usize>(model: &M, (t, place): &(f64, State<N>)) -> Vec<u64>
+where
+    M: Model<N>,
+{
     let bits = |index| model.parameter(index).to_bits();
     let mut all: Vec<u64> = (0..model.parameters()).map(bits).collect();
     model.unnumbered(&mut |value| all.push(value));
-    all
+    // Functions given for inputs, which models of this kind may have, are not called again.
+    if !all.is_empty() || M::FACTS.time_dependent {
+        return all;
+    }
+    let (mut first, mut second) = (First::ZERO, Second::ZERO);
+    model.second(*t, &place.q, &place.p, &mut first, &mut second);
+    let Second {
+        zz,
+        zq,
+        qq,
+        force_z,
+        force_q,
+    } = &second;
+    let matrices = [zz, zq, qq, force_z, force_q].into_iter().flatten();
+    let rows = [&first.z, &first.q, &first.force].into_iter();
+    let numbers = rows.chain(matrices).flatten();
+    // One NaN is as good as another.
+    let bits = |number: &f64| match number.is_nan() {
+        true => f64::NAN.to_bits(),
+        false => number.to_bits(),
+    };
+    numbers.map(bits).collect()
 }
 
 impl<const N: usize> Suspended<N> {
@@ -32,6 +60,12 @@ impl<const N: usize> Suspended<N> {
     #[must_use]
     pub fn element(&self) -> Element {
         self.element
+    }
+
+    /// Whether the stepper had this model: one of the same parameters, or, where none are numbered, of the same derivatives where it ended.
+    #[must_use]
+    pub fn is_of<M: Model<N>>(&self, model: &M) -> bool {
+        self.tokens == tokens(model, &self.place)
     }
 }
 
@@ -42,15 +76,17 @@ where
     /// Leaves the model.
     #[must_use]
     pub fn suspend(self) -> Suspended<N> {
+        let last = self.carried.memory.last;
+        let place = last.map_or((0.0, State::ZERO), |last| (last.t + last.h, last.end));
         Suspended {
             element: self.table.element(),
-            parameters: parameters(&*self.model),
+            tokens: tokens(&*self.model, &place),
+            place,
             carried: self.carried,
         }
     }
 
-    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where the model had other parameters, lengths or vectors of
-    /// numbers.
+    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where that [had](Suspended::is_of) another model.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -59,7 +95,7 @@ where
         control: Control,
         suspended: Suspended<N>,
     ) -> Result<Self, ElementError> {
-        if suspended.parameters != parameters(&*model) {
+        if !suspended.is_of(&*model) {
             return Self::sharing(model, suspended.element, control);
         }
         let mut carried = suspended.carried;
@@ -77,5 +113,110 @@ where
             extra: Vec::new(),
             backwards: None,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Mixed;
+    use crate::model::{CoordinateName, Facts, Form};
+    use crate::real::Real;
+
+    /// H = p²/2 + k q²/2, by hand and without numbered parameters.
+    struct Oscillator {
+        k: f64,
+    }
+
+    impl Model<1> for Oscillator {
+        const FORM: Form = Form::Hamiltonian;
+        const FACTS: Facts = Facts {
+            time_dependent: false,
+            forced: false,
+            quadratic_in_z: true,
+            constant_mass: true,
+            linear: true,
+            separable: true,
+            smooth: true,
+        };
+
+        fn energy_function<R: Real>(&self, _: R, q: &[R; 1], p: &[R; 1]) -> R {
+            (R::from_f64(self.k) * q[0] * q[0] + p[0] * p[0]) * R::from_f64(0.5)
+        }
+
+        fn first<R: Real>(&self, _: R, q: &[R; 1], p: &[R; 1], first: &mut First<R, 1>) {
+            (first.z[0], first.q[0]) = (p[0], R::from_f64(self.k) * q[0]);
+        }
+
+        fn first_and_mass<R: Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            p: &[R; 1],
+            first: &mut First<R, 1>,
+            zz: &mut [[R; 1]; 1],
+        ) {
+            self.first(t, q, p, first);
+            zz[0][0] = R::from_f64(1.0);
+        }
+
+        fn second<R: Real>(
+            &self,
+            t: R,
+            q: &[R; 1],
+            p: &[R; 1],
+            first: &mut First<R, 1>,
+            second: &mut Second<R, 1>,
+        ) {
+            self.first_and_mass(t, q, p, first, &mut second.zz);
+            second.qq[0][0] = R::from_f64(self.k);
+        }
+
+        fn coordinate_name(_: usize) -> CoordinateName {
+            CoordinateName {
+                name: "x",
+                index: None,
+            }
+        }
+    }
+
+    fn begun(model: &Oscillator) -> Stepper<'_, Oscillator, 1> {
+        let stepper = Stepper::new(model, Mixed::<4>.into(), Control::default());
+        stepper.expect("an element").ends_only()
+    }
+
+    /// After so many steps of 0.1.
+    fn moved(
+        stepper: &mut Stepper<'_, Oscillator, 1>,
+        steps: u32,
+        mut state: State<1>,
+    ) -> State<1> {
+        for k in 0..steps {
+            let t = 0.1 * f64::from(k);
+            stepper.advance(t, 0.1, &mut state, &[]).expect("a step");
+        }
+        state
+    }
+
+    /// Also where the state is zero, so that forces of both models are alike.
+    #[test]
+    fn matrices_of_another_model_are_not_gone_on_with() {
+        let (soft, stiff) = (Oscillator { k: 1.0 }, Oscillator { k: 9.0 });
+        for amplitude in [1.0, 0.0] {
+            let start = State {
+                q: [amplitude],
+                p: [0.0],
+            };
+            let mut first = begun(&soft);
+            moved(&mut first, 40, start);
+            let suspended = first.suspend();
+            assert!(suspended.is_of(&soft) && !suspended.is_of(&stiff));
+            let control = Control::default();
+            let resumed = Stepper::resume(Share::Borrowed(&stiff), control, suspended);
+            let start = State { q: [1.0], p: [0.0] };
+            let on = moved(&mut resumed.expect("an element"), 40, start);
+            let anew = moved(&mut begun(&stiff), 40, start);
+            assert!((on.q[0] - anew.q[0]).abs() < 1e-12);
+        }
     }
 }
