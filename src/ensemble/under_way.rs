@@ -185,6 +185,7 @@ where
                 step: self.step,
                 elements: 0,
                 time: t0,
+                direction: 0.0,
             },
             batches: (0..count)
                 .step_by(width)
@@ -230,7 +231,7 @@ where
         let (mesh, done, origin) = reached.place(end, None, |span, _| {
             Mesh::new(span, step, &ensemble.breaks, &[])
         })?;
-        let next = Reached::new(origin, chosen, &mesh, end);
+        let next = Reached::new((origin, reached.direction), chosen, &mesh, end);
         let plan = Plan {
             element: ensemble.element,
             control: ensemble.control,

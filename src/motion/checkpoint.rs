@@ -36,6 +36,8 @@ pub(crate) struct Reached {
     /// How many elements were done.
     pub(crate) elements: usize,
     pub(crate) time: f64,
+    /// That of its last element, which has had the impulses at that time; zero where there was none.
+    pub(crate) direction: f64,
 }
 
 /// What is known of events where a run has got to.

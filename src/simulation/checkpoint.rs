@@ -9,17 +9,24 @@ use crate::motion::{Checkpoint, Motion, Node, Reached, Seen};
 use std::ops::Range;
 
 impl Reached {
+    /// The end of a mesh with this origin, behind a last element that had the direction `before`.
     pub(crate) fn new<const N: usize>(
-        origin: f64,
+        (origin, before): (f64, f64),
         step: Option<f64>,
         mesh: &Mesh<N>,
         time: f64,
     ) -> Self {
+        let elements = mesh.steps();
+        let first = || mesh.elements().next().map(|(.., h)| h.abs());
         Self {
             origin,
-            step: step.or_else(|| mesh.elements().next().map(|(.., h)| h.abs())),
-            elements: mesh.steps(),
+            step: step.or(mesh.step()).or_else(first),
+            elements,
             time,
+            direction: match elements {
+                0 => before,
+                _ => mesh.direction(),
+            },
         }
     }
 
@@ -65,8 +72,8 @@ where
     /// Goes on where a run ended, up to the time `end`.
     ///
     /// Where that run ended on the grid of this one (its start, and the same steps and breaks), the motion is to the last bit what one run would have been from there on; else the grid
-    /// begins at the checkpoint. Impulses at the very time of the checkpoint have acted already, unless this is where the run began; those on models of run-time
-    /// length act now. Another element begins anew, and so does a model with other parameters, lengths or lists, from the coordinates and momenta.
+    /// begins at the checkpoint. Impulses at the very time of the checkpoint have acted already, unless this is where the run began, and are taken away where the run goes back; those on models of
+    /// run-time length act now. Another element begins anew, and so does a model with other parameters, lengths or lists, from the coordinates and momenta.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -94,12 +101,13 @@ where
         end: f64,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
         let (time, state) = (checkpoint.time(), &checkpoint.state);
+        let direction = checkpoint.reached.direction;
         let prepare = || -> Result<_, RunErrorKind> {
             self.check_start(state)?;
             let mut run = self.clone();
             run.step = run.step.or(checkpoint.reached.step);
-            // Before the first element nothing has acted.
-            if checkpoint.reached.elements > 0 {
+            // Before the first element none has acted, and back in time those at the checkpoint are taken away, as all others.
+            if (end - time) * direction > 0.0 {
                 M::leave_behind(&mut run.impulses, time);
             }
             let suspended = checkpoint.stepper.clone();

@@ -35,6 +35,8 @@ pub struct Mesh<const N: usize> {
     times: Times,
     /// In the order in which the run meets them.
     impulses: Vec<Impulse<N>>,
+    /// The length of its steps, where it is made of equal ones.
+    step: Option<f64>,
 }
 
 impl<const N: usize> Mesh<N> {
@@ -49,6 +51,7 @@ impl<const N: usize> Mesh<N> {
         Ok(Self {
             impulses: in_order(impulses, span)?,
             times: Times::new(span, step, breaks)?,
+            step: (step != 0.0).then_some(step.abs()),
         })
     }
 
@@ -76,6 +79,7 @@ impl<const N: usize> Mesh<N> {
         Ok(Self {
             impulses: in_order(&acting(start, end, impulses), &span)?,
             times: Times::even(cuts, step, breaks)?,
+            step: None,
         })
     }
 
@@ -90,7 +94,18 @@ impl<const N: usize> Mesh<N> {
         Ok(Self {
             impulses: in_order(impulses, span)?,
             times: Times::through(span, nodes, breaks)?,
+            step: None,
         })
+    }
+
+    /// The length of its steps, where it is made of equal ones; elements that end at breaks may be shorter.
+    pub(crate) fn step(&self) -> Option<f64> {
+        self.step
+    }
+
+    /// One, or minus one where the run goes back in time.
+    pub(crate) fn direction(&self) -> f64 {
+        self.times.direction
     }
 
     /// The end of the last element.

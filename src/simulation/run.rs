@@ -102,10 +102,11 @@ where
         let last = motion.last();
         // Where nothing was to be done the grid is that of before.
         let same = before.filter(|_| mesh.steps() == done);
+        let direction = before.map_or(0.0, |one| one.reached.direction);
         let checkpoint = Checkpoint {
             reached: match same {
                 Some(before) => before.reached.clone(),
-                None => Reached::new(origin, self.step, mesh, last.t),
+                None => Reached::new((origin, direction), self.step, mesh, last.t),
             },
             state: last.state(),
             velocity: last.v.clone(),

@@ -227,3 +227,40 @@ fn other_parameters_go_on_from_a_checkpoint() {
     let second = run.resume(same.checkpoint().expect("complete"), 2.0);
     assert_eq!(second.expect("a run").states(), &whole.states()[10..]);
 }
+
+/// An impulse at a checkpoint acts once, in the last element before it; where there was none it is still to act, and back in time it is taken away.
+#[test]
+fn impulses_at_a_checkpoint_act_once() {
+    let start = Oscillator.state([1.0], [0.2]);
+    let run = Simulation::new(&Oscillator).step(0.1).impulse(1.0, [0.7]);
+    let apart = |one: &tfe::Motion<1>, other: State<1>| {
+        let node = one.last();
+        let (q, p) = (node.q[0] - other.q[0], node.p[0] - other.p[0]);
+        assert!(q.abs() < 1e-13 && p.abs() < 1e-13, "{q:e} {p:e}");
+    };
+    let resumed = |motion: &tfe::Motion<1>, end| {
+        let checkpoint = motion.checkpoint().expect("complete");
+        run.resume(checkpoint, end).expect("a run")
+    };
+    let whole = run.run(start, 0.0..2.0).expect("a run").last().state();
+    let first = run.run(start, 0.0..1.0).expect("a run");
+    apart(&resumed(&first, 2.0), whole);
+    let same = resumed(&first, 1.0);
+    apart(&resumed(&same, 2.0), whole);
+    // Elements of collocation undo themselves.
+    apart(&resumed(&first, 0.0), start);
+    let empty = run.run(start, 1.0..1.0).expect("nothing to do");
+    let behind = run.run(start, 1.0..2.0).expect("a run").last().state();
+    apart(&resumed(&empty, 2.0), behind);
+}
+
+/// Without a step of one's own that of the first half is gone on with, not the length of an element that a break has cut short.
+#[test]
+fn steps_stay_where_a_break_cuts_the_first_one() {
+    let run = Simulation::new(&Oscillator).break_at(1e-3);
+    let first = run.run(Oscillator.state([1.0], [0.0]), 0.0..10.0);
+    let first = first.expect("a thousand steps and one");
+    let checkpoint = first.checkpoint().expect("complete");
+    let second = run.resume(checkpoint, 20.0).expect("a thousand steps");
+    assert_eq!(second.states().len(), 1001);
+}
