@@ -77,7 +77,7 @@ pub use ladder::{Choice, Ladder, Rung, RungPoint};
 ///
 /// Times are those of the steps alone, on one processor, the best of several repetitions where a run is short, as in
 /// [`WorkPrecision`](crate::WorkPrecision); nothing inside elements is asked for, so linear models of fixed size step by a matrix where that pays, as they do with
-/// [`record_every`](crate::Simulation::record_every). The reference is a run of the last rung with `Mixed::<9>` whose step is halved until two runs agree to a
+/// [`record_every`](crate::Simulation::record_every). The reference is a run of the last rung with `Mixed::<9>`, by steps that are never cut, whose length is halved until two runs agree to a
 /// tenth of the smallest accuracy or approach no more; accuracies below twice its uncertainty are not known, and nothing is chosen for them.
 pub struct Fidelity<'m> {
     span: Range<f64>,

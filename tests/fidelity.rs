@@ -7,7 +7,7 @@ use std::time::Duration;
 use tfe::fidelity::{Choice, FidelityError, Ladder, Rung};
 use tfe::prelude::*;
 use tfe::runtime::structure::{Operations, Structure};
-use tfe::work_precision::{Cost, SaveError};
+use tfe::work_precision::{Cost, Reference, SaveError};
 
 #[dynamics(
     coordinates(theta),
@@ -317,6 +317,30 @@ fn rods_err_by_the_compliance_of_their_springs() {
     }
     // The weight at rest is most of what lengthens the spring.
     assert!(points.iter().all(|[rod, long]| long.1 < rod.1 / 3.0));
+}
+
+/// Steps of several swings are cut, all into the same pieces: runs that agree because of that are neither a reference nor an error of the model.
+#[test]
+fn runs_that_agree_because_they_are_cut_tell_nothing() {
+    let (w, lag) = (200.0, 1e-5);
+    let (slow, fast) = (Full { w }, Full { w: w * (1.0 + lag) });
+    let found = ladder(0.0..4.0)
+        .rung("slow", &slow, slow.state([2.0], [0.0]))
+        .rung("fast", &fast, fast.state([2.0], [0.0]))
+        .outputs(["angle"])
+        .elements([Mixed::<3>.into()])
+        .accuracies([1e-4])
+        .run()
+        .unwrap();
+    let Reference::Computed { step, .. } = *found.reference() else {
+        panic!("{:?}", found.reference());
+    };
+    // A small swing takes 0.031, and the first steps that are tried 0.25.
+    assert!(step < 0.031, "{step}");
+    // By a composition of leapfrogs of order 8, with 8000 and with 16 000 steps.
+    let right = 0.005_907_765_687;
+    let error = found.rungs()[0].model_error().expect("above 1e-4");
+    assert!((error - right).abs() < 0.05 * right, "{error}");
 }
 
 #[test]

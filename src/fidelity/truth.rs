@@ -6,9 +6,8 @@ use crate::numbers::raise;
 use crate::work_precision::Reference;
 use crate::work_precision::grid::Grid;
 use crate::work_precision::measure::Way;
-use crate::work_precision::reference::Halving;
+use crate::work_precision::reference::{Halving, uncut};
 use std::ops::Range;
-use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed};
 
 /// The outputs of the last rung.
@@ -46,7 +45,7 @@ impl Truth {
             let grid = &grid.unwrap_or_else(|_| fine.clone());
             let way = Way {
                 element,
-                control: Control::default(),
+                control: uncut(),
                 grid,
             };
             rung.look(way, outputs).map(|seen| seen.rows)

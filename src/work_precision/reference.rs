@@ -333,6 +333,14 @@ impl Halving {
     }
 }
 
+/// Of steps that are never cut: those that are all have the same pieces, and runs that agree because of that prove nothing.
+pub(crate) fn uncut() -> Control {
+    Control {
+        solve: Solve::Trusting,
+        ..Control::default()
+    }
+}
+
 /// The larger relative difference of two runs at the end.
 fn difference<S: PhasePoint>(scale: Scale, a: &[S], b: &[S]) -> f64 {
     match (a.last(), b.last()) {
@@ -353,12 +361,7 @@ fn run<M: Subject<S>, S: PhasePoint>(
     times: &[f64],
     (step, halvings): (f64, u32),
 ) -> Result<Vec<S>, RunErrorKind> {
-    // Steps that are cut all have the same pieces: runs that agree because of that prove nothing.
-    let control = Control {
-        solve: Solve::Trusting,
-        ..Control::default()
-    };
-    let mut stepper = model.stepper(element, control)?;
+    let mut stepper = model.stepper(element, uncut())?;
     let mut state = start.clone();
     let mut states = Vec::with_capacity(times.len());
     let mut done = 0;
