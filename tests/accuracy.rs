@@ -421,14 +421,16 @@ fn a_search_costs_a_few_runs() {
 #[test]
 fn what_is_no_accuracy_is_refused() {
     for accuracy in [0.0, -1e-3, 1.0, f64::NAN, f64::INFINITY] {
-        let outcome = Simulation::new(&Pendulum)
-            .accuracy(accuracy)
-            .run(Pendulum.state([1.0], [0.0]), 0.0..1.0);
-        let error = outcome.expect_err("no number between 0 and 1");
-        assert!(
-            matches!(error.kind(), RunErrorKind::Accuracy { .. }),
-            "{error}"
-        );
+        for end in [0.0, 1.0] {
+            let outcome = Simulation::new(&Pendulum)
+                .accuracy(accuracy)
+                .run(Pendulum.state([1.0], [0.0]), 0.0..end);
+            let error = outcome.expect_err("no number between 0 and 1");
+            assert!(
+                matches!(error.kind(), RunErrorKind::Accuracy { .. }),
+                "{error}"
+            );
+        }
     }
     let start = Pendulum.state([f64::NAN], [0.0]);
     let error = Simulation::new(&Pendulum)
@@ -451,6 +453,7 @@ fn what_is_no_accuracy_is_refused() {
         .run(start, 2.0..2.0)
         .expect("an empty span");
     assert_eq!((motion.last().t, motion.error_estimate()), (2.0, 0.0));
+    assert_eq!(motion.error_estimate_of("height"), Some(0.0));
 }
 
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + 1/x)]

@@ -136,18 +136,15 @@ where
         let mut run = self.simulation.clone();
         run.at_kinks.get_or_insert(true);
         let run = &run;
+        let at_start = (span.start, &start);
         if span.start == span.end {
+            check_accuracy(self.accuracy).map_err(|kind| run.refused(kind, at_start))?;
             let motion = run.run(start, span)?;
             let outputs = run.outputs();
-            return Ok(Estimated::new(
-                motion,
-                Vec::new(),
-                Vec::new(),
-                outputs,
-                None,
-            ));
+            // Of coordinates, of momenta and of each output none.
+            let errors = vec![Vec::new(); 2 + outputs.len()];
+            return Ok(Estimated::new(motion, Vec::new(), errors, outputs, None));
         }
-        let at_start = (span.start, &start);
         let found = run.model.guarded(|| self.find(run, at_start, &span));
         found.unwrap_or_else(|| Err(run.refused(RunErrorKind::panicked(span.start), at_start)))
     }
