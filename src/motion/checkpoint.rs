@@ -48,6 +48,8 @@ pub(crate) struct Seen {
     /// Sides on which the values were seen last; 0 where this is not known.
     pub(crate) sides: Vec<f64>,
     pub(crate) last: Option<LastCut>,
+    /// The last cut that each of them has made.
+    pub(crate) lasts: Vec<Option<LastCut>>,
     /// Whether one has ended the run.
     pub(crate) has_stopped: bool,
 }
@@ -57,6 +59,7 @@ impl Seen {
     pub(crate) fn nothing(names: Vec<String>) -> Self {
         Self {
             sides: vec![0.0; names.len()],
+            lasts: vec![None; names.len()],
             names,
             last: None,
             has_stopped: false,

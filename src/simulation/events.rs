@@ -63,8 +63,6 @@ pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> 
     meet_due: MeetDue<'m, M, N, L>,
     watched: Vec<Watched<'m, N, L>>,
     pub(super) seen: Seen,
-    /// The last cut that each of them has made.
-    lasts: Vec<Option<LastCut>>,
     /// Those that come at the time of the last cut, or have come before it, and are still to be met.
     due: VecDeque<Crossed>,
     /// Of the steps that look for the times of events, as of those of the run.
@@ -409,7 +407,7 @@ where
             rises,
             is_idle: after.as_ref().is_some_and(is_idle),
         });
-        (self.seen.last, self.lasts[function]) = (last, last);
+        (self.seen.last, self.seen.lasts[function]) = (last, last);
         if returns || self.cuts > Self::MAX_CUTS {
             return Err(RunErrorKind::EventsWithoutEnd { name, time });
         }

@@ -446,3 +446,31 @@ fn zeros_at_the_ends_of_runs() {
         assert_eq!(whole.events(), second.events());
     }
 }
+
+/// A run that goes on from an event knows all calls that were made for it, not the last one alone: none is made again where the polynomial behind it begins with another velocity than the node.
+#[test]
+fn calls_at_the_end_of_a_run_are_not_made_again_behind_it() {
+    let model = Oscillator { level: 0.0 };
+    let start = model.state([1.0], [0.3]);
+    let again = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.state());
+    for nodes in [2, 3, 4, 6] {
+        for step in [0.1, 0.17, 0.23, 0.3] {
+            let run = Simulation::new(&model)
+                .element(Element::mixed(nodes))
+                .step(step)
+                .on("speed", Crossing::Either, again)
+                .on("speed", Crossing::Either, again)
+                .on("speed", Crossing::Either, again);
+            let whole = run.run(start, 0.0..20.0).expect("a run");
+            // −sin t + 0.3 cos t has seven zeros.
+            assert_eq!(whole.events().len(), 21, "{nodes}, {step}");
+            for event in whole.events().iter().step_by(3) {
+                let first = run.run(start, 0.0..event.t).expect("a run");
+                let checkpoint = first.checkpoint().expect("complete");
+                let second = run.resume(checkpoint, 20.0).expect("a run");
+                let met = first.events().len() + second.events().len();
+                assert_eq!(met, 21, "{nodes}, {step}, {}", event.t);
+            }
+        }
+    }
+}

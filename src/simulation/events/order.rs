@@ -168,9 +168,8 @@ where
     /// The last cut that this event made, where it was so short a time ago that its function may not have moved since.
     pub(super) fn last_of(&self, crossed: Crossed, time: f64) -> Option<LastCut> {
         let Crossed { function, rises } = crossed;
-        let last = self.lasts[function].or(self.seen.last)?;
-        let is_it = last.function == function && last.rises == rises;
-        (is_it && self.is_soon(last.time, time)).then_some(last)
+        let last = self.seen.lasts[function]?;
+        (last.rises == rises && self.is_soon(last.time, time)).then_some(last)
     }
 
     /// After an event has cut the element: what of the others is due at once, and on which sides they are.
@@ -201,7 +200,7 @@ where
 
     /// What is recorded at a node from which the run goes on is not met there again, where the polynomial behind it begins with another velocity.
     fn note_recorded(&mut self, Crossed { function, rises }: Crossed, time: f64) {
-        self.lasts[function] = Some(LastCut {
+        self.seen.lasts[function] = Some(LastCut {
             time,
             function,
             rises,

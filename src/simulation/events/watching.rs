@@ -171,7 +171,6 @@ where
             keep_off: watching.keep_off,
             meet_due: watching.meet_due,
             seen: unseen(&watched),
-            lasts: vec![None; watched.len()],
             due: VecDeque::new(),
             watched,
             chosen,
